@@ -34,7 +34,7 @@ def expected_component(robot: Robot) -> Iterator[Finding]:
           expected: [charger]
     ```
     """
-    known = {*robot.components, *robot.written}
+    known = {*robot.components, *robot.written, *robot.brought}
     for name, analyzer in robot.manifest.diagnostics.analyzers.items():
         for index, expected in enumerate(analyzer.expected):
             if expected.partition(": ")[0] not in known:

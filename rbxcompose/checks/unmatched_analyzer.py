@@ -35,7 +35,7 @@ def unmatched_analyzer(robot: Robot) -> Iterator[Finding]:
           match: [battery]
     ```
     """
-    known = {*robot.components, *robot.written}
+    known = {*robot.components, *robot.written, *robot.brought}
     compared = 0
     for name, analyzer in robot.manifest.diagnostics.analyzers.items():
         for index, pattern in enumerate(analyzer.match):

@@ -25,10 +25,13 @@ _WORD = re.compile(r"[A-Za-z_/.][\w/.]*")  # what may be the name of a component
 
 @dataclass(frozen=True, slots=True)
 class Doubts:
-    """What is in doubt: `about` are the worlds of rules, `places` the values by file, `files` those of missions."""
+    """What is in doubt: `about` are the worlds of rules, `files` those of missions.
+
+    `places` are the values, by file and line; those of several lines by file and line 0.
+    """
 
     about: frozenset[str] = frozenset()
-    places: Mapping[str, Collection[Span]] = field(default_factory=dict)
+    places: Mapping[tuple[str, int], Collection[Span]] = field(default_factory=dict)
     files: frozenset[str] = frozenset()
 
     def bar(self, closed: Iterable[str]) -> bool:
@@ -41,7 +44,8 @@ class Doubts:
         spans = [span for span in (finding.span, *(one.span for one in finding.related)) if span]
         if OWN in closed and any(span.file in self.files for span in spans[:1]):
             return True
-        return any(place.contains(span) for span in spans for place in self.places.get(span.file, ()))
+        near = ((span, (span.file, line)) for span in spans for line in (span.line, 0))
+        return any(place.contains(span) for span, key in near for place in self.places.get(key, ()))
 
 
 def doubts_of(manifest: RobotManifest, findings: Iterable[Finding]) -> Doubts:
@@ -55,10 +59,16 @@ def doubts_of(manifest: RobotManifest, findings: Iterable[Finding]) -> Doubts:
     files = {shown_name(one.path): name for name, one in manifest.missions.items()}
     elsewhere = {one.span.file if one.span else "" for one in errors if one.span not in found.seen}
     about |= {MISSIONS if file in files else _owner(manifest, file) for file in elsewhere}
-    places: dict[str, list[Span]] = {}
-    for span in [*found.places, *found.wanted]:
-        places.setdefault(span.file, []).append(span)
+    places = _by_line((*found.places, *found.wanted))
     return Doubts(frozenset(about), places, frozenset(elsewhere & files.keys()))
+
+
+def _by_line(spans: Iterable[Span]) -> dict[tuple[str, int], list[Span]]:
+    """Return spans by file and line, those of several lines by file and line 0."""
+    found: dict[tuple[str, int], list[Span]] = {}
+    for span in dict.fromkeys(spans):
+        found.setdefault((span.file, span.line if span.line == span.end_line else 0), []).append(span)
+    return found
 
 
 def _owner(manifest: RobotManifest, file: str) -> str:
@@ -73,7 +83,9 @@ class _Search:
 
     def __init__(self, manifest: RobotManifest, errors: Iterable[Finding]) -> None:
         self.wanted = {one.span: one.code == MISSING_KEY.code for one in errors if one.span}
-        self.lines = {(span.file, span.line) for span in self.wanted}
+        self.lines: dict[tuple[str, int], list[Span]] = {}
+        for span in self.wanted:
+            self.lines.setdefault((span.file, span.line), []).append(span)
         self.paths: list[tuple[KeyPath, bool]] = []
         self.places: list[Span] = []
         self.seen: set[Span | None] = set()
@@ -97,7 +109,9 @@ class _Search:
                 for index, item in enumerate(items):
                     self._walk(item, (*path, index))
             case ScalarNode() if (node.span.file, node.span.line) in self.lines or node.filled is BROKEN:
-                inside = [span for span in self.wanted if node.span.contains(span)]
+                inside = [
+                    one for one in self.lines.get((node.span.file, node.span.line), ()) if node.span.contains(one)
+                ]
                 if inside or node.filled is BROKEN:
                     self._add(path, node.span, inside)
                 return

@@ -13,7 +13,7 @@ from rbxcompose.expressions.types import UNKNOWN, Type
 from rbxcompose.findings import Span
 from rbxcompose.levels import Level
 from rbxcompose.manifest.open_names import OpenNames
-from rbxcompose.manifest.registry import naming
+from rbxcompose.manifest.registry import naming, sections
 from rbxcompose.manifest.tree import KeyPath, at, key_span, value_span
 from rbxcompose.missions.program.program import Program, RobotNames
 from rbxcompose.missions.program.sources import SkillSource, TopicSource, ValueSource
@@ -125,6 +125,11 @@ class Robot:
     def written(self) -> frozenset[str]:
         """Return the names of all components that sections of the manifest request, including those with mistakes."""
         return frozenset(name for one in naming(COMPONENT) for name in one.names_in(self.manifest.root))
+
+    @cached_property
+    def brought(self) -> frozenset[str]:
+        """Return the names of components that sections bring because they are there, including those with mistakes."""
+        return frozenset(name for one in sections() if one.name in self.manifest.root for name in one.brings)
 
     @cached_property
     def writers(self) -> Mapping[str, list[PortEnd]]:
