@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable
+from typing import Any
 
 from rbxcompose.findings import Finding, Report, Severity
-from rbxcompose.missions.analysis.check_runner import check_program
+from rbxcompose.manifest.walk import TWICE
+from rbxcompose.missions.analysis.check_runner import rule_findings
+from rbxcompose.missions.analysis.examined import Examined
+from rbxcompose.model.doubts import Doubts, doubts_of
 from rbxcompose.model.robot import Robot
 from rbxcompose.plugins import LEFT_OUT, BrokenPluginError, Plugins
 from rbxcompose.printable import plain
@@ -23,10 +27,17 @@ _CODE = re.compile(r"[A-Z]+\d+")
 CHECKS: dict[str, Check] = {}  # every check that has been imported, by code
 
 
-def check(code: str, severity: Severity = Severity.ERROR, *, is_fixable: bool = False) -> Callable[[Find], Check]:
+def check(
+    code: str,
+    severity: Severity = Severity.ERROR,
+    *,
+    is_fixable: bool = False,
+    closed: tuple[str, ...] | None = None,
+) -> Callable[[Find], Check]:
     """Declare a rule under its code.
 
-    Codes that begin with `RBX` are those of this project; others start with their own word (`LAMP01`).
+    Codes that begin with `RBX` are those of this project; others start with their own word (`LAMP01`). `closed` is what
+    the rule takes for known, see `Rule`.
 
     Raises:
         ValueError: if it has no docstring, or its code is taken, malformed or reserved.
@@ -37,7 +48,7 @@ def check(code: str, severity: Severity = Severity.ERROR, *, is_fixable: bool = 
             raise ValueError(f"'{code}' is not a code: a code is capital letters followed by digits")
         if _is_foreign(find) and code.startswith(OWN):
             raise ValueError(f"the code {code} starts with {OWN}, which is reserved for this project")
-        CHECKS[code] = declared(find, code, severity, is_fixable)
+        CHECKS[code] = declared(find, code, severity, is_fixable, closed)
         return CHECKS[code]
 
     return declare
@@ -67,17 +78,34 @@ def _problem(name: str) -> str:
 def run_checks(robot: Robot, report: Report) -> None:
     """Add the findings of the checks on missions and on the robot.
 
-    Warnings are reported only if there are no errors, since an error might cause them.
+    Rules that conclude from what is there come first, then errors that conclude from what is not there, then warnings:
+    each only if what it takes for known is known, in spite of the errors before it. A finding that rests on something
+    in doubt may only follow from an error, so it is left out. A mission with a key that is written twice is not
+    checked: half of something in it was not read.
     """
-    missions = [one for mission in robot.missions.values() for one in check_program(mission.program, robot.names)]
-    for severity in (Severity.ERROR, Severity.WARNING):
-        if severity is Severity.WARNING and report.has_errors:
-            break
-        report.extend(finding for finding in missions if finding.severity is severity)
-        for one in all_checks():
-            if one.severity is severity:
-                report.extend(_found(one, robot))
+    halves = {one.span.file for one in report if one.code == TWICE.code and one.span}
+    programs = (mission.program for mission in robot.missions.values())
+    missions = [Examined(program, robot.names) for program in programs if program.file not in halves]
+    for turn in range(_TURNS):
+        doubts = doubts_of(robot.manifest, report)
+
+        def tells(one: Rule[Any], turn: int = turn, doubts: Doubts = doubts) -> bool:
+            return _turn(one) == turn and not doubts.bar(one.relies_on)
+
+        found: list[tuple[Rule[Any], Finding]] = []
+        for mission in missions:
+            found += rule_findings(mission, tells)
+        found += [(one, finding) for one in all_checks() if tells(one) for finding in _found(one, robot)]
+        report.extend(finding for one, finding in found if not doubts.touch(finding, one.relies_on))
     report.extend(broken_checks())
+
+
+_TURNS = 3
+
+
+def _turn(one: Rule[Any]) -> int:
+    """Return when a rule has its turn: a later one is silent where earlier ones have found errors."""
+    return _TURNS - 1 if one.severity is Severity.WARNING else int(bool(one.relies_on))
 
 
 def _found(one: Check, robot: Robot) -> list[Finding]:

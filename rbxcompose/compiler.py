@@ -18,7 +18,6 @@ from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Related, Report, Severity, Span, kind
 from rbxcompose.manifest.limits import LEAST_STEPS, PROFILE_STEPS, STEP_BYTES, STEP_VALUES
 from rbxcompose.manifest.reader import ParsedText, Texts
-from rbxcompose.manifest.walk import TWICE
 from rbxcompose.model.build import build_robot
 from rbxcompose.model.robot import Robot
 from rbxcompose.per_compile import one_compile
@@ -87,8 +86,7 @@ def compile_robot(
         if manifest is None:
             return out
         out.robot = build_robot(manifest, environment=environment, report=out.report, sources=out.sources)
-        if not any(finding.code == TWICE.code for finding in out.report):  # otherwise half of it is missing
-            run_checks(out.robot, out.report)
+        run_checks(out.robot, out.report)
         out.report.findings = manifest.inclusions.told(out.report.findings)
         return out
 
@@ -114,7 +112,7 @@ def _steps_to_read(sources: Mapping[str, str]) -> int:
 
 
 def _tell_profile(profile: Span, tried: Compilation, out: Compilation, above: Set[str]) -> None:
-    """Add the findings that only a profile causes: those in its own text, and errors in the robot's files.
+    """Add the findings that only a profile causes, in its own text or in the robot's files.
 
     `above` names the layers that override profiles: their values were chosen without this profile.
     """
@@ -125,6 +123,6 @@ def _tell_profile(profile: Span, tried: Compilation, out: Compilation, above: Se
             continue
         if profile.contains(span):
             out.report.add(finding)
-        elif finding.severity is Severity.ERROR:
+        else:
             related = (*finding.related, Related(profile, "with this profile"))
             out.report.add(replace(finding, related=related, fix=None))

@@ -16,14 +16,30 @@ from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, FindingKind, Severity, register_kind
 
 S = TypeVar("S")
+WIRING, NAMES, MISSIONS, OWN, ALL = "wiring", "names", "missions", "own file", "everything"
+"""What rules may take for known: all ports with their topics; the names of all components; all missions; the mission
+file that a finding is in; everything. The name of a section means its contents."""
+EVERYTHING = (ALL, WIRING, NAMES, MISSIONS, OWN)
 MOST = 100  # findings of one rule about one subject: a thousand things make a million pairs
 
 
 @dataclass(frozen=True, slots=True)
 class Rule(FindingKind, Generic[S]):
-    """A kind of finding together with the function that finds it."""
+    """A kind of finding together with the function that finds it.
+
+    `closed` is what it takes for known, because it concludes something from what is not there; with an error in that,
+    it is silent. `None` stands for everything in warnings, for nothing in errors.
+    """
 
     find: Callable[[S], Iterable[Finding]] = lambda subject: ()
+    closed: tuple[str, ...] | None = None
+
+    @property
+    def relies_on(self) -> tuple[str, ...]:
+        """Return what it takes for known."""
+        if self.closed is None:
+            return EVERYTHING if self.severity is Severity.WARNING else ()
+        return self.closed
 
     def __call__(self, subject: S) -> Iterable[Finding]:
         """Return what is wrong with `subject`: at most the first `MOST` findings."""
@@ -34,7 +50,13 @@ class Rule(FindingKind, Generic[S]):
         return found
 
 
-def declared(find: Callable[[S], Iterable[Finding]], code: str, severity: Severity, is_fixable: bool) -> Rule[S]:
+def declared(
+    find: Callable[[S], Iterable[Finding]],
+    code: str,
+    severity: Severity,
+    is_fixable: bool,
+    closed: tuple[str, ...] | None = None,
+) -> Rule[S]:
     """Enter a rule and its docs page under a code.
 
     Raises:
@@ -42,11 +64,13 @@ def declared(find: Callable[[S], Iterable[Finding]], code: str, severity: Severi
     """
     if not find.__doc__:
         raise ValueError(f"check {code} has no docstring, so it would have no docs page")
-    made: Rule[S] = Rule(code, inspect.cleandoc(find.__doc__), severity, is_fixable, find=find)
+    made: Rule[S] = Rule(code, inspect.cleandoc(find.__doc__), severity, is_fixable, find=find, closed=closed)
     register_kind(made)
     return made
 
 
-def belonging(find: Callable[[S], Iterable[Finding]], kind: FindingKind) -> Rule[S]:
+def belonging(
+    find: Callable[[S], Iterable[Finding]], kind: FindingKind, closed: tuple[str, ...] | None = None
+) -> Rule[S]:
     """Return a rule for a kind of finding that is declared elsewhere, because not only rules find it."""
-    return Rule(kind.code, kind.doc, kind.severity, kind.is_fixable, find=find)
+    return Rule(kind.code, kind.doc, kind.severity, kind.is_fixable, find=find, closed=closed)

@@ -12,9 +12,10 @@ from rbxcompose.missions.language.spans import expression_of, inner_span
 from rbxcompose.missions.program.program import Program
 from rbxcompose.model.charge import constants
 from rbxcompose.model.robot import Robot
+from rbxcompose.rules import MISSIONS
 
 
-@check("RBX4132", Severity.WARNING)
+@check("RBX4132", Severity.WARNING, closed=(MISSIONS,))
 def beyond_list(robot: Robot) -> Iterator[Finding]:
     """A list item that does not exist
 

@@ -10,9 +10,10 @@ from rbxcompose.missions.analysis.travel_times import distance, too_short
 from rbxcompose.model.charge import charger_of, constants, ways_of
 from rbxcompose.model.flow import setting_span
 from rbxcompose.model.robot import Robot
+from rbxcompose.rules import WIRING
 
 
-@check("RBX4130")
+@check("RBX4130", closed=(WIRING, "places"))
 def charge_elsewhere(robot: Robot) -> Iterator[Finding]:
     """A mission charges where there is no dock
 

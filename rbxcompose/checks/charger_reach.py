@@ -12,7 +12,7 @@ from rbxcompose.sdk.capabilities import Charges, Navigates
 from rbxcompose.units import LENGTH, format_quantity
 
 
-@check("RBX3505", Severity.WARNING)
+@check("RBX3505", Severity.WARNING, closed=())
 def charger_reach(robot: Robot) -> Iterator[Finding]:
     """The robot may stop too far from its dock to be charged
 

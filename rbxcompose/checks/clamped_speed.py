@@ -9,11 +9,12 @@ from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, FindingKind, Related, Severity
 from rbxcompose.model.flow import OTHER_TYPE, Drive, MessageFlow, setting_span
 from rbxcompose.model.robot import Robot
+from rbxcompose.rules import NAMES, WIRING
 from rbxcompose.sdk.capabilities import Setting
 from rbxcompose.units import ANGULAR_SPEED, SPEED, Dimension, format_quantity
 
 
-@check("RBX3503", Severity.WARNING)
+@check("RBX3503", Severity.WARNING, closed=(WIRING, NAMES))
 def clamped_speed(robot: Robot) -> Iterator[Finding]:
     """A component drives faster than its base can
 

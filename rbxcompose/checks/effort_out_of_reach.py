@@ -8,6 +8,7 @@ from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Severity
 from rbxcompose.manifest.tree import value_span
 from rbxcompose.model.robot import Robot
+from rbxcompose.rules import WIRING
 from rbxcompose.sections.actuators import actuators
 from rbxcompose.sections.joints import effort_of, joints
 from rbxcompose.units import format_quantity
@@ -15,7 +16,7 @@ from rbxcompose.units import format_quantity
 ROUNDING = 1e-3  # of an effort
 
 
-@check("RBX2240", Severity.WARNING)
+@check("RBX2240", Severity.WARNING, closed=(WIRING,))
 def effort_out_of_reach(robot: Robot) -> Iterator[Finding]:
     """A limit of the effort that servos do not reach
 

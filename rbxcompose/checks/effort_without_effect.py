@@ -10,11 +10,12 @@ from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Severity
 from rbxcompose.manifest.tree import value_span
 from rbxcompose.model.robot import Robot
+from rbxcompose.rules import WIRING
 from rbxcompose.sections.actuators import actuators
 from rbxcompose.sections.joints import joints
 
 
-@check("RBX2241", Severity.WARNING)
+@check("RBX2241", Severity.WARNING, closed=(WIRING,))
 def effort_without_effect(robot: Robot) -> Iterator[Finding]:
     """A limit of the effort that has no effect
 

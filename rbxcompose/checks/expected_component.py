@@ -7,9 +7,10 @@ from collections.abc import Iterator
 from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding
 from rbxcompose.model.robot import Robot
+from rbxcompose.rules import NAMES
 
 
-@check("RBX5003", is_fixable=True)
+@check("RBX5003", is_fixable=True, closed=(NAMES,))
 def expected_component(robot: Robot) -> Iterator[Finding]:
     """An analyzer expects a component that the robot does not have
 
@@ -33,7 +34,7 @@ def expected_component(robot: Robot) -> Iterator[Finding]:
           expected: [charger]
     ```
     """
-    known = {*robot.components, *robot.written}
+    known = {*robot.components, *robot.written, *robot.brought}
     for name, analyzer in robot.manifest.diagnostics.analyzers.items():
         for index, expected in enumerate(analyzer.expected):
             if expected.partition(": ")[0] not in known:

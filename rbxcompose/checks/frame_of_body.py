@@ -8,11 +8,12 @@ from rbxcompose.body.model import Body
 from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Related, Severity, suggest
 from rbxcompose.model.robot import Robot, RobotComponent
+from rbxcompose.rules import WIRING
 from rbxcompose.sdk.capabilities import Drives, WritesFrame
 from rbxcompose.sdk.ports import Looks
 
 
-@check("RBX2019", Severity.WARNING)
+@check("RBX2019", Severity.WARNING, closed=(WIRING,))
 def frame_of_body(robot: Robot) -> Iterator[Finding]:
     """A component uses a frame that the body does not have
 

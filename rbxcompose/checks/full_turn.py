@@ -11,7 +11,7 @@ from rbxcompose.model.robot import Robot
 from rbxcompose.units import ANGLE, format_quantity
 
 
-@check("RBX3507", Severity.WARNING)
+@check("RBX3507", Severity.WARNING, closed=())
 def full_turn(robot: Robot) -> Iterator[Finding]:
     """The heading of a place is beyond a full turn
 

@@ -13,7 +13,7 @@ from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.model.robot import Robot
 
 
-@check("RBX7001", Severity.WARNING)
+@check("RBX7001", Severity.WARNING, closed=())
 def idle_overlay(robot: Robot) -> Iterator[Finding]:
     """A profile or an overlay sets a value to what it already is
 

@@ -8,10 +8,11 @@ from rbxcompose.check_runner import check
 from rbxcompose.checks.two_writers import is_command
 from rbxcompose.findings import Finding, Related
 from rbxcompose.model.robot import Robot
+from rbxcompose.rules import WIRING
 from rbxcompose.sdk.ports import Out
 
 
-@check("RBX3023")
+@check("RBX3023", closed=(WIRING,))
 def instance_topics(robot: Robot) -> Iterator[Finding]:
     """Two instances of a part publish on the same topic
 

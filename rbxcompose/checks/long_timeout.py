@@ -8,13 +8,14 @@ from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Severity
 from rbxcompose.model.robot import Robot
 from rbxcompose.qos import Qos
+from rbxcompose.rules import NAMES, WIRING
 from rbxcompose.sdk.ports import In
 from rbxcompose.units import TIME, format_quantity
 
 LONGEST = 60.0  # [s]: commands come many times a second
 
 
-@check("RBX3108", Severity.WARNING)
+@check("RBX3108", Severity.WARNING, closed=(WIRING, NAMES))
 def long_timeout(robot: Robot) -> Iterator[Finding]:
     """An input of a mux stays live long after its source fell silent
 

@@ -9,7 +9,7 @@ from rbxcompose.findings import Finding, Related, Severity
 from rbxcompose.model.robot import Robot
 
 
-@check("RBX5004", Severity.WARNING)
+@check("RBX5004", Severity.WARNING, closed=())
 def matched_twice(robot: Robot) -> Iterator[Finding]:
     """Two analyzers name the same component
 

@@ -8,10 +8,11 @@ from rbxcompose.check_runner import check
 from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, correction, suggest, surely_meant
 from rbxcompose.model.robot import Robot
+from rbxcompose.rules import NAMES
 from rbxcompose.sdk.ports import Out
 
 
-@check("RBX3003", is_fixable=True)
+@check("RBX3003", is_fixable=True, closed=(NAMES,))
 def mux_source(robot: Robot) -> Iterator[Finding]:
     """The `from:` of a mux input names no output
 

@@ -7,9 +7,10 @@ from collections.abc import Iterator
 from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Related
 from rbxcompose.model.robot import Robot
+from rbxcompose.rules import WIRING
 
 
-@check("RBX3107")
+@check("RBX3107", closed=(WIRING,))
 def mux_type(robot: Robot) -> Iterator[Finding]:
     """A mux input takes an output of another type
 

@@ -9,13 +9,14 @@ from rbxcompose.findings import Finding, Related, Severity
 from rbxcompose.model.robot import Robot, RobotComponent
 from rbxcompose.model.wires import PortEnd
 from rbxcompose.qos import Qos
+from rbxcompose.rules import NAMES, WIRING
 from rbxcompose.sdk.capabilities import RunsMissions
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Out, Serves, ServesAction
 
 SERVED_BY = {Calls: Serves, CallsAction: ServesAction, In: Out}
 
 
-@check("RBX3010", Severity.WARNING)
+@check("RBX3010", Severity.WARNING, closed=(WIRING, NAMES))
 def needed_port(robot: Robot) -> Iterator[Finding]:
     """A component needs something that nothing in the robot provides
 

@@ -8,9 +8,10 @@ from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding
 from rbxcompose.model.blame import blamed, decided
 from rbxcompose.model.robot import Robot
+from rbxcompose.rules import OWN
 
 
-@check("RBX4122")
+@check("RBX4122", closed=(OWN,))
 def never_holds(robot: Robot) -> Iterator[Finding]:
     """A condition can never hold
 

@@ -8,10 +8,11 @@ from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Severity
 from rbxcompose.model.driven_joints import driven_joints
 from rbxcompose.model.robot import Robot
+from rbxcompose.rules import WIRING
 from rbxcompose.units import ANGULAR_SPEED, SPEED, example
 
 
-@check("RBX2229", Severity.WARNING)
+@check("RBX2229", Severity.WARNING, closed=(WIRING,))
 def no_speed_limit(robot: Robot) -> Iterator[Finding]:
     """A joint has no limit of its speed
 

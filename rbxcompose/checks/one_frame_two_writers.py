@@ -10,12 +10,13 @@ from rbxcompose.findings import Finding, Related, Severity, Span
 from rbxcompose.model.flow import is_written, setting_span
 from rbxcompose.model.robot import Robot, RobotComponent
 from rbxcompose.model.wires import PortEnd
+from rbxcompose.rules import NAMES, WIRING
 from rbxcompose.sdk.capabilities import WritesFrame
 
 STATIC = "_static"  # suffix of the topic of static transforms; both topics describe one tree
 
 
-@check("RBX3014", Severity.WARNING)
+@check("RBX3014", Severity.WARNING, closed=(WIRING, NAMES))
 def one_frame_two_writers(robot: Robot) -> Iterator[Finding]:
     """Two components write the pose of the same frame
 

@@ -9,10 +9,11 @@ from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Related
 from rbxcompose.model.robot import Robot
 from rbxcompose.model.wires import resolve
+from rbxcompose.rules import WIRING
 from rbxcompose.sdk.ports import Looks
 
 
-@check("RBX3002")
+@check("RBX3002", closed=(WIRING,))
 def one_topic_two_types(robot: Robot) -> Iterator[Finding]:
     """Two ports of one topic have different types
 

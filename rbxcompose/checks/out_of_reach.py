@@ -10,12 +10,13 @@ from rbxcompose.findings import Finding, Related, Severity, Span
 from rbxcompose.manifest.tree import at
 from rbxcompose.model.driven_joints import DrivenJoint, driven_joints
 from rbxcompose.model.robot import Robot
+from rbxcompose.rules import WIRING
 
 _SCALES = ("calibration", "travel", "ratio", "offset")
 _TICK = 1.01  # ticks that a limit may lie outside: that of 150 deg is one beyond the last tick of an AX-12
 
 
-@check("RBX2225", Severity.WARNING)
+@check("RBX2225", Severity.WARNING, closed=(WIRING,))
 def out_of_reach(robot: Robot) -> Iterator[Finding]:
     """A joint may go where its servo cannot
 

@@ -8,12 +8,13 @@ from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding
 from rbxcompose.model.driven_joints import ROUNDED, DrivenJoint, driven_joints
 from rbxcompose.model.robot import Robot
+from rbxcompose.rules import WIRING
 from rbxcompose.sections.joints import joints
 from rbxcompose.sections.safety import safety
 from rbxcompose.units import ANGLE, LENGTH, Quantity
 
 
-@check("RBX2228")
+@check("RBX2228", closed=(WIRING,))
 def parked_joint(robot: Robot) -> Iterator[Finding]:
     """A joint cannot be parked there
 

@@ -10,13 +10,14 @@ from rbxcompose.composition.robot_manifest import About, IncludedPart
 from rbxcompose.findings import Finding, Related
 from rbxcompose.model.robot import Robot
 from rbxcompose.model.wires import PortEnd, resolve
+from rbxcompose.rules import NAMES, WIRING
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Out, Port, Serves, ServesAction
 
 WIRES: tuple[tuple[type[Port[Any]], type[Port[Any]]], ...] = ((Out, In), (Calls, Serves), (CallsAction, ServesAction))
 """The classes of the two ends of a wire."""
 
 
-@check("RBX3021")
+@check("RBX3021", closed=(WIRING, NAMES))
 def part_needs(robot: Robot) -> Iterator[Finding]:
     """A part needs a topic that nothing else provides
 

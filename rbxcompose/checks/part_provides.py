@@ -11,10 +11,11 @@ from rbxcompose.findings import Finding, Related
 from rbxcompose.manifest.tree import at
 from rbxcompose.model.robot import Robot
 from rbxcompose.model.wires import PortEnd, resolve
+from rbxcompose.rules import NAMES, WIRING
 from rbxcompose.sdk.ports import Serves, ServesAction, ServesTopic
 
 
-@check("RBX3022")
+@check("RBX3022", closed=(WIRING, NAMES, "values"))
 def part_provides(robot: Robot) -> Iterator[Finding]:
     """A part lacks something that it says it provides
 

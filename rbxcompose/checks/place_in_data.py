@@ -18,7 +18,7 @@ from rbxcompose.model.charge import constants
 from rbxcompose.model.robot import Robot
 
 
-@check("RBX4131")
+@check("RBX4131", closed=("places",))
 def place_in_data(robot: Robot) -> Iterator[Finding]:
     """The data of a mission name a place that the robot does not know
 

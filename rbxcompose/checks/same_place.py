@@ -9,7 +9,7 @@ from rbxcompose.findings import Finding, Related, Severity
 from rbxcompose.model.robot import Robot
 
 
-@check("RBX3506", Severity.WARNING)
+@check("RBX3506", Severity.WARNING, closed=("places",))
 def same_place(robot: Robot) -> Iterator[Finding]:
     """Two places have the same pose
 

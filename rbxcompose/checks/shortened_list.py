@@ -12,7 +12,7 @@ from rbxcompose.manifest.walk import REPLACE
 from rbxcompose.model.robot import Robot
 
 
-@check("RBX7002", Severity.WARNING)
+@check("RBX7002", Severity.WARNING, closed=())
 def shortened_list(robot: Robot) -> Iterator[Finding]:
     """A profile or an overlay adds to a list and drops its old items
 

@@ -13,10 +13,11 @@ from rbxcompose.findings import Finding, Severity
 from rbxcompose.manifest.tree import at
 from rbxcompose.model.driven_joints import DrivenBus, driven_buses
 from rbxcompose.model.robot import Robot
+from rbxcompose.rules import WIRING
 from rbxcompose.units import BIT_RATE, FREQUENCY, TIME, format_quantity
 
 
-@check("RBX2226", Severity.WARNING)
+@check("RBX2226", Severity.WARNING, closed=(WIRING,))
 def slow_bus(robot: Robot) -> Iterator[Finding]:
     """A cycle of a bus does not fit into its period
 

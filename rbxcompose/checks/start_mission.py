@@ -12,6 +12,7 @@ from rbxcompose.manifest.files import files_named
 from rbxcompose.manifest.reader import read_file
 from rbxcompose.manifest.tree import MappingNode, ScalarNode
 from rbxcompose.model.robot import Robot
+from rbxcompose.references import MISSION as MISSIONS
 
 _ENDING = ".yaml"
 
@@ -34,7 +35,7 @@ def start_mission(robot: Robot) -> Iterator[Finding]:
     ```
     """
     start = robot.manifest.start
-    if start is None or start in robot.manifest.missions:
+    if start is None or start in robot.manifest.missions or robot.manifest.contents.may_have(MISSIONS, start):
         return
     place = robot.value("start")
     message = f"the robot has no mission '{start}' to start"

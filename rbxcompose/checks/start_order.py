@@ -8,9 +8,10 @@ from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding
 from rbxcompose.model.order import cycle_of
 from rbxcompose.model.robot import Robot
+from rbxcompose.rules import NAMES
 
 
-@check("RBX3006", is_fixable=True)
+@check("RBX3006", is_fixable=True, closed=(NAMES,))
 def start_order(robot: Robot) -> Iterator[Finding]:
     """`starts_after:` names no component, or forms a circle
 

@@ -8,10 +8,11 @@ from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Related
 from rbxcompose.model.robot import Robot
 from rbxcompose.model.wires import PortEnd
+from rbxcompose.rules import WIRING
 from rbxcompose.sdk.capabilities import Drives
 
 
-@check("RBX3013")
+@check("RBX3013", closed=(WIRING,))
 def two_bases(robot: Robot) -> Iterator[Finding]:
     """Two bases follow the same commands
 

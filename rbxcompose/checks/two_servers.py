@@ -8,10 +8,11 @@ from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Related
 from rbxcompose.model.robot import Robot
 from rbxcompose.model.wires import PortEnd
+from rbxcompose.rules import WIRING
 from rbxcompose.sdk.ports import Serves, ServesAction, ServesTopic
 
 
-@check("RBX3008")
+@check("RBX3008", closed=(WIRING,))
 def two_servers(robot: Robot) -> Iterator[Finding]:
     """Two components serve the same service or action
 

@@ -8,10 +8,11 @@ from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Related
 from rbxcompose.model.robot import Robot
 from rbxcompose.model.wires import PortEnd
+from rbxcompose.rules import WIRING
 from rbxcompose.sdk.ports import ServesAction, ServesTopic
 
 
-@check("RBX3024")
+@check("RBX3024", closed=(WIRING,))
 def two_skills(robot: Robot) -> Iterator[Finding]:
     """Two actions are the same skill
 

@@ -13,11 +13,12 @@ from rbxcompose.model.build import MISSION
 from rbxcompose.model.robot import Robot
 from rbxcompose.model.wires import PortEnd, resolve
 from rbxcompose.qos import Qos
+from rbxcompose.rules import NAMES, WIRING
 from rbxcompose.sdk.capabilities import Forwards
 from rbxcompose.sdk.ports import In, Out
 
 
-@check("RBX3001")
+@check("RBX3001", closed=(WIRING, NAMES))
 def two_writers(robot: Robot) -> Iterator[Finding]:
     """Two components write commands on one topic without a mux
 

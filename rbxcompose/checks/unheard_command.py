@@ -9,11 +9,12 @@ from rbxcompose.checks.needed_port import is_unheard
 from rbxcompose.findings import Finding, Related, Severity, suggest
 from rbxcompose.model.robot import Robot
 from rbxcompose.model.wires import PortEnd
+from rbxcompose.rules import NAMES, WIRING
 
 _MOST_SHOWN = 8  # subscribers that are pointed at
 
 
-@check("RBX3011", Severity.WARNING)
+@check("RBX3011", Severity.WARNING, closed=(WIRING, NAMES))
 def unheard_command(robot: Robot) -> Iterator[Finding]:
     """Commands are published on a topic without a subscriber
 

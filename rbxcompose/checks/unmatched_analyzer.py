@@ -9,11 +9,12 @@ from rbxcompose.diagnostics.core import Analyzer, is_glob
 from rbxcompose.findings import Finding
 from rbxcompose.manifest.yaml_nodes import TOO_LARGE
 from rbxcompose.model.robot import Robot
+from rbxcompose.rules import NAMES
 
 _MOST_COMPARED = 200_000  # of patterns with names
 
 
-@check("RBX5001", is_fixable=True)
+@check("RBX5001", is_fixable=True, closed=(NAMES,))
 def unmatched_analyzer(robot: Robot) -> Iterator[Finding]:
     """A pattern of an analyzer matches no component
 
@@ -34,7 +35,7 @@ def unmatched_analyzer(robot: Robot) -> Iterator[Finding]:
           match: [battery]
     ```
     """
-    known = {*robot.components, *robot.written}
+    known = {*robot.components, *robot.written, *robot.brought}
     compared = 0
     for name, analyzer in robot.manifest.diagnostics.analyzers.items():
         for index, pattern in enumerate(analyzer.match):

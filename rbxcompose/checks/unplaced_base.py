@@ -7,11 +7,12 @@ from collections.abc import Iterator
 from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Related, Severity
 from rbxcompose.model.robot import Robot
+from rbxcompose.rules import NAMES, WIRING
 from rbxcompose.sdk.capabilities import Drives, WritesFrame
 from rbxcompose.sdk.ports import Looks
 
 
-@check("RBX2286", Severity.WARNING)
+@check("RBX2286", Severity.WARNING, closed=(WIRING, NAMES))
 def unplaced_base(robot: Robot) -> Iterator[Finding]:
     """Somebody looks up where the robot is, and nobody tells
 

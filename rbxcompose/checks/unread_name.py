@@ -7,9 +7,10 @@ from collections.abc import Iterator
 from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Severity
 from rbxcompose.model.robot import Robot
+from rbxcompose.rules import OWN
 
 
-@check("RBX4129", Severity.WARNING)
+@check("RBX4129", Severity.WARNING, closed=(OWN,))
 def unread_name(robot: Robot) -> Iterator[Finding]:
     """A mission never reads one of its inputs or data
 

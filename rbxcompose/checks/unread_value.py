@@ -7,9 +7,10 @@ from collections.abc import Iterator
 from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Severity
 from rbxcompose.model.robot import Robot
+from rbxcompose.rules import MISSIONS
 
 
-@check("RBX3012", Severity.WARNING)
+@check("RBX3012", Severity.WARNING, closed=(MISSIONS,))
 def unread_value(robot: Robot) -> Iterator[Finding]:
     """A value that no mission reads
 

@@ -8,10 +8,11 @@ from rbxcompose.check_runner import check
 from rbxcompose.checks.mux_source import Wrong
 from rbxcompose.findings import Finding, correction, suggest
 from rbxcompose.model.robot import Robot
+from rbxcompose.rules import NAMES
 from rbxcompose.sdk.ports import Out
 
 
-@check("RBX3005", is_fixable=True)
+@check("RBX3005", is_fixable=True, closed=(NAMES,))
 def value_source(robot: Robot) -> Iterator[Finding]:
     """A value names no output of a component
 

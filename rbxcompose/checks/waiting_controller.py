@@ -8,11 +8,12 @@ from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Related, Severity
 from rbxcompose.model.robot import Robot
 from rbxcompose.model.wires import PortEnd
+from rbxcompose.rules import NAMES, WIRING
 from rbxcompose.sdk.ports import In, ServesAction
 from rbxcompose.sections.controllers import controllers
 
 
-@check("RBX2284", Severity.WARNING)
+@check("RBX2284", Severity.WARNING, closed=(WIRING, NAMES))
 def waiting_controller(robot: Robot) -> Iterator[Finding]:
     """A controller is commanded, but waits
 

@@ -9,9 +9,10 @@ from rbxcompose.findings import Finding, Related, Severity
 from rbxcompose.model.base_wheels import rolling_bases
 from rbxcompose.model.flow import setting_span
 from rbxcompose.model.robot import Robot
+from rbxcompose.rules import WIRING
 
 
-@check("RBX2282", Severity.WARNING)
+@check("RBX2282", Severity.WARNING, closed=(WIRING,))
 def wheel_sides(robot: Robot) -> Iterator[Finding]:
     """A wheel is on the other side, or turns backwards
 

@@ -10,6 +10,7 @@ from rbxcompose.findings import Finding, Related, Severity
 from rbxcompose.model.base_wheels import BodyWheel, rolling_bases
 from rbxcompose.model.flow import setting_span
 from rbxcompose.model.robot import Robot
+from rbxcompose.rules import WIRING
 from rbxcompose.sdk.capabilities import Drives, Setting
 from rbxcompose.sections.joints import joints
 from rbxcompose.units import ANGULAR_SPEED, SPEED, Dimension, format_quantity
@@ -17,7 +18,7 @@ from rbxcompose.units import ANGULAR_SPEED, SPEED, Dimension, format_quantity
 ROUNDING = 1e-3  # of a speed
 
 
-@check("RBX2283", Severity.WARNING)
+@check("RBX2283", Severity.WARNING, closed=(WIRING,))
 def wheel_speed(robot: Robot) -> Iterator[Finding]:
     """A base is to be faster than its wheels can turn
 

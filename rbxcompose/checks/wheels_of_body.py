@@ -9,12 +9,13 @@ from rbxcompose.findings import Finding, Related, Severity
 from rbxcompose.model.base_wheels import rolling_bases
 from rbxcompose.model.flow import setting_span
 from rbxcompose.model.robot import Robot
+from rbxcompose.rules import WIRING
 from rbxcompose.units import LENGTH, format_quantity
 
 TOLERANCE = 0.02  # of a length, within which two count as the same
 
 
-@check("RBX2281", Severity.WARNING)
+@check("RBX2281", Severity.WARNING, closed=(WIRING,))
 def wheels_of_body(robot: Robot) -> Iterator[Finding]:
     """The wheels of a base are others than those of its body
 

@@ -8,6 +8,7 @@ from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Related, Severity
 from rbxcompose.model.driven_joints import ROUNDED, DrivenJoint, driven_joints
 from rbxcompose.model.robot import Robot
+from rbxcompose.rules import WIRING
 from rbxcompose.sections.joints import limits_of
 
 _KEYS: dict[str, tuple[str | int, ...]] = {
@@ -18,7 +19,7 @@ _KEYS: dict[str, tuple[str | int, ...]] = {
 _WORDS = {"lower": "least position", "upper": "greatest position", "velocity": "largest speed"}
 
 
-@check("RBX2223", Severity.WARNING)
+@check("RBX2223", Severity.WARNING, closed=(WIRING,))
 def wider_limit(robot: Robot) -> Iterator[Finding]:
     """A limit of a joint is wider than that of the body
 

@@ -11,7 +11,7 @@ from rbxcompose.model.robot import Robot
 WORLD = "world"
 
 
-@check("RBX6001", Severity.WARNING)
+@check("RBX6001", Severity.WARNING, closed=())
 def world_group(robot: Robot) -> Iterator[Finding]:
     """The process group `world` is for simulated truth only
 

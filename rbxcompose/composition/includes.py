@@ -173,6 +173,7 @@ class Parts:
         if path not in self._files:
             root = self.documents.read(path, PART, span)
             if root is not None:
+                root = self.documents.meant(file_model(PART), root)
                 self.documents.check(file_model(PART), root)
             self._files[path] = _File(root, tuple(claims_of(Contents(root, path, self.documents)))) if root else None
         self._size += len(self.documents.sources.get(shown_name(path), ""))

@@ -148,6 +148,7 @@ def _overlays(chosen: Sequence[str], documents: Documents) -> Iterator[tuple[Map
         if isinstance(file, Finding):
             documents.report.add(file)
         elif (root := documents.read(file, OVERLAY)) is not None:
+            root = documents.meant(file_model(OVERLAY), root)
             documents.check(file_model(OVERLAY), root)
             sections = {name: entry for name, entry in root.entries.items() if name not in ManifestHeader.model_fields}
             yield replace(root, entries=sections), f"overlay '{shown_name(file)}'"

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from rbxcompose.composition.includes import included_parts
-from rbxcompose.composition.layers import Chosen, Composed, compose_robot, profile_spans
+from rbxcompose.composition.layers import INCLUDE, Chosen, Composed, compose_robot, profile_spans
+from rbxcompose.composition.overlay import NOTHING_TO_CHANGE
 from rbxcompose.composition.robot_manifest import RobotManifest
 from rbxcompose.composition.scopes import fill_scopes
 from rbxcompose.composition.section_reader import read_sections
@@ -20,9 +21,12 @@ from rbxcompose.manifest.fill_names import names_of
 from rbxcompose.manifest.garbage_collection import paused_collection
 from rbxcompose.manifest.header import ManifestHeader
 from rbxcompose.manifest.mission_data import is_moderate
+from rbxcompose.manifest.registry import sections
 from rbxcompose.manifest.secrets import Secrets
 from rbxcompose.manifest.section import ROBOT
-from rbxcompose.manifest.tree import MappingNode, ScalarNode
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode
+from rbxcompose.manifest.validate import MISSING_KEY
+from rbxcompose.manifest.walk import TWICE
 
 MISSION = "Mission"
 
@@ -52,6 +56,7 @@ def load_robot(
     root = documents.read(file, ROBOT)
     if root is None:
         return None
+    root = documents.meant(file_model(ROBOT), root)
     composed = compose_robot(root, file, Chosen(profiles, overlays, sets), documents)
     manifest = _manifest(composed, file, sim, environment or {}, documents)
     if manifest is not None:
@@ -65,12 +70,14 @@ def load_robot(
 def _manifest(
     composed: Composed, file: Path, sim: bool, environment: Mapping[str, str], documents: Documents
 ) -> RobotManifest | None:
-    if not composed.parts.is_complete:
-        return None  # else everything that the missing part brings would be reported as missing
     documents.check(file_model(ROBOT), composed.root)
     names = names_of(_name(composed.root), sim, environment, Secrets(project_of(file), environment))
     root, include = fill_scopes(composed, names)
-    manifest = read_sections(root, file, sim, documents)
+    read_so_far = len(documents.report.findings)
+    is_whole = composed.parts.is_complete and not _has_a_section_twice(documents.report)
+    manifest = read_sections(root, file, sim, documents, is_whole=is_whole)
+    if not is_whole:
+        _drop_what_may_be_there(documents.report, root, include, read_so_far)
     return replace(
         manifest,
         parts=included_parts(composed.instances),
@@ -79,6 +86,37 @@ def _manifest(
         files=documents.files,
         inclusions=composed.parts.inclusions,
     )
+
+
+def _has_a_section_twice(report: Report) -> bool:
+    """Return whether a file has a section twice, so that what stands in the second one is not read."""
+    return any(one.code == TWICE.code and one.span is not None and one.span.column == 1 for one in report.findings)
+
+
+def _drop_what_may_be_there(report: Report, root: MappingNode, given: MappingNode, start: int) -> None:
+    """Remove the findings about entries that may only change what could not be read: what a part brings, for example.
+
+    `start` is the number of findings from before the sections were read.
+    """
+    prefixes = tuple(f"{name}_" for name, _ in _entries(given, INCLUDE))
+    changing = [
+        entry
+        for section in sections(ROBOT)
+        for name, entry in _entries(root, section.name)
+        if section.has_topics or name.startswith(prefixes) or not prefixes
+    ]
+    spans = [span for one in changing for span in (one.key.span, one.value.span)]
+
+    def stays(one: Finding) -> bool:
+        return one.code != MISSING_KEY.code or not any(one.span and span.contains(one.span) for span in spans)
+
+    before, after = report.findings[:start], report.findings[start:]
+    report.findings = [*(one for one in before if one.code != NOTHING_TO_CHANGE.code), *filter(stays, after)]
+
+
+def _entries(root: MappingNode, section: str) -> Iterable[tuple[str, Entry]]:
+    there = root.get(section)
+    return there.entries.items() if isinstance(there, MappingNode) else ()
 
 
 @paused_collection()

@@ -12,9 +12,11 @@ from rbxcompose.findings import Related, Report, Span, kind
 from rbxcompose.manifest.arguments import DeclaredArgument
 from rbxcompose.manifest.fill import fill
 from rbxcompose.manifest.fill_names import Names, Typed, with_arguments
-from rbxcompose.manifest.section import Contents
+from rbxcompose.manifest.registry import sections
+from rbxcompose.manifest.section import ROBOT, Contents
 from rbxcompose.manifest.tree import BROKEN, MappingNode
 from rbxcompose.manifest.validate import UNKNOWN_KEY
+from rbxcompose.references import ARGUMENT
 from rbxcompose.sections.args import args
 
 NO_VALUE = kind(
@@ -51,10 +53,13 @@ def fill_scopes(composed: Composed, names: Names) -> tuple[MappingNode, MappingN
     arguments = fill(only(root, args.name), names, report)
     declared = Contents(arguments, parts.robot, parts.documents).of(args)
     values = {name: _own_value(name, one, composed.history, report) for name, one in declared.items()}
-    names = with_arguments(names, values)
+    whole = Contents(root, parts.robot, parts.documents, sections(ROBOT))
+    may_have = (lambda name: whole.may_have(ARGUMENT, name)) if whole.stray or args.is_unreadable(root) else None
+    names = with_arguments(names, values, "", may_have)
     include = fill(composed.include, names, report)
     for instance in reversed(composed.instances):  # an instance follows those that it includes
-        names = with_arguments(names, _given_values(instance, names, parts), instance.name)
+        may_have = (lambda name: True) if args.is_unreadable(instance.arguments) else None
+        names = with_arguments(names, _given_values(instance, names, parts), instance.name, may_have)
     others = {name: entry for name, entry in root.entries.items() if name != args.name}
     filled = {**arguments.entries, **fill(replace(root, entries=others), names, report).entries}
     return replace(root, entries={name: filled[name] for name in root.entries}), include
@@ -84,11 +89,14 @@ def _given_values(instance: PartInstance, names: Names, parts: Parts) -> dict[st
                 entry.key.span, message, name, declared, "its arguments", taken=given.entries
             )
             report.add(finding)
+    is_misspelt = not given.entries.keys() <= declared.keys()  # then any other argument may be what was meant
     values: dict[str, Typed] = {}
     for name, (argument, span) in declared.items():
         node = given.get(name) or (argument.default if argument else None)
         if argument is None:
             values[name] = Typed(UNKNOWN, BROKEN)
+        elif node is not None and is_misspelt and name not in given:
+            values[name] = Typed(argument.type, BROKEN)
         elif node is None:
             message = f"part '{instance.name}' needs a value for its argument '{name}'"
             related = [Related(span, "declared here")]

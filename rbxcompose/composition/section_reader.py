@@ -47,10 +47,15 @@ RESERVED = ("buses", "actuators", "joints", "controllers", "safety", "devices", 
 """Names of sections that are reserved for later."""
 
 
-def read_sections(root: MappingNode, file: Path, sim: bool, documents: Documents) -> RobotManifest:
-    """Return the robot that a composed and filled tree describes; entries with mistakes are left out."""
+def read_sections(
+    root: MappingNode, file: Path, sim: bool, documents: Documents, *, is_whole: bool = True
+) -> RobotManifest:
+    """Return the robot that a composed and filled tree describes, with what could be read of entries with mistakes.
+
+    The tree is not whole if one of the robot's parts could not be read.
+    """
     documents.report.extend([*broken_sections(), *_taken_names(root), *_shown_secrets(root)])
-    contents = Contents(root, file, documents, sections(), is_simulated=sim)
+    contents = Contents(root, file, documents, sections(), is_simulated=sim, is_whole=is_whole)
     for section in sections(ROBOT):
         if section.is_composed:
             contents.of(section)

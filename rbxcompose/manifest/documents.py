@@ -11,9 +11,11 @@ from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Related, Report, Span, kind
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.manifest.header import ManifestHeader
+from rbxcompose.manifest.meant_keys import meant_keys, with_keys
 from rbxcompose.manifest.reader import Texts, read_file
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode
-from rbxcompose.manifest.validate import validate
+from rbxcompose.manifest.validate import KEYS, UNKNOWN_KEY, validate, where
+from rbxcompose.printable import plain
 
 OTHER_KIND = kind(
     "RBX1304",
@@ -68,6 +70,14 @@ class Documents:
     def writer(self, span: Span, robot: Path) -> Path:
         """Return the file that a value was written in; the robot's file for a value from the command line."""
         return self.files.get(span.file, robot)
+
+    def meant(self, model: type[ManifestHeader], root: MappingNode) -> MappingNode:
+        """Return a file with its misspelt keys corrected, after a finding for each."""
+        meant = meant_keys(root, model.model_fields)
+        for name in meant:
+            span, message = root.entries[name].key.span, f"unknown key '{plain(name, 60)}' in {where(())}"
+            self.report.add(UNKNOWN_KEY.misspelt(span, message, name, model.model_fields, KEYS, taken=root.entries))
+        return with_keys(root, meant)
 
     def check(self, model: type[ManifestHeader], root: MappingNode) -> None:
         """Add findings for the top-level keys of a file; the contents of a section are checked where it is read."""

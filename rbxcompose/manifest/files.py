@@ -33,6 +33,8 @@ missions:
 """,
 )
 ROBOT_FILE = "robot.yaml"  # the file that a folder means
+_ROBOTS = "robots"  # the folder of a project's robots
+_ENDINGS = (".yaml", ".yml")
 _MOST_NEIGHBOURS = 1000
 _MOST_NAMESAKES = 3
 
@@ -108,6 +110,8 @@ def _absolute(written: str, folder: Path) -> Path | None:
 
 
 def _missing(written: str, path: Path, span: Span | None, writer: Path | None = None) -> Finding:
+    if path.name == ROBOT_FILE and Path(written).name != ROBOT_FILE and path.parent.is_dir() and not path.is_symlink():
+        return _no_robot(written, path.parent, span, writer)
     if os.path.lexists(path):  # a pipe, a device, a dangling link
         return UNREADABLE.at(span, f"'{plain(written)}' is not a regular file")
     if writer is not None and (namesakes := files_named(path.name, writer)):
@@ -117,6 +121,26 @@ def _missing(written: str, path: Path, span: Span | None, writer: Path | None = 
         return UNREADABLE.at(span, f"'{plain(written)}' does not exist", help=_nearest_folder(path))
     message, there = f"'{plain(written)}' does not exist", f"in '{plain(shown_name(path.parent))}'"
     return UNREADABLE.misspelt(span, message, path.name, neighbours, there, within=written)
+
+
+def _no_robot(written: str, folder: Path, span: Span | None, writer: Path | None) -> Finding:
+    """Return the finding for a folder that was named like a robot, and is none."""
+    where = "this folder" if folder == Path.cwd() and writer is None else f"the folder '{plain(written)}'"
+    names = sorted(_names_in(folder) or ())
+    if writer is not None:
+        files = [f"'{plain(written.rstrip('/'))}/{plain(one)}'" for one in names if one.endswith(_ENDINGS)]
+        help_text = f"name a file in it: {', '.join(files[:_MOST_NAMESAKES])}" if files else "name a file"
+        return UNREADABLE.at(span, f"{where} is no file", help=help_text)
+    robots = _robots_in(folder) or [f"{_ROBOTS}/{one}" for one in _robots_in(folder / _ROBOTS)]
+    base = "" if written in (".", "./") else f"{written.rstrip('/')}/"
+    listed = " or ".join(f"'{plain(base + one)}'" for one in robots[:_MOST_NAMESAKES])
+    help_text = f"did you mean {listed}?" if robots else f"'rbxcompose new robot NAME' makes one in '{_ROBOTS}/NAME'"
+    return UNREADABLE.at(span, f"there is no robot in {where}: it has no {ROBOT_FILE}", help=help_text)
+
+
+def _robots_in(folder: Path) -> list[str]:
+    """Return the folders in a folder that are robots."""
+    return sorted(one for one in _names_in(folder) or () if (folder / one / ROBOT_FILE).is_file())
 
 
 def files_named(name: str, writer: Path) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import field, replace
 from typing import NamedTuple
 
@@ -11,10 +11,13 @@ from rbxcompose.expressions import types
 from rbxcompose.expressions.types import Type
 from rbxcompose.findings import Span
 from rbxcompose.manifest import tree
+from rbxcompose.manifest.open_names import OpenNames
 from rbxcompose.manifest.secrets import Secrets
 from rbxcompose.manifest.tree import ScalarNode, SequenceNode
 from rbxcompose.manifest.validate import to_plain
 from rbxcompose.units import Quantity
+
+_ARGS = "args."
 
 
 class Typed(NamedTuple):
@@ -29,17 +32,21 @@ class Typed(NamedTuple):
 class Names:
     """The names that `${...}` may use: a type and a typed value by dotted name, the environment and the secrets.
 
-    `arguments` holds those of each scope: of the robot (the empty scope), and of each instance of a part.
+    `arguments` holds those of each scope: of the robot (the empty scope), and of each instance of a part; `may_have`
+    tells of some scopes which arguments may be among those that could not be read.
     """
 
     values: Mapping[str, Typed] = field(default_factory=dict)
     environment: Mapping[str, str] = field(default_factory=dict)
     secrets: Secrets | None = None
     arguments: Mapping[str, Mapping[str, Typed]] = field(default_factory=dict)
+    may_have: Mapping[str, Callable[[str], bool]] = field(default_factory=dict)
 
     def known(self, scope: str) -> Mapping[str, Typed]:
         """Return all that a file of this scope may name in an expression."""
-        return {**self.values, **self.arguments.get(scope, {})}
+        known = {**self.values, **self.arguments.get(scope, {})}
+        may_have = self.may_have.get(scope)
+        return known if may_have is None else OpenNames(known, may_have, lambda name: Typed(types.UNKNOWN, tree.BROKEN))
 
 
 def names_of(robot: str, sim: bool, environment: Mapping[str, str], secrets: Secrets | None = None) -> Names:
@@ -47,10 +54,22 @@ def names_of(robot: str, sim: bool, environment: Mapping[str, str], secrets: Sec
     return Names({"robot.name": Typed(types.TEXT, robot), "sim": Typed(types.FLAG, sim)}, environment, secrets)
 
 
-def with_arguments(names: Names, arguments: Mapping[str, Typed], scope: str = "") -> Names:
-    """Return `names` with `args.NAME` for each argument of a scope; a broken argument has the value `BROKEN`."""
-    known = {f"args.{name}": value for name, value in arguments.items()}
-    return replace(names, arguments={**names.arguments, scope: known})
+def with_arguments(
+    names: Names, arguments: Mapping[str, Typed], scope: str = "", may_have: Callable[[str], bool] | None = None
+) -> Names:
+    """Return `names` with `args.NAME` for each argument of a scope; a broken argument has the value `BROKEN`.
+
+    `may_have` tells which arguments may be among those that could not be read, if there are any.
+    """
+    known = {f"{_ARGS}{name}": value for name, value in arguments.items()}
+    names = replace(names, arguments={**names.arguments, scope: known})
+    if may_have is None:
+        return names
+
+    def may_have_argument(name: str) -> bool:
+        return name.startswith(_ARGS) and may_have(name.removeprefix(_ARGS))
+
+    return replace(names, may_have={**names.may_have, scope: may_have_argument})
 
 
 @dataclass(frozen=True, slots=True)

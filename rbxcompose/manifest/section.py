@@ -20,7 +20,9 @@ from rbxcompose.config import Name
 from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Report
 from rbxcompose.manifest.documents import Documents
+from rbxcompose.manifest.header import ManifestHeader
 from rbxcompose.manifest.renamer import Renames
+from rbxcompose.manifest.salvage import salvaged
 from rbxcompose.manifest.shapes import below, kinds_of, with_references
 from rbxcompose.manifest.tree import Entry, KeyPath, MappingNode, ScalarNode, TreeNode, at
 from rbxcompose.manifest.validate import WRONG_TYPE, is_valid, label_of, validate
@@ -92,6 +94,8 @@ class Declaration(Generic[M]):
     entry: str = ""
     """What findings call an entry."""
     short: Short | None = None
+    stand_in: Callable[[str], object] = lambda name: name
+    """Returns what a name means that could not be read."""
     needs: str = ""
     """The key that every new entry in an overlay has; an entry without it was meant to change an existing one."""
     scope: SetScope = SetScope.ANYTHING
@@ -125,6 +129,8 @@ class Declaration(Generic[M]):
     """Names of the components that it adds if it is present."""
     components: Callable[[Contents, Wiring], Iterable[WantedComponent]] = lambda contents, wiring: ()
     """Returns the components that it defines."""
+    wires: bool = False
+    """Whether its entries decide which components there are, and what they are connected to."""
     connects: Callable[[Contents], Mapping[str, Mapping[str, str]]] = lambda contents: {}
     """Topics that it assigns to ports: component -> port -> topic."""
     details: Callable[[Any], Mapping[str, str]] = lambda read: {}
@@ -182,6 +188,12 @@ class Declaration(Generic[M]):
             entries[name] = Entry(entry.key, value)
         return replace(node, entries=entries)
 
+    def is_unreadable(self, root: MappingNode) -> bool:
+        """Return whether something stands in a tree where the section's names should, and is no map."""
+        places = ((self.name, *self.at)[:length] for length in range(1, len(self.at) + 2))
+        found = (node for node in (at(root, place) for place in places) if node is not None)
+        return any(not isinstance(node, MappingNode) and not is_empty(node) for node in found)
+
     def names_in(self, root: MappingNode) -> Iterable[str]:
         """Return the names that a tree defines in this section."""
         named = at(root, (self.name, *self.at)) if self.names else None
@@ -217,8 +229,11 @@ class Contents:
         sections: Iterable[Section[Any, Any]] = (),
         *,
         is_simulated: bool = True,
+        is_whole: bool = True,
     ) -> None:
         self.root, self.file, self.documents, self.is_simulated = root, file, documents, is_simulated
+        self.is_whole = is_whole
+        """Whether all files that the tree was composed of could be read."""
         self._sections = list(sections)
         self._read: dict[str, object] = {}
 
@@ -228,13 +243,30 @@ class Contents:
             self._read[section.name] = section.read(Reading(section, self))
         return cast(R, self._read[section.name])
 
+    def may_have(self, kind: str, name: str) -> bool:
+        """Return whether a name that was not found may stand where nothing could be read, so that it is not wrong."""
+        return kind in self.open_kinds or name in self.stray
+
+    @cached_property
+    def open_kinds(self) -> frozenset[str]:
+        """Return the kinds of which any name may exist: a section that defines them is no map, or a file lacks."""
+        naming = [one for one in self._sections if one.names and (not self.is_whole or one.is_unreadable(self.root))]
+        return frozenset((*(one.names for one in naming), *(COMPONENT for one in naming if one.runs)))
+
+    @cached_property
+    def stray(self) -> frozenset[str]:
+        """Return the names below keys that are no sections: they may belong to any."""
+        known = {*ManifestHeader.model_fields, *(one.name for one in self._sections)}
+        others = (entry.value for name, entry in self.root.entries.items() if name not in known)
+        return frozenset(name for node in others if isinstance(node, MappingNode) for name in node.entries)
+
     @cached_property
     def known(self) -> dict[str, Mapping[str, object]]:
         """Return the names of each kind, including entries with mistakes: references to them are not wrong."""
         naming = [one for one in self._sections if one.names]
         kinds = {COMPONENT, *(one.names for one in naming)}
         found: dict[str, Mapping[str, object]] = {
-            kind: _Names(self, [one for one in naming if one.has_names_of(kind)]) for kind in kinds
+            kind: _Names(self, kind, [one for one in naming if one.has_names_of(kind)]) for kind in kinds
         }
         return found | {kind: _Defined(self, one, kind) for one in self._sections for kind in one.defines}
 
@@ -242,16 +274,20 @@ class Contents:
 class _Names(Mapping[str, object]):
     """The names of a kind; what a name means is read on request."""
 
-    def __init__(self, contents: Contents, sections: Iterable[Section[Any, Any]]) -> None:
-        self._contents = contents
-        self._section = {name: one for one in sections for name in one.names_in(contents.root)}
+    def __init__(self, contents: Contents, kind: str, sections: Iterable[Section[Any, Any]]) -> None:
+        self._contents, self._kind = contents, kind
+        chosen = list(sections)
+        self._section = {name: one for one in chosen for name in one.names_in(contents.root)}
+        self._default = chosen[0] if chosen else None
 
     def __getitem__(self, name: str) -> object:
-        read = self._contents.of(self._section[name])
-        return read.get(name, name) if isinstance(read, Mapping) else name
+        section = self._section.get(name, self._default)
+        read = self._contents.of(section) if section else None
+        there = read.get(name) if isinstance(read, Mapping) else None
+        return there if there is not None else section.stand_in(name) if section else name
 
     def __contains__(self, name: object) -> bool:
-        return name in self._section
+        return name in self._section or self._contents.may_have(self._kind, str(name))
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._section)
@@ -318,6 +354,15 @@ class Reading(Generic[M]):
     def entries(self) -> dict[str, M]:
         """Return the entries without mistakes, by name."""
         found = ((name, self.valid(self.section.entry_type, name, entry.value)) for name, entry in self.named())
+        return {name: read for name, read in found if read is not None}
+
+    def readable(self, model: type[T], name: str, node: TreeNode) -> T | None:
+        """Return an entry as `valid` does; after its findings, what is left of it: see `salvaged`."""
+        return self.valid(model, name, node) or salvaged(model, node, self.contents.known)
+
+    def readable_entries(self) -> dict[str, M]:
+        """Return all entries by name, those with mistakes as far as they could be read."""
+        found = ((name, self.readable(self.section.entry_type, name, entry.value)) for name, entry in self.named())
         return {name: read for name, read in found if read is not None}
 
     def whole(self) -> M | None:

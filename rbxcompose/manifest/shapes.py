@@ -35,6 +35,20 @@ def dimension_at(model: Any, path: KeyPath) -> Dimension | None:
     return next((mark.dimension for mark in marks if isinstance(mark, Dimensioned)), None)
 
 
+def refers_below(hint: Any, path: KeyPath) -> bool | None:
+    """Return whether what stands at `path` below a type names something, itself or deeper; None if nothing may."""
+    found = _types_at(hint, path)
+    return any(_refers(one) for one in found) if found else None
+
+
+def _refers(hint: Any) -> bool:
+    if isinstance(hint, Refers):
+        return True
+    if isinstance(hint, type) and issubclass(hint, BaseModel):
+        return any(map(_refers, field_types(hint).values()))
+    return any(map(_refers, get_args(hint)))
+
+
 def kinds_of(hint: Any) -> Iterator[str]:
     """Yield the kinds of things that a value of this type names itself, not through the items of a list or map."""
     return (one.kind for one in alternatives(hint) if isinstance(one, Refers))

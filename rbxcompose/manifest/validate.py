@@ -171,14 +171,15 @@ def to_plain(node: TreeNode) -> object:
 
 
 @cache
-def _adapter(model: Any) -> TypeAdapter[Any]:
+def adapter(model: Any) -> TypeAdapter[Any]:
+    """Return what validates against a model."""
     return TypeAdapter(model)
 
 
 def is_valid(model: Any, data: object) -> bool:
     """Return whether `model` accepts plain data, without reasons."""
     try:
-        _adapter(model).validate_python(data, strict=True)
+        adapter(model).validate_python(data, strict=True)
     except ValidationError:
         return False
     return True
@@ -202,7 +203,7 @@ def validate(
     data = to_plain(node)
     for _ in range(_ROUNDS):
         try:
-            return cast(T, _adapter(cast(Any, model)).validate_python(data, strict=True, context=dict(context or {})))
+            return cast(T, adapter(cast(Any, model)).validate_python(data, strict=True, context=dict(context or {})))
         except ValidationError as error:
             errors = error.errors(include_url=False)
         before = data
@@ -372,7 +373,7 @@ def _with(data: object, path: KeyPath, value: object) -> object:
 def _takes(model: Any, data: object, loc: KeyPath) -> bool:
     """Return whether a model accepts the value at `loc`."""
     try:
-        _adapter(model).validate_python(data)
+        adapter(model).validate_python(data)
     except ValidationError as error:
         return not any(one["loc"][: len(loc)] == loc for one in error.errors(include_url=False))
     return True
@@ -394,7 +395,5 @@ _EXPECTED = {
     "list_type": "a list",
     "tuple_type": "a list",
     "dict_type": "a map of keys and values",
-    "model_type": "a map of keys and values",
-    "model_attributes_type": "a map of keys and values",
-    "dataclass_type": "a map of keys and values",
+    **dict.fromkeys(("model_type", "model_attributes_type", "dataclass_type"), "a map of keys and values"),
 }

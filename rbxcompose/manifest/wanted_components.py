@@ -25,6 +25,8 @@ class WantedComponent:
     places: Mapping[str, KeyPath] = field(default_factory=dict)
     """Where the manifest has fields and ports that it got from elsewhere: `{"controllers.base": ("controllers",
     "base")}`."""
+    is_sound: bool = True
+    """Whether its configuration is what the user meant; otherwise only its ports count."""
 
 
 class Wiring(Protocol):

@@ -139,7 +139,8 @@ def _component(manifest: RobotManifest, wanted: WantedComponent, given: Mapping[
     ends = ends_of(wanted.name, cls, config, manifest.bus.namespace or "", {**options.connect, **given})
     process, log = options.process or cls.process, LOG_LEVELS[options.log]
     names = (end.name for end in ends)
-    capabilities = require_declared(wanted.type_name, cls.capabilities(config), names, type(config))
+    capable = cls.capabilities(config) if wanted.is_sound else ()
+    capabilities = require_declared(wanted.type_name, capable, names, type(config))
     return RobotComponent(
         wanted.name,
         wanted.type_name,
@@ -153,6 +154,7 @@ def _component(manifest: RobotManifest, wanted: WantedComponent, given: Mapping[
         log,
         capabilities,
         wanted.places,
+        wanted.is_sound,
     )
 
 

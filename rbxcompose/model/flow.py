@@ -70,8 +70,8 @@ def period_of(component: RobotComponent) -> float | None:
 
 
 def setting(component: RobotComponent, name: str) -> float | None:
-    """Return a number from a component's configuration, in SI; None if its type has no such setting."""
-    value = getattr(component.config, name, None)
+    """Return a number from a component's configuration, in SI; None if it is in doubt, or there is no such setting."""
+    value = getattr(component.config, name, None) if component.is_sound else None
     return value if isinstance(value, float) else None
 
 

@@ -13,7 +13,8 @@ from rbxcompose.missions.analysis.uses import Using
 from rbxcompose.missions.engine.inputs import bind_inputs
 from rbxcompose.missions.language.budget import Budget
 from rbxcompose.missions.language.reader import read_program
-from rbxcompose.model.robot import RobotMission
+from rbxcompose.model.robot import RobotMission, places_of
+from rbxcompose.sections.missions import missions
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,10 +50,12 @@ def read_missions(
         program = read_program(root, report, skills, budget) if root else None
         if program is not None:
             gone = manifest.history.removed("places")
-            given, is_begun = entry.with_.entries, name == manifest.start
-            inputs, findings = bind_inputs(program, given, manifest.places, entry.span, gone, is_begun=is_begun)
+            given, is_begun = entry.with_.entries, name == manifest.start and entry.is_sound
+            places = places_of(manifest)
+            inputs, findings = bind_inputs(program, given, places, entry.span, gone, is_begun=is_begun)
             report.extend(findings)
             found[name] = RobotMission(name, program, inputs)
     using = Using({name: one.program for name, one in found.items()})
     report.extend(using.findings)
-    return ReadMissions(found, frozenset((manifest.missions.keys() - found.keys()) | using.broken))
+    written = frozenset(missions.names_in(manifest.root))
+    return ReadMissions(found, frozenset((written - found.keys()) | using.broken))

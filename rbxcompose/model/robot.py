@@ -8,21 +8,26 @@ from functools import cached_property
 from typing import Any, TypeVar
 
 from rbxcompose.composition.robot_manifest import RobotManifest
-from rbxcompose.config import Config
+from rbxcompose.config import Config, Place
 from rbxcompose.dataclass import dataclass
-from rbxcompose.expressions.types import UNKNOWN
+from rbxcompose.expressions.types import UNKNOWN, Type
 from rbxcompose.findings import Span
 from rbxcompose.levels import Level
-from rbxcompose.manifest.registry import naming
+from rbxcompose.manifest.open_names import OpenNames
+from rbxcompose.manifest.registry import naming, sections
 from rbxcompose.manifest.tree import KeyPath, at, key_span, value_span
 from rbxcompose.missions.program.program import Program, RobotNames
 from rbxcompose.missions.program.sources import SkillSource, TopicSource, ValueSource
+from rbxcompose.model.doubts import doubts_of
 from rbxcompose.model.wires import PortEnd
-from rbxcompose.references import COMPONENT
+from rbxcompose.references import COMPONENT, PLACE
 from rbxcompose.restarts import DEFAULT, Restart
+from rbxcompose.rules import NAMES, WIRING
 from rbxcompose.sdk.capabilities import Capability
 from rbxcompose.sdk.component import Component
 from rbxcompose.sdk.ports import In, Out
+from rbxcompose.sections.places import unknown_place
+from rbxcompose.sections.values import values
 
 K = TypeVar("K", bound=Capability)
 ENTRY = 2  # length of the path of an entry: section and name
@@ -30,7 +35,10 @@ ENTRY = 2  # length of the path of an entry: section and name
 
 @dataclass(frozen=True, slots=True)
 class RobotComponent:
-    """Everything that runs under one name in `ps`; `path` is where the manifest requests it, empty if nowhere."""
+    """Everything that runs under one name in `ps`; `path` is where the manifest requests it, empty if nowhere.
+
+    One whose configuration has mistakes is not sound: its ports are known, but not what it can do.
+    """
 
     name: str
     type_name: str
@@ -44,6 +52,7 @@ class RobotComponent:
     log: Level = Level.OK  # the lowest level that is logged
     capabilities: tuple[Capability, ...] = ()
     places: Mapping[str, KeyPath] = field(default_factory=dict)  # of fields and ports that are written elsewhere
+    is_sound: bool = True
     _by_port: dict[str, PortEnd] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -92,22 +101,37 @@ class Robot:
     def names(self) -> RobotNames:
         """Return the names that the robot gives to its missions."""
         return RobotNames(
-            values={name: self.values[name].type if name in self.values else UNKNOWN for name in self.manifest.values},
-            places=self.manifest.places,
+            values=self._types_of_values(),
+            places=places_of(self.manifest),
             removed=self.manifest.history.removed("places"),
             skills={name: source.skill for name, source in self.skills.items()},
             missions={name: one.program for name, one in self.missions.items() if name not in self.unread},
             topics={name: topic.message for name, topic in self.topics.items()},
             services=self.services,
             unread=self.unread,
-            is_complete=self.written <= self.components.keys(),
             events=frozenset(name for name, source in self.values.items() if source.is_event),
+            is_complete=self.is_complete,
+            may_have=self.manifest.contents.may_have,
         )
+
+    def _types_of_values(self) -> dict[str, Type]:
+        written = values.names_in(self.manifest.root)
+        return {name: self.values[name].type if name in self.values else UNKNOWN for name in written}
+
+    @cached_property
+    def is_complete(self) -> bool:
+        """Return whether all its components with their ports could be read."""
+        return not doubts_of(self.manifest, self.manifest.contents.documents.report).bar((WIRING, NAMES))
 
     @cached_property
     def written(self) -> frozenset[str]:
         """Return the names of all components that sections of the manifest request, including those with mistakes."""
         return frozenset(name for one in naming(COMPONENT) for name in one.names_in(self.manifest.root))
+
+    @cached_property
+    def brought(self) -> frozenset[str]:
+        """Return the names of components that sections bring because they are there, including those with mistakes."""
+        return frozenset(name for one in sections() if one.name in self.manifest.root for name in one.brings)
 
     @cached_property
     def writers(self) -> Mapping[str, list[PortEnd]]:
@@ -168,6 +192,14 @@ class Robot:
         brought = (one.span for one in self.manifest.parts.values() if name in one.components)
         place = self.components[name].places.get(port, ())
         return next(brought, None) or (self.key(*place[:ENTRY]) if place else self.component_span(name))
+
+
+def places_of(manifest: RobotManifest) -> Mapping[str, Place]:
+    """Return the places, also those that could not be read."""
+    contents = manifest.contents
+    if PLACE not in contents.open_kinds and not contents.stray:
+        return manifest.places
+    return OpenNames(manifest.places, lambda name: contents.may_have(PLACE, name), unknown_place)
 
 
 def _by_topic(ends: Iterable[PortEnd]) -> Mapping[str, list[PortEnd]]:

@@ -110,7 +110,7 @@ def _details(read: Mapping[str, ActuatorModel]) -> dict[str, str]:
     return {name: f"{one.model}, id {one.id} on {one.bus}" for name, one in read.items()}
 
 
-@section("actuators", ActuatorModel, order=32, names=ACTUATOR, entry="actuator", details=_details)
+@section("actuators", ActuatorModel, order=32, names=ACTUATOR, entry="actuator", wires=True, details=_details)
 def actuators(reading: Reading[ActuatorModel]) -> dict[str, ActuatorModel]:
     """The servos by name: on which bus, of which model, with which id.
 

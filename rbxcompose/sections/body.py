@@ -114,6 +114,7 @@ def _names(read: Description | None) -> Mapping[str, Mapping[str, object]]:
     entry="piece",
     shared=((), (PIECES,)),
     brings=(DESCRIPTION,),
+    wires=True,
     brought=_brought,
     defines=(LINK, JOINT),
     defined=_names,

@@ -183,6 +183,7 @@ def _share(driven: JointModel, servos: list[ActuatorModel], joint: BodyJoint | N
     order=31,
     names=SERVO_BUS,
     runs=True,
+    wires=True,
     entry="bus of servos",
     scope=SetScope.KEYS,
     components=_components,

@@ -13,6 +13,7 @@ from rbxcompose.findings import SIMILAR, Report, Span, kind
 from rbxcompose.manifest.options import OPTIONS, ComponentOptions
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.renamer import Renames
+from rbxcompose.manifest.salvage import salvaged
 from rbxcompose.manifest.section import Contents, Reading, SetScope
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode, at
 from rbxcompose.manifest.validate import MISSING_KEY, UNKNOWN_KEY, WRONG_TYPE, is_broken, label_of, validate
@@ -49,19 +50,24 @@ components:
 
 @dataclass(frozen=True, slots=True)
 class ComponentEntry:
-    """A component that the user wrote; `config` is None if it has mistakes."""
+    """A component that the user wrote; without `config` if nothing of it could be read.
+
+    It is not sound if the configuration has mistakes: then it is as far as it could be read.
+    """
 
     name: str
     type: str
     options: ComponentOptions
     config: Config | None
     span: Span
+    is_sound: bool = True
 
 
 def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]:
     for name, one in contents.of(components).items():
         if one.config is not None:
-            yield WantedComponent(name, one.type, one.config, ("components", name), one.options)
+            place = ("components", name)
+            yield WantedComponent(name, one.type, one.config, place, one.options, is_sound=one.is_sound)
 
 
 def _models(node: TreeNode) -> Iterator[type[Config]]:
@@ -113,6 +119,7 @@ def _details(read: Mapping[str, ComponentEntry]) -> dict[str, str]:
     order=40,
     names=COMPONENT,
     runs=True,
+    wires=True,
     entry="component",
     needs="type",
     scope=SetScope.BARE,
@@ -153,8 +160,8 @@ def component_class(node: TreeNode) -> type[Component[Any]] | None:
 
 
 def _component(reading: Reading[ComponentOptions], name: str, entry: Entry) -> ComponentEntry | None:
-    """Return one component; None if its type is missing or unknown, without a `config` if that has mistakes."""
-    report = reading.report
+    """Return one component, as far as it could be read; None if its type is missing or unknown."""
+    report, known = reading.report, reading.contents.known
     node, path = entry.value, ("components", name)
     if is_broken(node):
         return None
@@ -164,15 +171,18 @@ def _component(reading: Reading[ComponentOptions], name: str, entry: Entry) -> C
         return None
     # A missing key is reported at the component's name, not at whatever its first key happens to be.
     options_node = replace(_part(node, OPTIONS), span=entry.key.span)
-    options = validate(ComponentOptions, options_node, path, report) or ComponentOptions()
+    options = validate(ComponentOptions, options_node, path, report) or salvaged(ComponentOptions, options_node)
     type_name = _type_name(name, entry, node, report)
     if type_name is None:
         return None
     model = registry.component_type(type_name).config_type()
     keys = [key for key in node.entries if key not in (*OPTIONS, "type")]
     config_node = replace(_part(node, keys), span=entry.key.span)
-    config = validate(model, config_node, path, report, reading.contents.known, also=[*OPTIONS, "type"])
-    return ComponentEntry(name, type_name, options, config, entry.key.span)
+    sound = validate(model, config_node, path, report, known, also=[*OPTIONS, "type"])
+    config = sound or salvaged(model, config_node, known)
+    return ComponentEntry(
+        name, type_name, options or ComponentOptions(), config, entry.key.span, is_sound=sound is not None
+    )
 
 
 def _part(node: MappingNode, keys: Collection[str]) -> MappingNode:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 
 from rbxcompose.actuation.control_tables import OUTPUTS
 from rbxcompose.body.model import BodyJoint
@@ -18,7 +19,7 @@ from rbxcompose.plugins import BROKEN, BrokenPluginError
 from rbxcompose.references import CONTROLLER
 from rbxcompose.sections.actuators import actuators, model_of
 from rbxcompose.sections.body import body
-from rbxcompose.sections.joints import held_limits, joints
+from rbxcompose.sections.joints import held_limits, joints, may_be_driven
 
 NOT_DRIVEN = kind(
     "RBX2215",
@@ -129,6 +130,7 @@ def _details(read: Mapping[str, ControllerConfig]) -> dict[str, str]:
     ControllerConfig,
     order=34,
     names=CONTROLLER,
+    wires=True,
     entry="controller",
     needs="type",
     models=_models,
@@ -171,6 +173,9 @@ def _read(reading: Reading[ControllerConfig], name: str, entry: Entry) -> Contro
     if not isinstance(entry.value, MappingNode) or not isinstance(written, ScalarNode):
         if isinstance(entry.value, MappingNode) and written is None:
             reading.report.add(MISSING_KEY.at(entry.key.span, f"controller '{name}' needs the key 'type'"))
+        elif isinstance(entry.value, MappingNode):  # without a type nobody knows which other keys it has
+            only = {"type": entry.value.entries["type"]}
+            reading.valid(ControllerConfig, name, replace(entry.value, entries=only))
         else:
             reading.valid(ControllerConfig, name, entry.value)
         return None
@@ -217,7 +222,7 @@ def _undriven(reading: Reading[ControllerConfig], name: str, one: ControllerConf
     for joint in one.claimed:
         span = _place(reading, name, joint)
         if joint not in driven:
-            if joint in _written(reading):
+            if may_be_driven(reading.contents, joint):
                 return  # it has a mistake, which is told
             message = f"the controller '{name}' leads '{joint}', which no servo drives"
             yield NOT_DRIVEN.misspelt(span, message, joint, driven, "joints with a servo")
@@ -313,11 +318,6 @@ def _shown(joint: BodyJoint | None) -> Callable[[float], str]:
 
 _ROUNDING = 1e-4  # [rad or m], less than a tick
 _PLURAL = {"position": "positions", "velocity": "velocities"}
-
-
-def _written(reading: Reading[ControllerConfig]) -> Mapping[str, object]:
-    node = reading.contents.root.get("joints")
-    return node.entries if isinstance(node, MappingNode) else {}
 
 
 def _place(reading: Reading[ControllerConfig], name: str, joint: str) -> Span:

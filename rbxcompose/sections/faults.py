@@ -14,7 +14,7 @@ from rbxcompose.manifest.section import Contents, Reading
 from rbxcompose.manifest.tree import key_span, value_span
 from rbxcompose.references import FAULT, SERVO_BUS, Refers
 from rbxcompose.sections.actuators import actuators
-from rbxcompose.sections.joints import joints
+from rbxcompose.sections.joints import joints, may_be_driven, unread_joints
 from rbxcompose.twins.servo_faults import UNPLUG, FaultName
 
 NO_SERVO = kind(
@@ -120,7 +120,8 @@ def _mistake(reading: Reading[FaultModel], name: str, one: FaultModel) -> Findin
     if one.joint is not None and one.fault == UNPLUG:
         span = value_span(root, ("faults", name, "joint"))
         return OF_WHAT.at(span, f"'{one.joint}' cannot be unplugged", help="give 'bus' instead of 'joint'")
-    if not driven and "joints" in root:
+    in_doubt = may_be_driven(reading.contents, one.joint) if one.joint else bool(unread_joints(reading.contents))
+    if in_doubt or (not driven and "joints" in root):
         return None  # they have mistakes, which are told
     if one.joint is not None and one.joint not in driven:
         message, span = f"no servo drives '{one.joint}'", value_span(root, ("faults", name, "joint"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from itertools import chain
 from typing import Annotated, Any
 
@@ -17,9 +18,9 @@ from rbxcompose.control.calibration import Calibration
 from rbxcompose.control.limits import MotionLimits, Tightened, tightened
 from rbxcompose.findings import Finding, kind
 from rbxcompose.manifest.registry import section
-from rbxcompose.manifest.section import Reading
+from rbxcompose.manifest.section import Contents, Reading
 from rbxcompose.manifest.tree import KeyPath, MappingNode, key_span, value_span
-from rbxcompose.manifest.validate import MISSING_KEY, WRONG_TYPE
+from rbxcompose.manifest.validate import MISSING_KEY, WRONG_TYPE, validate
 from rbxcompose.references import ACTUATOR, Refers
 from rbxcompose.sections.actuators import ActuatorModel, actuators
 from rbxcompose.sections.body import body
@@ -140,7 +141,7 @@ class JointModel(Config):
         return [*([self.actuator] if self.actuator else []), *self.actuators]
 
 
-@section("joints", dict[JointName, JointModel], order=33, shared=((),))
+@section("joints", dict[JointName, JointModel], order=33, wires=True, shared=((),))
 def joints(reading: Reading[dict[str, JointModel]]) -> dict[str, JointModel]:
     """Which joints of the body are driven, by their names in the URDF: the servos of each, and its limits.
 
@@ -159,7 +160,7 @@ def joints(reading: Reading[dict[str, JointModel]]) -> dict[str, JointModel]:
               position: [-90 deg, 90 deg]
               velocity: 90 deg/s
     """
-    found, known = reading.whole() or {}, reading.contents.of(body)
+    found, known = _read(reading), reading.contents.of(body)
     there = known.body.joints if known else {}
     wrong: dict[str, Finding] = {}
     users: dict[str, str] = {}
@@ -170,6 +171,36 @@ def joints(reading: Reading[dict[str, JointModel]]) -> dict[str, JointModel]:
             wrong[name] = finding
     reading.report.extend(wrong.values())
     return {name: one for name, one in found.items() if name not in wrong}
+
+
+def _read(reading: Reading[dict[str, JointModel]]) -> dict[str, JointModel]:
+    """Return the joints without mistakes: one by one, so that none hides another one."""
+    node, found = reading.node, dict[str, JointModel]()
+    if not isinstance(node, MappingNode):
+        return reading.whole() or {}
+    for name, entry in node.entries.items():
+        alone = replace(node, entries={name: entry})
+        read = validate(reading.section.model, alone, ("joints",), reading.report, reading.contents.known)
+        found.update(read or {})
+    return found
+
+
+def unread_joints(contents: Contents) -> frozenset[str]:
+    """Return the joints that are written and have mistakes."""
+    node = contents.root.get(joints.name)
+    written = node.entries.keys() if isinstance(node, MappingNode) else ()
+    return frozenset(written - contents.of(joints).keys() if written else ())
+
+
+def _is_written(reading: Reading[dict[str, JointModel]], joint: str) -> bool:
+    node = reading.node
+    return isinstance(node, MappingNode) and joint in node
+
+
+def may_be_driven(contents: Contents, joint: str) -> bool:
+    """Return whether a joint is among those with mistakes, or may be one of them under a misspelt name."""
+    description, unread = contents.of(body), unread_joints(contents)
+    return joint in unread or (description is not None and not unread <= description.body.joints.keys())
 
 
 def _mistakes(
@@ -221,6 +252,8 @@ def _follows(
     leader, known = joint.mimic.joint, reading.contents.of(actuators)
     at = key_span(reading.contents.root, ("joints", name))
     if leader not in found:
+        if _is_written(reading, leader):
+            return  # it has a mistake, which is told
         yield NOT_TOGETHER.at(at, f"joint '{name}' mimics '{leader}' in the body, which no servo drives")
         return
     servos = [known[servo] for one in (name, leader) for servo in found[one].servos if servo in known]

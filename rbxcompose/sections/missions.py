@@ -16,6 +16,7 @@ from rbxcompose.manifest.files import resolve
 from rbxcompose.manifest.fill import SHOWN_SECRET
 from rbxcompose.manifest.mission_data import is_moderate
 from rbxcompose.manifest.registry import section
+from rbxcompose.manifest.salvage import salvaged
 from rbxcompose.manifest.section import Reading, Short
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode, children
 from rbxcompose.references import ANYTHING, MISSION, Refers
@@ -37,12 +38,13 @@ class MissionModel(Config):
 
 @dataclass(frozen=True, slots=True)
 class MissionEntry:
-    """A mission of the robot: its file, and the values for its inputs as nodes."""
+    """A mission of the robot: its file, and the values for its inputs as nodes; not all of them, if it is not sound."""
 
     name: str
     path: Path
     with_: MappingNode
     span: Span
+    is_sound: bool = True
 
 
 def _details(read: Mapping[str, MissionEntry]) -> dict[str, str]:
@@ -66,19 +68,23 @@ def missions(reading: Reading[MissionModel]) -> dict[str, MissionEntry]:
 
 def _mission(reading: Reading[MissionModel], name: str, entry: Entry) -> MissionEntry | None:
     node = entry.value
-    read = reading.valid(MissionModel, name, node)
-    if read is None or not isinstance(node, MappingNode):
+    sound = reading.valid(MissionModel, name, node)
+    read = sound or salvaged(MissionModel, node)
+    written = node.get("file") if isinstance(node, MappingNode) else None
+    if read is None or not isinstance(node, MappingNode) or not isinstance(written, ScalarNode):
+        return None
+    if sound is None and written.text != read.file:
         return None
     _refuse_secrets(node, reading.report)
     inputs = node.get("with")
     if not is_moderate(inputs, "input", reading.report):
         return None
-    written = node.entries["file"].value
     path = resolve(read.file, reading.writer(written), written.span)
     if isinstance(path, Finding):
         reading.report.add(path)
         return None
-    return MissionEntry(name, path, inputs if isinstance(inputs, MappingNode) else MappingNode(), entry.key.span)
+    given = inputs if isinstance(inputs, MappingNode) else MappingNode()
+    return MissionEntry(name, path, given, entry.key.span, is_sound=sound is not None)
 
 
 def _refuse_secrets(node: TreeNode, report: Report) -> None:

@@ -126,6 +126,7 @@ def _details(read: Iterable[str]) -> Mapping[str, str]:
     order=50,
     names=MUX,
     runs=True,
+    wires=True,
     entry="mux",
     scope=SetScope.KEYS,
     has_topics=True,
@@ -156,4 +157,4 @@ def muxes(reading: Reading[MuxModel]) -> dict[str, MuxModel]:
                 priority: 200
                 timeout: 0.3 s
     """
-    return reading.entries()
+    return reading.readable_entries()

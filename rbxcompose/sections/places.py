@@ -27,7 +27,12 @@ def _details(read: Mapping[str, Place]) -> dict[str, str]:
     return {name: f"({place.x:g} m, {place.y:g} m)" for name, place in read.items()}
 
 
-@section("places", PlaceModel, order=70, names=PLACE, entry="place", details=_details)
+def unknown_place(name: str) -> Place:
+    """Return what stands for a place that could not be read."""
+    return Place(name, 0.0, 0.0, 0.0)
+
+
+@section("places", PlaceModel, order=70, names=PLACE, entry="place", stand_in=unknown_place, details=_details)
 def places(reading: Reading[PlaceModel]) -> dict[str, Place]:
     """Places by name: poses in `map`, to which missions refer.
 

@@ -106,7 +106,7 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
         yield WantedComponent("estop", "estop", config, ("safety", "estop"))
 
 
-@section("safety", SafetyModel, order=35, shared=((), ("park",)), components=_components)
+@section("safety", SafetyModel, order=35, wires=True, shared=((), ("park",)), components=_components)
 def safety(reading: Reading[SafetyModel]) -> SafetyModel:
     """What happens to the torque of joints at the start, at the end, and when they are too hot; the emergency stop.
 

@@ -43,4 +43,4 @@ def values(reading: Reading[ValueModel]) -> dict[str, ValueModel]:
             type: flag
             event: true
     """
-    return reading.entries()
+    return reading.readable_entries()

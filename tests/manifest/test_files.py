@@ -103,6 +103,33 @@ def test_what_is_there_and_no_file_is_told_as_that(project: Path, kind: str) -> 
     assert expected in refused("../../missions/odd.yaml", project).message
 
 
+@pytest.mark.parametrize(
+    ("written", "message", "help_text"),
+    [
+        (".", "there is no robot in this folder: it has no robot.yaml", "did you mean 'robots/one'?"),
+        ("robots", "there is no robot in the folder 'robots': it has no robot.yaml", "did you mean 'robots/one'?"),
+        (
+            "missions",
+            "there is no robot in the folder 'missions': it has no robot.yaml",
+            "'rbxcompose new robot NAME' makes one in 'robots/NAME'",
+        ),
+    ],
+)
+def test_a_folder_that_is_there_is_not_told_to_be_missing(
+    project: Path, monkeypatch: pytest.MonkeyPatch, written: str, message: str, help_text: str
+) -> None:
+    monkeypatch.chdir(project)
+    finding = find(written)
+    assert isinstance(finding, Finding)
+    assert (finding.code, finding.message, finding.help) == ("RBX1301", message, help_text)
+
+
+def test_a_manifest_that_names_a_folder_hears_which_files_are_in_it(project: Path) -> None:
+    finding = refused("../../missions", project)
+    assert finding.message == "the folder '../../missions' is no file"
+    assert finding.help == "name a file in it: '../../missions/patrol.yaml'"
+
+
 def test_a_command_may_name_a_link_inside_its_project_but_not_one_that_leads_out(project: Path) -> None:
     robot, inside, outside = (project / f"robots/{name}" for name in ("one/robot.yaml", "two.yaml", "three.yaml"))
     inside.symlink_to(robot)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from rbxcompose.components.battery_sim import BatterySimConfig
 from rbxcompose.composition.robot_file import load_robot, read_mission
 from rbxcompose.composition.robot_manifest import RobotManifest
 from rbxcompose.findings import Report
@@ -122,10 +123,20 @@ def test_all_mistakes_are_found_in_one_run_by_place(bench: Bench) -> None:
     ]
 
 
-def test_a_component_with_mistakes_stays_without_its_configuration(bench: Bench) -> None:
+def test_a_component_with_mistakes_stays_as_far_as_it_could_be_read(bench: Bench) -> None:
     robot = bench.load(("runtime: 45 s", "runtime: long"))
     assert robot
-    assert robot.components["battery"].config is None
+    battery = robot.components["battery"]
+    assert isinstance(battery.config, BatterySimConfig)
+    assert (battery.is_sound, battery.config.warn) == (False, 0.5)
+
+
+def test_an_input_of_a_mux_with_mistakes_stays_in_its_mux(bench: Bench) -> None:
+    robot = bench.load(("priority: 100", "priority: high"))
+    assert robot
+    assert list(robot.muxes["cmd_vel"].inputs) == ["teleop", "navigation"]
+    assert robot.muxes["cmd_vel"].inputs["navigation"].source == "go_to"
+    assert bench.codes == ["RBX1003"]
 
 
 def test_a_place_with_mistakes_is_not_missing_as_well(bench: Bench) -> None:

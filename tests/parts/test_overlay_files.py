@@ -96,6 +96,15 @@ def test_a_profile_that_breaks_something_else_is_told_with_the_profile(project: 
     ]
 
 
+def test_a_warning_that_only_a_profile_causes_is_told_with_the_profile_wherever_it_is(project: Project) -> None:
+    robot = ROBOT.replace("battery: {runtime: 30 s}", "base: {connect: {cmd_vel: nobody}}")
+    driving = "components:\n  base: {type: diff_drive_sim}\n  go_to: {type: go_to}"
+    project.check(robot.replace("components:", driving, 1))
+    (finding,) = project.findings
+    assert (finding.code, str(finding.span)) == ("RBX3011", "robots/one/robot.yaml:6:3")
+    assert "with this profile" in [one.message for one in finding.related]
+
+
 def test_profiles_that_were_not_chosen_say_nothing_of_overlays_and_sets(project: Project) -> None:
     robot = ROBOT.replace("battery: {runtime: 30 s}", "battery: !remove").replace("values:", "about:")
     overlay = OVERLAY + "components:\n  battery: {warn: 40 %}\n"

@@ -51,7 +51,7 @@ ABOVE = {
     "body": "",
     "bus": "sdk.bound",
     "bus_types": "actuation",
-    "check_runner": "missions.analysis model.robot",
+    "check_runner": "missions.analysis model.doubts model.robot",
     "checks": "actuation body.model check_runner composition diagnostics.core missions model sdk sections",
     "cli": "actuation body bus compiler composition controller_requests doctor executive.requests finding_pages "
     "importing inspection lsp.server mission_tests missions model params plan recording rendering replay runtime "

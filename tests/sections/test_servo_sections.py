@@ -47,6 +47,12 @@ controllers:
   look: {type: joint_trajectory, joints: [pan_joint]}
 """
 WRONG = {
+    "mistakes of two joints": SERVOS.replace("velocity: 60 deg/s", "velocity: 60").replace(
+        "{actuator: tilt}", "{actuator: tilt, ratio: x}"
+    ),
+    "no word for the type of a controller": SERVOS.replace("type: joint_trajectory", "type: [joint_trajectory]"),
+    "a fault of a joint with a mistake": SERVOS.replace("{actuator: tilt}", "{actuator: tilt, ratio: x}")
+    + "faults:\n  one: {at: 1 s, fault: mute, joint: tilt_joint}\n",
     "a misspelt joint of a controller": SERVOS.replace("[pan_joint, tilt_joint]", "[pan_jiont, tilt_joint]"),
     "a misspelt joint": SERVOS.replace("  tilt_joint: {", "  tlit_joint: {"),
     "a joint that no servo drives": SERVOS.replace("  tilt_joint: {actuator: tilt}\n", ""),

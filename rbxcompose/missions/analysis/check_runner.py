@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 
 from rbxcompose.findings import Finding, FindingKind, Severity
@@ -20,16 +20,25 @@ _CHECKS: dict[str, MissionCheck] = {}
 
 
 def mission_check(
-    kind: str | FindingKind, severity: Severity = Severity.ERROR, *, is_fixable: bool = False
+    kind: str | FindingKind,
+    severity: Severity = Severity.ERROR,
+    *,
+    is_fixable: bool = False,
+    closed: tuple[str, ...] | None = None,
 ) -> Callable[[Find], MissionCheck]:
     """Declare a rule under its own code, or under a kind of finding that reading a mission also reports.
+
+    `closed` is what it takes for known, see `Rule`.
 
     Raises:
         ValueError: if it has no docs page, or another rule has its code.
     """
 
     def declare(find: Find) -> MissionCheck:
-        made = belonging(find, kind) if isinstance(kind, FindingKind) else declared(find, kind, severity, is_fixable)
+        if isinstance(kind, FindingKind):
+            made = belonging(find, kind, closed)
+        else:
+            made = declared(find, kind, severity, is_fixable, closed)
         if _CHECKS.setdefault(made.code, made) is not made:
             raise ValueError(f"two rules have the code {made.code}")
         return made
@@ -47,8 +56,16 @@ def mission_checks() -> tuple[MissionCheck, ...]:
 
 def check_program(program: Program, robot: RobotNames) -> list[Finding]:
     """Return all findings about a mission on this robot, in the order of the text."""
-    mission = Examined(program, robot)
-    return sorted((finding for one in mission_checks() for finding in one(mission)), key=_place)
+    return sorted((finding for _, finding in rule_findings(Examined(program, robot))), key=_place)
+
+
+def rule_findings(
+    mission: Examined, tells: Callable[[MissionCheck], bool] = lambda rule: True
+) -> Iterator[tuple[MissionCheck, Finding]]:
+    """Yield the findings of some rules about a mission, each with its rule."""
+    for one in mission_checks():
+        if tells(one):
+            yield from ((one, finding) for finding in one(mission))
 
 
 def _place(finding: Finding) -> tuple[str, int, int]:

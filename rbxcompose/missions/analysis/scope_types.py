@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import field, replace
 
 from rbxcompose.dataclass import dataclass
@@ -15,6 +15,7 @@ from rbxcompose.missions import codes
 from rbxcompose.missions.engine.condition_watches import POSE as POSE_NAME
 from rbxcompose.missions.language.spans import inner_span
 from rbxcompose.missions.program.program import MissionNode, Program, RobotNames
+from rbxcompose.references import VALUE
 
 _MEASURED = (TypeKind.QUANTITY, TypeKind.COUNT, TypeKind.FLAG)  # types that no place can have
 
@@ -26,10 +27,11 @@ class NodeScope:
     names: Mapping[str, Type]
     places: Iterable[str]
     removed: Mapping[str, Span] = field(default_factory=dict)  # removed places, each with what removed it
+    may_have: Callable[[str], bool] = lambda name: False  # whether a name may exist that could not be read
 
     def variable(self, name: str) -> Type | None:
         """Return the type of `$name`, if there is one."""
-        return self.names.get(name)
+        return self.names.get(name) or (UNKNOWN if self.may_have(name) else None)
 
     def word(self, name: str) -> Type | None:
         """Return the type of a bare word, if it is a place."""
@@ -76,7 +78,11 @@ def base_names(program: Program, robot: RobotNames) -> dict[str, Type]:
 
 def base_scope(program: Program, robot: RobotNames) -> NodeScope:
     """Return the scope of a whole mission."""
-    return NodeScope(base_names(program, robot), robot.places, robot.removed)
+
+    def may_have(name: str) -> bool:
+        return program.is_open or robot.may_have(VALUE, name)
+
+    return NodeScope(base_names(program, robot), robot.places, robot.removed, may_have)
 
 
 def views(program: Program, robot: RobotNames) -> Iterator[View]:

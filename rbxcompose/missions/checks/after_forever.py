@@ -12,9 +12,10 @@ from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.missions.analysis.facts import never_skipped
 from rbxcompose.missions.program.outcomes import SUCCEEDS
 from rbxcompose.missions.program.program import MissionNode, Program
+from rbxcompose.rules import OWN
 
 
-@mission_check("RBX4125", Severity.WARNING)
+@mission_check("RBX4125", Severity.WARNING, closed=(OWN,))
 def after_forever(mission: Examined) -> Iterator[Finding]:
     """A step is never reached
 

@@ -10,15 +10,17 @@ from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.missions.program.branches import ALL, Branches
 from rbxcompose.missions.program.outcomes import SUCCEEDS
-from rbxcompose.missions.program.program import MissionNode
+from rbxcompose.missions.program.program import MissionNode, Program
+from rbxcompose.rules import OWN
 
 
-@mission_check("RBX4138", Severity.WARNING)
+@mission_check("RBX4138", Severity.WARNING, closed=(OWN,))
 def endless_branch(mission: Examined) -> Iterator[Finding]:
     """A parallel waits for a branch that never succeeds
 
     A parallel is done when all of its branches have succeeded. A branch that repeats for ever never does, so the
-    mission never continues. Say which branch decides (`ends_with`), or that one success is enough.
+    mission never continues. Say which branch decides (`ends_with`), or that one success is enough. A branch with an
+    `end` is not waited for: it ends the mission.
 
     Bad:
     ```yaml
@@ -55,6 +57,7 @@ def endless_branch(mission: Examined) -> Iterator[Finding]:
             continue
         endless = [child for child in node.children if not ending.of(child).counting_as(SUCCEEDS)]
         others = [child for child in node.children if child not in endless]
+        endless = [child for child in endless if not _ends_the_mission(program, child)]
         if endless and others and _most_wanted(node, branches) > len(others):
             yield endless_branch.at(
                 program.nodes[endless[0]].span,
@@ -62,6 +65,11 @@ def endless_branch(mission: Examined) -> Iterator[Finding]:
                 help="write 'ends_with' and the name of the branch that decides, or 'succeed_when: any'",
                 related=[Related(program.nodes[others[0]].span, "beside this one")],
             )
+
+
+def _ends_the_mission(program: Program, branch: int) -> bool:
+    """Return whether a branch may end the mission, so that nothing waits for the branch."""
+    return any(node.step.ends_mission for node in program.below(branch))
 
 
 def _most_wanted(node: MissionNode, branches: Branches) -> float:

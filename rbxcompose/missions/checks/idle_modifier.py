@@ -11,9 +11,10 @@ from rbxcompose.missions.analysis.facts import place_in_text
 from rbxcompose.missions.program.answers import ModifierScope
 from rbxcompose.missions.program.outcomes import FAILS
 from rbxcompose.missions.program.program import CONTINUE, MissionNode, Program
+from rbxcompose.rules import OWN
 
 
-@mission_check("RBX4127", Severity.WARNING)
+@mission_check("RBX4127", Severity.WARNING, closed=(OWN,))
 def idle_modifier(mission: Examined) -> Iterator[Finding]:
     """A modifier changes nothing
 

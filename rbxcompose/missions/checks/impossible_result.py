@@ -10,9 +10,10 @@ from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.missions.language.spans import inner_span
 from rbxcompose.missions.program.outcomes import FAILS, SUCCEEDS, Outcomes
+from rbxcompose.rules import OWN
 
 
-@mission_check("RBX4135", Severity.WARNING)
+@mission_check("RBX4135", Severity.WARNING, closed=(OWN,))
 def impossible_result(mission: Examined) -> Iterator[Finding]:
     """A branch is compared with a result that it cannot have
 

@@ -7,9 +7,10 @@ from collections.abc import Iterator
 from rbxcompose.findings import Finding, Severity
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.examined import Examined
+from rbxcompose.rules import OWN
 
 
-@mission_check("RBX4107", Severity.WARNING)
+@mission_check("RBX4107", Severity.WARNING, closed=(OWN,))
 def never_waits(mission: Examined) -> Iterator[Finding]:
     """An endless loop never waits
 

@@ -8,9 +8,10 @@ from rbxcompose.findings import Finding, Related, Severity
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.missions.program.program import END
+from rbxcompose.rules import OWN
 
 
-@mission_check("RBX4116", Severity.WARNING)
+@mission_check("RBX4116", Severity.WARNING, closed=(OWN,))
 def not_restartable(mission: Examined) -> Iterator[Finding]:
     """An interrupt may restart a skill that cannot be restarted
 

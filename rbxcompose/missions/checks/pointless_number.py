@@ -11,7 +11,7 @@ from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.missions.analysis.facts import place_in_text
 
 
-@mission_check("RBX4128", Severity.WARNING)
+@mission_check("RBX4128", Severity.WARNING, closed=())
 def pointless_number(mission: Examined) -> Iterator[Finding]:
     """A number of rounds or attempts, or a duration, leaves nothing to be done
 
@@ -44,7 +44,7 @@ def pointless_number(mission: Examined) -> Iterator[Finding]:
 
 def _written(expression: Expression | None) -> float | None:
     """Return a literal number; one that has a name may have been chosen on purpose."""
-    match expression.tree if expression else None:
+    match expression.tree if expression and expression.text else None:
         case Number(value=value):
             return value
         case Minus(operand=Number(value=value)):

@@ -16,7 +16,7 @@ WORDS = (TypeKind.TEXT, TypeKind.CHOICE, TypeKind.PLACE)
 NUMBERS = (TypeKind.QUANTITY, TypeKind.COUNT)
 
 
-@mission_check("RBX4154", Severity.WARNING)
+@mission_check("RBX4154", Severity.WARNING, closed=())
 def same_case(mission: Examined) -> Iterator[Finding]:
     """A case that is never taken
 

@@ -9,9 +9,10 @@ from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.missions.analysis.transitions import leading_to, reached, transitions
 from rbxcompose.missions.program.program import MissionNode
+from rbxcompose.rules import OWN
 
 
-@mission_check("RBX4133", Severity.WARNING)
+@mission_check("RBX4133", Severity.WARNING, closed=(OWN,))
 def trapped_state(mission: Examined) -> Iterator[Finding]:
     """A state from which no path leads to an end
 

@@ -9,9 +9,10 @@ from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.effects import called, published
 from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.missions.program.messages import MessageTemplate
+from rbxcompose.rules import NAMES, WIRING
 
 
-@mission_check("RBX4150", is_fixable=True)
+@mission_check("RBX4150", is_fixable=True, closed=(WIRING, NAMES))
 def unknown_channel(mission: Examined) -> Iterator[Finding]:
     """A mission uses a topic or a service that the robot does not have
 
@@ -31,8 +32,6 @@ def unknown_channel(mission: Examined) -> Iterator[Finding]:
       publish: cmd_vel/teleop
     ```
     """
-    if not mission.robot.is_complete:
-        return  # it may belong to a part that could not be read
     for node in mission.program.nodes:
         for message in published(node):
             yield from _nowhere(message, "topic", mission.robot.topics)

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from rbxcompose.findings import Finding
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.examined import Examined
+from rbxcompose.references import MISSION
 
 
 @mission_check("RBX4144", is_fixable=True)
@@ -33,6 +34,7 @@ def unknown_mission(mission: Examined) -> Iterator[Finding]:
     for node in mission.program.nodes:
         used = node.step.uses
         name = used.text if used else ""
-        if used and name and name not in missions and name not in mission.robot.unread:
+        known = name in missions or name in mission.robot.unread or mission.robot.may_have(MISSION, name)
+        if used and name and not known:
             message = f"the robot has no mission '{name}'"
             yield unknown_mission.misspelt(used.span, message, name, missions, "missions of this robot")

@@ -19,7 +19,7 @@ def unknown_name(mission: Examined) -> Iterator[Finding]:
         set_here = list(assignments(node))
         for assignment in set_here:
             name = assignment.name
-            if name not in data:
+            if name not in data and not (mission.program.is_open and name not in mission.program.inputs):
                 message = f"only data can be set; the mission has no datum '{name}'"
                 help_text = suggest(name, data, "its data") or f"write '{name}: ...' under 'data'"
                 fix = correction(name, data, assignment.span, taken=[one.name for one in set_here])

@@ -42,8 +42,9 @@ def unknown_outcome(mission: Examined) -> Iterator[Finding]:
     """
     for node in mission.program.nodes:
         leads_to = node.step.leads_to
-        if leads_to is None or "" in leads_to.to:
-            continue
+        below = mission.program.below(node.number)
+        if leads_to is None or "" in leads_to.to or any(one.skill not in ("", *mission.robot.skills) for one in below):
+            continue  # how a skill may end that the robot does not have is not known
         words, handled = mission.ending.of(node.number).words, leads_to.to
         counted = {counts_as for word, counts_as in words.items() if word not in handled}
         for outcome in leads_to.keys:

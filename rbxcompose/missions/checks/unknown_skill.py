@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rbxcompose.findings import Finding, nearest
+from rbxcompose.findings import Finding, nearest, surely_meant
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.missions.program.registry import kinds
@@ -33,8 +33,10 @@ def unknown_skill(mission: Examined) -> Iterator[Finding]:
     skills = mission.robot.skills
     for node in mission.program.nodes:
         if node.skill and node.skill not in skills:
-            close = nearest(node.skill, (*skills, *kinds()))
-            if close or mission.robot.is_complete:
+            known = (*skills, *kinds())
+            close = nearest(node.skill, known)
+            # Else it may belong to a component that could not be read.
+            if mission.robot.is_complete or surely_meant(node.skill, known):
                 message = f"mission '{mission.program.name}' uses a skill that the robot does not have: '{node.skill}'"
-                known = (*skills, *kinds()) if close else skills
-                yield unknown_skill.misspelt(node.span, message, node.skill, known, "skills of this robot")
+                valid = known if close else skills
+                yield unknown_skill.misspelt(node.span, message, node.skill, valid, "skills of this robot")

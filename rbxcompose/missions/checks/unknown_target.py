@@ -50,6 +50,6 @@ def unknown_target(mission: Examined) -> Iterator[Finding]:
     known = {name for node in mission.program.nodes for name in (node.name, node.item) if name}
     for interrupt in mission.program.interrupts:
         named = interrupt.restarts
-        if named and not interrupt.targets:
+        if named and not interrupt.targets and not mission.program.is_open:
             message = f"nothing in the mission is named '{named.text}'"
             yield unknown_target.misspelt(named.span, message, named.text, known, "names of the mission")

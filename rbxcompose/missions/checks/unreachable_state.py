@@ -8,9 +8,10 @@ from rbxcompose.findings import Finding, Severity
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.missions.analysis.transitions import reached, transitions
+from rbxcompose.rules import OWN
 
 
-@mission_check("RBX4143", Severity.WARNING)
+@mission_check("RBX4143", Severity.WARNING, closed=(OWN,))
 def unreachable_state(mission: Examined) -> Iterator[Finding]:
     """A state that cannot be reached
 

@@ -8,9 +8,10 @@ from rbxcompose.findings import Finding, Related, Severity
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.effects import written
 from rbxcompose.missions.analysis.examined import Examined
+from rbxcompose.rules import OWN
 
 
-@mission_check("RBX4134", Severity.WARNING)
+@mission_check("RBX4134", Severity.WARNING, closed=(OWN,))
 def unwritten_output(mission: Examined) -> Iterator[Finding]:
     """An output that nothing writes
 

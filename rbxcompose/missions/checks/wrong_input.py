@@ -20,7 +20,8 @@ def wrong_input(mission: Examined) -> Iterator[Finding]:
     for view in mission.views:
         used = view.node.step.uses
         program = mission.robot.missions.get(used.text) if used else None
-        if used and program:
+        is_read = all(argument.name for argument in view.node.step.arguments)
+        if used and program and is_read:
             yield from _given(view, used.text, program)
             yield from _missing(view, used.text, program)
 
@@ -37,7 +38,9 @@ def _given(view: View, name: str, program: Program) -> Iterator[Finding]:
 
 def _missing(view: View, mission: str, program: Program) -> Iterator[Finding]:
     given = {argument.name for argument in view.node.step.arguments}
+    if given - program.inputs.keys():
+        return  # the missing input may be the misspelt one
     for name, declared in program.inputs.items():
-        if declared.default is None and name not in given:
+        if declared.must_be_given and name not in given:
             message = f"the input '{name}' of the mission '{mission}' needs a value"
             yield WRONG_INPUT.at(view.node.span, message, help=f"write it under 'with': '{name}: ...'")

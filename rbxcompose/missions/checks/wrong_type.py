@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from rbxcompose.expressions.check import check
 from rbxcompose.expressions.tree import Number
-from rbxcompose.expressions.types import COUNT, PLACE, TEXT, UNKNOWN, TypeKind, choice_of, quantity_of
+from rbxcompose.expressions.types import COUNT, PLACE, TEXT, UNKNOWN, Type, TypeKind, choice_of, quantity_of
 from rbxcompose.findings import Finding
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.effects import assignments
@@ -43,16 +43,22 @@ def wrong_type(mission: Examined) -> Iterator[Finding]:
 def _assigned(view: View, assignment: Assignment) -> Iterator[Finding]:
     """Yield a finding if a value does not fit its datum.
 
-    A count accepts any number, which must then be whole, and a text accepts a place: `room: dock` under `data` is both
-    a text and the name of a place.
+    A count accepts any number, also within a list or a map: `sum: 0` under `data` does not say that it stays whole. And
+    a text accepts a place: `room: dock` is both a text and the name of a place.
     """
     asked, data = assignment.asked, view.program.data
     wanted = data[assignment.name].type if assignment.name in data else UNKNOWN
-    if wanted == COUNT:
-        wanted = quantity_of(NUMBER)
-    elif wanted == TEXT and check(asked.expression, view.scope)[0] == PLACE:
+    wanted = _with_numbers(wanted)
+    if wanted == TEXT and check(asked.expression, view.scope)[0] == PLACE:
         wanted = PLACE
     yield from view.typed(asked.expression, wanted, asked.scalar, WRONG_TYPE)
+
+
+def _with_numbers(wanted: Type) -> Type:
+    """Return a type with any number in place of counts."""
+    if wanted == COUNT:
+        return quantity_of(NUMBER)
+    return replace(wanted, of=_with_numbers(wanted.of)) if wanted.of else wanted
 
 
 def _not_listed(view: View) -> Iterator[Finding]:

@@ -54,8 +54,8 @@ def bind_inputs(
     for name, declared in program.inputs.items():
         datum = _given(declared, given[name], findings) if name in given else declared.default
         if datum is None and name not in given:
-            if not is_begun:
-                continue
+            if not is_begun or not declared.must_be_given or given.keys() - program.inputs.keys():
+                continue  # the missing input may be the misspelt one
             message = f"the input '{name}' of the mission '{program.name}' needs a value"
             findings.append(codes.WRONG_INPUT.at(span, message, help=f"write it under 'with': '{name}: ...'"))
         elif datum is not None:

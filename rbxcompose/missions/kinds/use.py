@@ -136,6 +136,9 @@ class UseStep(Straight):
         given = reader.map_of("with", "a map from inputs to values") if reader.has("with") else None
         entries = given.entries.items() if given else ()
         arguments = tuple(WrittenArgument(key, entry.value, entry.key.span) for key, entry in entries)
+        if given is None and reader.has("with"):
+            span = reader.key_span("with")
+            arguments = (WrittenArgument("", ScalarNode("", span), span),)  # what is given could not be read
         return cls(name, arguments, read_history(reader))
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:

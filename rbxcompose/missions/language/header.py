@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from rbxcompose.expressions.types import TYPES, Type, choice_of
+from rbxcompose.expressions.types import TYPES, UNKNOWN, Type, choice_of
 from rbxcompose.findings import Report
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions import codes
@@ -27,9 +27,8 @@ def read_data(node: TreeNode | None, report: Report) -> dict[str, Datum]:
 
 
 def read_inputs(node: TreeNode | None, report: Report) -> dict[str, Input]:
-    """Return the inputs under `inputs:`; one whose type cannot be read is left out."""
-    read = (_input(name, entry, report) for name, entry in _named(node, "inputs", report).items())
-    return {one.name: one for one in read if one}
+    """Return the inputs under `inputs:`; one whose type cannot be read may have any."""
+    return {name: _input(name, entry, report) for name, entry in _named(node, "inputs", report).items()}
 
 
 def read_rate(node: TreeNode | None, report: Report) -> float:
@@ -58,12 +57,12 @@ def _named(node: TreeNode | None, section: str, report: Report) -> dict[str, Ent
     return node.entries
 
 
-def _input(name: str, entry: Entry, report: Report) -> Input | None:
+def _input(name: str, entry: Entry, report: Report) -> Input:
     value, place = entry.value, entry.key.span
     if not isinstance(value, MappingNode):
         message = f"the input '{name}' needs its 'type' below it"
         report.add(codes.WRONG_SHAPE.at(value.span, message, help="give 'type' and perhaps 'default'"))
-        return None
+        return Input(name, UNKNOWN, place, is_sound=False)
     for key, unknown in value.entries.items():
         if key not in INPUT_KEYS:
             message, taken = f"unknown key '{key}' in the input '{name}'", value.entries
@@ -71,9 +70,10 @@ def _input(name: str, entry: Entry, report: Report) -> Input | None:
                 codes.UNKNOWN_KEY.misspelt(unknown.key.span, message, key, INPUT_KEYS, "keys of an input", taken=taken)
             )
     if (wanted := _type(name, value, entry, report)) is None:
-        return None
+        return Input(name, UNKNOWN, place, is_sound=False)
     default, least, most = (_value(value.get(key), wanted, f"'{key}'", report) for key in ("default", "min", "max"))
-    read = Input(name, wanted, place, default, _number(least), _number(most))
+    is_sound = value.entries.keys() <= {*INPUT_KEYS} and (default is not None or "default" not in value)
+    read = Input(name, wanted, place, default, _number(least), _number(most), is_sound)
     if default and (trouble := range_trouble(read, default)):
         report.add(codes.WRONG_TYPE.at(default.span, f"the default of '{name}' {trouble}"))
     return read

@@ -8,7 +8,8 @@ from dataclasses import replace
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.expressions.types import UNKNOWN
 from rbxcompose.findings import Finding, Related, Report, Span
-from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode
+from rbxcompose.manifest.meant_keys import meant_keys, with_keys
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions import codes
 from rbxcompose.missions.analysis.held_nodes import ITEM, PathPattern, matching, pattern_of, with_held
 from rbxcompose.missions.analysis.uses import TOO_MUCH
@@ -52,27 +53,40 @@ def read_program(
             report.add(
                 codes.UNKNOWN_KEY.misspelt(entry.key.span, message, name, KEYS, "keys of a mission", taken=root.entries)
             )
-    reader = _Reader(report, root, repairs, budget)
+    is_open = _is_open(root)
+    root = with_keys(root, meant_keys(root, KEYS))
     inputs, data = read_inputs(root.get("inputs"), report), read_data(root.get("data"), report)
+    reader = _Reader(report, root, repairs, budget)
     body = _body(root, report)
     if body is None:
         reader.interrupts(root.get("interrupts"))
         return None
     reader.child(body, "do" if "do" in root else "", None)
     interrupts = reader.interrupts(root.get("interrupts"))
+    nodes = tuple(node for node in reader.nodes if node)
     data = {name: replace(one, value=with_held(one.value, reader.found, (name,))) for name, one in data.items()}
     return Program(
         _text(root, "name"),
         _text(root, "about"),
         root.span.file,
-        tuple(node for node in reader.nodes if node),
+        nodes,
         inputs,
         data,
         interrupts,
         read_rate(root.get("rate"), report),
         reader.outputs(root.get("outputs")),
         root=whole,
+        is_open=is_open or any(node.step.items is not None and not node.item for node in nodes),
     )
+
+
+def _is_open(root: MappingNode) -> bool:
+    """Return whether a mission may have names that could not be read."""
+    named = (root.get(key) for key in ("inputs", "data"))
+    unread = any(isinstance(node, SequenceNode) or (isinstance(node, ScalarNode) and node.text) for node in named)
+    meant = meant_keys(root, KEYS)
+    others = (entry.value for name, entry in root.entries.items() if name not in KEYS and name not in meant)
+    return unread or any(isinstance(node, MappingNode) for node in others)
 
 
 def _is_too_much(root: MappingNode, budget: Budget, report: Report) -> bool:

@@ -19,7 +19,10 @@ class Datum:
 
 @dataclass(frozen=True, slots=True)
 class Input:
-    """A typed argument of a mission; without a default it must be given."""
+    """A typed argument of a mission; without a default it must be given.
+
+    With mistakes in its declaration it is not sound: it may have a default that could not be read.
+    """
 
     name: str
     type: Type
@@ -27,3 +30,9 @@ class Input:
     default: Datum | None = None
     least: float | None = None
     most: float | None = None
+    is_sound: bool = True
+
+    @property
+    def must_be_given(self) -> bool:
+        """Return whether it has no value unless one is given."""
+        return self.default is None and self.is_sound

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import field
 from functools import cached_property
 from typing import ClassVar, Protocol, Self
@@ -77,6 +77,8 @@ class RobotNames:
     removed: Mapping[str, Span] = field(default_factory=dict)
     is_complete: bool = True
     events: frozenset[str] = NOTHING
+    may_have: Callable[[str, str], bool] = lambda kind, name: False
+    """Returns whether something of a kind may have a name, though it was not found: where it should be is a mistake."""
     ends: dict[str, Outcomes] = field(init=False, compare=False, repr=False, default_factory=dict)
     """How its missions may end, as far as that was asked: one that many others use is examined once."""
     claims: dict[str, frozenset[str]] = field(init=False, compare=False, repr=False, default_factory=dict)
@@ -345,7 +347,7 @@ class Program:
     """A mission: its main node has the number `main`, which is 0 unless it is part of a linked program.
 
     The nodes of the interrupts follow. `outputs` are what it returns to a mission that uses it. `root` is the tree it
-    was read from; everything else follows from that.
+    was read from; everything else follows from that. It is open if some of its own names could not be read.
     """
 
     name: str
@@ -359,6 +361,7 @@ class Program:
     outputs: Mapping[str, Asked] = field(default_factory=dict)
     main: int = ROOT
     root: MappingNode = field(default_factory=MappingNode, repr=False)
+    is_open: bool = False
 
     def asked(self) -> Iterator[tuple[MissionNode | None, Asked]]:
         """Yield all expressions, each with its node; None for an interrupt or an output."""
