@@ -9,9 +9,10 @@ from rbxcompose.expressions.tree import Expression, Junction, Variable, new_name
 from rbxcompose.expressions.types import FLAG
 from rbxcompose.findings import Finding, Related, Severity
 from rbxcompose.model.robot import Robot
+from rbxcompose.rules import WIRING
 
 
-@check("RBX4181", Severity.WARNING)
+@check("RBX4181", Severity.WARNING, closed=(WIRING,))
 def stale_event(robot: Robot) -> Iterator[Finding]:
     """An old message would end a wait at once
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from rbxcompose.check_runner import check
+from rbxcompose.checks.two_writers import is_command
 from rbxcompose.findings import Finding, Related, Severity
 from rbxcompose.model.robot import Robot
 from rbxcompose.sdk.ports import In, Out
 
 
-@check("RBX3120", Severity.WARNING)
+@check("RBX3120", Severity.WARNING, closed=())
 def unlike_classes(robot: Robot) -> Iterator[Finding]:
     """A port reads messages of another QoS class than they are published in
 
@@ -22,8 +23,11 @@ def unlike_classes(robot: Robot) -> Iterator[Finding]:
     Good: `qos=Qos.STATE` in both.
     """
     for topic, readers in robot.readers.items():
+        writers = robot.writers.get(topic, [])
         for reader in readers:
-            for writer in robot.writers.get(topic, []):
+            if is_command(reader) and len(writers) > 1:
+                continue  # that there are two is told, and the worse mistake
+            for writer in writers:
                 mine, theirs = reader.port, writer.port
                 if not isinstance(mine, In) or not isinstance(theirs, Out) or reader.type_name != writer.type_name:
                     continue

@@ -97,7 +97,7 @@ ABOVE = {
     "sim": "",
     "skills": "sdk",
     "twins": "actuation",
-    "testing": "twins bus compiler components model.wires params plan.model recording.message rendering.text "
+    "testing": "twins bus compiler components missions model.wires params plan.model recording.message rendering.text "
     "runtime.process_group runtime.records sdk",
 }
 # Pure: no bus, thread or clock.
