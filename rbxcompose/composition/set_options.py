@@ -50,7 +50,7 @@ def _set_overlay(text: str, line: int, root: MappingNode, report: Report) -> Map
     names = written.strip().split(".")
     if not equals or not all(names):
         message = f"'{SET} {text}' is not a path and a value"
-        report.add(BAD_SET.at(span, message, help=f"write {SET} battery.runtime='30 s'"))
+        report.add(BAD_SET.at(span, message, help=f"write {SET} {written.strip('. ') or 'PATH'}=VALUE"))
         return None
     path = _set_path(names, span, root, report)
     if path is None:

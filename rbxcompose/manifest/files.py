@@ -146,7 +146,7 @@ def _names_in(folder: Path) -> list[str] | None:
     """Return the names in a folder, of a large one only the first; None if it cannot be read."""
     try:
         with os.scandir(folder) as entries:
-            return [entry.name for entry in islice(entries, _MOST_NEIGHBOURS)]
+            return sorted(entry.name for entry in islice(entries, _MOST_NEIGHBOURS))
     except OSError:
         return None
 

@@ -13,7 +13,7 @@ from rbxcompose.expressions.parser import parse_fill
 from rbxcompose.expressions.tree import Expression, ExpressionError
 from rbxcompose.expressions.types import Type, TypeKind
 from rbxcompose.expressions.values import EvaluationError
-from rbxcompose.findings import Report, correction, kind, replacement, suggest
+from rbxcompose.findings import DID_YOU_MEAN, Report, correction, kind, replacement, suggest
 from rbxcompose.manifest import tree
 from rbxcompose.manifest.arguments import show
 from rbxcompose.manifest.fill_names import Names, NameTypes, NameValues
@@ -333,7 +333,7 @@ class _Filler:
         if name.startswith("secret."):
             return "a secret must stand alone: '${" + name.lower() + "}'"
         fix = suggest(name, self.known, "names that can be filled in")
-        if self.runs and not fix.startswith("did you mean"):
+        if self.runs and not fix.startswith(DID_YOU_MEAN):
             return f"what is known while the robot runs is written '${name}'"
         return fix
 

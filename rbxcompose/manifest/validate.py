@@ -13,7 +13,7 @@ from typing import Any, TypeVar, cast
 from pydantic import TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
-from rbxcompose.findings import SIMILAR, Finding, Report, Span, correction, kind
+from rbxcompose.findings import DID_YOU_MEAN, SIMILAR, Finding, Report, Span, correction, kind
 from rbxcompose.manifest.conversions import changed, repaired
 from rbxcompose.manifest.scalars import describe, number_trouble, plain_value
 from rbxcompose.manifest.shapes import dimension_at, keys_at
@@ -320,7 +320,7 @@ def not_a_choice(span: Span, name: str, value: TreeNode | None, choices: list[st
         fix = correction(written, choices, span)
         return NOT_A_CHOICE.at(span, f"'{name}' must be '{choices[0]}'", label=label, fix=fix)
     finding = NOT_A_CHOICE.misspelt(span, f"'{name}' must be one of {', '.join(choices)}", written, choices)
-    is_near = finding.help.startswith("did you mean")
+    is_near = finding.help.startswith(DID_YOU_MEAN)
     return finding if is_near else replace(finding, help="")  # the message lists all of them
 
 
@@ -346,10 +346,10 @@ def label_of(node: TreeNode | None) -> str:
 
 def unit_finding(error: UnitError, node: TreeNode, name: str) -> Finding:
     """Return the finding for a value that is not the required quantity."""
-    # If it does not even look like a number, help about numbers is no use.
+    # If it does not even look like a number, what is wrong with the number is no use.
     is_word = isinstance(node, ScalarNode) and node.filled is None and node.text[:1] not in "+-.0123456789"
     label = label_of(node) if is_word or not error.detail else error.detail
-    return WRONG_TYPE.at(node.span, f"'{name}' {error.message}", label=label, help="" if is_word else error.help)
+    return WRONG_TYPE.at(node.span, f"'{name}' {error.message}", label=label, help=error.help)
 
 
 def _slip(model: Any, node: TreeNode, path: KeyPath, loc: KeyPath, error: ErrorDetails) -> Finding | None:
