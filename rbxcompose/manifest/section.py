@@ -19,8 +19,10 @@ from pydantic import BeforeValidator
 from rbxcompose.config import Name
 from rbxcompose.findings import Report
 from rbxcompose.manifest.documents import Documents
+from rbxcompose.manifest.misplaced import is_misplaced, misplaced
+from rbxcompose.manifest.named_items import help_with_names
 from rbxcompose.manifest.renamer import Renames
-from rbxcompose.manifest.shapes import below, kinds_of, with_references
+from rbxcompose.manifest.shapes import below, keys_at, kinds_of, with_references
 from rbxcompose.manifest.tree import Entry, KeyPath, MappingNode, ScalarNode, TreeNode, at
 from rbxcompose.manifest.validate import WRONG_TYPE, is_valid, label_of, validate
 from rbxcompose.manifest.wanted_components import WantedComponent, Wiring
@@ -227,6 +229,13 @@ class Contents:
             self._read[section.name] = section.read(Reading(section, self))
         return cast(R, self._read[section.name])
 
+    def is_misplaced(self, section: Section[Any, Any], entry: Entry) -> bool:
+        """Return whether an entry of a section is another section of the file, indented too far."""
+        names = [one.name for one in self._sections]
+        if entry.key.text not in names:
+            return False
+        return is_misplaced(entry, names, {key for one in section.types_of(entry.value) for key in keys_at(one, ())})
+
     @cached_property
     def known(self) -> dict[str, Mapping[str, object]]:
         """Return the names of each kind, including entries with mistakes: references to them are not wrong."""
@@ -306,8 +315,12 @@ class Reading(Generic[M]):
         return self.contents.documents.writer(node.span, self.contents.file)
 
     def named(self) -> Iterator[tuple[str, Entry]]:
-        """Yield the entries by name, after a finding for each bad name."""
-        return named_entries(self.contents.root, (self.section.name, *self.section.at), self.report)
+        """Yield the entries by name, after a finding for each bad name, and for sections that were indented too far."""
+        for name, entry in named_entries(self.contents.root, (self.section.name, *self.section.at), self.report):
+            if self.contents.is_misplaced(self.section, entry):
+                self.report.add(misplaced(entry.key, self.section.name))
+            else:
+                yield name, entry
 
     def valid(self, model: type[T], name: str, node: TreeNode) -> T | None:
         """Return an entry as an instance of `model`, None after its findings."""
@@ -338,7 +351,7 @@ def named_entries(root: MappingNode, path: tuple[str, ...], report: Report) -> I
         return
     if not isinstance(node, MappingNode):
         message = f"'{path[-1]}' must be a map of named entries"
-        report.add(WRONG_TYPE.at(node.span, message, label=label_of(node)))
+        report.add(WRONG_TYPE.at(node.span, message, label=label_of(node), help=help_with_names(node)))
         return
     for name, entry in node.entries.items():
         if is_valid(Name, name) or validate(Name, replace(entry.key, plain=False), (*path, name), report) is not None:
