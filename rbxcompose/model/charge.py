@@ -76,6 +76,13 @@ def top_speed(robot: Robot, driver: RobotComponent, navigates: Navigates) -> flo
     return min((limit.value for limit in limits if limit), default=math.inf)
 
 
+def top_turn_rate(robot: Robot, driver: RobotComponent) -> float:
+    """Return the highest rate at which the robot turns on its way to a place [rad/s], infinite if none is known."""
+    limits = [one.max_turn_rate for one in driver.declared(CommandsMotion)]
+    limits += [one.drives.max_turn_rate for one in MessageFlow(robot).drives() if one.driver is driver]
+    return min((limit.value for limit in limits if limit and limit.value > 0), default=math.inf)
+
+
 def ways_of(robot: Robot, mission: RobotMission) -> Ways | None:
     """Return an empty record of the mission's ways; None if it drives with several skills."""
     used = {node.skill for node in mission.program.nodes if node.skill}
@@ -86,5 +93,6 @@ def ways_of(robot: Robot, mission: RobotMission) -> Ways | None:
         return None
     skill, driver, navigates = found[0]
     speed, tolerance = top_speed(robot, driver, navigates), navigates.tolerance
-    driving = Driving(skill, robot.skills[skill].skill.main, speed, tolerance.value if tolerance else 0.0)
+    main, ends_within = robot.skills[skill].skill.main, tolerance.value if tolerance else 0.0
+    driving = Driving(skill, main, speed, ends_within, top_turn_rate(robot, driver))
     return Ways(mission.program, driving, robot.manifest.places)

@@ -18,12 +18,13 @@ Here = Place | None  # where the robot is; None: unknown
 
 @dataclass(frozen=True, slots=True)
 class Driving:
-    """The skill that drives, its main argument, the speed [m/s] and the goal tolerance [m]."""
+    """The skill that drives, its main argument, the speed [m/s], the goal tolerance [m], the turn rate [rad/s]."""
 
     skill: str
     main: str
     speed: float
     tolerance: float
+    turn_rate: float = math.inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,6 +99,14 @@ class Ways:
     def between(self, here: Place, there: Place) -> float:
         """Return the time of a straight drive at full speed, from edge to edge of the tolerances [s]."""
         return max(0.0, distance(here, there) - 2 * self.driving.tolerance) / self.driving.speed
+
+    def with_turns(self, here: Place, there: Place) -> float:
+        """Return the time of that drive with a turn towards it before, and one to the heading there after it [s]."""
+        way = distance(here, there)
+        bearing = math.atan2(there.y - here.y, there.x - here.x) if way else here.heading
+        turns = abs(math.remainder(bearing - here.heading, math.tau))
+        turns += abs(math.remainder(there.heading - bearing, math.tau))
+        return self.between(here, there) + turns / self.driving.turn_rate
 
     def _in_turn(self, node: MissionNode, here: Here, constants: Constants) -> tuple[Here, float]:
         takes = 0.0
