@@ -35,3 +35,8 @@ def other_unit(left: tuple[ExpressionNode, Type], right: tuple[ExpressionNode, T
         if dimension in DIMENSIONS.values() and dimension and _written(written) and not _written(other):
             return f"units of {kind.phrase}: {', '.join(units_of(dimension)) or 'none'}"
     return ""
+
+
+def quotes_needed(text: str) -> str:
+    """Return the help for a text without quotes: those of the expression, within those of YAML."""
+    return f"a text needs quotes: write '\"{text}\"'"

