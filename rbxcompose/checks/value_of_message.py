@@ -29,14 +29,14 @@ def value_of_message(robot: Robot) -> Iterator[Finding]:
     values:
       level:
         topic: battery_level
-        type: text
+        field: dta
     ```
     Good:
     ```yaml
     values:
       level:
         topic: battery_level
-        type: ratio
+        field: data
     ```
     """
     for name, entry in robot.manifest.values.items():

@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from rbxcompose.findings import Finding, nearest
-from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode
+from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode
 from rbxcompose.manifest.validate import UNKNOWN_KEY
 
 
-def is_misplaced(entry: Entry, sections: Collection[str], keys: Collection[str]) -> bool:
-    """Return whether an entry is a section of the file: it has the name of one, and none of the `keys` of an entry."""
-    value = entry.value
-    return (
-        entry.key.text in sections
-        and isinstance(value, MappingNode)
-        and bool(value.entries)
-        and not any(nearest(name, keys) for name in value.entries)
-    )
+def is_misplaced(entry: TreeNode, keys: Collection[str], own: Collection[str]) -> bool:
+    """Return whether an entry with the name of a section is that section, and no entry of the section around it.
+
+    `keys` are those of the section, none if it takes any name; `own` are those of an entry.
+    """
+    if not isinstance(entry, MappingNode) or not entry.entries:
+        return False
+    is_section = not keys or any(name in keys for name in entry.entries)
+    return is_section and not any(nearest(name, own) for name in entry.entries)
 
 
 def misplaced(key: ScalarNode, around: str) -> Finding:

@@ -142,6 +142,12 @@ class Declaration(Generic[M]):
             return (self.short_type,)
         return self.models(entry) if self.models else (self.model,)
 
+    def keys_of(self, entry: Entry) -> set[str]:
+        """Return the keys that an entry may have."""
+        if self.at:
+            return set(keys_at(self.model, (*self.at, entry.key.text)))
+        return {key for one in self.types_of(entry.value) for key in keys_at(one, ())}
+
     def has_names_of(self, kind: str) -> bool:
         """Return whether its keys are names of a kind; everything that runs is a component, too."""
         return kind == self.names or (kind == COMPONENT and self.runs)
@@ -231,10 +237,11 @@ class Contents:
 
     def is_misplaced(self, section: Section[Any, Any], entry: Entry) -> bool:
         """Return whether an entry of a section is another section of the file, indented too far."""
-        names = [one.name for one in self._sections]
-        if entry.key.text not in names:
+        other = next((one for one in self._sections if one.name == entry.key.text), None)
+        if other is None:
             return False
-        return is_misplaced(entry, names, {key for one in section.types_of(entry.value) for key in keys_at(one, ())})
+        keys = () if other.is_map else keys_at(other.model, ())
+        return is_misplaced(entry.value, keys, section.keys_of(entry))
 
     @cached_property
     def known(self) -> dict[str, Mapping[str, object]]:
