@@ -8,7 +8,7 @@ PYTEST ?= -n auto
 .PHONY: up test lint types unit soak bench docs messages lock clean
 
 up: $(VENV)/.up
-	@$(BIN)/rbxcompose up $(ROBOT)
+	@trap : INT; $(BIN)/rbxcompose up $(ROBOT) || test $$? -eq 130  # Ctrl-C is how a run ends
 
 test: lint types unit
 

@@ -7,13 +7,14 @@ adds its findings to the report; nothing here prints, exits or starts anything.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence, Set
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 from types import MappingProxyType
 
 from rbxcompose.check_runner import run_checks
 from rbxcompose.composition.overlay import SET
 from rbxcompose.composition.robot_file import load_robot
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Related, Report, Severity, Span, kind
 from rbxcompose.manifest.limits import LEAST_STEPS, PROFILE_STEPS, STEP_BYTES, STEP_VALUES
 from rbxcompose.manifest.reader import ParsedText, Texts

@@ -5,13 +5,22 @@ Inside, all is SI and ratios are 0 to 1. A field's docstring becomes its descrip
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated, Any
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, GetCoreSchemaHandler, StringConstraints, WithJsonSchema
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    StringConstraints,
+    WithJsonSchema,
+)
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from rbxcompose import units
+from rbxcompose.dataclass import dataclass
+from rbxcompose.field_docs import field_docs
 from rbxcompose.references import JOINT, LINK, PLACE, Refers
 from rbxcompose.units import Dimension, to_si
 
@@ -19,7 +28,17 @@ from rbxcompose.units import Dimension, to_si
 class Config(BaseModel):
     """A closed, frozen set of fields; a key that it does not declare is a finding."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        made = handler(schema)
+        properties = handler.resolve_ref_schema(made).get("properties", {})
+        for name, text in field_docs(cls).items():
+            shown = properties.get(cls.model_fields[name].alias or name) if name in cls.model_fields else None
+            if shown is not None:
+                shown.setdefault("description", text)
+        return made
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,6 @@ from __future__ import annotations
 import inspect
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, ClassVar, Generic, Literal, Protocol, Self, TypeVar, get_args
 
@@ -17,6 +16,7 @@ from pydantic import PrivateAttr
 from rbxcompose.config import Config
 from rbxcompose.control.curves import JointSample
 from rbxcompose.control.trajectory_plan import JointRules
+from rbxcompose.dataclass import dataclass
 from rbxcompose.plugins import Plugins
 from rbxcompose.sdk.bound import ActionServer, ServedGoal
 from rbxcompose.sdk.capabilities import Capability

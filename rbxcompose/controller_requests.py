@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import shlex
-from dataclasses import dataclass
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.requests import Command, Query
 
 BUS = "servo_bus"

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Edit, Finding, Fix, Sources
 
 COMMAND_LINE = "--"  # prefix of the names of texts that are not files, such as `--set`

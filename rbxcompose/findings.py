@@ -9,11 +9,12 @@ import difflib
 import heapq
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import StrEnum
 from functools import lru_cache
 from typing import NamedTuple
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.per_compile import may_guess
 
 SIMILAR = 0.6  # difflib ratio above which a name is offered as "did you mean"

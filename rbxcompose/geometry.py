@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+
+from rbxcompose.dataclass import dataclass
 
 Vector3 = tuple[float, float, float]  # x, y, z
 Quaternion = tuple[float, float, float, float]  # x, y, z, w

@@ -8,9 +8,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import wraps
 from typing import ParamSpec, TypeVar, cast
+
+from rbxcompose.dataclass import dataclass
 
 P = ParamSpec("P")
 T = TypeVar("T")

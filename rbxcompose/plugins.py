@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from functools import cached_property
+import sys
+from functools import cache, cached_property
 from typing import TYPE_CHECKING
 
 from rbxcompose.findings import Severity, kind
@@ -63,11 +64,9 @@ class Plugins:
     @cached_property
     def third_party(self) -> dict[str, tuple[EntryPoint, ...]]:
         """Entry points of other distributions, by name; two with the same name conflict."""
-        from importlib.metadata import entry_points  # slow to import, and most commands need no plug-in
-
         prefix = f"{self.family}."
         found: dict[str, tuple[EntryPoint, ...]] = {}
-        for entry in entry_points(group=GROUP):
+        for entry in _entries(tuple(sys.path)):
             if entry.name.startswith(prefix):
                 name = entry.name.removeprefix(prefix)
                 found[name] = (*found.get(name, ()), entry)
@@ -113,3 +112,11 @@ class Plugins:
         entries = self.third_party[name]
         packages = sorted({f"'{plain(one.dist.name, 60)}'" if one.dist else one.module for one in entries})
         return f"package{'s' if len(packages) > 1 else ''} {' and '.join(packages)}"
+
+
+@cache
+def _entries(path: tuple[str, ...]) -> tuple[EntryPoint, ...]:
+    """Return what the distributions on Python's path announce: their files are read once for all families."""
+    from importlib.metadata import entry_points  # slow to import, and most commands need no plug-in
+
+    return tuple(entry_points(group=GROUP))

@@ -7,11 +7,12 @@ A section of the manifest defines the names of a kind. A field says that it take
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+from rbxcompose.dataclass import dataclass
 
 COMPONENT, PLACE, VALUE, MISSION = "component", "place", "value", "mission"
 ANALYZER, ARGUMENT, INSTANCE = "analyzer", "argument", "instance"

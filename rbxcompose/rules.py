@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import islice
 from typing import Generic, TypeVar
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, FindingKind, Severity, register_kind
 
 S = TypeVar("S")

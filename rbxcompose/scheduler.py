@@ -53,7 +53,7 @@ class Scheduler:
     def at(self, time: float, owner: str, callback: Callback) -> ScheduledCallback:
         """Run `callback` for `owner` once at robot time `time` [s] (immediately, if that is past)."""
         event = ScheduledCallback(callback)
-        heapq.heappush(self._events, (max(time, self.now), owner, next(self._sequence), event))
+        heapq.heappush(self._events, (time if time > self.now else self.now, owner, next(self._sequence), event))
         return event
 
     def post(self, owner: str, callback: Callback) -> ScheduledCallback:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
 
 from rbxcompose.actuation.bus import ServoBus
 from rbxcompose.actuation.bus_types import bus_type
 from rbxcompose.actuation.servo_joint import ServoJoint
+from rbxcompose.dataclass import dataclass
 from rbxcompose.servo_bus_config import ServoBusConfig
 from rbxcompose.twins.fault_script import FaultScript
 from rbxcompose.twins.servo_fake import FakeServo

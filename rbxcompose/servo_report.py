@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
 from rbxcompose.actuation.joint_drive import JointDrive
 from rbxcompose.actuation.periods import Periods
 from rbxcompose.control.joint_states import JointMode
+from rbxcompose.dataclass import dataclass
 from rbxcompose.levels import Level
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.stamps import to_time

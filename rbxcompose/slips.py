@@ -11,11 +11,11 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from functools import cached_property
 from graphlib import TopologicalSorter
 from typing import Any, Generic, TypeVar
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Report
 
 Find = TypeVar("Find", bound=Callable[..., Any])

@@ -8,10 +8,10 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import lru_cache
 from types import MappingProxyType
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import suggest
 
 MOST = 1e15  # magnitudes from here on are refused: they are slips, and floats soon stop being exact for whole numbers

@@ -10,6 +10,7 @@ from pydantic.fields import FieldInfo
 
 from docs.generating.markdown import code, table
 from rbxcompose.config import Config, Dimensioned, Name, Secret
+from rbxcompose.field_docs import field_docs
 from rbxcompose.manifest.fields import DottedName, InterfaceName
 from rbxcompose.manifest.options import RestartModel
 from rbxcompose.manifest.registry import naming
@@ -41,7 +42,10 @@ _LIMITS: tuple[tuple[type, str, str], ...] = (
 def keys_table(model: type[Config]) -> str:
     """Return a table of the keys of a model."""
     hints = get_type_hints(model, include_extras=True)
-    rows = [_row(field.alias or name, field, hints[name]) for name, field in model.model_fields.items()]
+    about = field_docs(model)
+    rows = [
+        _row(field.alias or name, field, hints[name], about.get(name, "")) for name, field in model.model_fields.items()
+    ]
     return table(("key", "takes", "default", "what it is"), rows)
 
 
@@ -55,9 +59,9 @@ def with_default(model: type[Config]) -> list[str]:
     return [f"{code(key)} ({default})" if default else code(key) for key, default in fields]
 
 
-def _row(key: str, field: FieldInfo, hint: object) -> tuple[str, str, str, str]:
+def _row(key: str, field: FieldInfo, hint: object, about: str) -> tuple[str, str, str, str]:
     takes = ", ".join([takes_of(hint), *limits(field, dimension_of(hint))])
-    return code(key), takes, default_of(field, dimension_of(hint)), field.description or ""
+    return code(key), takes, default_of(field, dimension_of(hint)), about
 
 
 def takes_of(hint: object) -> str:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Protocol
 
 from rbxcompose.actuation.servo_models import ServoModel, model_of_number
+from rbxcompose.dataclass import dataclass
 
 
 @dataclass(frozen=True, slots=True)

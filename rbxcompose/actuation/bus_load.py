@@ -9,12 +9,12 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 
 from rbxcompose.actuation.cycle_items import FAST, slow_items
 from rbxcompose.actuation.groups import FACTORY_DELAY, REPLY, ROOM, in_chunks, request_groups
 from rbxcompose.actuation.servo_models import ServoModel
 from rbxcompose.actuation.transfers import Stretch, read_plan, write_plans
+from rbxcompose.dataclass import dataclass
 
 _BITS = 10  # of a byte on the wire, with those that begin and end it
 _REQUEST = {1: 6, 2: 10}  # [B] of a request without parameters, by protocol

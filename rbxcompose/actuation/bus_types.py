@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Protocol
 
 from rbxcompose.actuation.bus import ServoBus
 from rbxcompose.actuation.servo_models import ServoModel, find_model
+from rbxcompose.dataclass import dataclass
 from rbxcompose.plugins import Plugins
 
 PLUGINS = Plugins("bus_type", "rbxcompose.bus_types")

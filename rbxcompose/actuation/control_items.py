@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import Enum
+
+from rbxcompose.dataclass import dataclass
 
 _DIRECTION = 10  # bit of a speed or load in protocol 1.0: set means clockwise, which is negative
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 
 from rbxcompose.actuation.bus import ServoBus
 from rbxcompose.actuation.joint_drive import JointDrive
 from rbxcompose.control.joint_states import Enable
+from rbxcompose.dataclass import dataclass
 
 PAUSE = 0.1  # [s] in which a servo may still answer from before
 PATIENCE = 2.0  # [s] after which it must have answered

@@ -7,11 +7,11 @@ same when the device comes back under another number.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
 
 from rbxcompose.actuation.port_errors import DeviceNotUniqueError, NoDeviceError
+from rbxcompose.dataclass import dataclass
 from rbxcompose.printable import plain
 
 ROOT = Path("/")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import zip_longest
 from typing import Protocol
 
@@ -17,6 +17,7 @@ from rbxcompose.actuation.speed_limits import keep_speeds
 from rbxcompose.actuation.torque_limits import LIMIT, TorqueLimits
 from rbxcompose.control.curves import JointSample
 from rbxcompose.control.joint_states import Relax
+from rbxcompose.dataclass import dataclass
 
 
 class Leader(Protocol):

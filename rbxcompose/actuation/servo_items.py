@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from rbxcompose.actuation.bus import ServoBus
 from rbxcompose.actuation.servo_models import ServoModel
+from rbxcompose.dataclass import dataclass
 
 PERIOD = 0.1  # [s] between two uses of one item
 

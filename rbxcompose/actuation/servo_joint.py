@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Literal
 
 from rbxcompose.actuation.servo_models import ServoModel
 from rbxcompose.control.limits import MotionLimits
 from rbxcompose.control.transmission import Gear, Transmission
+from rbxcompose.dataclass import dataclass
 
 ONE_TO_ONE = Gear()
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cache
 from types import MappingProxyType
 
 from rbxcompose.actuation.control_items import ControlItem
 from rbxcompose.actuation.control_tables import items_of
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import suggest
 
 HARDWARE_ERRORS: Mapping[int, str] = MappingProxyType(

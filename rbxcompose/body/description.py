@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, MutableMapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 from rbxcompose.body.attachment import PieceAttachment
@@ -15,6 +15,7 @@ from rbxcompose.body.model import Body
 from rbxcompose.body.pieces import PieceOfBody, assembled, to_xml, with_meshes
 from rbxcompose.body.urdf import read_body
 from rbxcompose.body.xml_reader import XmlElement
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Span
 
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, MutableMapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 
 from rbxcompose.body.xacro import Expanded, XacroFile, expand_all
 from rbxcompose.body.xml_reader import XmlElement, read_urdf
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Span
 from rbxcompose.manifest.files import project_of, shown_name
 from rbxcompose.manifest.library import library_root

@@ -7,7 +7,7 @@ import os
 import stat
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from xxhash import xxh3_128_hexdigest
@@ -15,6 +15,7 @@ from xxhash import xxh3_128_hexdigest
 import rbxcompose
 from rbxcompose.atomic_files import replace_file
 from rbxcompose.body.xacro_answer import XacroAnswer, limited
+from rbxcompose.dataclass import dataclass
 from rbxcompose.regular_files import open_regular
 from rbxcompose.typed_json import UnreadableError, from_data, to_data
 

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rbxcompose.body.inertia import Tensor, about, added, principal_moments
 from rbxcompose.body.model import Body, BodyLink, Inertial
 from rbxcompose.findings import Finding, Severity, kind
-from rbxcompose.geometry import Transform3, rotate
 from rbxcompose.printable import plain
 
 NO_MASS = kind(
@@ -79,9 +76,6 @@ Good:
 _TOLERANCE = 1e-6  # relative, of moments that were rounded when they were written
 _THIN = 1e-6  # [m]: a mass that is nearer than this to an axis has no moment about it
 _SHOWN = 60
-_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-
-Array = NDArray[np.float64]
 
 
 def mass_mistakes(body: Body) -> Iterator[Finding]:
@@ -123,7 +117,7 @@ def _impossible(inertial: Inertial) -> str:
         return f"has the mass {inertial.mass:g} kg"
     if inertial.mass == 0.0:
         return "has a moment of inertia and no mass" if any(inertial.inertia) else ""
-    least, middle, most = np.linalg.eigvalsh(_tensor(inertial))
+    least, middle, most = principal_moments(_tensor(inertial))
     slack = inertial.mass * _THIN**2 + most * _TOLERANCE
     if least < -slack:
         return "has a negative moment of inertia"
@@ -132,27 +126,19 @@ def _impossible(inertial: Inertial) -> str:
     return ""
 
 
-def _tensor(inertial: Inertial) -> Array:
+def _tensor(inertial: Inertial) -> Tensor:
     ixx, ixy, ixz, iyy, iyz, izz = inertial.inertia
-    return np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
+    return (ixx, ixy, ixz), (ixy, iyy, iyz), (ixz, iyz, izz)
 
 
-def _is_thin(mass: float, tensor: Array) -> bool:
-    return bool(np.linalg.eigvalsh(tensor)[0] <= mass * _THIN**2)
+def _is_thin(mass: float, tensor: Tensor) -> bool:
+    return principal_moments(tensor)[0] <= mass * _THIN**2
 
 
-def _together(body: Body, links: Sequence[BodyLink]) -> tuple[float, Array]:
+def _together(body: Body, links: Sequence[BodyLink]) -> tuple[float, Tensor]:
     """Return the mass of links that are fixed to each other, and their inertia about the centre of mass."""
     poses, parts = body.poses({}), [(link.name, link.inertial) for link in links if link.inertial is not None]
     places = [(poses[name].compose(one.origin), one) for name, one in parts]
     mass = sum(one.mass for _, one in places)
-    centre = np.sum([one.mass * np.array(at.translation) for at, one in places], axis=0) / mass
-    return mass, np.sum([_about(centre, at, one) for at, one in places], axis=0)
-
-
-def _about(centre: Array, at: Transform3, inertial: Inertial) -> Array:
-    """Return the inertia of a link about a point, by the parallel axis theorem."""
-    turn = np.transpose([rotate(at.rotation, axis) for axis in _AXES])
-    arm = np.array(at.translation) - centre
-    moved: Array = turn @ _tensor(inertial) @ turn.T + inertial.mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
-    return moved
+    x, y, z = (sum(one.mass * at.translation[axis] for at, one in places) / mass for axis in range(3))
+    return mass, added([about((x, y, z), at, one.mass, _tensor(one)) for at, one in places])

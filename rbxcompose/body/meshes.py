@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 
 from rbxcompose.body.extra import need
 from rbxcompose.body.mesh_files import FORMATS, LARGEST, mesh_problem
+from rbxcompose.dataclass import dataclass
 from rbxcompose.printable import plain
 from rbxcompose.regular_files import read_regular
 

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Span
 from rbxcompose.geometry import Transform3, Vector3, quaternion_about
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from xml.sax.saxutils import escape, quoteattr
+from dataclasses import replace
 
 from rbxcompose.body.attachment import PieceAttachment
 from rbxcompose.body.xml_reader import XmlElement
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Span, kind
 
 NOT_ATTACHED = kind(
@@ -150,6 +150,8 @@ def to_xml(root: XmlElement) -> str:
 
 
 def _lines(element: XmlElement, indent: str) -> Iterator[str]:
+    from xml.sax.saxutils import escape, quoteattr  # imports much of the network's modules; most bodies are one text
+
     attributes = "".join(f" {name}={quoteattr(value)}" for name, value in element.attributes.items())
     text = escape(element.text.strip())
     if not element.children:

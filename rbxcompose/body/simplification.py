@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 
 from rbxcompose.body.extra import need
 from rbxcompose.body.meshes import Solid, Trimesh, read_mesh
+from rbxcompose.dataclass import dataclass
 from rbxcompose.printable import plain
 
 LARGEST_FILE = 512_000_000  # [bytes]

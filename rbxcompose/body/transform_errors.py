@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import nearest
 from rbxcompose.units import TIME, format_quantity
 

@@ -7,7 +7,6 @@ was *measured* at its stamp [ns], by the clock of who sent it: look-ups at a tim
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from rbxcompose.body.pose_history import PoseHistory
 from rbxcompose.body.transform_errors import (
@@ -18,6 +17,7 @@ from rbxcompose.body.transform_errors import (
     TransformError,
     UnknownFrameError,
 )
+from rbxcompose.dataclass import dataclass
 from rbxcompose.geometry import Transform3, composed
 
 MOST_FRAMES = 10_000  # names come from outside; a tree must not grow without bound
@@ -31,6 +31,9 @@ class TransformAnswer:
 
     accepted: bool
     message: str = ""
+
+
+_ACCEPTED = TransformAnswer(True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +90,8 @@ class TransformTree:
         history = PoseHistory() if known is None else known
         late = self._remember(history, transform, round(stamp * NANOSECONDS) if measured is None else measured)
         self._replace(child, _Link(parent, transform, stamp, history))
-        return TransformAnswer(True, note or (f"the stamps of '{child}' went back{late}" if late else ""))
+        note = note or (f"the stamps of '{child}' went back{late}" if late else "")
+        return TransformAnswer(True, note) if note else _ACCEPTED
 
     def lookup(self, target: str, source: str) -> Transform3 | None:
         """Return the newest pose of frame `source` in frame `target`, or None when they are not connected.
@@ -165,16 +169,16 @@ class TransformTree:
 
     def _remember(self, history: PoseHistory, pose: Transform3, measured: int) -> str:
         """Add a pose to a history; if its stamp is not the newest, return what becomes of the history."""
-        late = ""
-        if history.is_set_back(measured):
-            late = ": its earlier poses are forgotten"
-        elif len(history) and measured < history.newest:
-            late = ", by less than a second"
-        held = len(history)
+        late, held = "", len(history)
+        if held and measured < history.newest:
+            is_forgotten = history.is_set_back(measured)
+            late = ": its earlier poses are forgotten" if is_forgotten else ", by less than a second"
         history.add(measured, pose)
-        if self._kept + len(history) - held > MOST_POSES:
-            history.halve()
         self._kept += len(history) - held
+        if self._kept > MOST_POSES:
+            before = len(history)
+            history.halve()
+            self._kept += len(history) - before
         return late
 
     def _replace(self, child: str, link: _Link) -> None:
@@ -186,7 +190,8 @@ class TransformTree:
     def _refusal(self, parent: str, child: str, transform: Transform3) -> str:
         if not parent or not child:
             return "a frame needs a name"
-        if not all(map(math.isfinite, (*transform.translation, *transform.rotation))):
+        numbers = (*transform.translation, *transform.rotation)
+        if not math.isfinite(sum(numbers)) and not all(map(math.isfinite, numbers)):
             return f"the transform of '{child}' contains a number that is not finite"
         if abs(math.hypot(*transform.rotation) - 1.0) > UNIT_TOLERANCE:
             return f"the rotation of '{child}' is not a unit quaternion"
@@ -244,4 +249,6 @@ class TransformTree:
 def _normalised(transform: Transform3) -> Transform3:
     x, y, z, w = transform.rotation
     length = math.hypot(x, y, z, w)
+    if length == 1.0:
+        return transform
     return Transform3(transform.translation, (x / length, y / length, z / length, w / length))

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import partial
 from typing import TypeVar
 
 from rbxcompose.body.model import KINDS, Body, BodyJoint, BodyLink, Geometry, Inertial, JointLimits, Mimic, Shape
 from rbxcompose.body.tree_rules import tree_mistakes
 from rbxcompose.body.xml_reader import XmlElement
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Related, kind
 from rbxcompose.geometry import Transform3, quaternion_from_rpy
 from rbxcompose.printable import plain

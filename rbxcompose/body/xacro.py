@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 from rbxcompose.body.prefixes import missing_prefixes
 from rbxcompose.body.xacro_answer import XacroAnswer
 from rbxcompose.body.xacro_answers import XacroRequest, answers
 from rbxcompose.body.xml_reader import PLACE, span_of_place
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Severity, Span, kind
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.printable import plain

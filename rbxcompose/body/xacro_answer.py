@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.typed_json import UnreadableError, from_data
 
 _PLACE = re.compile(r".*\|[1-9]\d{0,7}\|[1-9]\d{0,7}\|\d{1,8}", re.DOTALL)

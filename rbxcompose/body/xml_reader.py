@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from xml.parsers import expat
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Related, Span, kind
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.manifest.limits import DEPTH, URDF_ELEMENTS

@@ -79,6 +79,7 @@ class ActionServer(Generic[G, R, F]):
         """With `waits`, hold goals back until the node is open."""
         names = ActionNames.of(name)
         self.current: ServedGoal[G, R, F] | None = None  # the goal to carry out; a newer one replaces it
+        self.began: Callable[[], None] = lambda: None  # called when there is a goal to carry out
         self._name, self._action, self._accept = name, action, accept
         self._process, self._owner = node.process, node.owner
         self._goals: Goals[G, R] = Goals()
@@ -171,6 +172,7 @@ class ActionServer(Generic[G, R, F]):
         goal: Goal[G, R] = Goal(id_, request.message.goal, request.client, self._process.clock.stamp())
         self._goals.accept(goal)
         self.current = ServedGoal(self, goal)
+        self.began()
         self._tell_status()
         request.reply(response(accepted=True, stamp=to_time(goal.accepted)))
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from rbxcompose.bus.wire import RosQos
+from rbxcompose.dataclass import dataclass
 from rbxcompose.qos import Qos
 
 SERVICE_QOS = RosQos(depth=10)  # ROS's default for services

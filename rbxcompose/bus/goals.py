@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from enum import IntEnum
 from typing import Generic, TypeVar
+
+from rbxcompose.dataclass import dataclass
 
 G = TypeVar("G")
 R = TypeVar("R")

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 from rbxcompose.bus.names import ros_type
 from rbxcompose.bus.tokens import EndpointToken, EntityKind, NodeToken, gid, parse_token
 from rbxcompose.bus.wire import RosQos, WireProfile
+from rbxcompose.dataclass import dataclass
 
 _SEND_GOAL = "/_action/send_goal"
 _WIRE = WireProfile("tokens")

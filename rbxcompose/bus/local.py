@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import chain, count
 from typing import Generic, Protocol, TypeVar
 
@@ -13,6 +13,7 @@ from rbxcompose.bus.tokens import EntityKind, NodeToken, endpoint_pattern, gid
 from rbxcompose.bus.transport import Closable, Transport
 from rbxcompose.bus.wire import RosQos, WireProfile
 from rbxcompose.clock import Clock
+from rbxcompose.dataclass import dataclass
 from rbxcompose.msgs.types import Interface
 from rbxcompose.scheduler import Scheduler
 

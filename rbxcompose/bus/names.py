@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+
+from rbxcompose.dataclass import dataclass
 
 LONGEST_NAME = 247  # rmw's limit: 255 bytes less the prefixes that some middleware adds
 ADMIN = "rbx/"  # prefix of the keys that are not part of ROS 2

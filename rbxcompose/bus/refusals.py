@@ -23,6 +23,7 @@ class Refusals:
         self._numbers = {reason: count(1) for reason in RefusalReason}  # `next` is atomic
         self._counted = dict.fromkeys(RefusalReason, 0)
         self._told = dict.fromkeys(RefusalReason, 0)
+        self._told_total = 0
 
     def add(self, reason: RefusalReason) -> None:
         """Count one more."""
@@ -35,9 +36,11 @@ class Refusals:
 
     def news(self) -> dict[RefusalReason, int]:
         """Return how many messages were refused since the last call, by reason."""
+        if self.total == self._told_total:
+            return {}
         counted = dict(self._counted)
         new = {reason: counted[reason] - self._told[reason] for reason in RefusalReason}
-        self._told = counted
+        self._told, self._told_total = counted, sum(counted.values())
         return {reason: number for reason, number in new.items() if number > 0}
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import partial
 from itertools import count
 from typing import Any, Generic, TypeVar
@@ -17,6 +17,7 @@ from rbxcompose.bus.local import Participant, Registry
 from rbxcompose.bus.tokens import EntityKind, gid, session_of
 from rbxcompose.bus.transport import Closable, Question, TransportReply
 from rbxcompose.bus.witness import Witness, WitnessedCall
+from rbxcompose.dataclass import dataclass
 from rbxcompose.msgs.cdr import decode, encode
 from rbxcompose.msgs.types import Message, Service
 from rbxcompose.requests import Refused

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import StrEnum
 
 import xxhash
+
+from rbxcompose.dataclass import dataclass
 
 SPACE = "@ros2_lv"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import count
 from typing import Any, Generic, NamedTuple, TypeVar
 
@@ -17,12 +17,15 @@ from rbxcompose.bus.refusals import RefusalReason, Refusals
 from rbxcompose.bus.tokens import EntityKind
 from rbxcompose.bus.transport import Arrival, Closable
 from rbxcompose.bus.writers import TopicReader
+from rbxcompose.dataclass import dataclass
 from rbxcompose.msgs.cdr import CdrError, CdrLengthError, decode, encode
 from rbxcompose.msgs.finite import NotFiniteError, require_finite
 from rbxcompose.msgs.types import Message
 from rbxcompose.qos import Qos
 
 M = TypeVar("M", bound=Message)
+
+PATIENT_QUEUE = 50  # messages; half a second of poses at 50 Hz wakes the process once
 
 
 class Delivery(NamedTuple, Generic[M]):
@@ -65,16 +68,24 @@ class Publisher(Generic[M]):
         """Return whether anything in another process would receive it, now or (if latched) later."""
         return self._remote.has_match
 
+    @property
+    def is_wanted(self) -> bool:
+        """Return whether anything, in this process or another, would receive it."""
+        return self._remote.has_match or self._qos is Qos.LATCHED or bool(self._topics.subscriptions.at(self.route))
+
     def __call__(self, message: M) -> None:
         """Publish `message`."""
-        process = self._process
-        source = Attachment(next(self._sequence), process.clock.stamp(), self.gid)
+        number, here = next(self._sequence), self._topics.subscriptions.at(self.route)
+        has_match, is_latched = self._remote.has_match, self._qos is Qos.LATCHED
+        if not (here or has_match or is_latched):
+            return  # nobody listens
+        source = Attachment(number, self._process.clock.stamp(), self.gid)
         delivery = Delivery(message, source)
-        if self._qos is Qos.LATCHED:
+        if is_latched:
             self.kept = delivery
-        for subscription in self._topics.subscriptions.at(self.route):
+        for subscription in here:
             subscription.deliver(delivery)
-        if self._remote.has_match:
+        if has_match:
             self._remote.put(encode(message), source.encode())
 
     def look_again(self) -> None:
@@ -124,13 +135,14 @@ class Subscription(Generic[M]):
         rate = max_rate or most_per_second(qos)
         self._allowances = None if rate is None or math.isinf(rate) else Allowances(rate)
         self._arrived = -math.inf  # [s] of robot time
-        self._patience = queue_depth(qos) // 2 if is_patient else 1  # messages that may wait for each other
+        depth = max(PATIENT_QUEUE, queue_depth(qos)) if is_patient else queue_depth(qos)
+        self._patience = depth // 2 if is_patient else 1  # messages that may wait for each other
         self._has_complained = False  # in the log; diagnostics continue to count
         process = node.process
         is_lent = is_light and qos not in (Qos.LATCHED, Qos.BULK)
         self._post = process.scheduler.post_light if is_lent else process.scheduler.post
         self._bring = process.transport.bring if is_lent else process.transport.wake
-        self._inbox: Inbox[_Received[M]] = Inbox(node.owner, queue_depth(qos), self._take, self._post)
+        self._inbox: Inbox[_Received[M]] = Inbox(node.owner, depth, self._take, self._post)
         if waits:
             self._inbox.hold()
             node.when_open(self._inbox.go_on)

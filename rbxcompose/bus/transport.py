@@ -6,9 +6,9 @@ A transport calls its callbacks in its own threads: they may only put items into
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Protocol
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.qos import Qos
 
 LONGEST_WAIT = 600.0  # [s] of real time for an answer; the transport keeps a little of each request that long

@@ -5,8 +5,9 @@ Keys, payloads and the 33-byte attachment are the same for all of them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.msgs.types import Interface
 
 DEFAULT_DEPTH = 42  # of rmw_zenoh, since its version 0.2

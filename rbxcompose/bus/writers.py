@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from rbxcompose.bus.local import Route
 from rbxcompose.bus.names import ros_type
 from rbxcompose.bus.tokens import EndpointToken, EntityKind, parse_token
+from rbxcompose.dataclass import dataclass
 
 SILENCE = 5.0  # [s] after which a publisher of a state or a latched topic should have published
 

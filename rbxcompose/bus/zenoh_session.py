@@ -18,6 +18,12 @@ from rbxcompose.endpoints import is_private, socket_of, tcp_endpoint, unix_endpo
 
 LEASE = 2000  # [ms] until a silent link counts as lost
 PATIENCE = 1000  # [ms] that a visitor waits for a router
+THREADS = "(rx: (worker_threads: 2), acc: (handover: rx), net: (handover: rx), app: (handover: rx))"
+"""Which threads Zenoh has: two that receive and do all else, and one that sends.
+
+By default there are six, and a message passes three of them: one sees it, one reads it, one watches meanwhile. Those
+that send must not be those that receive, or Zenoh waits for itself.
+"""
 _TAKEN = ("os error 98", "Unable to acquire lock")  # what Zenoh says of an endpoint in use
 _session_numbers = itertools.count()
 
@@ -82,7 +88,7 @@ def client_settings(router: str) -> dict[str, object]:
 
 def open_peer(router: str) -> zenoh.Session:
     """Open the session of a process; the router need not be there yet."""
-    return zenoh.open(_config(peer_settings(router)))
+    return _opened(peer_settings(router))
 
 
 def open_client(router: str) -> zenoh.Session:
@@ -92,7 +98,7 @@ def open_client(router: str) -> zenoh.Session:
         OSError: if `router` is no endpoint, or does not answer.
     """
     try:
-        return zenoh.open(_config(client_settings(router)))
+        return _opened(client_settings(router))
     except zenoh.ZError as error:
         raise OSError(errno.ECONNREFUSED, f"no router answers at {router}") from error
 
@@ -104,11 +110,16 @@ def open_router(endpoint: str) -> zenoh.Session:
         OSError: if `endpoint` is taken.
     """
     try:
-        return zenoh.open(_config(router_settings(endpoint)))
+        return _opened(router_settings(endpoint))
     except zenoh.ZError as error:
         if not any(cause in str(error) for cause in _TAKEN):
             raise
         raise OSError(errno.EADDRINUSE, f"{endpoint} is taken") from error
+
+
+def _opened(settings: Mapping[str, object]) -> zenoh.Session:
+    os.environ.setdefault("ZENOH_RUNTIME", THREADS)  # read once, when the first session of a process opens
+    return zenoh.open(_config(settings))
 
 
 def _config(settings: Mapping[str, object]) -> zenoh.Config:

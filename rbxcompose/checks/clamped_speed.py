@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from rbxcompose.check_runner import check
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, FindingKind, Related, Severity
 from rbxcompose.model.flow import OTHER_TYPE, Drive, MessageFlow, setting_span
 from rbxcompose.model.robot import Robot

@@ -21,7 +21,7 @@ def empty_on_the_way(robot: Robot) -> Iterator[Finding]:
     """The battery may be empty before the robot reaches its dock
 
     At the level at which the mission is interrupted, the charge must last for the way from the farthest place to the
-    dock: the drive, and the turns before and after it.
+    dock.
 
     Bad:
     ```yaml
@@ -61,8 +61,8 @@ def empty_on_the_way(robot: Robot) -> Iterator[Finding]:
             runtime = call.drains.runtime
             if dock is None or runtime is None or not ways.visited:
                 continue
-            far = max(ways.visited.values(), key=lambda place: ways.with_turns(place, dock))
-            lasts, needs = call.level * runtime.value, ways.with_turns(far, dock)
+            far = max(ways.visited.values(), key=lambda place: ways.between(place, dock))
+            lasts, needs = call.level * runtime.value, ways.between(far, dock)
             if runtime.value < needs:
                 yield _never_there(robot, call.battery, runtime, f"from '{far.name}' to '{dock.name}'", needs)
             elif 0 <= lasts < needs:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass
 
 from rbxcompose.check_runner import check
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, correction, suggest, surely_meant
 from rbxcompose.model.robot import Robot
 from rbxcompose.sdk.ports import Out

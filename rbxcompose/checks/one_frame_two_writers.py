@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from rbxcompose.check_runner import check
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Related, Severity, Span
 from rbxcompose.model.flow import is_written, setting_span
 from rbxcompose.model.robot import Robot, RobotComponent

@@ -17,8 +17,9 @@ from rbxcompose.units import LENGTH, TIME, format_quantity
 def timeout_and_way(robot: Robot) -> Iterator[Finding]:
     """A timeout is shorter than the step it limits
 
-    The way from one place to the next, straight and at full speed, takes longer than the step's timeout, so the step
-    would fail each time. Waits are checked in the same way.
+    The way from one place to the next takes longer than the step's timeout, even if nothing is in the way, so the step
+    would fail each time. Turns, speeding up and braking count; a drive in the simulated world takes at most a quarter
+    longer than this least time. Waits are checked in the same way.
 
     Bad:
     ```yaml
@@ -46,7 +47,7 @@ def timeout_and_way(robot: Robot) -> Iterator[Finding]:
                 related = [Related(robot.key("places", place.name), f"'{place.name}'") for place in one.leg]
             yield timeout_and_way.at(
                 place_in_text(one.node, one.node.limit),
-                f"{what} takes at least {format_quantity(round(one.needs, 1), TIME)}, "
+                f"{what} takes at least {format_quantity(round(one.needs, 2), TIME)}, "
                 f"but has {format_quantity(one.given, TIME)}",
                 help="give it two or three times as long as it needs",
                 related=related,

@@ -10,14 +10,15 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
-from rbxcompose.cli.output.console import FINDINGS, has_colour, tell
+from rbxcompose.cli.output.console import FINDINGS, good, has_colour, tell
 from rbxcompose.cli.project.fixes import fix, only_ours
 from rbxcompose.cli.project.robot_options import add_layer_options, compiled
 from rbxcompose.cli.project.targets import Targets, projects_of, targets
 from rbxcompose.compiler import Compilation
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Report
 from rbxcompose.formats import format_names, renderer
 from rbxcompose.plan.model import Plan, extent
@@ -95,7 +96,8 @@ def _written(checked: CheckedRobots, form: str) -> str:
     if any(checked.report) or form not in FOR_PEOPLE:
         return renderer(form)(checked.report, checked.sources, has_colour(sys.stdout))
     lines = [f"{plan.robot} is fine: {extent(len(plan.instances), len(plan.groups))}" for plan in checked.fine]
-    return "\n".join([*lines, *(f"the test {name} is fine" for name in checked.tests)])
+    lines += [f"the test {name} is fine" for name in checked.tests]
+    return "\n".join(map(good, lines))
 
 
 def _whisper(text: str) -> None:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, NoReturn
 import rbxcompose
 from rbxcompose import cli
 from rbxcompose.cli.verbs import load, module_of, parser_of, verbs
+from rbxcompose.manifest.garbage_collection import collect_rarely
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -27,6 +28,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command and return its exit code: 0 fine, 1 findings, 2 wrong usage, 3 and 4 of `up`, 130 interrupted."""
     if arguments is None:
         signal.signal(signal.SIGINT, _interrupted)
+        collect_rarely()
     words = list(sys.argv[1:] if arguments is None else arguments)
     if not words or words[0] in ("-h", "--help", "help"):
         sys.stdout.write(_help())

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from rbxcompose.cli.output.console import FINDINGS, refuse, tell, tell_report
 from rbxcompose.cli.project.new_mission import MistakenRobotError, find_home
 from rbxcompose.cli.project.questions import Asker, CancelledError
+from rbxcompose.dataclass import dataclass
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.printable import plain
 from rbxcompose.scaffold import component, mission, part, robot
@@ -90,9 +91,9 @@ def _write(new: New) -> int:
 def _robot(arguments: argparse.Namespace, asker: Asker) -> New:
     name = read_name(arguments.name, "the robot")
     about = asker.ask(ABOUT, read_text, robot.ABOUT, given=arguments.about)
-    base = asker.ask("The type of its base?", robot.read_base, robot.BASE, given=arguments.base)
+    base = asker.ask("Which component drives it?", robot.read_base, robot.BASE, given=arguments.base)
     if arguments.place is None:
-        question = "A place to go to, as NAME=X,Y in metres from the dock (empty: continue)"
+        question = "Where can it go? Write one place, such as 'table=2,0' in metres from the dock, or nothing to go on"
         places = tuple(asker.ask_several(question, robot.read_next_place)) or robot.PLACES
     else:
         places = robot.read_places(arguments.place)
@@ -129,7 +130,7 @@ def _mission(arguments: argparse.Namespace, asker: Asker) -> New:
     usual = home.usual(read_name(arguments.name, "the mission", home.robot.manifest.missions))
     answers = replace(usual, about=asker.ask(ABOUT, read_text, usual.about, given=arguments.about))
     file = shown_name(home.file)
-    is_wanted = not arguments.no_add and asker.ask(f"Add it to {file}? (yes or no)", read_yes, "yes")
+    is_wanted = not arguments.no_add and asker.ask(f"Shall it be added to {file}?", read_yes, "yes")
     then = (
         f"rbxcompose up --rate 10x {shown_name(home.file.parent)} --set start={answers.name}",
         f"python -m pytest {shown_name(home.project / 'tests')}/test_{answers.name}.py",

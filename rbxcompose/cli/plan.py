@@ -1,4 +1,4 @@
-"""Show what would run: processes, components in start order, wire keys; or the changes to a plan.
+"""Show what would run: processes, components in start order, their topics; or the changes to a plan.
 
 Exit codes: 0 fine, 1 errors found, 2 wrong usage.
 """
@@ -39,6 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("path", metavar="PATH", help="the robot's file, its folder, or rbx:robots/NAME of the library")
     add_layer_options(parser)
     parser.add_argument("--json", action="store_true", help="write the plan, or the difference, as JSON")
+    parser.add_argument("--keys", action="store_true", help="show the keys on the wire, too")
     parser.add_argument("--diff", metavar="FILE", help="a plan that --json wrote, or a robot: what has changed since")
 
 
@@ -48,7 +49,7 @@ def run(arguments: argparse.Namespace) -> int:
     if after is None:
         return FINDINGS
     if arguments.diff is None:
-        tell(dump(after).rstrip("\n") if arguments.json else plan_text(after))
+        tell(dump(after).rstrip("\n") if arguments.json else plan_text(after, with_keys=arguments.keys))
         return 0
     before = _other(arguments.diff, arguments)
     if before is None or isinstance(before, Finding):

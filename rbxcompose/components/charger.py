@@ -48,6 +48,7 @@ class Charger(Component[ChargerConfig]):
     """
 
     rate = 10.0
+    steps_for_goals = True
     pose = Looks(source="base_footprint", target="map")
     battery_level = In(Float32, "battery_level", unit="%")
     set_battery_level = Calls(SetBatteryLevel, "set_battery_level")

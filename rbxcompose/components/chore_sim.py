@@ -52,6 +52,7 @@ class ChoreSim(Component[ChoreSimConfig]):
     """
 
     rate = 20.0
+    steps_for_goals = True
     simulated = True
     cmd_vel = Out(Twist, "cmd_vel", qos="command")
     chore = ServesAction(Wait, "chore", claims="base", pausable=True)

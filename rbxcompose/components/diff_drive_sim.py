@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from rbxcompose.geometry import Transform3, Velocity2
+from rbxcompose.geometry import Pose2, Transform3, Velocity2
 from rbxcompose.levels import Level
 from rbxcompose.msgs import geometry_msgs as geometry
 from rbxcompose.msgs.nav_msgs import Odometry
@@ -85,6 +85,7 @@ class DiffDriveSim(Component[DiffDriveSimConfig]):
     def configure(self) -> None:
         """Put the base at the origin of `odom`."""
         self.core = DiffDriveCore(settings_of(self.config))
+        self.pose, self.place = self.core.pose, placed(self.core.pose)  # the last one, and as a message
 
     def reconfigure(self, old: DiffDriveSimConfig) -> None:
         """Apply the new limits to later commands; the last command stays as it was clamped."""
@@ -103,12 +104,13 @@ class DiffDriveSim(Component[DiffDriveSimConfig]):
         """Move for `dt` [s] and publish where the base is."""
         self.core.step(self.now, dt)
         header = Header(stamp=to_time(self.stamp), frame_id=ODOM)
-        at = Transform3.from_pose2(self.core.pose)
-        x, y, z = at.translation
-        turn = geometry.Quaternion(*at.rotation)
-        self.odom(self.odometry(header, geometry.Pose(position=geometry.Point(x, y, z), orientation=turn)))
-        placed = geometry.Transform(translation=geometry.Vector3(x, y, z), rotation=turn)
-        link = geometry.TransformStamped(header=header, child_frame_id=BASE, transform=placed)
+        if self.core.pose is not self.pose:
+            self.pose, self.place = self.core.pose, placed(self.core.pose)
+        if self.odom.is_wanted:
+            at = self.place.translation
+            position = geometry.Point(at.x, at.y, at.z)
+            self.odom(self.odometry(header, geometry.Pose(position=position, orientation=self.place.rotation)))
+        link = geometry.TransformStamped(header=header, child_frame_id=BASE, transform=self.place)
         self.tf(TFMessage(transforms=(link,)))
         self.tell_commands()
 
@@ -150,6 +152,12 @@ class DiffDriveSim(Component[DiffDriveSimConfig]):
     def summary(self) -> dict[str, str]:
         """Report how far it went."""
         return {"distance driven": f"{self.core.distance:.2f} m"}
+
+
+def placed(pose: Pose2) -> geometry.Transform:
+    """Return a pose as a message."""
+    at = Transform3.from_pose2(pose)
+    return geometry.Transform(translation=geometry.Vector3(*at.translation), rotation=geometry.Quaternion(*at.rotation))
 
 
 def settings_of(config: DiffDriveSimConfig) -> DiffDriveSettings:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from functools import partial
 from typing import Annotated
 
 from pydantic import Field
@@ -11,6 +13,7 @@ from rbxcompose.geometry import AT_REST, Pose2, Velocity2, yaw_of
 from rbxcompose.msgs.geometry_msgs import PoseStamped, Twist, Vector3
 from rbxcompose.msgs.nav2_msgs import NavigateToPose
 from rbxcompose.navigation.go_to import GoToCore, GoToSettings
+from rbxcompose.navigation.travel_time import least_time
 from rbxcompose.sdk import (
     Angle,
     AngularSpeed,
@@ -18,6 +21,7 @@ from rbxcompose.sdk import (
     CommandsMotion,
     Component,
     Config,
+    Drives,
     Length,
     Live,
     Looks,
@@ -56,6 +60,7 @@ class GoTo(Component[GoToConfig]):
     """
 
     rate = 20.0
+    steps_for_goals = True
     cmd_vel = Out(Twist, "cmd_vel", qos="command")
     pose = Looks(source="base_footprint", target=MAP)
     go_to = ServesAction(NavigateToPose, "go_to", claims="base")
@@ -65,7 +70,9 @@ class GoTo(Component[GoToConfig]):
         """Declare how fast it drives and how near it comes."""
         speed, turn_rate = Setting(config.speed, "speed"), Setting(config.turn_rate, "turn_rate")
         tolerance = Setting(config.tolerance, "tolerance")
-        return CommandsMotion("cmd_vel", speed, turn_rate), Navigates("go_to", tolerance)
+        return CommandsMotion("cmd_vel", speed, turn_rate), Navigates(
+            "go_to", tolerance, least_time=partial(fastest, settings_of(config))
+        )
 
     def configure(self) -> None:
         """Build the core."""
@@ -129,6 +136,14 @@ class GoTo(Component[GoToConfig]):
     def drive(self, velocity: Velocity2) -> None:
         """Publish a velocity."""
         self.cmd_vel(Twist(linear=Vector3(x=velocity.linear), angular=Vector3(z=velocity.angular)))
+
+
+def fastest(settings: GoToSettings, start: Pose2, goal: Pose2, base: Drives | None) -> float:
+    """Return the least time of a drive on a base [s]."""
+    limits = (base.max_speed, base.max_turn_rate, base.acceleration, base.turn_acceleration) if base else (None,) * 4
+    speed, turn_rate, acceleration, turn_acceleration = (one.value if one else math.inf for one in limits)
+    settings = replace(settings, speed=min(speed, settings.speed), turn_rate=min(turn_rate, settings.turn_rate))
+    return least_time(start, goal, settings, acceleration=acceleration, turn_acceleration=turn_acceleration)
 
 
 def settings_of(config: GoToConfig) -> GoToSettings:

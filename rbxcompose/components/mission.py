@@ -106,6 +106,7 @@ class MissionConfig(Config):
             {name: program for name, program in self.programs.items() if name not in broken},
             {name: topic.message for name, topic in self.topics.items()},
             self.services,
+            events=frozenset(name for name, source in self.values.items() if source.is_event),
         )
 
 
@@ -210,14 +211,17 @@ class Mission(Component[MissionConfig]):
             self.planned = None
         wakes: list[float] = []
         for one in self.missions:
-            if not one.is_paused:
-                wakes += self.turn(one)
+            wakes += self.turn(one)
         if wakes:
             self.plan(min(wakes))
         self.broadcast.tell(self.missions)
 
     def turn(self, one: MissionRun) -> list[float]:
         """Do what is due in a mission; return its next wake [s], if any."""
+        if one.is_paused:
+            one.look(self.now)
+            due = one.next_wake()
+            return [due] if due is not None else []
         if one.engine.status == IDLE and (missing := one.missing()):
             return self.wait(one, ", ".join(missing))
         if one.began is None:

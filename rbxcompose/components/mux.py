@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from pydantic import Field
@@ -84,6 +85,7 @@ class Mux(Component[MuxConfig]):
             stopped=self.context.is_stopped,
         )
         self.told: object = None
+        self.wakes_at = math.inf  # [s], the first of the wakes to come
         self.refused: list[str] = []
 
     def activate(self) -> None:
@@ -105,6 +107,7 @@ class Mux(Component[MuxConfig]):
 
     def wake(self) -> None:
         """Send the single zero after the last source has ended."""
+        self.wakes_at = math.inf
         if (zero := self.core.tick(self.now)) is not None:
             self.send(zero)
         self.settle()
@@ -140,7 +143,9 @@ class Mux(Component[MuxConfig]):
 
     def settle(self) -> None:
         """Schedule the next deadline, and report changes in which source is let through and which are locked out."""
-        if (deadline := self.core.next_deadline()) is not None:
+        deadline = self.core.next_deadline()
+        if deadline is not None and not self.now <= self.wakes_at <= deadline:  # each message puts off the deadline
+            self.wakes_at = deadline
             self.context.wake_at(deadline)
         active = "stop" if self.core.stopped else self.core.active
         locked, refused = self.core.locked_out(self.now), self.core.refused(self.now)

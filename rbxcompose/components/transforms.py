@@ -23,6 +23,7 @@ from rbxcompose.msgs.tf2_msgs import TFMessage
 from rbxcompose.sdk import Capability, Component, Config, In, Out, Port, Setting, WritesFrame, component
 
 PERIOD = 0.1  # [s] after which the frames of all joints are published again
+ROUNDING = 1e-6  # of a period
 MOST_LAG = 10_000_000_000  # [ns]; a stamp that is further off comes from another clock
 JOINT_STATES, TF = "joint_states", "tf"
 MOVING: dict[str, Port[Any]] = {
@@ -124,7 +125,8 @@ class Transforms(Component[TransformsConfig]):
             self.publish(joints, self.stamp - lag)
         self.reported.clear()
         if self.moving:
-            self.context.wake_at(self.now + PERIOD)
+            # On a grid, like steps, so that the process wakes up once for all that is due.
+            self.context.wake_at(PERIOD * (math.floor(self.now / PERIOD + ROUNDING) + 1))
 
     def publish(self, joints: Iterable[BodyJoint], stamp: int) -> None:
         """Publish where the children of joints are at a time [ns]."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from rbxcompose.composition.inclusions import Inclusion, Inclusions
 from rbxcompose.composition.instance_names import Renaming, topics_of
 from rbxcompose.composition.overlay import settled
 from rbxcompose.composition.robot_manifest import Claim, IncludedPart
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Related, Span, kind
 from rbxcompose.manifest.documents import Documents
 from rbxcompose.manifest.file_models import file_model

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Related, Span
 from rbxcompose.manifest.given_values import told_where_given
 

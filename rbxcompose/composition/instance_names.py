@@ -9,9 +9,10 @@ and stays unchanged. The descriptor of a section defines its names and its refer
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.manifest.registry import naming, section_named, sections
 from rbxcompose.manifest.renamer import RenamedTopic
 from rbxcompose.manifest.section import Section

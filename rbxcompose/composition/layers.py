@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from itertools import islice
 from pathlib import Path
 
@@ -11,6 +11,7 @@ from rbxcompose.composition.history import ROBOT_LAYER, History, HistoryStep
 from rbxcompose.composition.includes import PartInstance, Parts
 from rbxcompose.composition.overlay import NOTHING_TO_CHANGE, compose, join, settled
 from rbxcompose.composition.set_options import read_sets
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Report, Span
 from rbxcompose.manifest.documents import Documents
 from rbxcompose.manifest.file_models import file_model

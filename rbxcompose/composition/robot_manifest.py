@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import StrEnum
 from pathlib import Path
 
@@ -11,6 +11,7 @@ from rbxcompose.body.description import Description
 from rbxcompose.composition.history import History
 from rbxcompose.composition.inclusions import Inclusions
 from rbxcompose.config import Place
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Span
 from rbxcompose.manifest.section import Contents
 from rbxcompose.manifest.tree import MappingNode

@@ -6,8 +6,9 @@ import itertools
 import math
 from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
+
+from rbxcompose.dataclass import dataclass
 
 Pair = tuple[float, float]
 

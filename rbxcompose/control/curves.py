@@ -10,10 +10,10 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
-import numpy as np
+from rbxcompose.dataclass import dataclass
 
 NEGLIGIBLE = 1e-13  # a coefficient of the highest power that is smaller than this times the greatest one
 Coefficients = tuple[float, ...]  # of 1, t, t^2 and so on, up to t^5
@@ -223,4 +223,6 @@ def _roots(polynomial: Coefficients) -> list[float]:
         return []
     if len(kept) == 2:
         return [-kept[0] / kept[1]]
+    import numpy as np  # a tenth of the time of `check`, and plans of most robots need no roots
+
     return [float(root.real) for root in np.roots(kept[::-1]) if abs(root.imag) <= 1e-6]

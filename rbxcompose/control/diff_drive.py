@@ -6,9 +6,10 @@ The base has its frame between the wheels, x forwards; turning left is positive.
 from __future__ import annotations
 
 import math
-from dataclasses import astuple, dataclass, replace
+from dataclasses import astuple, replace
 
 from rbxcompose.control.velocity_window import VelocityWindow
+from rbxcompose.dataclass import dataclass
 from rbxcompose.geometry import AT_REST, Velocity2
 
 ABSURD = 2.0  # a command above this many times a limit is a fault of its sender, not a wish to go fast

@@ -8,10 +8,10 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Literal, Protocol
 
 from rbxcompose.control.calibration import Calibration
+from rbxcompose.dataclass import dataclass
 
 
 class GripperModel(Protocol):

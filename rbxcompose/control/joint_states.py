@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from enum import StrEnum
 from typing import Literal
+
+from rbxcompose.dataclass import dataclass
 
 
 class JointMode(StrEnum):

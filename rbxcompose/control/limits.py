@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import dataclass, fields
+from dataclasses import fields
+
+from rbxcompose.dataclass import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,9 +6,9 @@ Positions are metres, times robot time [s].
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from rbxcompose.control.limits import stopping_speed
+from rbxcompose.dataclass import dataclass
 
 CREEP = 0.1  # of its speed, below which it does not slow down before it has arrived
 MOVES = 0.02  # of its speed: slower than this it is stuck

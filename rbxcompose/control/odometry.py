@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rbxcompose.control.diff_drive import WheelGeometry, WheelSpeeds
+from rbxcompose.dataclass import dataclass
 from rbxcompose.geometry import AT_REST, Pose2, Velocity2
 
 Covariance = NDArray[np.float64]

@@ -6,9 +6,11 @@ import itertools
 import math
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import IntEnum
 from typing import Literal
+
+from rbxcompose.dataclass import dataclass
 
 
 class TrajectoryCode(IntEnum):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 from rbxcompose.control.curves import Curve, JointSample, braking
 from rbxcompose.control.trajectory import (
@@ -15,6 +15,7 @@ from rbxcompose.control.trajectory import (
     TrajectoryTolerance,
 )
 from rbxcompose.control.trajectory_plan import JointRules, TrajectoryPlan, begin_of, plan_trajectory
+from rbxcompose.dataclass import dataclass
 from rbxcompose.geometry import wrap_angle
 
 Samples = Mapping[str, JointSample]

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any, Protocol
 
 from rbxcompose.control.trajectory import TrajectoryCode, TrajectoryGoal, TrajectoryPoint, TrajectoryRefusal
 from rbxcompose.control.trajectory_follower import TrajectoryFollower, TrajectoryOutcome
 from rbxcompose.control.trajectory_plan import TrajectoryPlan
+from rbxcompose.dataclass import dataclass
 from rbxcompose.msgs.rbxcompose_msgs import MoveJoints
 from rbxcompose.msgs.stamps import to_seconds
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from operator import itemgetter
 from typing import Literal
 
@@ -26,6 +26,7 @@ from rbxcompose.control.trajectory import (
     TrajectoryRefusal,
     mistake_in,
 )
+from rbxcompose.dataclass import dataclass
 
 ROUNDING = 1e-9  # a smaller excess over a limit, relative or in [rad, m], counts as none
 BRIEFEST = 1e-3  # [s], the least time to a point

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Protocol
 
 from rbxcompose.control.calibration import Calibration
+from rbxcompose.dataclass import dataclass
 
 NUDGE = 1e-4  # [rad], over which a table's slope is taken
 

@@ -7,9 +7,10 @@ All times are robot time [s] at which a status reached the aggregator.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fnmatch import fnmatchcase
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.diagnostics.status import Status
 from rbxcompose.levels import Level, combined
 
@@ -111,7 +112,7 @@ class Aggregator:
         return combined(self._levels(now).values())
 
     def _levels(self, now: float) -> dict[str, Level]:
-        return {group: self._header(group, items, now).level for group, items in self._groups(now).items()}
+        return {group: self._level(group, items, now) for group, items in self._groups(now).items()}
 
     def _groups(self, now: float) -> dict[str, list[Status]]:
         """Return the items of every group with their status at `now`, sorted by name; Other only if it has any."""
@@ -130,16 +131,20 @@ class Aggregator:
             self._groups_of[name] = matching or (OTHER,)
         return self._groups_of[name]
 
+    def _level(self, group: str, items: list[Status], now: float) -> Level:
+        if items:
+            return combined(item.level for item in items)
+        is_late = now - self._started > self._analyzers[group].timeout
+        return Level.STALE if is_late else Level.OK
+
     def _header(self, group: str, items: list[Status], now: float) -> Status:
+        level = self._level(group, items, now)
         if not items:
-            late = now - self._started > self._analyzers[group].timeout
-            return Status(
-                f"/{group}", *(Level.STALE, "nothing reported") if late else (Level.OK, "nothing reported yet")
-            )
+            return Status(f"/{group}", level, "nothing reported" if level is Level.STALE else "nothing reported yet")
         worst = max(items, key=lambda item: item.level)  # the first one if several are equal
         return Status(
             f"/{group}",
-            combined(item.level for item in items),
+            level,
             "OK" if worst.level is Level.OK else f"{worst.name}: {worst.message}",
             values=tuple((item.name, item.message) for item in items),
         )

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 from rbxcompose.bus.graph import Graph
+from rbxcompose.dataclass import dataclass
 from rbxcompose.model.robot import Robot
 from rbxcompose.runtime.folder import RobotFolder, RobotState
 from rbxcompose.runtime.processes import Process

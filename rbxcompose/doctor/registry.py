@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.doctor.facts import HostFacts
 from rbxcompose.findings import Finding, Severity
 from rbxcompose.plugins import Plugins

@@ -5,11 +5,11 @@ from __future__ import annotations
 import grp
 import os
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from rbxcompose.actuation.port_errors import FORBIDDEN, NO_PORT, UNFIT, PortError, slow_adapter
 from rbxcompose.actuation.serial_ports import SerialPort, UsbDevice, connected, latency_of, port_of
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Span
 from rbxcompose.model.flow import setting_span
 from rbxcompose.model.robot import Robot

@@ -57,7 +57,7 @@ class MissionRun:
         self.engine = Engine(program, names, inputs, self.log, settings)
         self.claims = claims_of(self.engine.program, self.engine.robot.skills)  # parts of the robot, exclusively
         self.mirror = Mirror(self.engine)
-        self._known = frozenset(names.values) | {POSE}
+        self._states = (names.values.keys() | {POSE}) - names.events
         self._inputs, self._settings = inputs, settings
 
     @property
@@ -75,8 +75,8 @@ class MissionRun:
         return "waiting" if self.engine.status == IDLE else NAMES[self.engine.status]
 
     def missing(self) -> list[str]:
-        """Return the names that it reads and that have no value yet."""
-        reads = self.engine.program.reads & self._known
+        """Return the names that it reads and that have no value yet; it does not wait for events."""
+        reads = self.engine.program.reads & self._states
         return sorted(name for name in reads if self.robot.value(name) is NOT_ARRIVED)
 
     def loses_patience(self, now: float) -> bool:
@@ -103,10 +103,15 @@ class MissionRun:
 
     def next_wake(self) -> float | None:
         """Return when to tick it next [s]."""
-        if self.is_over or self.is_paused:
+        if self.is_over:
             return None
         due = (self.engine.next_wake(), self.robot.next_look())
         return min((time for time in due if time is not None), default=None)
+
+    def look(self, now: float) -> None:
+        """Poll the requests that go on while it is paused."""
+        self._now = now
+        self.robot.look()
 
     def pause(self, now: float) -> None:
         """Pause it: its timers stop."""

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.requests import Command, Query, Refused
 
 MISSION = "mission"

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Protocol
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.functions import FUNCTIONS
 from rbxcompose.expressions.tree import (
     Arithmetic,

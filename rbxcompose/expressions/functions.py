@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.values import MOST_ITEMS, Value, is_located
 from rbxcompose.units import MOST
 

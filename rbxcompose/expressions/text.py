@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import TypeAlias
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.evaluate import evaluate
 from rbxcompose.expressions.parser import parse
 from rbxcompose.expressions.tokens import NAME

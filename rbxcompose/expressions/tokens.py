@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from enum import Enum, auto
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.tree import ExpressionError
 from rbxcompose.units import NUMBER_TEXT, UNITS, Quantity, UnitError, quantity, unit_help
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, TypeAlias
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.units import Dimension
 
 
@@ -224,3 +225,11 @@ class Expression:
             ],
         }.items():
             object.__setattr__(self, name, tuple(found))
+
+
+def new_names(expression: Expression) -> frozenset[str]:
+    """Return the names that an expression passes to `new($x)`."""
+    if not any(call.name == "new" for call in expression.calls):
+        return frozenset()
+    calls = (node for node, _ in walk(expression.tree) if isinstance(node, FunctionCall) and node.function == "new")
+    return frozenset(argument.name for call in calls for argument in call.arguments if isinstance(argument, Variable))

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from enum import Enum
 from types import MappingProxyType
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.units import DIMENSIONS, NUMBER, Dimension
 
 

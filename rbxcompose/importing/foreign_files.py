@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, MutableMapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Generic, TypeVar
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Report, Span
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.manifest.limits import KEY

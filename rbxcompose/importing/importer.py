@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Report, Severity, kind
 from rbxcompose.importing.foreign_files import ForeignFile
 from rbxcompose.plugins import LEFT_OUT, BrokenPluginError, Plugins

@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from decimal import Decimal
 from pathlib import PurePath
 
 from rbxcompose.composition.dump import exact
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Span
 from rbxcompose.printable import escaped, plain
 from rbxcompose.units import UNITS, format_quantity, to_si

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 from rbxcompose.composition.history import ROBOT_LAYER
 from rbxcompose.composition.overlay import SET
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Span
 from rbxcompose.inspection.origin import Origin, as_data
 from rbxcompose.manifest.tree import TreeNode

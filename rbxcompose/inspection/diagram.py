@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import StrEnum
 
 from rbxcompose.bus.names import resolve
+from rbxcompose.dataclass import dataclass
 from rbxcompose.inspection.wire_keys import qos_of
 from rbxcompose.missions.analysis.effects import sent_by
 from rbxcompose.missions.engine.condition_watches import POSE

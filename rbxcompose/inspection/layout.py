@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import Any
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, kind
 
 MARGIN, GROUP_EDGE = 10.0, 26.0  # around the picture, and around a group's contents: room for its name [px]

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from rbxcompose.composition.dump import exact
 from rbxcompose.composition.history import ROBOT_LAYER
 from rbxcompose.composition.overlay import SET
 from rbxcompose.composition.robot_manifest import RobotManifest
 from rbxcompose.config import HIDDEN, Secret
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Span
 from rbxcompose.manifest.arguments import show
 from rbxcompose.manifest.scalars import plain_value

@@ -15,12 +15,12 @@ from rbxcompose.sdk.registry import component_type
 _NUMBER = 4  # width of a position in the start order
 
 
-def plan_text(plan: Plan) -> str:
-    """Return what `up` would do: processes with their components in start order, and every key on the wire."""
-    return "\n".join(_lines(plan))
+def plan_text(plan: Plan, *, with_keys: bool = False) -> str:
+    """Return what `up` would do: processes with their components in start order, and the keys on the wire if wanted."""
+    return "\n".join(_lines(plan, with_keys))
 
 
-def _lines(plan: Plan) -> Iterator[str]:
+def _lines(plan: Plan, with_keys: bool) -> Iterator[str]:
     how = "simulated" if plan.is_simulated else "real devices"
     yield f"{plan.robot}: {extent(len(plan.instances), len(plan.groups))}, {how}"
     yield from (f"  {label:<8}{text}" for label, text in _facts(plan))
@@ -30,7 +30,7 @@ def _lines(plan: Plan) -> Iterator[str]:
         yield f"process {group}"
         for instance in plan.of_group(group):
             yield f"{order[instance.name]:>{_NUMBER}} {instance.name} ({', '.join(_options(instance))})"
-            yield from (f"{'':<{_NUMBER}}   {line}" for line in _wires(plan, instance))
+            yield from (f"{'':<{_NUMBER}}   {line}" for line in _wires(plan, instance, with_keys))
 
 
 def _facts(plan: Plan) -> Iterator[tuple[str, str]]:
@@ -55,13 +55,13 @@ def _options(instance: Instance) -> Iterator[str]:
         yield f"restarts: {instance.restart.when}, at most {instance.restart.max} within {instance.restart.within:g} s"
 
 
-def _wires(plan: Plan, instance: Instance) -> Iterator[str]:
+def _wires(plan: Plan, instance: Instance, with_keys: bool) -> Iterator[str]:
     ports: dict[str, Port[Any]] = component_type(instance.type).ports(instance.config)
     for wire in instance.wires:
         port = ports.get(wire.port)
         if port is not None:
             yield _wire(wire, port)
-            keys = keys_of(port, wire.topic, plan.bus)
+            keys = keys_of(port, wire.topic, plan.bus) if with_keys else []
             yield from (f"    {f'{what}: ' if len(keys) > 1 else ''}{key}" for what, key in keys)
 
 

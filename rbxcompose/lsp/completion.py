@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 import string
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.lsp.document import Document, Spot
 from rbxcompose.lsp.names import SKILL, named_by_key
 from rbxcompose.lsp.variables import fills, variables

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.lsp.quick import LARGE, near, quick_tree
 from rbxcompose.manifest.garbage_collection import paused_collection
 from rbxcompose.manifest.tree import Entry, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode, at

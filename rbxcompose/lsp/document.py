@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.lsp.cursor import Cursor, locate
 from rbxcompose.lsp.names import KnownNames
 from rbxcompose.lsp.project import MISSION, OVERLAY, kind_of

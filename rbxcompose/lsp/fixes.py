@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.edits import apply
 from rbxcompose.findings import Finding, Span
 from rbxcompose.lsp.project import Project

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.manifest.files import resolve
 from rbxcompose.manifest.options import OWN_PORT
 from rbxcompose.manifest.reader import read_file

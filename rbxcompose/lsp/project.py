@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 from rbxcompose.compiler import Compilation, compile_robot
 from rbxcompose.composition.robot_file import read_mission
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Report
 from rbxcompose.manifest.files import ROBOT_FILE, project_of, shown_name
 from rbxcompose.manifest.reader import Texts, read_file

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 from pydantic import Field
 
 from rbxcompose.config import Config, Secret
+from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.types import TYPES, Type, TypeKind, choice_of
 from rbxcompose.findings import Report
 from rbxcompose.manifest.scalars import describe

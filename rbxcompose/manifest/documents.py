@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from dataclasses import replace as changed
 from pathlib import Path
 from typing import Any
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Related, Report, Span, kind
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.manifest.header import ManifestHeader

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from operator import is_
 
 from rbxcompose.config import Secret
+from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.check import check
 from rbxcompose.expressions.evaluate import evaluate
 from rbxcompose.expressions.parser import parse_fill

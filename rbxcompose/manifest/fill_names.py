@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import NamedTuple
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions import types
 from rbxcompose.expressions.types import Type
 from rbxcompose.findings import Span

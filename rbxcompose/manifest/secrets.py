@@ -6,11 +6,11 @@ import errno
 import os
 import stat
 from collections.abc import Mapping
-from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 
 from rbxcompose.config import Secret
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import DID_YOU_MEAN, nearest
 from rbxcompose.manifest.limits import SECRET
 from rbxcompose.regular_files import NotRegularError, open_regular

@@ -7,7 +7,7 @@ none of them refers to a section by name.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import KW_ONLY, dataclass, replace
+from dataclasses import KW_ONLY, replace
 from enum import Enum
 from functools import cache, cached_property
 from pathlib import Path
@@ -17,6 +17,7 @@ from typing import Annotated, Any, Generic, TypeVar, cast
 from pydantic import BeforeValidator
 
 from rbxcompose.config import Name
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Report
 from rbxcompose.manifest.documents import Documents
 from rbxcompose.manifest.misplaced import is_misplaced, misplaced
@@ -32,7 +33,7 @@ M = TypeVar("M")
 R = TypeVar("R")
 T = TypeVar("T")
 
-ROBOT, PART, OVERLAY = "Robot", "Part", "Overlay"
+ROBOT, PART, OVERLAY, TEST = "Robot", "Part", "Overlay", "Test"
 EVERYWHERE = (ROBOT, PART, OVERLAY)
 ANY = "*"
 """Any key, in a path of `Section.shared`."""

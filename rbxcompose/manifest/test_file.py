@@ -11,7 +11,6 @@ from rbxcompose.config import Config, Name, Time
 from rbxcompose.manifest.fields import TopicName
 from rbxcompose.manifest.header import ManifestHeader
 
-TEST = "Test"
 LONGEST_TEST = 3600.0  # [s] of robot time
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Span
 from rbxcompose.manifest.limits import FILL_TEXT
 

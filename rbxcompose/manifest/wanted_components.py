@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Protocol
 
 from rbxcompose.config import Config
+from rbxcompose.dataclass import dataclass
 from rbxcompose.manifest.options import ComponentOptions
 from rbxcompose.manifest.tree import KeyPath
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Span
 from rbxcompose.mission_tests.mission_facts import missions_in
 from rbxcompose.missions.engine.events import InterruptStarted, MissionEvent, SkillEnded, Transition

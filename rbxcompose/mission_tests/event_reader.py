@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Span
 from rbxcompose.manifest import test_file as trials
 from rbxcompose.manifest.tree import KeyPath, SequenceNode, TreeNode, at, key_span, value_span

@@ -8,9 +8,10 @@ from __future__ import annotations
 import json
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.values import NOT_ARRIVED, NotArrived, Value
 from rbxcompose.mission_tests.model import FAILS, SUCCEEDS
 from rbxcompose.mission_tests.representatives import representatives
@@ -34,6 +35,9 @@ class ExplorationLimits:
 
     states: int = 2000
     depth: int = 30
+
+
+USUAL_LIMITS = ExplorationLimits()
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +85,7 @@ class Moment:
 
 
 def explore(
-    program: Program, robot: RobotNames, inputs: Mapping[str, Value], limits: ExplorationLimits = ExplorationLimits()
+    program: Program, robot: RobotNames, inputs: Mapping[str, Value], limits: ExplorationLimits = USUAL_LIMITS
 ) -> Explored:
     """Explore a mission that has no errors."""
     return Explorer(program, robot, inputs, limits).explore()

@@ -7,7 +7,7 @@ import stat
 from collections.abc import Iterable
 from pathlib import Path
 
-from rbxcompose.manifest.test_file import TEST
+from rbxcompose.manifest.section import TEST
 from rbxcompose.regular_files import open_regular
 
 _KIND = re.compile(rb"^kind:[ \t]*['\"]?(\w+)", re.MULTILINE)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import TypeVar
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.types import Type
 from rbxcompose.expressions.values import NOT_ARRIVED, Value
 from rbxcompose.findings import Span

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.mission_tests.model import FAILS, SUCCEEDS
 from rbxcompose.missions.analysis.effects import sent_by
 from rbxcompose.missions.analysis.endings import Ending

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.values import NOT_ARRIVED, NotArrived, Value
 from rbxcompose.mission_tests.model import FAILS, SUCCEEDS, Mock, ValueSetting
 from rbxcompose.mission_tests.scope import TrialScope, agrees

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Any
 
 from rbxcompose.compiler import Compilation, compile_robot
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Report
 from rbxcompose.manifest.documents import Documents
 from rbxcompose.manifest.files import resolve, shown_name
 from rbxcompose.manifest.header import ManifestHeader
 from rbxcompose.manifest.library import PREFIX
-from rbxcompose.manifest.test_file import SECTIONS, TEST, TrialFile
+from rbxcompose.manifest.section import TEST
+from rbxcompose.manifest.test_file import SECTIONS, TrialFile
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode
 from rbxcompose.manifest.validate import MISSING_KEY, WRONG_TYPE, label_of, validate
 from rbxcompose.mission_tests import codes

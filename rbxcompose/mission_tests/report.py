@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Severity
 from rbxcompose.levels import Level
 from rbxcompose.mission_tests.coverage import Coverage

@@ -81,9 +81,9 @@ class RobotRun:
         if self.bench.host.hosted[self.name].component is not self.executive:
             failed = [one.text for one in self.bench.records if one.source == self.name]
             self.record.trouble = f"the executive failed: {failed[-1] if failed else 'without a word'}"
-        elif not self.record.lines and not self.events and self.now > BEGINS_WITHIN:
-            missing = self.executive.missions.runs[self.trial.mission].missing()
-            if missing:
+        elif not self.events and self.now > BEGINS_WITHIN:
+            run = self.executive.missions.runs[self.trial.mission]
+            if run.began is None and (missing := run.missing()):
                 names = ", ".join(f"${name}" for name in missing)
                 self.record.trouble = f"the mission does not start: nothing has arrived for {names}"
         return self.record.end is not None or bool(self.record.trouble)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from rbxcompose.dataclass import dataclass
 from rbxcompose.mission_tests.coverage import SeenWays
 from rbxcompose.mission_tests.judge import UnmetExpectation, judge
 from rbxcompose.mission_tests.model import Trial

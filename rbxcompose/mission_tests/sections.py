@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.types import UNKNOWN, Type
 from rbxcompose.findings import Report
 from rbxcompose.manifest.tree import Entry, MappingNode, TreeNode

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from rbxcompose.body.model import Body, BodyJoint
+from rbxcompose.dataclass import dataclass
 from rbxcompose.geometry import Vector3, rotate
 from rbxcompose.model.robot import Robot, RobotComponent
 from rbxcompose.sdk.capabilities import RollsOn, Setting

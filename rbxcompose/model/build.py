@@ -7,10 +7,11 @@ from __future__ import annotations
 
 from bisect import bisect_left, insort
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from rbxcompose.composition.robot_manifest import RobotManifest
 from rbxcompose.config import Config
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Report
 from rbxcompose.levels import LOG_LEVELS
 from rbxcompose.manifest.registry import sections

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.tree import Comparison, Variable
+from rbxcompose.geometry import Pose2
 from rbxcompose.missions.analysis.facts import Constants, constants_of, number_in
 from rbxcompose.missions.analysis.travel_times import Driving, Ways
 from rbxcompose.missions.program.program import Interrupt, MissionNode
@@ -76,23 +77,25 @@ def top_speed(robot: Robot, driver: RobotComponent, navigates: Navigates) -> flo
     return min((limit.value for limit in limits if limit), default=math.inf)
 
 
-def top_turn_rate(robot: Robot, driver: RobotComponent) -> float:
-    """Return the highest rate at which the robot turns on its way to a place [rad/s], infinite if none is known."""
-    limits = [one.max_turn_rate for one in driver.declared(CommandsMotion)]
-    limits += [one.drives.max_turn_rate for one in MessageFlow(robot).drives() if one.driver is driver]
-    return min((limit.value for limit in limits if limit and limit.value > 0), default=math.inf)
-
-
 def ways_of(robot: Robot, mission: RobotMission) -> Ways | None:
     """Return an empty record of the mission's ways; None if it drives with several skills."""
     used = {node.skill for node in mission.program.nodes if node.skill}
     found = [(skill, *one) for skill in sorted(used) if (one := navigator_of(robot, skill))]
     if not found:
-        return Ways(mission.program, Driving("", "", 1.0, 0.0), robot.manifest.places)
+        return Ways(mission.program, Driving("", "", 0.0, Pose2.distance), robot.manifest.places)
     if len(found) > 1:
         return None
     skill, driver, navigates = found[0]
-    speed, tolerance = top_speed(robot, driver, navigates), navigates.tolerance
-    main, ends_within = robot.skills[skill].skill.main, tolerance.value if tolerance else 0.0
-    driving = Driving(skill, main, speed, ends_within, top_turn_rate(robot, driver))
+    tolerance, least_time = navigates.tolerance, _least_time(robot, driver, navigates)
+    driving = Driving(skill, robot.skills[skill].skill.main, tolerance.value if tolerance else 0.0, least_time)
     return Ways(mission.program, driving, robot.manifest.places)
+
+
+def _least_time(robot: Robot, driver: RobotComponent, navigates: Navigates) -> Callable[[Pose2, Pose2], float]:
+    """Return what tells the least time between two poses [s]: the driver itself, or the straight way at full speed."""
+    if (own := navigates.least_time) is not None:
+        base = next((one.drives for one in MessageFlow(robot).drives() if one.driver is driver), None)
+        return lambda start, goal: own(start, goal, base)
+    speed, tolerance = top_speed(robot, driver, navigates), navigates.tolerance
+    free = 2 * tolerance.value if tolerance else 0.0  # from edge to edge of the tolerances
+    return lambda start, goal: max(0.0, start.distance(goal) - free) / speed

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from rbxcompose.actuation.bus_types import DYNAMIXEL
 from rbxcompose.actuation.servo_joint import ServoJoint
 from rbxcompose.actuation.servo_models import ServoModel
 from rbxcompose.body.model import BodyJoint
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Span
 from rbxcompose.manifest.tree import KeyPath
 from rbxcompose.model.robot import Robot

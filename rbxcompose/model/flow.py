@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Span
 from rbxcompose.manifest.tree import at
 from rbxcompose.model.robot import Robot, RobotComponent

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from rbxcompose.composition.robot_file import read_mission
 from rbxcompose.composition.robot_manifest import RobotManifest
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Report
 from rbxcompose.missions.analysis.uses import Using
 from rbxcompose.missions.engine.inputs import bind_inputs

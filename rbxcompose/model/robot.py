@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import Any, TypeVar
 
 from rbxcompose.composition.robot_manifest import RobotManifest
 from rbxcompose.config import Config
+from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.types import UNKNOWN
 from rbxcompose.findings import Span
 from rbxcompose.levels import Level
@@ -100,6 +101,7 @@ class Robot:
             services=self.services,
             unread=self.unread,
             is_complete=self.written <= self.components.keys(),
+            events=frozenset(name for name, source in self.values.items() if source.is_event),
         )
 
     @cached_property

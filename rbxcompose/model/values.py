@@ -40,29 +40,31 @@ def value_of(
         if component == DIAGNOSTICS and port in groups:
             return ValueSource(LEVELS_TOPIC, LEVELS_TYPE, "level", type=choice_of(*LEVEL_WORDS), group=port)
         end = components[component].end(port) if component in components else None
-        return _of_port(end, entry.unit) if end else None
+        return _of_port(end, entry) if end else None
     if entry.topic is None:
         return None
     topic = resolve(entry.topic, namespace)
     message = types.get(topic) or STANDARD.get(entry.type or "", NUMBER)
-    return _value(topic, message, entry.field or DATA, entry.unit or "", TYPES.get(entry.type or ""))
+    return _value(topic, message, entry.field or DATA, entry.unit or "", TYPES.get(entry.type or ""), entry.event)
 
 
-def _of_port(end: PortEnd, unit: str | None) -> ValueSource | None:
+def _of_port(end: PortEnd, entry: ValueModel) -> ValueSource | None:
     port = end.port
     if not isinstance(port, Out | In):
         return None
     fields = tuple(registry.message(end.type_name).FIELDS)
     if len(fields) != 1:
         return None  # a whole message is not a value
-    return _value(end.topic, end.type_name, fields[0], unit or port.unit, None)
+    return _value(end.topic, end.type_name, fields[0], entry.unit or port.unit, None, entry.event)
 
 
-def _value(topic: str, message: str, field: str, unit: str, declared: Type | None) -> ValueSource:
+def _value(
+    topic: str, message: str, field: str, unit: str, declared: Type | None, is_event: bool | None
+) -> ValueSource:
     known = UNITS.get(unit)
     times, per = (known.times, known.per) if known else (1.0, 1.0)
     measured = quantity_of(known.dimension) if known else _plain_type(message, field)
-    return ValueSource(topic, message, field, times, per, declared or measured)
+    return ValueSource(topic, message, field, times, per, declared or measured, is_event=bool(is_event))
 
 
 def _plain_type(message: str, field: str) -> Type:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from rbxcompose.config import Config
+from rbxcompose.dataclass import dataclass
 from rbxcompose.sdk.component import Component
 from rbxcompose.sdk.ports import Port, Serves, ServesAction
 

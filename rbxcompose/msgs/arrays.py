@@ -48,7 +48,11 @@ class ArrayMessage(Message):
 
     def __post_init__(self) -> None:
         for name, type_ in self.ARRAYS.items():
-            array = _read_only(getattr(self, name), type_.base)
+            length = type_.length if type_.shape is FieldShape.ARRAY else 0
+            given = getattr(self, name)
+            if given is zeros(type_.base, length):
+                continue  # the default
+            array = _read_only(given, type_.base)
             if type_.shape is FieldShape.ARRAY and array.size != type_.length:
                 raise ValueError(f"{name} of {self.TYPE} has {array.size} values, not {type_.length}")
             object.__setattr__(self, name, array)

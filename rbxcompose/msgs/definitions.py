@@ -9,9 +9,10 @@ from __future__ import annotations
 import keyword
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
+
+from rbxcompose.dataclass import dataclass
 
 INTERFACES = Path(__file__).with_name("interfaces")  # <package>/<kind>/<Name>.<kind>
 KINDS = ("msg", "srv", "action")

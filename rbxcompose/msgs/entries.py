@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.msgs.types import Message
 from rbxcompose.units import Dimension
 

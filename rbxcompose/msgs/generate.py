@@ -27,6 +27,7 @@ from rbxcompose.msgs.hashes import type_hash
 
 INDENT = "    "
 TYPES = "rbxcompose.msgs.types"
+DATACLASS = "rbxcompose.dataclass"
 ARRAYS = "rbxcompose.msgs.arrays"
 
 
@@ -80,6 +81,7 @@ class _Module:
         yield from ('"""', "", "from __future__ import annotations", "")
         yield from self._import_lines("dataclasses", "typing")
         yield ""
+        yield from self._import_lines(DATACLASS)
         if self.packages:
             yield f"from rbxcompose.msgs import {', '.join(sorted(self.packages))}"
         yield from self._import_lines(ARRAYS, TYPES)
@@ -140,7 +142,7 @@ class _Module:
         has_arrays = any(holds_numbers(field.type) for field in structure.fields)
         base = self._use("ArrayMessage", ARRAYS) if has_arrays else self._use("Message", TYPES)
         options = "frozen=True, slots=True" + (", eq=False" if has_arrays else "")
-        yield f"@{self._use('dataclass', 'dataclasses')}({options})"
+        yield f"@{self._use('dataclass', DATACLASS)}({options})"
         yield f"class {self._path(name).split('.')[-1]}({base}):"
         yield from _indented(self._heading(name, doc))
         yield from _indented(self._fields_by_name(structure))

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Generic, Protocol, TypeVar
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Span, kind, suggest
 from rbxcompose.msgs.definitions import FLOATS, OCTETS, FieldShape, FieldType, attribute, parse_type
 from rbxcompose.msgs.types import Message, declared

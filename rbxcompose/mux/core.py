@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Generic, TypeVar
+
+from rbxcompose.dataclass import dataclass
 
 M = TypeVar("M")
 
@@ -214,6 +215,8 @@ class MuxCore(Generic[M]):
 
     def _floor(self, now: float) -> float:
         """Return the lowest priority that passes."""
+        if not self._locks:
+            return -math.inf
         return max((self._locks[name].priority for name in self._silent_locks(now)), default=-math.inf)
 
     def _is_live(self, name: str, now: float) -> bool:

@@ -6,8 +6,8 @@ Speeds follow a braking profile, so that the base can stop at the goal from any 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.geometry import AT_REST, Pose2, Velocity2, wrap_angle
 
 ALIGNED = math.radians(6)  # bearing error below which the base starts to drive [rad]

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, Literal, get_args, get_origin
 
 from pydantic import ValidationError
@@ -15,6 +14,8 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from rbxcompose.config import Config, Dimensioned, Live
+from rbxcompose.dataclass import dataclass
+from rbxcompose.field_docs import field_docs
 from rbxcompose.findings import suggest
 from rbxcompose.msgs.rcl_interfaces import (
     FloatingPointRange,
@@ -42,6 +43,7 @@ class ParameterField:
     name: str
     value: object
     field: FieldInfo | None = None
+    model: type[Config] | None = None  # whose field it is
 
     @property
     def is_live(self) -> bool:
@@ -72,7 +74,7 @@ class ParameterField:
         return self.field.metadata if self.field else ()
 
     def _description(self) -> str:
-        text = (self.field.description or "") if self.field else ""
+        text = field_docs(self.model).get(self.name, "") if self.model else ""
         return f"{text} [{unit}]".strip() if (unit := _si_unit(self.dimension)) else text
 
     def _bounds(self) -> Iterator[tuple[str, float]]:
@@ -113,21 +115,23 @@ def settings(config: Config) -> dict[str, ParameterField]:
     """Return all parameters by name; fields without a plain value, such as a secret, are omitted."""
     found: dict[str, ParameterField] = {}
     for name, field in type(config).model_fields.items():
-        for one in _settings_of(name, getattr(config, name), field):
+        for one in _settings_of(name, getattr(config, name), field, type(config)):
             found[one.name] = one
     return found
 
 
-def _settings_of(name: str, value: object, field: FieldInfo | None) -> Iterator[ParameterField]:
+def _settings_of(
+    name: str, value: object, field: FieldInfo | None = None, model: type[Config] | None = None
+) -> Iterator[ParameterField]:
     match value:
         case Config():
             for key in type(value).model_fields:
-                yield from _settings_of(f"{name}{SEPARATOR}{key}", getattr(value, key), None)
+                yield from _settings_of(f"{name}{SEPARATOR}{key}", getattr(value, key))
         case Mapping():
             for key, each in value.items():
-                yield from _settings_of(f"{name}{SEPARATOR}{key}", each, None)
+                yield from _settings_of(f"{name}{SEPARATOR}{key}", each)
         case _ if parameter_type(value) is not None:
-            yield ParameterField(name, value, field)
+            yield ParameterField(name, value, field, model)
 
 
 def values_of(known: Mapping[str, ParameterField], names: Iterable[str]) -> tuple[ParameterValue, ...]:

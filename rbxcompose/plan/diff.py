@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import fields, is_dataclass
 from typing import Any
 
 from rbxcompose.config import Config
+from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.types import Type
 from rbxcompose.levels import log_word
 from rbxcompose.manifest.shapes import dimension_at

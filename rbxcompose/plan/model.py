@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from rbxcompose.config import Config
+from rbxcompose.dataclass import dataclass
 from rbxcompose.levels import Level
 from rbxcompose.restarts import DEFAULT, Restart
 

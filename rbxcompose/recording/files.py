@@ -8,11 +8,11 @@ from __future__ import annotations
 import fcntl
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
 from rbxcompose.atomic_files import sync_folder
+from rbxcompose.dataclass import dataclass
 from rbxcompose.printable import plain
 from rbxcompose.recording.reader import NotARecordingError
 from rbxcompose.recording.recovery import recover

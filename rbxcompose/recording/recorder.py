@@ -5,10 +5,10 @@ from __future__ import annotations
 import contextlib
 import os
 from collections import Counter
-from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.recording.files import complete, create
 from rbxcompose.recording.message import Recorded
 from rbxcompose.recording.topics import RecordedTopic

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from rbxcompose.clock import NANOSECONDS
+from rbxcompose.dataclass import dataclass
 from rbxcompose.recording.message import Recorded
 from rbxcompose.recording.topics import RecordedTopic
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fnmatch import fnmatchcase
 
 from rbxcompose.bus.classes import ros_qos
 from rbxcompose.bus.names import name_problem
 from rbxcompose.bus.tokens import EndpointToken, EntityKind
+from rbxcompose.dataclass import dataclass
 from rbxcompose.qos import Qos
 
 CDR = "cdr"

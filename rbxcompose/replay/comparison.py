@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from rbxcompose.clock import NANOSECONDS
+from rbxcompose.dataclass import dataclass
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.cdr import CdrError, decode
 from rbxcompose.msgs.events import TOPIC

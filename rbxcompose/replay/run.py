@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 
 from rbxcompose.clock import SteppedClock
+from rbxcompose.dataclass import dataclass
 from rbxcompose.levels import Level
 from rbxcompose.plan.model import Instance, Plan
 from rbxcompose.recording.message import Recorded

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TypeVar
 
 from rbxcompose.bus.attachment import Attachment, decode_attachment
@@ -11,6 +11,7 @@ from rbxcompose.bus.bus import Bus
 from rbxcompose.bus.topics import Publisher
 from rbxcompose.bus.transport import LONGEST_WAIT, Arrival, NoTransport, Question, TransportReply
 from rbxcompose.clock import Clock
+from rbxcompose.dataclass import dataclass
 from rbxcompose.msgs.types import Message
 from rbxcompose.plan.model import Plan
 from rbxcompose.qos import Qos

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import socket
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, get_args
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.robot_events import MissionOver, RobotHeld
 from rbxcompose.typed_json import Family
 

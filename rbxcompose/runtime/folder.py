@@ -11,10 +11,11 @@ import stat
 import tempfile
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 from rbxcompose.atomic_files import TEMPORARY, replace_file
+from rbxcompose.dataclass import dataclass
 from rbxcompose.regular_files import open_regular
 from rbxcompose.runtime.processes import Process, boot_id
 from rbxcompose.typed_json import UnreadableError, from_data, to_data

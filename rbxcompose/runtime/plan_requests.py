@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from rbxcompose.dataclass import dataclass
 from rbxcompose.plan.diff import Change
 from rbxcompose.requests import Command, Query
 from rbxcompose.runtime.requests import ROBOT

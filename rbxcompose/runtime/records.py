@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.levels import Level
 
 

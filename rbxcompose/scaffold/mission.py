@@ -6,11 +6,11 @@ import math
 import os
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import combinations
 from pathlib import PurePosixPath
 
 from rbxcompose.config import Place
+from rbxcompose.dataclass import dataclass
 from rbxcompose.scaffold.texts import render
 
 MOST_PLACES = 2  # places that it visits

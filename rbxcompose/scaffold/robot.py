@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import combinations
 
 from pydantic import ValidationError
 
 from rbxcompose.config import Config, Place
+from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.functions import FUNCTIONS
 from rbxcompose.findings import suggest
 from rbxcompose.missions.modifiers.registry import modifier_keys

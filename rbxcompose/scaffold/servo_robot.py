@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from rbxcompose.actuation.bus_load import cycle_load
 from rbxcompose.actuation.servo_models import ServoModel
 from rbxcompose.actuation.torques import stall_torque
+from rbxcompose.dataclass import dataclass
 from rbxcompose.scaffold.texts import render, yaml_text
 
 _PLAIN_PATH = re.compile(r"/[\w./:-]*\w")

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
+from rbxcompose.dataclass import dataclass
+from rbxcompose.field_docs import field_docs
 from rbxcompose.manifest.file_models import file_model
 from rbxcompose.manifest.header import ManifestHeader
 from rbxcompose.manifest.registry import sections as all_sections
@@ -114,8 +115,8 @@ def header(kind: str) -> dict[str, Schema]:
     (made,) = schemas_of({"header": ManifestHeader})[1].values()
     return {
         **{name: dict(one) for name, one in made["properties"].items()},
-        "rbx": {"const": 1, "description": ManifestHeader.model_fields["rbx"].description},
-        "kind": {"const": kind, "description": ManifestHeader.model_fields["kind"].description},
+        "rbx": {"const": 1, "description": field_docs(ManifestHeader)["rbx"]},
+        "kind": {"const": kind, "description": field_docs(ManifestHeader)["kind"]},
     }
 
 

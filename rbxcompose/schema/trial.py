@@ -6,7 +6,9 @@ from collections.abc import Iterable
 from typing import Any
 
 from rbxcompose.config import Name, Time
-from rbxcompose.manifest.test_file import SECTIONS, TEST, TrialFile
+from rbxcompose.field_docs import field_docs
+from rbxcompose.manifest.section import TEST
+from rbxcompose.manifest.test_file import SECTIONS, TrialFile
 from rbxcompose.schema.robot import document, or_empty
 from rbxcompose.schema.scalars import Schema
 from rbxcompose.schema.settle import opened, schemas_of
@@ -36,7 +38,7 @@ def trial_schema(types: Iterable[str]) -> Schema:
 
 def _description(name: str) -> str:
     fields = TrialFile.model_fields
-    return next(field.description or "" for key, field in fields.items() if name in (key, field.alias))
+    return next(field_docs(TrialFile)[key] for key, field in fields.items() if name in (key, field.alias))
 
 
 def _step(time: Schema) -> Schema:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from enum import StrEnum
 from typing import Generic, Protocol, TypeVar
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.geometry import Pose2, Transform3
 
 M = TypeVar("M")
@@ -23,6 +23,11 @@ F_contra = TypeVar("F_contra", contravariant=True)
 
 class Sender(Protocol[M_contra]):
     """Publishes one message per call."""
+
+    @property
+    def is_wanted(self) -> bool:
+        """Return whether anything would receive a message now; a costly one need not be made for nobody."""
+        ...
 
     def __call__(self, message: M_contra, /) -> None:
         """Publish `message`."""

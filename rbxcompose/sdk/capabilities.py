@@ -6,11 +6,13 @@ text in a capability is the name of a port of the component; everything else is 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, fields, replace
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import fields, replace
 from typing import Any, Generic, TypeVar
 
 from rbxcompose.config import Config, Place
+from rbxcompose.dataclass import dataclass
+from rbxcompose.geometry import Pose2
 
 T_co = TypeVar("T_co", covariant=True)
 C = TypeVar("C", bound="Capability")
@@ -90,6 +92,8 @@ class Navigates(Capability):
     """How far from the goal it may end [m]."""
     max_speed: Setting[float] | None = None
     """[m/s], unless declared as what it commands."""
+    least_time: Callable[[Pose2, Pose2, Drives | None], float] | None = None
+    """Returns the least time from a pose to another on this base [s]; without it, that of the way at full speed."""
 
 
 @dataclass(frozen=True, slots=True)

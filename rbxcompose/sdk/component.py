@@ -66,6 +66,7 @@ class Component(Generic[C]):
     """
 
     rate: ClassVar[float] = 0.0  # [Hz] of `step`; 0: no steps
+    steps_for_goals: ClassVar[bool] = False  # steps only while an action that it serves has a goal, and once after it
     process: ClassVar[str] = "robot"  # default process group
     blocking: ClassVar[bool] = False  # may wait or compute for a long time: runs in a thread of its own
     simulated: ClassVar[bool] = False  # exists only in simulation

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from types import MappingProxyType
 from typing import Any, ClassVar, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 from rbxcompose.config import Dimensioned, Place
+from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.types import COUNT, FLAG, PLACE, POSE, TEXT, Type, choice_of, quantity_of
 from rbxcompose.geometry import Pose2
 from rbxcompose.plugins import BrokenPluginError, Plugins

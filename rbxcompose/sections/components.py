@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from difflib import get_close_matches
 from typing import Any
 
 from rbxcompose.config import Config, Name
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import DID_YOU_MEAN, SIMILAR, Finding, Report, Span, kind
 from rbxcompose.manifest.options import OPTIONS, ComponentOptions
 from rbxcompose.manifest.registry import section

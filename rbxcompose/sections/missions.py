@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import Field
 
 from rbxcompose.config import Config, Name, Secret
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Report, Span
 from rbxcompose.manifest.fields import FileName
 from rbxcompose.manifest.files import resolve

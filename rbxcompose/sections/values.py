@@ -39,6 +39,10 @@ class ValueModel(Config):
     """Its type: a dimension, `number`, `text`, `flag`, ..."""
     unit: Annotated[str, AfterValidator(partial(_known, "unit", tuple(UNITS)))] | None = None
     """Unit of the message, if it differs from that of the type."""
+    event: bool | None = None
+    """Whether each message is an event: a condition that waits counts it only if it came since its node began, and no
+    mission waits for it before it begins. Else the last message counts, however old.
+    """
 
 
 @section("values", ValueModel, order=80, names=VALUE, entry="value", short=Short("port", is_merged=False))
@@ -51,5 +55,9 @@ def values(reading: Reading[ValueModel]) -> dict[str, ValueModel]:
           door:
             topic: door/state
             type: text
+          confirmed:
+            topic: button
+            type: flag
+            event: true
     """
     return reading.entries()

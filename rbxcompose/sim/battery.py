@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from rbxcompose.dataclass import dataclass
 from rbxcompose.levels import Level
 
 NOTHING_LEFT = 1e-9  # anything less is rounding from many small steps, not charge

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from rbxcompose.dataclass import dataclass
 from rbxcompose.geometry import AT_REST, Velocity2
 
 NOTHING_LEFT = 1e-9  # [s]; anything less is rounding from many small steps, not work

@@ -6,8 +6,8 @@ All times are robot time [s].
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.geometry import AT_REST, Pose2, Velocity2
 
 ABSURD = 2.0  # a command above this many times a limit is a fault of its sender, not a wish to go fast
@@ -87,6 +87,8 @@ class DiffDriveCore:
         self._follow(AT_REST, dt - driven)
 
     def _follow(self, target: Velocity2, duration: float) -> None:
+        if duration <= 0.0 or self.velocity == target == AT_REST:
+            return
         elapsed = 0.0
         for until in self._corners(target, duration):
             dt = until - elapsed
@@ -103,6 +105,8 @@ class DiffDriveCore:
     def _corners(self, target: Velocity2, duration: float) -> list[float]:
         """Return the moments up to `duration` between which both velocities are linear and keep their signs [s]."""
         now, limits = self.velocity, self.settings
+        if now == target:
+            return [duration]
         corners = (
             abs(now.linear) / limits.acceleration,
             abs(target.linear - now.linear) / limits.acceleration,

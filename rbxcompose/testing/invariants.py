@@ -17,9 +17,10 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from rbxcompose.bus.goals import GoalState
+from rbxcompose.dataclass import dataclass
 
 ROBOT = "robot itself"  # who receives a stop or a release first; each process receives it a little later
 ROUNDING = 1e-6  # velocities up to this count as rest [m/s, rad/s]

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from rbxcompose.compiler import Compilation, compile_robot
+from rbxcompose.dataclass import dataclass
 from rbxcompose.plan.model import Plan
 from rbxcompose.rendering.text import render_text
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from rbxcompose.dataclass import dataclass
 from rbxcompose.plan.model import Plan
 from rbxcompose.robot_events import MissionOver
 from rbxcompose.testing.bench import Bench
@@ -32,5 +31,14 @@ class Ran:
 def run_robot(plan: Plan, *, most: float = LONGEST) -> Ran:
     """Run a robot until its mission has ended, at most `most` [s] of robot time."""
     bench = Bench(plan=plan)
-    bench.run_until(lambda: any(isinstance(event, MissionOver) for event in bench.events), most)
+    seen = 0
+
+    def is_over() -> bool:
+        nonlocal seen  # asked after each instant, so only new events are looked at
+        if len(bench.events) == seen:
+            return False
+        news, seen = bench.events[seen:], len(bench.events)
+        return any(isinstance(event, MissionOver) for event in news)
+
+    bench.run_until(is_over, most)
     return Ran(bench)

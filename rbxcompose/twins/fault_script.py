@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Protocol
 
 from rbxcompose.config import Config
+from rbxcompose.dataclass import dataclass
 from rbxcompose.requests import Command, Refused
 from rbxcompose.twins.servo_fake import FakeServo
 from rbxcompose.twins.servo_faults import FAULTS, UNPLUG, FaultName, servo_faults

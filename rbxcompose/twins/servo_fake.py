@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
-from dataclasses import dataclass
 from random import Random
 
 from rbxcompose.actuation.control_items import ControlItem
 from rbxcompose.actuation.servo_models import ONE_ERRORS, ServoModel, servo_models
+from rbxcompose.dataclass import dataclass
 from rbxcompose.twins.servo_faults import ServoFaults
 from rbxcompose.twins.servo_motor import IdealMotor, MotorTraits, ServoMotor
 

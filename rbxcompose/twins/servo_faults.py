@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from types import MappingProxyType
 from typing import Any, Literal
+
+from rbxcompose.dataclass import dataclass
 
 UNPLUG = "unplug"
 """The fault of a bus as a whole: its port has gone."""

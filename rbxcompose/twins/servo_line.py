@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.twins import servo_packets as wire
 from rbxcompose.twins.servo_fake import FakeServo
 from rbxcompose.twins.servo_packets import ServoPacket, crc_of, packet_two, packets, status

@@ -8,7 +8,8 @@ the goal.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+
+from rbxcompose.dataclass import dataclass
 
 STEP = 0.01  # [s], the longest step of a profile
 _INSTANT = 1e-9  # [s]; nothing moves in less

@@ -6,7 +6,8 @@ Written from ROBOTIS's description of the protocols and independently of its SDK
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+
+from rbxcompose.dataclass import dataclass
 
 BROADCAST = 254
 PING, READ, WRITE, REBOOT, STATUS = 0x01, 0x02, 0x03, 0x08, 0x55

@@ -29,6 +29,7 @@ from rbxcompose.sdk import (
     OpensPort,
     Out,
     PlaceName,
+    Qos,
     Ratio,
     RollsOn,
     ServesAction,
@@ -251,3 +252,17 @@ def declaring(name: str, *capabilities: Capability) -> type[Component[Any]]:
             return capabilities
 
     return component(name)(Thing)
+
+
+@component("toy_pusher")
+class Pusher(Component[Config]):
+    """Pushes the base, and does not call it a command."""
+
+    velocity = Out(Twist, "cmd_vel", qos=Qos.STATE)
+
+
+@component("toy_surveyor")
+class Surveyor(Component[Config]):
+    """Waits for a last odometry that nobody keeps."""
+
+    where = In(Odometry, "odom", qos=Qos.LATCHED)

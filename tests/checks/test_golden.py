@@ -12,6 +12,7 @@ from rbxcompose.msgs.std_msgs import Empty
 from rbxcompose.rendering.text import render_text
 from rbxcompose.sdk import Component, Config, Out, component
 from rbxcompose.testing.golden import Golden
+from tests.checks import strangers
 
 
 @component("toy_heartbeat")
@@ -33,6 +34,10 @@ def test_what_a_check_says_is_its_golden_text(check: Check, golden: Golden, monk
     out = compile_robot(str(robot), real=real, environment={})
     assert {finding.code for finding in out.report} == {check.code}
     golden.check(f"{check.code}.txt", render_text(out.report, out.sources))
+
+
+def test_the_types_of_others_are_known() -> None:
+    assert strangers.Surveyor.type_name == "toy_surveyor"
 
 
 def test_every_golden_robot_belongs_to_a_check() -> None:

@@ -208,6 +208,15 @@ def test_a_command_to_a_running_robot_imports_nothing_heavy(verb: str) -> None:
     assert not {"pydantic", "numpy", "zenoh", "yaml", "rosbags"} & set(found.stdout.split())
 
 
+def test_check_imports_nothing_heavy_that_the_robot_does_not_need() -> None:
+    script = "import sys; from rbxcompose.cli.main import main; main(sys.argv[1:]); print(*sys.modules)"
+    command = [sys.executable, "-c", script, "check", "robots/turtlebot"]
+    found = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    needless = {"numpy", "zenoh", "xacro", "mcap", "jinja2", "urllib.request"}
+    assert "turtlebot is fine" in found.stdout
+    assert not needless & set(found.stdout.split())
+
+
 def test_each_verb_says_what_it_does_in_one_line() -> None:
     for verb in verbs.verbs():
         text = (ROOT / "rbxcompose" / "cli" / f"{verbs.module_of(verb)}.py").read_text(encoding="utf-8")

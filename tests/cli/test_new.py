@@ -177,7 +177,7 @@ def test_at_a_terminal_it_asks_and_asks_again_after_a_wrong_answer(project: Path
     terminal.answer("when the battery is low.]: ", "\n")
     terminal.answer("[diff_drive_sim]: ", "diff_drive\n")
     assert "did you mean 'diff_drive_sim'?" in terminal.answer("[diff_drive_sim]: ", "\n")
-    place = "(empty: continue): "
+    place = "or nothing to go on: "
     terminal.answer(place, "shelf=3,1\n")
     terminal.answer(place, "shelf=1,1\n")
     assert "it is taken" in terminal.answer(place, "door=1,-1,90 deg\n")

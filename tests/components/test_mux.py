@@ -1,8 +1,11 @@
 from __future__ import annotations
 
+import pytest
+
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticStatus
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.msgs.std_msgs import Empty
+from rbxcompose.qos import Qos
 from rbxcompose.testing import Bench, instance
 
 SLOW, FAST, ZERO = Twist(linear=Vector3(x=0.1)), Twist(linear=Vector3(x=0.4)), Twist()
@@ -33,6 +36,27 @@ def test_one_zero_follows_the_last_command_and_then_silence() -> None:
     robot.publish("/cmd_vel/navigation", SLOW)
     robot.advance(5.0)
     assert out == [SLOW, ZERO]
+
+
+def test_it_wakes_when_sources_may_have_fallen_silent_and_not_for_each_message(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot = bench()
+    component = robot.component("cmd_vel")
+    wake, woken = component.wake, []
+
+    def counted() -> None:
+        woken.append(robot.clock.now())
+        wake()
+
+    monkeypatch.setattr(component, "wake", counted)
+    times: list[float] = []
+    robot.bus.subscribe("test", "/cmd_vel", Twist, Qos.EVENT, lambda message: times.append(robot.clock.now()))
+    for _ in range(50):
+        robot.publish("/cmd_vel/navigation", SLOW)
+        robot.advance(0.1)
+    robot.advance(5.0)
+    assert times[-1] == pytest.approx(4.9 + 0.5, abs=1e-9)  # the zero
+    assert len(times) == 51
+    assert len(woken) <= 12
 
 
 def test_a_stop_sends_zero_at_once_and_lets_nothing_through_until_rest_after_release() -> None:

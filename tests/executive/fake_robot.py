@@ -140,6 +140,12 @@ class Look:
         return Transform3.from_pose2(self.pose)
 
 
+VALUES = {
+    "battery": ValueSource("battery_level", "std_msgs/msg/Float32", "data", 1, 100, TYPES["ratio"]),
+    "confirmed": ValueSource("button", "std_msgs/msg/Bool", "data", type=FLAG, is_event=True),
+}
+
+
 class FakeWindow:
     """A window whose viewer is the test."""
 
@@ -172,7 +178,7 @@ class Robot:
         config = MissionConfig(
             programs=programs,
             start=start,
-            values={"battery": ValueSource("battery_level", "std_msgs/msg/Float32", "data", 1, 100, TYPES["ratio"])},
+            values=VALUES,
             places=PLACES,
             skills={
                 "go_to": SkillSource(

@@ -8,7 +8,7 @@ from rbxcompose.executive.requests import CancelMission, PauseMission, ResumeMis
 from rbxcompose.levels import Level
 from rbxcompose.msgs.geometry_msgs import PoseStamped
 from rbxcompose.msgs.rbxcompose_msgs import Recharge
-from rbxcompose.msgs.std_msgs import Float32, String
+from rbxcompose.msgs.std_msgs import Bool, Float32, String
 from rbxcompose.msgs.std_srvs import SetBool, Trigger
 from rbxcompose.sdk import Outcome
 from tests.executive.fake_robot import Robot, ToySlow
@@ -123,6 +123,29 @@ def test_a_held_goal_that_a_stop_ends_is_sent_again() -> None:
     robot.mission.handle(ResumeMission())
     robot.advance(0.0)
     assert len(robot.scan.goals) == 2
+
+
+def test_a_call_goes_on_while_the_robot_is_stopped_and_its_answer_waits_for_the_resume() -> None:
+    robot = started("do:\n  - call: reset\n  - go_to: corner")
+    robot.mission.stop()
+    robot.reset.answer(Trigger.Response(success=True))
+    robot.advance(3.0)
+    assert not robot.go_to.goals
+    robot.mission.handle(ResumeMission())
+    robot.advance(0.0)
+    assert (len(robot.reset.asked), len(robot.go_to.goals)) == (1, 1)
+
+
+def test_a_mission_begins_without_events_and_ends_its_wait_with_one_that_comes_meanwhile() -> None:
+    robot = started("do:\n  - wait_for: $confirmed\n  - wait: 31 s\n  - wait_for: $confirmed")
+    for _ in range(2):  # the second one comes between the waits
+        robot.advance(20.0)
+        robot.mission.received("value_confirmed", Bool(data=True))
+    robot.advance(60.0)
+    assert not robot.events
+    robot.mission.received("value_confirmed", Bool(data=True))
+    robot.advance(0.0)
+    assert end_of(robot) == "success"
 
 
 def test_the_reason_in_a_result_is_told() -> None:

@@ -26,7 +26,7 @@ def between(*sets: str, profiles: tuple[str, ...] = ()) -> Difference:
 
 @pytest.mark.parametrize("name", ["turtlebot", "twins"])
 def test_a_plan_tells_processes_order_topics_and_keys(name: str, golden: Golden) -> None:
-    golden.check(f"plan_{name}.txt", plan_text(plan(name=name)) + "\n")
+    golden.check(f"plan_{name}.txt", plan_text(plan(name=name), with_keys=True) + "\n")
 
 
 def test_a_plan_that_was_saved_reads_the_same() -> None:

@@ -30,6 +30,8 @@ SKILLS = {
     "recharge": Skill("recharge", claims="base"),
     "say": Skill("say", {"words": TEXT}, "words"),
     "pour": Skill("pour", restartable=False),
+    "lift": Skill("lift", claims="arm"),
+    "press": Skill("press", claims="arm", restartable=False),
     "look": Skill("look", outcomes={"empty": "failure", "person": "success"}, results={"people": TYPES["count"]}),
     "hold": Skill("hold", pausable=True),
     **{name: Skill(name) for name in ("a", "b", "c", "d", "react", "first", "second")},

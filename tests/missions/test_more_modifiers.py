@@ -201,7 +201,7 @@ def test_a_cooldown_stands_still_while_the_mission_is_paused() -> None:
     simulated.at(1.5, lambda: simulated.engine.pause(1.5))
     simulated.at(11.5, lambda: simulated.engine.resume(11.5))
     assert simulated.advance(40) == "success"
-    assert skills(simulated) == ["0 a", "1 b", "11.5 b", "12.5 b"]
+    assert skills(simulated) == ["0 a", "1 b", "11.5 b"]
 
 
 def test_a_cooldown_in_a_reaction_that_was_cut_lasts_as_long_as_it_says() -> None:

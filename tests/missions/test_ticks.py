@@ -60,16 +60,51 @@ def test_timers_stand_still_while_the_mission_is_paused() -> None:
     assert skills(simulated) == ["8 a"]
 
 
-def test_a_pause_halts_the_running_leaf_and_the_resume_asks_for_it_again() -> None:
-    simulated = simulate("do: [a, b]", takes={"a": 4.0})
+def test_a_pause_halts_what_claims_a_part_of_the_robot_and_the_resume_asks_for_it_again() -> None:
+    simulated = simulate("do: [lift, b]", takes={"lift": 4.0})
     simulated.at(1.0, lambda: simulated.engine.pause(1.0))
     simulated.at(6.0, lambda: simulated.engine.resume(6.0))
     assert simulated.advance(20.0) == "success"
-    assert simulated.told[:3] == ["0 a", "1 a: halted (1 s)", "6 a"]
+    assert simulated.told[:3] == ["0 lift", "1 lift: halted (1 s)", "6 lift"]
+
+
+@pytest.mark.parametrize("resumed", [3.0, 6.0])
+def test_what_claims_nothing_goes_on_during_a_pause_and_its_result_waits(resumed: float) -> None:
+    simulated = simulate("do: [a, b]", takes={"a": 4.0})
+    simulated.at(1.0, lambda: simulated.engine.pause(1.0))
+    simulated.at(resumed, lambda: simulated.engine.resume(resumed))
+    assert simulated.advance(20.0) == "success"
+    assert simulated.calls == {"a": 1, "b": 1}
+    assert f"{max(resumed, 4.0):g} b" in simulated.told
+
+
+def test_a_call_goes_on_during_a_pause() -> None:
+    simulated = simulate("do:\n  - call: reset\n  - a")
+    simulated.at(0.5, lambda: simulated.engine.pause(0.5))
+    simulated.at(6.0, lambda: simulated.engine.resume(6.0))
+    assert simulated.advance(20.0) == "success"
+    assert simulated.calls == {"reset": 1, "a": 1}
+
+
+def test_what_may_not_be_repeated_has_failed_after_a_pause() -> None:
+    simulated = simulate("do:\n  fallback: [press, b]", takes={"press": 4.0})
+    simulated.at(1.0, lambda: simulated.engine.pause(1.0))
+    simulated.at(6.0, lambda: simulated.engine.resume(6.0))
+    assert simulated.advance(20.0) == "success"
+    assert simulated.told[:3] == ["0 press", "1 press: halted (1 s)", "6 b"]
+    assert simulated.calls == {"press": 1, "b": 1}
+
+
+def test_a_mission_tells_why_it_failed_after_a_pause() -> None:
+    simulated = simulate("do: press")
+    simulated.at(0.5, lambda: simulated.engine.pause(0.5))
+    simulated.at(1.0, lambda: simulated.engine.resume(1.0))
+    assert simulated.advance(20.0) == "failure"
+    assert "it was stopped, and may not be started again" in simulated.told[-1]
 
 
 def test_a_pause_leaves_the_modifiers_of_a_leaf_where_they_were() -> None:
-    simulated = simulate("do:\n  a:\n  timeout: 5 s\n  attempts: 2", takes={"a": 4.5})
+    simulated = simulate("do:\n  lift:\n  timeout: 5 s\n  attempts: 2", takes={"lift": 4.5})
     simulated.at(1.0, lambda: simulated.engine.pause(1.0))
     simulated.at(6.0, lambda: simulated.engine.resume(6.0))
     assert simulated.advance(20.0) == "failure"

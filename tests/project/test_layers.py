@@ -15,32 +15,34 @@ PACKAGE = Path(__file__).parents[2] / "rbxcompose"
 GROUND = {
     "atomic_files": "",
     "clock": "",
-    "config": "references units",
-    "edits": "findings",
+    "config": "dataclass field_docs references units",
+    "dataclass": "",
+    "edits": "dataclass findings",
     "endpoints": "",
-    "expressions": "findings units",
+    "expressions": "dataclass findings units",
     "fence": "",
-    "findings": "per_compile",
+    "field_docs": "",
+    "findings": "dataclass per_compile",
     "formats": "findings plugins",
-    "geometry": "",
+    "geometry": "dataclass",
     "levels": "",
-    "manifest": "config expressions findings per_compile plugins printable references regular_files restarts slips "
-    "units",
-    "msgs": "findings units",
-    "per_compile": "",
+    "manifest": "config dataclass expressions findings per_compile plugins printable references regular_files "
+    "restarts slips units",
+    "msgs": "dataclass findings units",
+    "per_compile": "dataclass",
     "plugins": "findings printable",
     "printable": "",
     "qos": "",
-    "references": "findings units",
+    "references": "dataclass findings units",
     "regular_files": "",
     "requests": "typed_json",
     "restarts": "config",
-    "robot_events": "",
-    "rules": "findings",
+    "robot_events": "dataclass",
+    "rules": "dataclass findings",
     "scheduler": "",
-    "slips": "findings",
+    "slips": "dataclass findings",
     "typed_json": "",
-    "units": "findings",
+    "units": "dataclass findings",
 }
 # What the others import beside the ground and themselves. A row may be that of a package, a module or what lies deeper.
 ABOVE = {
@@ -60,7 +62,7 @@ ABOVE = {
     "controllers": "control controller_interface sdk",
     "compiler": "check_runner composition model plan",
     "components": "actuation body control controller_interface controller_manager controller_requests diagnostics "
-    "executive missions mux.core navigation.go_to sdk servo_bus_config servo_bus_line servo_report sim "
+    "executive missions mux.core navigation sdk servo_bus_config servo_bus_line servo_report sim "
     "twins.fault_script",
     "servo_report": "actuation control",
     "composition": "body.description sections",
@@ -104,7 +106,7 @@ TABLE = {
     **{name: frozenset(row.split()) for name, row in GROUND.items()},
     **{name: frozenset(row.split()) | GROUND.keys() for name, row in ABOVE.items()},
 }
-TYPE_CHECKING_BLOCKS = 13
+TYPE_CHECKING_BLOCKS = 14
 
 
 def imports(path: Path) -> set[str]:

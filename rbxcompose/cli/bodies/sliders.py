@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from types import MappingProxyType
 
 from rbxcompose.body.model import Body, BodyJoint
+from rbxcompose.dataclass import dataclass
 from rbxcompose.printable import columns, fitted, plain
 from rbxcompose.units import ANGLE, LENGTH, NUMBER, Dimension, UnitError, example, format_number, parse_quantity
 

@@ -6,12 +6,13 @@ import argparse
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 from rbxcompose.body.description import BodyPart, Description, describe
 from rbxcompose.body.files import BodyFile
 from rbxcompose.cli.project.robot_options import add_layer_options, compiled
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Report, Span
 from rbxcompose.manifest.files import find, shown_name
 from rbxcompose.per_compile import one_compile

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from rbxcompose.dataclass import dataclass
 
 HOLD = 0.3  # [s] that a key counts as pressed; terminals report only presses, and repeat them while a key is held
 PERIOD = 0.1  # [s] between two commands

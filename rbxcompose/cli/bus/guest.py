@@ -9,7 +9,6 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from types import FrameType, TracebackType
 from typing import TYPE_CHECKING, Self
 
@@ -26,6 +25,7 @@ from rbxcompose.bus.zenoh_transport import ZenohTransport
 from rbxcompose.cli.bus.place import BusPlace
 from rbxcompose.cli.robots.lookup import NotDoneError
 from rbxcompose.clock import MonotonicClock
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import kind
 from rbxcompose.qos import Qos
 from rbxcompose.runtime.process_group.inbox import CallbackInbox

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import yaml
@@ -13,6 +12,7 @@ import yaml
 from rbxcompose.bus.graph import WireType
 from rbxcompose.cli.output.console import tell_report
 from rbxcompose.cli.robots.lookup import NotDoneError
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Report, Span, kind
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.scalars import plain_value

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
+
+from rbxcompose.dataclass import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass
 
 from rbxcompose.cli.robots.lookup import (
     NO_ANSWER,
@@ -13,6 +12,7 @@ from rbxcompose.cli.robots.lookup import (
     known_state,
     no_answer,
 )
+from rbxcompose.dataclass import dataclass
 from rbxcompose.runtime.folder import RobotFolder
 
 

@@ -6,10 +6,11 @@ import argparse
 import re
 import shlex
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Protocol
 
 from rbxcompose.cli.verbs import load, parser_of, verbs
+from rbxcompose.dataclass import dataclass
 
 _GENERAL = ("--help", "--version")
 _BREAKS = re.compile(r".*[:=]", re.DOTALL)  # bash treats these as ends of words and replaces only what follows

@@ -5,13 +5,14 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
 from rbxcompose.cli.missions.files import mission_in, robot_of
 from rbxcompose.cli.output.console import FINDINGS, tell
 from rbxcompose.cli.robots.lookup import NotDoneError
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Span, kind
 from rbxcompose.missions.engine.log_replay import OtherMissionError, ReplayBudget, ReplayError, replay
 from rbxcompose.missions.engine.logbook import INPUTS, LogRecord

@@ -12,9 +12,10 @@ import re
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, NoReturn, TextIO
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Report, Severity, Sources
 from rbxcompose.rendering.text import render_text
 
@@ -78,6 +79,11 @@ def misused(verb: str, problem: str) -> int:
 def has_colour(stream: TextIO) -> bool:
     """Return whether to use colours: on a terminal, unless `NO_COLOR` is set."""
     return stream.isatty() and not os.environ.get("NO_COLOR")
+
+
+def good(text: str) -> str:
+    """Return a line of good news, green where stdout shows colours."""
+    return f"\x1b[32m{text}\x1b[0m" if has_colour(sys.stdout) else text
 
 
 def tell(text: str) -> None:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from rbxcompose.atomic_files import replace_file
 from rbxcompose.compiler import Compilation, compile_robot
+from rbxcompose.dataclass import dataclass
 from rbxcompose.manifest.files import find, project_of, shown_name
 from rbxcompose.manifest.library import PREFIX
 from rbxcompose.manifest.limits import FILE_BYTES

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Severity, Span, kind
 from rbxcompose.manifest.files import ROBOT_FILE, find, project_of, shown_name
 from rbxcompose.manifest.library import PREFIX
-from rbxcompose.manifest.test_file import TEST
+from rbxcompose.manifest.section import TEST
 from rbxcompose.regular_files import open_regular
 
 UNUSED = kind(

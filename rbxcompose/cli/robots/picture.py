@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.levels import Level
 from rbxcompose.printable import columns, fitted, plain
 from rbxcompose.runtime.records import Record

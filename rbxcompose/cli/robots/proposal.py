@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 from rbxcompose.cli.robots.lookup import answer_of, find_robot
+from rbxcompose.dataclass import dataclass
 from rbxcompose.inspection.changes_text import changes_text, with_places
 from rbxcompose.model.robot import Robot
 from rbxcompose.plan.dump import dump

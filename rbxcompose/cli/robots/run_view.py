@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable
 
-from rbxcompose.cli.output.console import has_colour, refuse, tell
+from rbxcompose.cli.output.console import good, has_colour, refuse, tell
 from rbxcompose.cli.robots.live_reload import LiveReload
 from rbxcompose.cli.robots.lookup import ALREADY_UP, UNSAFE
 from rbxcompose.cli.robots.story import StoryWriter, summary
@@ -91,7 +91,8 @@ class _Watch:
                 return None
             case Up(components, processes, seconds):
                 self._is_up = True
-                tell(f"{name} is up: {extent(components, processes)}, {seconds:.2f} s")
+                took = "" if self._options.is_stepped else f", {seconds:.2f} s"  # each stepped run tells the same
+                tell(f"{name} is up: {extent(components, processes)}{took}")
                 if self._options.is_detached:
                     self._started.let_go()
                     return 0
@@ -104,6 +105,7 @@ class _Watch:
                 self._started.wait()
                 return refuse(UNSAFE.at(None, reason))
             case RunEnded(exit_code, reason, time, facts):
-                tell(summary(name, reason, time, facts))
+                first, *rest = summary(name, reason, time, facts).split("\n")
+                tell("\n".join([good(first) if exit_code == 0 else first, *rest]))
                 self._started.wait()
                 return exit_code

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
 from rbxcompose.actuation.bus import FoundServo
 from rbxcompose.actuation.dynamixel_bus import DynamixelBus
 from rbxcompose.actuation.servo_findings import ID_TAKEN, OTHER_RATE, UNKNOWN_MODEL
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding
 
 _IDS = range(1, 253)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import PurePath
 from typing import TypeVar
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Report, Span
 from rbxcompose.importing.arbotix.controllers import DiffController, FollowController, read_controller
 from rbxcompose.importing.arbotix.grippers import ArbotixGripper, read_gripper

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Severity, Span, kind
 from rbxcompose.importing.foreign_files import ForeignMap, Given
 from rbxcompose.importing.manifest_text import angle, flag, flow_list, length, number, place, word

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Protocol, TypeVar
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Related, Report, Severity, Span, kind
 from rbxcompose.importing.arbotix.controllers import DiffController, FollowController
 from rbxcompose.importing.arbotix.driver import ArbotixDriver, ArbotixFile

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from rbxcompose.actuation.servo_models import ServoModel, servo_models
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Severity, Span, kind
 from rbxcompose.importing.foreign_files import ForeignMap, Given
 from rbxcompose.importing.importer import NOT_CARRIED_OVER

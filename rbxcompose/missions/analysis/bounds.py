@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.tree import (
     Arithmetic,
     Comparison,

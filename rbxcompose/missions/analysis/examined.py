@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.missions.analysis.endings import Ending
 from rbxcompose.missions.analysis.scope_types import NodeScope, View, base_scope, views
 from rbxcompose.missions.program.program import Program, RobotNames

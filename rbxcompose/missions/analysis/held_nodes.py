@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.tree import Expression, ExpressionNode, FieldAccess, Index, Variable
 from rbxcompose.expressions.values import Value
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, TreeNode

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.check import ExpressionProblem, check_value
 from rbxcompose.expressions.tree import Expression, Word
 from rbxcompose.expressions.types import PLACE, POSE, TEXT, UNKNOWN, Type, TypeKind, map_of

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import field
 
 from rbxcompose.config import Place
+from rbxcompose.dataclass import dataclass
+from rbxcompose.geometry import Pose2
 from rbxcompose.missions.analysis.facts import Constants, goal_place, items_of, number_of
 from rbxcompose.missions.program.answers import NodeFlow
 from rbxcompose.missions.program.program import ROOT, MissionNode, Program
@@ -18,13 +20,12 @@ Here = Place | None  # where the robot is; None: unknown
 
 @dataclass(frozen=True, slots=True)
 class Driving:
-    """The skill that drives, its main argument, the speed [m/s], the goal tolerance [m], the turn rate [rad/s]."""
+    """The skill that drives, its main argument, the goal tolerance [m], and the least time between two poses [s]."""
 
     skill: str
     main: str
-    speed: float
     tolerance: float
-    turn_rate: float = math.inf
+    least_time: Callable[[Pose2, Pose2], float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,19 +95,12 @@ class Ways:
         if here is None:
             return there, 0.0
         self.leg = (here, there)
-        return there, self.between(here, there)
+        return there, self.driving.least_time(_pose(here), _pose(there))
 
     def between(self, here: Place, there: Place) -> float:
-        """Return the time of a straight drive at full speed, from edge to edge of the tolerances [s]."""
-        return max(0.0, distance(here, there) - 2 * self.driving.tolerance) / self.driving.speed
-
-    def with_turns(self, here: Place, there: Place) -> float:
-        """Return the time of that drive with a turn towards it before, and one to the heading there after it [s]."""
-        way = distance(here, there)
-        bearing = math.atan2(there.y - here.y, there.x - here.x) if way else here.heading
-        turns = abs(math.remainder(bearing - here.heading, math.tau))
-        turns += abs(math.remainder(there.heading - bearing, math.tau))
-        return self.between(here, there) + turns / self.driving.turn_rate
+        """Return the least time from one place to another, whichever way the robot looks at the start [s]."""
+        heading = math.atan2(there.y - here.y, there.x - here.x)
+        return self.driving.least_time(Pose2(here.x, here.y, heading), _pose(there))
 
     def _in_turn(self, node: MissionNode, here: Here, constants: Constants) -> tuple[Here, float]:
         takes = 0.0
@@ -135,6 +129,10 @@ def too_short(ways: Ways, constants: Constants) -> Iterator[TooShort]:
         if interrupt.root is not None:
             ways.go(interrupt.root, None, constants)
     yield from ways.short.values()
+
+
+def _pose(place: Place) -> Pose2:
+    return Pose2(place.x, place.y, place.heading)
 
 
 def distance(here: Place, there: Place) -> float:

@@ -8,7 +8,8 @@ from rbxcompose.missions.engine.engine_base import EngineBase
 from rbxcompose.missions.engine.leaf import Leaf
 from rbxcompose.missions.engine.observers import Branch, NamedObserver, Observed, Since
 from rbxcompose.missions.engine.run import Run
-from rbxcompose.missions.engine.scopes import ItemScope, MissionScope, SinceScope, new_names
+from rbxcompose.missions.engine.scopes import ItemScope, MissionScope, SinceScope
+from rbxcompose.missions.engine.since import since_scope
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.modifiers.registry import decorator_of
 from rbxcompose.missions.program.history import WithHistory
@@ -44,8 +45,8 @@ class Builder:
             KeyError: if the robot has no such skill; `check_program` reports that earlier.
         """
         node = self.nodes[number]
-        names = frozenset[str]().union(*(new_names(asked.expression) for asked in node.asked))
-        since = SinceScope(scope, names) if names else None
+        view = since_scope(scope, node.asked, self.robot, run.program)
+        since = view if view.is_needed else None
         own: MissionScope = since or scope
         item = ItemScope(own, node.item) if node.item else None
         inner = self.run(node.inner) if node.inner else None

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.tree import Expression
 
 POSE = "pose"  # `$pose` changes all the time without a message

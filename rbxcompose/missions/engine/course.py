@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rbxcompose.expressions.evaluate import holds
 from rbxcompose.missions.engine.condition_watches import Watched
-from rbxcompose.missions.engine.scopes import MissionScope, SinceScope, new_names
+from rbxcompose.missions.engine.scopes import SinceScope
 from rbxcompose.missions.engine.task import Task
 from rbxcompose.missions.program.program import Interrupt, Target
 from rbxcompose.missions.program.statuses import RUNNING, SUCCESS
@@ -77,14 +77,14 @@ class Course:
 class Reaction(Course):
     """An interrupt: its condition, its course, and what comes afterwards."""
 
-    def __init__(self, order: int, definition: Interrupt, scope: MissionScope) -> None:
+    def __init__(self, order: int, definition: Interrupt, scope: SinceScope) -> None:
         super().__init__(order)
         self.name = definition.name
         self.afterwards = definition.afterwards
         self.targets = definition.targets
         self.restarts = definition.restarts.text if definition.restarts else ""  # the name of the targets
         self.watched = Watched.of(definition.when.expression)
-        self.scope = SinceScope(scope, new_names(definition.when.expression))
+        self.scope = scope
         self.is_armed = True  # it may act: its condition has been false since it last acted
         self.trouble = ""  # why the condition had no value when it was last evaluated
 

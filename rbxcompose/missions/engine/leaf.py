@@ -10,12 +10,16 @@ from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.program.results import Result
 from rbxcompose.missions.program.statuses import FAILURE, IDLE, RUNNING, SUCCESS
 
+STOPPED = "it was stopped, and may not be started again"
+
 
 class Leaf(Task):
     """Sends a request when it begins, and returns the result once it arrives; kinds implement `ask`."""
 
     __slots__ = ("is_asked", "is_held", "outcome", "status", "values")
     saved: ClassVar[tuple[str, ...]] = ("is_asked", "is_held", "outcome", "status", "values")
+    claims = ""  # the part of the robot that the request needs exclusively
+    is_restartable = True  # it may be requested again after it was stopped
 
     def __init__(self, site: Site) -> None:
         super().__init__(site)
@@ -70,10 +74,17 @@ class Leaf(Task):
             self.engine.world.halt(self.number)
 
     def suspend(self, from_start: bool) -> bool:
-        """Stop the request, to be repeated later; keep a result that has already arrived."""
-        if not self.is_asked:
+        """Stop the request, to be repeated later; keep a result that has already arrived.
+
+        A pause stops only what needs a part of the robot: the rest goes on, and its result waits. What must not be
+        repeated has then failed.
+        """
+        if not self.is_asked or not (from_start or self.claims):
             return False
         self.stop()
+        if not from_start and not self.is_restartable:
+            self.status, self.engine.reasons[self.number] = FAILURE, STOPPED
+            return False
         self.statuses[self.number] = IDLE
         self.engine.cut_short.append(self.number)
         return from_start

@@ -10,6 +10,7 @@ from rbxcompose.missions.engine.engine_base import EngineBase
 from rbxcompose.missions.engine.events import InterruptEnded, InterruptStarted, Reported
 from rbxcompose.missions.engine.resume_points import DEEP
 from rbxcompose.missions.engine.run_base import RunBase
+from rbxcompose.missions.engine.since import since_scope
 from rbxcompose.missions.program.history import WithHistory
 from rbxcompose.missions.program.program import CONTINUE, END, Program, RobotNames, Target
 from rbxcompose.missions.program.results import words
@@ -28,7 +29,10 @@ class Run(RunBase):
         super().__init__(engine, program, robot)
         self.failed: Course | None = None  # the one that made it fail
         self.mission = Course(len(program.interrupts))
-        self.reactions = [Reaction(order, one, self.scope) for order, one in enumerate(program.interrupts)]
+        self.reactions = [
+            Reaction(order, one, since_scope(self.scope, (one.when,), robot, program))
+            for order, one in enumerate(program.interrupts)
+        ]
         self.stack: list[Course] = [self.mission]  # suspended courses, with the running one on top
         self.returns: list[tuple[int, ...]] = []  # the leaves that each reaction of the stack halted
         self.keepers: list[WithHistory] = []  # the tasks of the main node that can keep a place

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import Protocol
 
 from rbxcompose.config import Place
-from rbxcompose.expressions.tree import Expression, FunctionCall, Variable, walk
 from rbxcompose.expressions.values import NotArrived, Value
 
 
@@ -127,12 +126,23 @@ class ItemScope(Inner):
 
 
 class SinceScope(Inner):
-    """The scope of a node that uses `new($x)`: messages count from its start."""
+    """The scope of a node that asks for events or uses `new($x)`: messages count from its start."""
 
-    def __init__(self, outer: MissionScope, names: frozenset[str]) -> None:
+    def __init__(self, outer: MissionScope, names: frozenset[str], events: Mapping[str, Value | NotArrived]) -> None:
+        """Take the names in `new($x)`, and the events, each with its value until one has come."""
         super().__init__(outer)
-        self._names = names
+        self._names = names | events.keys()
+        self._events = events
         self.seen: dict[str, int] = {}
+
+    def variable(self, name: str, /) -> Value | NotArrived:
+        """Return a value of the outer scope; that of an event only if it has come since `mark`."""
+        return self._events[name] if name in self._events and not self.is_new(name) else self.outer.variable(name)
+
+    @property
+    def is_needed(self) -> bool:
+        """Return whether anything counts from the start of the node."""
+        return bool(self._names)
 
     def mark(self) -> None:
         """Count from now on."""
@@ -141,11 +151,3 @@ class SinceScope(Inner):
     def is_new(self, name: str, /) -> bool:
         """Return whether a message has arrived since `mark`."""
         return self.outer.count(name) > self.seen.get(name, 0)
-
-
-def new_names(expression: Expression) -> frozenset[str]:
-    """Return the names that an expression passes to `new($x)`."""
-    if not any(call.name == "new" for call in expression.calls):
-        return frozenset()
-    calls = (node for node, _ in walk(expression.tree) if isinstance(node, FunctionCall) and node.function == "new")
-    return frozenset(argument.name for call in calls for argument in call.arguments if isinstance(argument, Variable))

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
 from typing import ClassVar
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.evaluate import evaluate
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.expressions.values import Value

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Protocol
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.values import Value
 from rbxcompose.missions.engine.events import MissionEvent
 from rbxcompose.missions.engine.scopes import RobotValues

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Self
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.missions.engine.instant_actions import fields_of
 from rbxcompose.missions.engine.leaf import Leaf
 from rbxcompose.missions.engine.task import Site

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Self
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.check import StaticScope, check
 from rbxcompose.expressions.evaluate import evaluate
 from rbxcompose.expressions.tree import Expression, FieldAccess, Index, Variable

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Self
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.values import Value
 from rbxcompose.missions.engine.events import Transition
 from rbxcompose.missions.engine.task import Site, Task

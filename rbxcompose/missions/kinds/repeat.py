@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Self
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.evaluate import holds
 from rbxcompose.expressions.tree import Expression, Number
 from rbxcompose.missions.analysis.facts import is_simple, takes_time
@@ -113,7 +113,7 @@ class RepeatStep(Loop):
         """Read the number of rounds, `do`, `until` and `every`."""
         rounds = reader.count_or_forever(reader.key)
         reader.child("do")
-        until = reader.condition("until") if reader.has("until") else None
+        until = reader.watched("until") if reader.has("until") else None
         return cls(rounds, until, reader.duration("every") if reader.has("every") else None)
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:

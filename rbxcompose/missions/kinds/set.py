@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Self
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.missions.analysis.facts import is_sure
 from rbxcompose.missions.engine.instant_actions import assign
 from rbxcompose.missions.engine.task import Site, Task

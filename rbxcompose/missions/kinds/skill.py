@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Self
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.values import Value
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions.engine.events import Reported, SkillEnded, SkillStarted
@@ -27,7 +28,7 @@ from rbxcompose.missions.program.statuses import FAILURE, NAMES, RUNNING, SUCCES
 class SkillTask(Leaf):
     """A leaf that runs a skill of the robot."""
 
-    __slots__ = ("arguments", "getters", "skill", "started")
+    __slots__ = ("arguments", "claims", "getters", "is_restartable", "skill", "started")
     saved = (*Leaf.saved, "arguments", "started")
     fresh = ("arguments",)
     told = ("started",)
@@ -35,6 +36,7 @@ class SkillTask(Leaf):
     def __init__(self, site: Site, step: SkillStep) -> None:
         super().__init__(site)
         self.skill = site.engine.robot.skills[step.skill]
+        self.claims, self.is_restartable = self.skill.claims, self.skill.restartable
         names = [(argument.name or self.skill.main, argument.value) for argument in step.arguments]
         self.getters: Mapping[str, Getter] = {name: getter(value, self.skill.arguments[name]) for name, value in names}
         self.arguments: dict[str, Value] = {}

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Self
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.evaluate import evaluate
 from rbxcompose.expressions.values import NotArrivedError, Value
 from rbxcompose.manifest.tree import ScalarNode

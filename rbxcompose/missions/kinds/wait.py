@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Self
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.tree import Expression, Number
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.node_reader import NodeReader

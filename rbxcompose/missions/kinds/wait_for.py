@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Self
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.evaluate import holds
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.missions.analysis.facts import is_simple
@@ -68,7 +68,7 @@ class WaitForStep(LeafStep):
     @classmethod
     def read(cls, reader: NodeReader) -> Self:
         """Read the condition."""
-        return cls(reader.condition(reader.key))
+        return cls(reader.watched(reader.key))
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return that it succeeds; only a condition that cannot be evaluated is a failure."""

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.expressions.types import Type
 from rbxcompose.findings import Span
@@ -14,13 +13,15 @@ from rbxcompose.manifest.tree import ScalarNode, TreeNode
 class Asked:
     """An expression of a node, the type that its value must have, and the scalar that contains it.
 
-    If its value is assigned, it must have the type of the datum.
+    If its value is assigned, it must have the type of the datum. A watched condition is evaluated again and again while
+    its node runs; all else is evaluated once.
     """
 
     expression: Expression
     wanted: Type
     scalar: ScalarNode
     is_assigned: bool = False
+    is_watched: bool = False
 
 
 @dataclass(frozen=True, slots=True)

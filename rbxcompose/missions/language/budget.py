@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.manifest.tree import ScalarNode, TreeNode, children, count
 
 MOST_HELD = 5_000  # values, names and operators of nodes in the data, counted for each `run` that may get them

@@ -294,7 +294,7 @@ class _Reader:
         if "when" not in value:
             self.add(codes.MISSING.at(entry.key.span, f"the interrupt '{name}' needs 'when': a condition"))
         else:
-            reader.condition("when")
+            reader.watched("when")
         afterwards, restarts = self.afterwards(reader)
         reaction = value.get("do")
         root = None if reaction is None else self.child(reaction, f"interrupts.{name}", None)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Report
 from rbxcompose.manifest.tree import Key, MappingNode, ScalarNode, TreeNode, with_children
 from rbxcompose.missions.language.grammar import (

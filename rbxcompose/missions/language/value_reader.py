@@ -114,6 +114,11 @@ class ValueReader:
         """Read a condition."""
         return self.expression(key, FLAG, "a condition")
 
+    def watched(self, key: str) -> Expression:
+        """Read a condition that is evaluated again and again while the node runs."""
+        scalar = self.scalar(key, "a condition")
+        return self._asked(scalar, FLAG, is_watched=True) if scalar else UNREADABLE
+
     def duration(self, key: str) -> Expression:
         """Read a duration."""
         return self.expression(key, quantity_of(TIME), "a duration, such as '5 s'")
@@ -180,11 +185,11 @@ class ValueReader:
             return False
         return True
 
-    def _asked(self, scalar: ScalarNode, wanted: Type) -> Expression:
+    def _asked(self, scalar: ScalarNode, wanted: Type, *, is_watched: bool = False) -> Expression:
         expression = read_expression(scalar, self.nodes, wanted)
         if expression is None:
             return UNREADABLE
-        self.asked.append(Asked(expression, wanted, scalar))
+        self.asked.append(Asked(expression, wanted, scalar, is_watched=is_watched))
         return expression
 
     def branch(self, key: str, branches: tuple[str, ...]) -> str:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Self
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.node_reader import NodeReader

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Self
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.evaluate import holds
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.missions import codes
@@ -75,7 +76,7 @@ class AsLongAs(Cutting):
     @classmethod
     def read(cls, reader: NodeReader, key: str) -> Self:
         """Read a condition."""
-        return cls(reader.condition(key))
+        return cls(reader.watched(key))
 
 
 class TimeoutTask(Decorator):

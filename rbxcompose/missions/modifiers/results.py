@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import ClassVar, Self
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.modifiers.registry import Decorator, modifier

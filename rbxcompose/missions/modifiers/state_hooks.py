@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Self
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.missions.engine.instant_actions import act, act_safely
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.node_reader import NodeReader

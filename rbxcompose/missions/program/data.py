@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.types import Type
 from rbxcompose.expressions.values import Value
 from rbxcompose.findings import Span

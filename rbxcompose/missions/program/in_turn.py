@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import ClassVar, Self
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.missions.engine.condition_watches import Watched
 from rbxcompose.missions.engine.task import Site
 from rbxcompose.missions.language.node_reader import NodeReader

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TypeAlias
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.text import Template
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.findings import Span

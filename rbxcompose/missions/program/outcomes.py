@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.missions.program.statuses import FAILURE, NAMES, SUCCESS
 
 SUCCEEDS, FAILS = NAMES[SUCCESS], NAMES[FAILURE]

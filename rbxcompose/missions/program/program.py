@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import ClassVar, Protocol, Self
 
 from rbxcompose.config import Place
+from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.check import StaticScope
 from rbxcompose.expressions.text import parse_template
 from rbxcompose.expressions.tree import Expression
@@ -60,6 +61,7 @@ class Skill:
 class RobotNames:
     """What the robot offers every mission: types of its values, its places, its skills, its missions, all by name.
 
+    `events` are the values whose messages are events.
     `topics` and `services` have the ROS names of their types; `unread` are missions whose files could not be read;
     `removed` are places that a layer has removed, each with where it did so.
     It is not complete if a part of the robot has errors: a missing skill may then belong to that part.
@@ -74,6 +76,7 @@ class RobotNames:
     unread: frozenset[str] = frozenset()
     removed: Mapping[str, Span] = field(default_factory=dict)
     is_complete: bool = True
+    events: frozenset[str] = NOTHING
     ends: dict[str, Outcomes] = field(init=False, compare=False, repr=False, default_factory=dict)
     """How its missions may end, as far as that was asked: one that many others use is examined once."""
     claims: dict[str, frozenset[str]] = field(init=False, compare=False, repr=False, default_factory=dict)

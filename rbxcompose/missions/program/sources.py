@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import StrEnum
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.types import UNKNOWN, Type
 from rbxcompose.missions.program.program import Skill
 
@@ -16,7 +16,8 @@ OUTCOME = "outcome"  # the field of a result with the action's own outcome
 class ValueSource:
     """Where a value comes from: a field (with dots) of the messages on a topic, times `times / per` for SI.
 
-    With `group`, it is the level of that group of the diagnostics, as a word.
+    With `group`, it is the level of that group of the diagnostics, as a word. An event counts only for conditions of
+    nodes that began before it came.
     """
 
     topic: str
@@ -26,6 +27,7 @@ class ValueSource:
     per: float = 1.0
     type: Type = UNKNOWN
     group: str = ""
+    is_event: bool = False
 
 
 class SkillWay(StrEnum):

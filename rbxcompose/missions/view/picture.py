@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.missions.program.linker import link
 from rbxcompose.missions.program.look import Form
 from rbxcompose.missions.program.program import Interrupt, MissionNode, Program, RobotNames

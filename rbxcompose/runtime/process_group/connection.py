@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rbxcompose.bus import shared_memory
@@ -13,6 +12,7 @@ from rbxcompose.bus.transport import Transport
 from rbxcompose.bus.zenoh_session import open_peer
 from rbxcompose.bus.zenoh_transport import ZenohTransport
 from rbxcompose.clock import Clock
+from rbxcompose.dataclass import dataclass
 from rbxcompose.plan.model import Plan
 from rbxcompose.runtime.process_group.inbox import CallbackInbox
 from rbxcompose.runtime.process_group.lifeline import Lifeline

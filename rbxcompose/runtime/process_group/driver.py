@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import selectors
 import time
 from collections.abc import Callable, Sequence
@@ -53,6 +54,7 @@ class Driver:
         self._selector.register(inbox, selectors.EVENT_READ)
         self._selector.register(channel, selectors.EVENT_READ)
         self._next_beat = 0.0  # [s] on the monotonic clock
+        self._beats_from = 0.0  # [s] on that clock; on this grid, beats need no waking of their own
 
     def run(self) -> None:
         """Run until the driven process is over."""
@@ -78,7 +80,9 @@ class Driver:
         until_beat = self._next_beat - time.monotonic()
         if until_beat <= EARLY:
             self._driven.beat()
-            self._next_beat = time.monotonic() + BEAT
+            self._next_beat = self._beats_from + BEAT * (
+                math.floor((time.monotonic() + EARLY - self._beats_from) / BEAT) + 1
+            )
             until_beat = BEAT
         ready = self._wait(max(0.0, min(pause, until_beat)))
         self._inbox.drain(self._scheduler)
@@ -111,7 +115,7 @@ class RealTimeDriver(Driver):
         driven: Driven,
     ) -> None:
         super().__init__(scheduler, inbox, channel, driven)
-        self._clock, self._turns = clock, turns
+        self._clock, self._turns, self._beats_from = clock, turns, clock.start
 
     def _wait(self, longest: float) -> list[tuple[selectors.SelectorKey, int]]:
         self._turns.rest(self._clock.now() + longest)

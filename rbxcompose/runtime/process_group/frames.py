@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from rbxcompose.body.transform_errors import TransformError
 from rbxcompose.body.transforms import TransformAnswer, TransformTree
 from rbxcompose.bus.bus import Bus
 from rbxcompose.clock import NANOSECONDS, Clock
+from rbxcompose.dataclass import dataclass
 from rbxcompose.geometry import Pose2, Transform3
 from rbxcompose.levels import Level
 from rbxcompose.msgs.geometry_msgs import TransformStamped

@@ -24,7 +24,7 @@ def handed_over(end: Any, port: Port[Any], worker: Worker) -> Any:
     """Return an end of the bus for use in the worker's thread."""
     match port:
         case Out():
-            return lambda message: worker.send(partial(end, message))
+            return _Sender(end, worker)
         case Calls():
             return _Caller(end, worker)
         case CallsAction():
@@ -37,6 +37,20 @@ def handed_over(end: Any, port: Port[Any], worker: Worker) -> Any:
 
 def _answering(worker: Worker, label: str, then: Callable[[Any], None]) -> Callable[[Any], None]:
     return lambda reply: worker.submit(label, partial(then, reply))
+
+
+class _Sender:
+    """A publisher."""
+
+    def __init__(self, end: Any, worker: Worker) -> None:
+        self._end, self._worker = end, worker
+
+    @property
+    def is_wanted(self) -> bool:
+        return bool(self._end.is_wanted)
+
+    def __call__(self, message: Any, /) -> None:
+        self._worker.send(partial(self._end, message))
 
 
 class _Caller:

@@ -8,6 +8,7 @@ from enum import StrEnum
 from functools import partial
 from typing import Any, Protocol
 
+from rbxcompose.bus.action_server import ActionServer
 from rbxcompose.bus.bus import Bus
 from rbxcompose.bus.names import admin_key
 from rbxcompose.clock import Clock
@@ -21,6 +22,7 @@ from rbxcompose.runtime.process_group.frames import Frames
 from rbxcompose.runtime.process_group.handover import HandedOver, handed_over
 from rbxcompose.runtime.process_group.live_ports import bind
 from rbxcompose.runtime.process_group.statuses import Statuses
+from rbxcompose.runtime.process_group.steps import GoalSteps
 from rbxcompose.runtime.process_group.worker import Worker
 from rbxcompose.scheduler import Scheduler
 from rbxcompose.sdk.bound import Window
@@ -167,10 +169,7 @@ class Hosted:
         component = self._made()
         self._enter(Lifecycle.ACTIVE)
         if component.rate:
-            step = component.step
-            self.host.scheduler.every(
-                1.0 / component.rate, self.instance.name, lambda dt: self.do("step", lambda: step(dt), depth=1)
-            )
+            self._step_with(component)
         if self.host.is_stopped:
             self.do("stop", component.stop)
         if self.host.is_held:
@@ -182,6 +181,18 @@ class Hosted:
             for request in self._repeated:
                 self.do("command", partial(self._repeat, component, request))
         self.host.bus.open(self.instance.name)  # those who found it before it was active have waited
+
+    def _step_with(self, component: Component[Any]) -> None:
+        scheduler, owner, period, step = self.host.scheduler, self.instance.name, 1.0 / component.rate, component.step
+
+        def run(dt: float) -> None:
+            self.do("step", lambda: step(dt), depth=1)
+
+        if component.steps_for_goals:
+            servers = [end for end in self._ends.values() if isinstance(end, ActionServer)]
+            GoalSteps(scheduler, owner, period, run, servers)
+        else:
+            scheduler.every(period, owner, run)
 
     def close(self) -> None:
         """Deactivate and clean up, as far as it got, and release its ports."""

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 from rbxcompose.bus.bus import Bus
 from rbxcompose.clock import Clock
+from rbxcompose.dataclass import dataclass
 from rbxcompose.levels import Level
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray, DiagnosticStatus, KeyValue
 from rbxcompose.msgs.stamps import to_time

@@ -11,10 +11,10 @@ import sys
 import threading
 import traceback
 from collections.abc import Callable
-from dataclasses import dataclass
 from queue import SimpleQueue
 
 from rbxcompose.clock import Clock
+from rbxcompose.dataclass import dataclass
 
 LONG = 1.0  # [s] in one call, after which diagnostics report it
 LONGEST = 30.0  # [s] in one call, after which the component has failed and its thread is left behind

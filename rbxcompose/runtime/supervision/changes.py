@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass
 from enum import StrEnum
 
 from rbxcompose.config import HIDDEN, Config, Live, Secret
+from rbxcompose.dataclass import dataclass
 from rbxcompose.plan.diff import WHOLE, Change, difference
 from rbxcompose.plan.model import Instance, Plan
 from rbxcompose.runtime.supervision.dependents import is_commanding

@@ -7,7 +7,7 @@ import os
 import select
 import signal
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from types import FrameType
 from typing import NoReturn, TextIO, get_args
 
@@ -15,8 +15,10 @@ import setproctitle
 
 from rbxcompose.bus import shared_memory
 from rbxcompose.clock import MonotonicClock
+from rbxcompose.dataclass import dataclass
 from rbxcompose.endpoints import unix_endpoint
 from rbxcompose.levels import Level
+from rbxcompose.manifest.garbage_collection import collect_as_usual
 from rbxcompose.plan.model import Plan
 from rbxcompose.runtime.faults import explain
 from rbxcompose.runtime.folder import BrokenStateError, RobotFolder, RobotState, title
@@ -138,6 +140,7 @@ def start_supervisor(plan: Plan, options: RunOptions) -> Started:
 
 def _become_supervisor(plan: Plan, options: RunOptions, clock: MonotonicClock, pipe: int, caller: int) -> NoReturn:
     exit_code = ROBOT_FAILED
+    collect_as_usual()
     try:
         os.setsid()  # signals of the terminal reach the caller, who passes them on
         if not options.is_detached:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import Enum, auto
 from typing import Protocol
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.levels import Level
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.faults import RestartPolicy

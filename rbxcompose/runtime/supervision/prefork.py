@@ -2,6 +2,9 @@
 
 It is forked from the supervisor while that has one thread, opens no bus and starts no thread. The kernel ends it with
 the supervisor and signals the groups to stop when it ends, so that no process outlives a supervisor that was killed.
+
+All processes of a robot share the memory that the supervisor has filled before that fork, until they write to it. So
+the supervisor imports what the groups need, though it uses none of it.
 """
 
 from __future__ import annotations
@@ -15,12 +18,13 @@ import socket
 import sys
 import traceback
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import setproctitle
 
 from rbxcompose.clock import MonotonicClock
+from rbxcompose.dataclass import dataclass
 from rbxcompose.plan.model import Plan
 from rbxcompose.runtime.channel import Channel
 from rbxcompose.runtime.folder import RobotFolder, title
@@ -91,6 +95,10 @@ class Parent:
         """Fork the parent. Call it from the main thread, before any other thread exists."""
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         supervisor = os.getpid()
+        give_back_large_memory()
+        _import_what_is_common(launch.plan)
+        gc.collect()
+        gc.freeze()  # a collection writes to every object that it inspects, which would copy all pages
         signal.pthread_sigmask(signal.SIG_BLOCK, _HELD_BACK)
         pid = os.fork()
         if pid == 0:
@@ -150,10 +158,6 @@ def _run_parent(launch: Launch, connection: socket.socket, supervisor: int) -> N
     setproctitle.setproctitle(launch.title("parent"))
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, _HELD_BACK)
-    give_back_large_memory()
-    _import_what_is_common(launch.plan)
-    gc.collect()
-    gc.freeze()  # so that collections in the children do not copy these pages
     _Forking(launch, connection).run()
 
 

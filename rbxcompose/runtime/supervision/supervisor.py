@@ -11,10 +11,10 @@ import selectors
 import signal
 import socket
 from collections.abc import Callable
-from dataclasses import dataclass
 from types import FrameType
 
 from rbxcompose.clock import MonotonicClock
+from rbxcompose.dataclass import dataclass
 from rbxcompose.endpoints import is_private, socket_of
 from rbxcompose.levels import Level
 from rbxcompose.plan.model import Plan

@@ -1,0 +1,38 @@
+"""Two ends of a topic with different QoS classes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.check_runner import check
+from rbxcompose.findings import Finding, Related, Severity
+from rbxcompose.model.robot import Robot
+from rbxcompose.sdk.ports import In, Out
+
+
+@check("RBX3120", Severity.WARNING)
+def unlike_classes(robot: Robot) -> Iterator[Finding]:
+    """A port reads messages of another QoS class than they are published in
+
+    The class says what matters about messages. Who reads a `state` topic as `latched` waits for a last message that
+    nobody keeps; who reads commands as `event` handles old ones, too. The classes are in the ports of both components.
+
+    Bad: `odom = Out(Odometry, "odom", qos=Qos.STATE)`, and `odom = In(Odometry, "odom", qos=Qos.LATCHED)` in another
+    component.
+    Good: `qos=Qos.STATE` in both.
+    """
+    for topic, readers in robot.readers.items():
+        for reader in readers:
+            for writer in robot.writers.get(topic, []):
+                mine, theirs = reader.port, writer.port
+                if not isinstance(mine, In) or not isinstance(theirs, Out) or reader.type_name != writer.type_name:
+                    continue
+                if mine.qos is not theirs.qos:
+                    yield unlike_classes.at(
+                        robot.end_span(reader),
+                        f"'{reader.instance}' reads '{topic}' as {mine.qos.value}, "
+                        f"and '{writer.instance}' publishes it as {theirs.qos.value}",
+                        label=f"its port '{reader.name}'",
+                        help="give both ports the same 'qos'",
+                        related=[Related(robot.end_span(writer), f"its port '{writer.name}'")],
+                    )
