@@ -18,10 +18,13 @@ from rbxcompose.dataclass import dataclass
 from rbxcompose.per_compile import may_guess
 
 SIMILAR = 0.6  # difflib ratio above which a name is offered as "did you mean"
-MOST_NAMES = 6  # valid names listed when none is similar
+LEAST_WORD = 2  # characters of a word that makes two names alike
+SOMEWHAT = 0.4  # difflib ratio above which a name comes first in a list of valid names
+MOST_NAMES = 8  # valid names listed when none is similar
 SURE = 0.8  # difflib ratio above which a similar name may replace a misspelt one,
 LEAD = 0.1  # if it leads every other name by this much
 VALID = "valid names"
+DID_YOU_MEAN = "did you mean"  # how the help begins if there is one name that was probably meant
 MOST_COMPARED = 100  # names; with more, only those one slip away are considered
 _LONGEST_COMPARED = 60  # characters of a name
 _PER_LOOKUP, _PER_NAME, _PER_CHARACTER, _PER_RATIO = 300, 12, 3, 500  # units of work of guessing
@@ -141,7 +144,7 @@ class FindingKind:
         `what` describes the valid names, which are listed if none is similar; see `correction` for the other arguments.
         If `valid` holds things with a `span` by their names, the place of that name is told, too.
         """
-        names = list(valid)
+        names = _ordered(valid)
         fix = correction(name, names, span, taken=taken, within=within)
         related = _declared(name, valid) if isinstance(valid, Mapping) else ()
         return self.at(span, message, help=suggest(name, names, what), related=related, fix=fix)
@@ -204,20 +207,44 @@ def _place(finding: Finding) -> tuple[bool, Span | None, str, str]:
 
 
 def suggest(name: str, valid: Iterable[str], what: str = VALID) -> str:
-    """Return the help for a misspelt `name`: the nearest of `valid`, else up to six of them, else nothing.
+    """Return the help for a misspelt `name`: the nearest of `valid`, else the first of them, else nothing.
 
-    A compile that has spent its guesses on thousands of other names gives no help any more.
+    They are listed by their likeness to `name`; those that are equally unlike it keep their order, so callers put the
+    more likely kind first. A compile that has spent its guesses on thousands of other names gives no help any more.
     """
     if not may_guess():
         return ""
-    names = sorted(set(valid))
+    names = _ordered(valid)
     near = nearest(name, names)
     if near:
-        return f"did you mean '{near[0]}'?"
+        return f"{DID_YOU_MEAN} '{near[0]}'?"
     if not names:
         return ""
     rest = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
-    return f"{what}: {', '.join(names[:MOST_NAMES])}{rest}"
+    return f"{what}: {', '.join(_by_likeness(name, names)[:MOST_NAMES])}{rest}"
+
+
+def _ordered(names: Iterable[str]) -> list[str]:
+    """Return names once each, in their order; those of a set, which has none, by the alphabet."""
+    return sorted(names) if isinstance(names, set | frozenset) else list(dict.fromkeys(names))
+
+
+def _by_likeness(name: str, names: list[str]) -> list[str]:
+    """Return names with those first that share words with `name`, then those that are spelt a little like it."""
+    if len(names) > MOST_COMPARED or not may_guess(_PER_NAME * len(names)):
+        return names
+    words = _words(name)
+    spelt = {one: rank for rank, one in enumerate(nearest(name, names, most=MOST_NAMES, cutoff=SOMEWHAT))}
+    return sorted(names, key=lambda one: (-_shared(words, _words(one)), spelt.get(one, MOST_NAMES)))
+
+
+def _shared(words: set[str], others: set[str]) -> int:
+    """Return how many words are in both sets, or begin one there: `baud` and `baudrate`."""
+    return sum(any(one.startswith(other) or other.startswith(one) for other in others) for one in words)
+
+
+def _words(name: str) -> set[str]:
+    return {word for word in re.split(r"[\W_]+", name.casefold()) if len(word) >= LEAST_WORD}
 
 
 def nearest(name: str, valid: Iterable[str], *, most: int = 1, cutoff: float = SIMILAR) -> list[str]:

@@ -134,11 +134,7 @@ DIMENSIONS: Mapping[str, Dimension] = MappingProxyType({dimension.name: dimensio
 _BY_EXPONENTS = {dimension.exponents: dimension for dimension in (*DIMENSIONS.values(), QUOTIENT)}
 
 # These have two conventions each, so a bare number is ambiguous.
-_AMBIGUOUS: Mapping[Dimension, str] = {
-    ANGLE: "write '90 deg' or '1.57 rad'",
-    RATIO: "write '50 %'",
-    TEMPERATURE: "write '50 degC'",
-}
+_AMBIGUOUS: Mapping[Dimension, tuple[str, ...]] = {ANGLE: ("deg", "rad"), RATIO: ("%",), TEMPERATURE: ("degC",)}
 
 
 def _measured(exponents: tuple[int, ...]) -> Dimension:
@@ -184,11 +180,14 @@ _OTHER_NAMES: Mapping[str, str] = {
     for unit, names in {
         "m": "meter meters metre metres",
         "in": 'inch inches "',
+        "m/s": "mps",
         "s": "sec secs second seconds",
         "min": "minute minutes mins",
         "h": "hour hours hr hrs",
-        "km/h": "kmh kph",
+        "km/h": "kmh kph kmph",
         "deg": "degree degrees °",
+        "deg/s": "dps",
+        "rad": "radian radians",
         "degC": "c °c celsius",
         "%": "percent pct",
         "us": "µs μs",
@@ -196,6 +195,8 @@ _OTHER_NAMES: Mapping[str, str] = {
     for name in names.split()
 }
 _QUANTITY = re.compile(rf"([+-]?{NUMBER_TEXT})\s*(.*)", re.DOTALL)
+_FACTOR = re.compile(r"([^\d^/²³]+?)(?:\^?([23²³]))?")
+_POWERS = {"²": "2", "³": "3"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -211,16 +212,76 @@ def example(dimension: Dimension) -> str:
     return _TABLE[dimension][0]
 
 
-def unit_help(name: str) -> str:
-    """Return the help for an unknown unit: the one that was probably meant, or the beginning of the list."""
-    folded = name.casefold()
-    meant = _OTHER_NAMES.get(folded) or next((unit for unit in UNITS if unit.casefold() == folded), None)
-    return f"did you mean '{meant}'?" if meant else suggest(name, UNITS, "units")
+def unit_help(written: str, number: str = "", wanted: Dimension | None = None) -> str:
+    """Return the help for an unknown unit: what was probably meant, else the units of the wanted dimension.
+
+    `number` stands before the unit. A unit of another dimension than the wanted one is never proposed, and where the
+    number would be another one, the help says the whole quantity.
+    """
+    made = _made_of_units(written)
+    if made and wanted in (None, made.dimension) and (shown := _SHOWN_IN.get(made.dimension)):
+        if same := next((unit for unit in units_of(made.dimension) if UNITS[unit].to_si(1) == made.to_si(1)), ""):
+            return f"did you mean '{same}'?"
+        if number:
+            return f"write '{shown.from_si(made.to_si(float(number))):.12g} {shown.name}', which is the same"
+    usual = _SHOWN_IN[wanted].name if wanted in _SHOWN_IN else ""
+    fitting = sorted(units_of(wanted), key=lambda unit: unit != usual) if wanted else list(UNITS)
+    if number and wanted and (whole := [unit for unit in fitting if written and unit.endswith(written)]):
+        return f"write {_with_each(number, whole)}"
+    # What is of another dimension was not misspelt.
+    return suggest("" if made else written, fitting, f"units of {wanted.phrase}" if wanted else "units")
 
 
-def bare_number_help(dimension: Dimension) -> str:
-    """Return what to write instead of a bare number; empty if a bare number is taken as SI."""
-    return _AMBIGUOUS.get(dimension, "")
+def units_of(dimension: Dimension) -> list[str]:
+    """Return the units of a dimension, the base unit first."""
+    return [name for name, unit in UNITS.items() if unit.dimension == dimension]
+
+
+def _named(word: str) -> Unit | None:
+    """Return the unit of a name that people write; letters of another case will do."""
+    if known := UNITS.get(word):
+        return known
+    folded = word.casefold()
+    meant = _OTHER_NAMES.get(folded) or next((unit for unit in UNITS if unit.casefold() == folded), "")
+    return UNITS.get(meant)
+
+
+def _made_of_units(written: str) -> Unit | None:
+    """Return the unit that a text means: one by another name, or one made of known units, such as `mm/s^2`."""
+    if (known := _named(written)) or not written:
+        return known
+    made = Unit(written, NUMBER, 1.0, 1.0)
+    for index, part in enumerate(written.split("/")):
+        found = _FACTOR.fullmatch(part.strip())
+        unit = _named(found[1]) if found else None
+        if unit and found:
+            for _ in range(int(_POWERS.get(found[2], found[2]) or 1)):
+                made = _times(made, Unit("", unit.dimension, unit.per, unit.times) if index else unit, index > 0)
+        elif index or part.strip() not in ("", "1"):
+            return None
+    return made
+
+
+def _times(one: Unit, other: Unit, is_below: bool) -> Unit:
+    dimension = one.dimension / other.dimension if is_below else one.dimension * other.dimension
+    return Unit(one.name, dimension, one.times * other.times, one.per * other.per)
+
+
+def _with_each(number: str, units: list[str]) -> str:
+    return " or ".join(f"'{number} {unit}'" for unit in units)
+
+
+def needs_unit(dimension: Dimension) -> bool:
+    """Return whether a bare number is ambiguous for a dimension; otherwise it is taken as SI."""
+    return dimension in _AMBIGUOUS
+
+
+def bare_number_help(dimension: Dimension, value: float) -> str:
+    """Return what to write instead of a bare number, with that number; empty if it is taken as SI."""
+    if dimension == RATIO and 0 < abs(value) < 1:
+        share, same = format_number(value * 100), format_number(value)
+        return f"write '{share} %', or '{same} %' if it is that little"
+    return f"write {_with_each(format_number(value), list(_AMBIGUOUS[dimension]))}" if needs_unit(dimension) else ""
 
 
 def quantity(number: str, unit: Unit | None) -> Quantity:
@@ -244,20 +305,23 @@ def _require_moderate(value: float) -> None:
 
 
 @lru_cache(1000)  # robots repeat the same texts
-def parse_quantity(text: str) -> Quantity:
-    """Read `0.3 m/s`, `5s`, `-90 deg`, `1e-3 m`, `50 %` or a plain number.
+def parse_quantity(text: str, wanted: Dimension | None = None) -> Quantity:
+    """Read `0.3 m/s`, `5s`, `-90 deg`, `1e-3 m`, `50 %` or a plain number; `wanted` is for the help.
 
     Raises:
         UnitError: if the text is not a number with a unit of the list.
     """
     match = _QUANTITY.fullmatch(text.strip())
     if not match:
-        raise UnitError("not a number with a unit, such as '0.3 m/s'")
+        alone = _named(text.strip())
+        is_meant = alone is not None and wanted in (None, alone.dimension)
+        help_text = f"write a number before '{alone.name}'" if alone and is_meant else ""
+        raise UnitError("not a number with a unit, such as '0.3 m/s'", help=help_text)
     number, unit = match.groups()
     if re.match(r",\d", unit):
         raise UnitError("write a decimal point, not a comma", help=f"write '{text.strip().replace(',', '.', 1)}'")
     if unit and unit not in UNITS:
-        raise UnitError(f"unknown unit '{_shortened(unit)}'", help=unit_help(unit))
+        raise UnitError(f"unknown unit '{_shortened(unit)}'", help=unit_help(unit, number, wanted))
     return quantity(number, UNITS.get(unit))
 
 
@@ -273,7 +337,7 @@ def to_si(value: object, dimension: Dimension) -> float:
     """
     if isinstance(value, str):
         try:
-            read = parse_quantity(value)
+            read = parse_quantity(value, dimension)
         except UnitError as error:
             raise UnitError(_must_be(dimension), detail=error.message, help=error.help) from None
     elif isinstance(value, Quantity):
@@ -282,8 +346,8 @@ def to_si(value: object, dimension: Dimension) -> float:
         read = _bare(value)
     else:
         raise UnitError(_must_be(dimension))
-    if read.dimension == NUMBER and (fix := bare_number_help(dimension)):
-        raise UnitError(_must_be(dimension), detail="the unit is missing", help=fix)
+    if read.dimension == NUMBER and (fix := bare_number_help(dimension, read.value)):
+        raise UnitError(f"must be {dimension.phrase}", detail="the unit is missing", help=fix)
     if read.dimension not in (dimension, NUMBER):
         raise UnitError(_must_be(dimension), detail=f"this is {read.dimension.phrase}")
     _require_moderate(read.value)

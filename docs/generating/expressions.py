@@ -7,8 +7,7 @@ from rbxcompose.expressions.functions import FUNCTIONS
 from rbxcompose.expressions.operators import OPERATORS
 from rbxcompose.expressions.parser import LEVELS, LONGEST, STEPS
 from rbxcompose.expressions.values import LONGEST_TEXT, MOST_ITEMS
-from rbxcompose.schema.scalars import units_of
-from rbxcompose.units import DIMENSIONS, Dimension, bare_number_help, example
+from rbxcompose.units import DIMENSIONS, Dimension, example, needs_unit, units_of
 
 UNITS = """## Types and units
 A quantity is a number with a unit. A bare number is in the first unit of its row; where the row says
@@ -57,7 +56,7 @@ def whole_page() -> str:
 def of_dimension(dimension: Dimension) -> tuple[str, str, str]:
     """Return units, example and the meaning of a bare number."""
     units = units_of(dimension)
-    bare = "*must have its unit*" if bare_number_help(dimension) else f"counts in {code(units[0])}" if units else ""
+    bare = "*must have its unit*" if needs_unit(dimension) else f"counts in {code(units[0])}" if units else ""
     return " ".join(map(code, units)), code(example(dimension)), bare
 
 

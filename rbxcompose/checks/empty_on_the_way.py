@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import partial
 
 from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Related, Severity
 from rbxcompose.missions.analysis.facts import goal_place
-from rbxcompose.missions.analysis.travel_times import distance, too_short
+from rbxcompose.missions.analysis.travel_times import too_short
 from rbxcompose.model.blame import blamed
 from rbxcompose.model.charge import calls, constants, ways_of
 from rbxcompose.model.flow import setting_span
-from rbxcompose.model.robot import Robot
+from rbxcompose.model.robot import Robot, RobotComponent
+from rbxcompose.sdk.capabilities import Setting
 from rbxcompose.units import RATIO, TIME, format_quantity
 
 
@@ -61,9 +61,11 @@ def empty_on_the_way(robot: Robot) -> Iterator[Finding]:
             runtime = call.drains.runtime
             if dock is None or runtime is None or not ways.visited:
                 continue
-            far = max(ways.visited.values(), key=partial(distance, dock))
+            far = max(ways.visited.values(), key=lambda place: ways.between(place, dock))
             lasts, needs = call.level * runtime.value, ways.between(far, dock)
-            if 0 <= lasts < needs:
+            if runtime.value < needs:
+                yield _never_there(robot, call.battery, runtime, f"from '{far.name}' to '{dock.name}'", needs)
+            elif 0 <= lasts < needs:
                 span, related = blamed(robot, mission, call.interrupt.when)
                 yield empty_on_the_way.at(
                     span,
@@ -75,3 +77,13 @@ def empty_on_the_way(robot: Robot) -> Iterator[Finding]:
                         Related(setting_span(robot, (call.battery, runtime.field)), "how long a full battery lasts"),
                     ],
                 )
+
+
+def _never_there(robot: Robot, battery: RobotComponent, runtime: Setting[float], way: str, needs: float) -> Finding:
+    """Return the finding about a battery that even when full is empty before the dock is reached."""
+    lasts, takes = format_quantity(runtime.value, TIME), format_quantity(round(needs, 1), TIME)
+    return empty_on_the_way.at(
+        setting_span(robot, (battery, runtime.field)),
+        f"a full battery lasts for {lasts}, but the way {way} takes {takes}",
+        help=f"make it last longer: several times {takes}",
+    )

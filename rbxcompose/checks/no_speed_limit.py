@@ -9,7 +9,6 @@ from rbxcompose.findings import Finding, Severity
 from rbxcompose.model.driven_joints import driven_joints
 from rbxcompose.model.robot import Robot
 from rbxcompose.rules import WIRING
-from rbxcompose.units import ANGULAR_SPEED, SPEED, example
 
 
 @check("RBX2229", Severity.WARNING, closed=(WIRING,))
@@ -27,5 +26,5 @@ def no_speed_limit(robot: Robot) -> Iterator[Finding]:
             yield no_speed_limit.at(
                 one.key(),
                 f"'{one.name}' has no limit of its speed: it moves as fast as its servo can",
-                help=f"add one: 'limits: {{velocity: {example(SPEED if one.slides else ANGULAR_SPEED)}}}'",
+                help=f"add one in {'m/s' if one.slides else 'deg/s'}: 'limits: {{velocity: ...}}'",
             )

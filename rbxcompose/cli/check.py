@@ -75,7 +75,7 @@ def _check(wanted: Targets, arguments: argparse.Namespace) -> CheckedRobots:
     if wanted.tests:
         _check_tests(wanted.tests, checked)
     projects = projects_of([*wanted.robots, *wanted.users, *wanted.tests])
-    checked.report = Report([*only_ours(checked.report, projects), *wanted.unused(checked.sources)])
+    checked.report = Report([*only_ours(checked.report, checked.sources, projects), *wanted.unused(checked.sources)])
     return checked
 
 

@@ -14,7 +14,7 @@ from rbxcompose.manifest.fill import SHOWN_SECRET
 from rbxcompose.manifest.header import ManifestHeader
 from rbxcompose.manifest.registry import broken_sections, naming, sections
 from rbxcompose.manifest.section import ROBOT, Contents, Section
-from rbxcompose.manifest.tree import MappingNode, ScalarNode, key_span
+from rbxcompose.manifest.tree import MappingNode, ScalarNode, at, key_span
 from rbxcompose.references import COMPONENT
 
 TAKEN_NAME = kind(
@@ -54,8 +54,9 @@ def read_sections(
 
     The tree is not whole if one of the robot's parts could not be read.
     """
-    documents.report.extend([*broken_sections(), *_taken_names(root), *_shown_secrets(root)])
+    documents.report.extend([*broken_sections(), *_shown_secrets(root)])
     contents = Contents(root, file, documents, sections(), is_simulated=sim, is_whole=is_whole)
+    documents.report.extend(_taken_names(contents))
     for section in sections(ROBOT):
         if section.is_composed:
             contents.of(section)
@@ -82,17 +83,26 @@ def _shown_secrets(root: MappingNode) -> Iterator[Finding]:
             yield SHOWN_SECRET.at(value.span, f"'{key}' cannot hold a secret: everybody sees it")
 
 
-def _taken_names(root: MappingNode) -> Iterator[Finding]:
+def _taken_names(contents: Contents) -> Iterator[Finding]:
     """Yield a finding for each name of something that runs that is already taken."""
+    root = contents.root
     running = list(naming(COMPONENT))
     for index, section in enumerate(running):
-        for name in () if section.has_topics else section.names_in(root):
+        for name in () if section.has_topics else _placed_names(contents, section):
             span = key_span(root, (section.name, *section.at, name))
             if message := _own_name(name, section):
                 yield TAKEN_NAME.at(span, message)
             elif found := _other_owner(root, name, section, running[index + 1 :]):
                 message, label, other = found
                 yield TAKEN_NAME.at(span, message, related=[Related(key_span(root, other), label)])
+
+
+def _placed_names(contents: Contents, section: Section[Any, Any]) -> Iterator[str]:
+    """Yield the names in a section, but not those of sections that were indented too far."""
+    named = at(contents.root, (section.name, *section.at))
+    for name, entry in named.entries.items() if isinstance(named, MappingNode) else ():
+        if not contents.is_misplaced(section, entry):
+            yield name
 
 
 def _own_name(name: str, section: Section[Any, Any]) -> str:

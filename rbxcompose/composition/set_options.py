@@ -49,8 +49,9 @@ def _set_overlay(text: str, line: int, root: MappingNode, report: Report) -> Map
     span = Span(SET, line, 1, line, len(written) + 1)
     names = written.strip().split(".")
     if not equals or not all(names):
+        meant = ".".join(filter(None, names))
         message = f"'{SET} {text}' is not a path and a value"
-        report.add(BAD_SET.at(span, message, help=f"write {SET} battery.runtime='30 s'"))
+        report.add(BAD_SET.at(span, message, help=f"write {SET} {meant or 'PATH'}={value_text or 'VALUE'}"))
         return None
     path = _set_path(names, span, root, report)
     if path is None:

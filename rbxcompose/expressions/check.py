@@ -39,8 +39,8 @@ from rbxcompose.expressions.types import (
     list_of,
     quantity_of,
 )
-from rbxcompose.expressions.written import is_bare, missing_unit, other_unit
-from rbxcompose.findings import suggest, surely_meant
+from rbxcompose.expressions.written import is_bare, missing_unit, other_unit, quotes_needed
+from rbxcompose.findings import DID_YOU_MEAN, suggest, surely_meant
 from rbxcompose.units import LENGTH, NUMBER, QUOTIENT, TIME
 
 
@@ -74,6 +74,8 @@ class ExpressionProblem:
     help: str = ""
     meant: str = ""
     """The only possible correction, if there is one."""
+    is_choice: bool = False
+    """Whether it is about a word that had to be one of a few."""
 
 
 def check(expression: Expression, scope: StaticScope) -> tuple[Type, list[ExpressionProblem]]:
@@ -180,14 +182,25 @@ class _Checker:
         if self.scope.variable(node.name):
             fix, meant = f"write '${node.name}'", f"${node.name}"
         elif expected == TEXT:
-            fix, meant = f"a text needs quotes: '{node.name}'", ""
+            fix, meant = quotes_needed(node.name), ""
+        elif expected.choices:
+            return self.choice(node, expected)
         else:
-            known = list(expected.choices or self.scope.words())
-            fix, meant = suggest(node.name, known), surely_meant(node.name, known) or ""
+            known = list(self.scope.words())
+            fix, meant = suggest(node.name, known, "places"), surely_meant(node.name, known) or ""
+            if expected == UNKNOWN and not fix.startswith(DID_YOU_MEAN):
+                fix = f"{quotes_needed(node.name)}{f'; {fix}' if fix else ''}"
             variable = "" if meant else surely_meant(node.name, self.scope.variables())
             if variable:
                 fix, meant = f"did you mean '${variable}'?", f"${variable}"
         return self.wrong(node, f"unknown name '{node.name}'", fix, meant)
+
+    def choice(self, node: Word, expected: Type) -> Type:
+        message = f"'{node.name}' is none of {', '.join(expected.choices)}"
+        fix, meant = suggest(node.name, expected.choices, "choices"), surely_meant(node.name, expected.choices) or ""
+        fix = fix if fix.startswith(DID_YOU_MEAN) else ""  # the message lists them
+        self.problems.append(ExpressionProblem(message, node.start, node.end, fix, meant, is_choice=True))
+        return UNKNOWN
 
     def part(self, node: FieldAccess | Index) -> Type:
         whole = self.type_of(node.of)
@@ -273,7 +286,9 @@ class _Checker:
     def is_measured(self, typed: _Typed) -> bool:
         """Return whether a value can be computed with; report it if not."""
         if typed.type != UNKNOWN and not typed.type.measure:
-            self.wrong(typed.node, f"this must be a number; it is {typed.type.phrase}")
+            name = typed.node.name if isinstance(typed.node, Variable) and typed.type.kind is TypeKind.MAP else ""
+            fix = f"read an entry of it: '${name}.NAME'" if name else ""
+            self.wrong(typed.node, f"this must be a number; it is {typed.type.phrase}", fix)
         return typed.type.measure is not None
 
     def measured(self, node: ExpressionNode) -> Type:

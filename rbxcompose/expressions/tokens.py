@@ -104,7 +104,7 @@ def _with_unit(text: str, start: int, end: int) -> tuple[Quantity, int]:
     if unit and unit[1] == "in" and _VALUE.match(text, unit.end()):
         unit = None
     elif not unit and (wrong := _NO_UNIT.match(text, end)):
-        raise ExpressionError(f"unknown unit '{wrong[1]}'", wrong.start(1), wrong.end(1), unit_help(wrong[1]))
+        raise ExpressionError(f"unknown unit '{wrong[1]}'", wrong.start(1), wrong.end(1), unit_help(wrong[1], number))
     if unit:
         end = unit.end()
     try:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rbxcompose.expressions.tree import ExpressionNode, Minus, Number
 from rbxcompose.expressions.types import Type
-from rbxcompose.units import DIMENSIONS, NUMBER, RATIO, Dimension, bare_number_help, example, format_number
+from rbxcompose.units import DIMENSIONS, NUMBER, Dimension, bare_number_help, units_of
 
 
 def _written(node: ExpressionNode) -> Number | None:
@@ -22,16 +22,21 @@ def is_bare(node: ExpressionNode) -> bool:
 
 def missing_unit(node: ExpressionNode, dimension: Dimension) -> str:
     """Return what to write instead of a bare number, or nothing if it is read as SI."""
-    if dimension == RATIO and isinstance(node, Number):
-        percentage = node.value * 100 if node.value < 1 else node.value
-        return f"write '{format_number(percentage)} %'"
-    return bare_number_help(dimension)
+    sign = 1.0
+    while isinstance(node, Minus):
+        node, sign = node.operand, -sign
+    return bare_number_help(dimension, sign * node.value) if isinstance(node, Number) else ""
 
 
 def other_unit(left: tuple[ExpressionNode, Type], right: tuple[ExpressionNode, Type]) -> str:
-    """Return the form required of a literal quantity next to one that is not; nothing if both are alike."""
+    """Return the units of a literal quantity next to one that is not; nothing if both are alike."""
     for (written, _), (other, kind) in ((left, right), (right, left)):
         dimension = kind.dimension
         if dimension in DIMENSIONS.values() and dimension and _written(written) and not _written(other):
-            return f"{kind.phrase} is written like '{example(dimension)}'"
+            return f"units of {kind.phrase}: {', '.join(units_of(dimension)) or 'none'}"
     return ""
+
+
+def quotes_needed(text: str) -> str:
+    """Return the help for a text without quotes: those of the expression, within those of YAML."""
+    return f"a text needs quotes: write '\"{text}\"'"

@@ -14,8 +14,8 @@ from rbxcompose.lsp.variables import fills, variables
 from rbxcompose.missions.language.keys import anywhere
 from rbxcompose.references import PLACE, PREFIXED
 from rbxcompose.schema.guide import Guide, GuidedValue
-from rbxcompose.schema.scalars import Schema, units_of
-from rbxcompose.units import NUMBER_TEXT, Dimension
+from rbxcompose.schema.scalars import Schema
+from rbxcompose.units import NUMBER_TEXT, Dimension, units_of
 
 _FILL = re.compile(r"\$\{\s*([A-Za-z0-9_.]*)$")
 _VARIABLE = re.compile(r"\$([A-Za-z0-9_]*)$")

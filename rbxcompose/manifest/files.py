@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
+import re
 from itertools import islice
 from pathlib import Path
 
-from rbxcompose.findings import Finding, Span, kind
+from rbxcompose.findings import Finding, Span, kind, replacement
 from rbxcompose.manifest.library import PARTS, PREFIX, library_root
 from rbxcompose.manifest.reader import UNREADABLE
 from rbxcompose.per_compile import once
@@ -35,6 +36,8 @@ missions:
 ROBOT_FILE = "robot.yaml"  # the file that a folder means
 _ROBOTS = "robots"  # the folder of a project's robots
 _ENDINGS = (".yaml", ".yml")
+_DRIVE = re.compile(r"[A-Za-z]:[/\\]")
+BACKSLASH = "\\"
 _MOST_NEIGHBOURS = 1000
 _MOST_NAMESAKES = 3
 
@@ -61,7 +64,8 @@ def _project_around(folder: Path) -> Path:
 def resolve(written: str, writer: Path, span: Span) -> Path | Finding:
     """Return the file that a manifest names, or the finding that says why it must not or cannot be used."""
     path = _absolute(written, _real(writer).parent)
-    if path is None or not any(path.is_relative_to(root) for root in (project_of(writer), library_root())):
+    is_inside = path and any(path.is_relative_to(root) for root in (project_of(writer), library_root()))
+    if path is None or not is_inside or _DRIVE.match(written):
         message, folder = f"'{plain(written)}' is outside the project", plain(shown_name(project_of(writer)))
         where = f"'{folder}'" if folder != "." else "this folder"
         return OUTSIDE.at(span, message, help=f"the project is {where}: move the file there, or use what 'rbx:' has")
@@ -114,6 +118,8 @@ def _missing(written: str, path: Path, span: Span | None, writer: Path | None = 
         return _no_robot(written, path.parent, span, writer)
     if os.path.lexists(path):  # a pipe, a device, a dangling link
         return UNREADABLE.at(span, f"'{plain(written)}' is not a regular file")
+    if writer is not None and BACKSLASH in written and span is not None:
+        return _with_backslashes(written, span, writer)
     if writer is not None and (namesakes := files_named(path.name, writer)):
         message, help_text = f"'{plain(written)}' does not exist", " or ".join(f"'{one}'" for one in namesakes)
         return UNREADABLE.at(span, message, help=f"did you mean {help_text}?")
@@ -143,6 +149,17 @@ def _robots_in(folder: Path) -> list[str]:
     return sorted(one for one in _names_in(folder) or () if (folder / one / ROBOT_FILE).is_file())
 
 
+def _with_backslashes(written: str, span: Span, writer: Path) -> Finding:
+    """Return the finding about a path as Windows has them; there is a fix if the file is there."""
+    forward = written.replace(BACKSLASH, "/")
+    found = resolve(forward, writer, span)
+    if isinstance(found, Finding) and found.code == OUTSIDE.code:
+        return found
+    fix = replacement(span, written, forward) if isinstance(found, Path) else None
+    message = f"'{plain(written)}' has backslashes; paths are written with '/'"
+    return UNREADABLE.at(span, message, help=f"write '{plain(forward)}'", fix=fix)
+
+
 def files_named(name: str, writer: Path) -> list[str]:
     """Return the files of a name elsewhere in the writer's project, as the writer has to name them."""
     file = _real(writer)
@@ -170,7 +187,7 @@ def _names_in(folder: Path) -> list[str] | None:
     """Return the names in a folder, of a large one only the first; None if it cannot be read."""
     try:
         with os.scandir(folder) as entries:
-            return [entry.name for entry in islice(entries, _MOST_NEIGHBOURS)]
+            return sorted(entry.name for entry in islice(entries, _MOST_NEIGHBOURS))
     except OSError:
         return None
 

@@ -14,11 +14,12 @@ from rbxcompose.expressions.parser import parse_fill
 from rbxcompose.expressions.tree import Expression, ExpressionError
 from rbxcompose.expressions.types import Type, TypeKind
 from rbxcompose.expressions.values import EvaluationError
-from rbxcompose.findings import Report, correction, kind, replacement, suggest
+from rbxcompose.findings import DID_YOU_MEAN, Report, correction, kind, replacement, suggest
 from rbxcompose.manifest import tree
 from rbxcompose.manifest.arguments import show
 from rbxcompose.manifest.fill_names import Names, NameTypes, NameValues
 from rbxcompose.manifest.given_values import given_span
+from rbxcompose.manifest.launch_syntax import PATTERN, cure_of
 from rbxcompose.manifest.limits import ALL_BYTES
 from rbxcompose.manifest.scalar_parts import part_span
 from rbxcompose.manifest.scalars import describe
@@ -33,7 +34,7 @@ SYNTAX = kind(
     "RBX1201",
     """`${...}` that cannot be read
 
-Between `${` and `}` there must be a name or an expression.
+Between `${` and `}` there must be a name or an expression. `$(arg speed)` is the syntax of ROS launch files.
 
 Bad:
 ```yaml
@@ -44,6 +45,7 @@ Good:
 speed: ${args.speed * 2}
 ```
 """,
+    is_fixable=True,
 )
 UNKNOWN_NAME = kind(
     "RBX1202",
@@ -143,7 +145,10 @@ about: Speaks with the cloud
 """,
 )
 
-_PIECE = re.compile(r"\$\$|\$\{(?P<body>[^}]*)(?P<end>\}?)|\$(?P<name>[A-Za-z][A-Za-z0-9_.]*)")
+_PIECE = re.compile(
+    r"\$\$|\$\{(?P<body>[^}]*)(?P<end>\}?)|\$(?P<name>[A-Za-z][A-Za-z0-9_.]*)"
+    rf"|{PATTERN}"
+)
 _SECRET = re.compile(r"\s*secret\.(?P<name>[a-z][a-z0-9_]{0,59})\s*")
 _ENVIRONMENT = re.compile(r"\s*env\.(?P<name>[A-Za-z_][A-Za-z0-9_]*)(:(?P<mode>[-?])(?P<rest>.*))?\s*", re.DOTALL)
 
@@ -238,6 +243,8 @@ class _Filler:
 
     def piece(self, scalar: ScalarNode, piece: re.Match[str]) -> object:
         """Return the value of one `${...}`, None if it stays as it is, `BROKEN` after a finding."""
+        if piece["verb"]:
+            return self.launch(scalar, piece)
         body, name = piece["body"], piece["name"]
         if body is None and name:
             return None if self.runs else self.running_name(scalar, piece)
@@ -258,6 +265,15 @@ class _Filler:
             self.report.add(SYNTAX.at(span, error.message, help=error.help))
             return BROKEN
         return self.expression(scalar, piece.start("body"), expression)
+
+    def launch(self, scalar: ScalarNode, piece: re.Match[str]) -> object:
+        """Report a substitution of ROS launch files."""
+        span = part_span(scalar, piece.start(), piece.end())
+        cure = cure_of(piece["verb"], piece["of"], self.known, runs=self.runs)
+        fix = replacement(span, piece.group(), cure.meant) if cure.meant else None
+        message = f"'{plain(piece.group(), 60)}' is a substitution of ROS launch files"
+        self.report.add(SYNTAX.at(span, message, help=cure.help, fix=fix))
+        return BROKEN
 
     def running_name(self, scalar: ScalarNode, piece: re.Match[str]) -> object:
         name = piece["name"].rstrip(".")
@@ -290,7 +306,10 @@ class _Filler:
         try:
             return self.names.secrets.get(name)
         except NoSecretError as error:
-            self.report.add(SECRET.at(part_span(scalar, piece.start(), piece.end()), error.message, help=error.help))
+            span = part_span(scalar, piece.start(), piece.end())
+            meant = piece.group().replace(name, error.near)
+            fix = replacement(span, piece.group(), meant, is_safe=False) if error.near else None
+            self.report.add(SECRET.at(span, error.message, help=error.help, fix=fix))
             return BROKEN
 
     def shown_secret(self, scalar: ScalarNode, piece: re.Match[str], message: str) -> object:
@@ -334,7 +353,7 @@ class _Filler:
         if name.startswith("secret."):
             return "a secret must stand alone: '${" + name.lower() + "}'"
         fix = suggest(name, self.known, "names that can be filled in")
-        if self.runs and not fix.startswith("did you mean"):
+        if self.runs and not fix.startswith(DID_YOU_MEAN):
             return f"what is known while the robot runs is written '${name}'"
         return fix
 

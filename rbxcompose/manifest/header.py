@@ -6,6 +6,9 @@ from typing import Literal
 
 from rbxcompose.config import Config, Name
 
+KINDS = ("Robot", "Part", "Overlay", "Mission", "Test")
+"""What a manifest may describe."""
+
 
 class ManifestHeader(Config):
     """The keys at the start of every manifest."""

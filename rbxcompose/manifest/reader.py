@@ -8,8 +8,10 @@ from collections.abc import Iterator, Mapping, MutableMapping
 from pathlib import Path
 
 from rbxcompose.findings import Edit, Finding, Fix, Span, kind
+from rbxcompose.manifest.foreign_text import foreign_text
 from rbxcompose.manifest.limits import ALL_BYTES, ALL_VALUES, FILE_BYTES, FILES, FILL_TEXT
 from rbxcompose.manifest.parser_error import NOT_YAML
+from rbxcompose.manifest.passwords import passwords
 from rbxcompose.manifest.tree import TreeNode, count
 from rbxcompose.manifest.walk import CHARACTER, Walk
 from rbxcompose.manifest.yaml_nodes import TOO_LARGE, compose
@@ -157,6 +159,8 @@ def read_text(text: str | bytes, file: str) -> ParsedText:
         text = text[1:]
     if len(text) > FILE_BYTES:
         return None, [TOO_LARGE.at(None, f"'{file}' is larger than {FILE_BYTES:,} bytes, the limit of a manifest")]
+    if foreign := foreign_text(text, file):
+        return None, [foreign]
     if findings := list(_trouble_in_characters(text, file)):
         return None, findings
     root, failure = compose(text, file)
@@ -166,7 +170,7 @@ def read_text(text: str | bytes, file: str) -> ParsedText:
         return None, [NOT_YAML.at(Span(file, 1, 1, 1, 2), "this file is empty")]
     walk = Walk(text, file)
     node = walk.node(root)
-    return node, walk.findings
+    return node, [*walk.findings, *passwords(text, node)]
 
 
 def _trouble_in_characters(text: str, file: str) -> Iterator[Finding]:

@@ -6,24 +6,28 @@ import errno
 import os
 import stat
 from collections.abc import Mapping
+from itertools import islice
 from pathlib import Path
 
 from rbxcompose.config import Secret
 from rbxcompose.dataclass import dataclass
+from rbxcompose.findings import DID_YOU_MEAN, nearest
 from rbxcompose.manifest.limits import SECRET
 from rbxcompose.regular_files import NotRegularError, open_regular
 
 FOLDER = "secrets"
 VARIABLE = "RBX_SECRET_"
+_MOST_NAMES = 1000
 
 
 class NoSecretError(Exception):
-    """Raised when a secret is not available; `help` says what to do."""
+    """Raised when a secret is not available; `help` says what to do, `near` is a secret with a similar name."""
 
-    def __init__(self, message: str, help: str) -> None:
+    def __init__(self, message: str, help: str, near: str = "") -> None:
         super().__init__(message)
         self.message = message
         self.help = help
+        self.near = near
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,12 +61,25 @@ class Secrets:
             is_missing = error.errno in (errno.ENOENT, errno.ENOTDIR)
             reason = "does not exist" if is_missing else f"cannot be read: {os.strerror(error.errno or 0)}"
             message = f"the secret '{name}' is not available: the file '{shown}' {reason}"
-            raise NoSecretError(
-                message, f"put it into '{shown}' with mode 0600, or into the variable {VARIABLE}{name.upper()}"
-            ) from None
+            near = next(iter(nearest(name, self._names())), "") if is_missing else ""
+            there = f"put it into '{shown}' with mode 0600, or into the variable {VARIABLE}{name.upper()}"
+            raise NoSecretError(message, f"{DID_YOU_MEAN} '{near}'?" if near else there, near) from None
         if len(data) > SECRET:
             raise NoSecretError(f"'{shown}' is larger than {SECRET:,} bytes", "a secret is one short text")
+        return _text(data, shown)
+
+    def _names(self) -> list[str]:
+        """Return the names of the secrets that there are."""
+        given = [one.removeprefix(VARIABLE).lower() for one in self.environment if one.startswith(VARIABLE)]
         try:
-            return data.decode("utf-8").removesuffix("\n").removesuffix("\r")
-        except UnicodeDecodeError:
-            raise NoSecretError(f"'{shown}' is not UTF-8 text", "write it as text, such as base64") from None
+            with os.scandir(self.project / FOLDER) as entries:
+                return sorted([*given, *(entry.name for entry in islice(entries, _MOST_NAMES))])
+        except OSError:
+            return given
+
+
+def _text(data: bytes, shown: str) -> str:
+    try:
+        return data.decode("utf-8").removesuffix("\n").removesuffix("\r")
+    except UnicodeDecodeError:
+        raise NoSecretError(f"'{shown}' is not UTF-8 text", "write it as text, such as base64") from None

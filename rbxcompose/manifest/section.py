@@ -9,25 +9,26 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, replace
 from enum import Enum
-from functools import cache, cached_property
+from functools import cached_property
 from pathlib import Path
 from types import GenericAlias
-from typing import Annotated, Any, Generic, TypeVar, cast
-
-from pydantic import BeforeValidator
+from typing import Any, Generic, TypeVar, cast
 
 from rbxcompose.config import Name
 from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Report
 from rbxcompose.manifest.documents import Documents
 from rbxcompose.manifest.header import ManifestHeader
+from rbxcompose.manifest.misplaced import is_misplaced, misplaced
+from rbxcompose.manifest.named_items import help_with_names
 from rbxcompose.manifest.renamer import Renames
 from rbxcompose.manifest.salvage import salvaged
-from rbxcompose.manifest.shapes import below, kinds_of, with_references
+from rbxcompose.manifest.shapes import keys_at, with_references
+from rbxcompose.manifest.short_forms import Short, entry_type_of, short_type_of
 from rbxcompose.manifest.tree import Entry, KeyPath, MappingNode, ScalarNode, TreeNode, at
 from rbxcompose.manifest.validate import WRONG_TYPE, is_valid, label_of, validate
 from rbxcompose.manifest.wanted_components import WantedComponent, Wiring
-from rbxcompose.references import COMPONENT, Refers
+from rbxcompose.references import COMPONENT
 
 M = TypeVar("M")
 R = TypeVar("R")
@@ -46,31 +47,6 @@ class SetScope(Enum):
     ANYTHING = "an entry as a whole, or what stands in it"
     KEYS = "what stands in an entry"
     BARE = "what stands in an entry, whose name may come first in the path, without the section"
-
-
-@dataclass(frozen=True, slots=True)
-class Short:
-    """One word in place of an entry with one key: `patrol: FILE` is `{file: FILE}`."""
-
-    key: str
-    is_merged: bool = True
-    """Whether layers may change single keys of such an entry; otherwise they replace it as a whole."""
-    only_over: str = ""
-    """Meaning of the word, if only an overlay may use the short form."""
-
-
-@cache
-def _short_type(model: Any, key: str) -> Any:
-    return Annotated[(str, *(Refers(kind, is_told=True) for kind in kinds_of(next(below(model, key)))))]
-
-
-@cache  # each type is compiled once
-def _entry_type(model: Any, short: Short) -> Any:
-    word = _short_type(model, short.key)
-    read = BeforeValidator(
-        lambda value: {short.key: value} if isinstance(value, str) else value, json_schema_input_type=model | word
-    )
-    return Annotated[model, read]
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,6 +123,12 @@ class Declaration(Generic[M]):
             return (self.short_type,)
         return self.models(entry) if self.models else (self.model,)
 
+    def keys_of(self, entry: Entry) -> set[str]:
+        """Return the keys that an entry may have."""
+        if self.at:
+            return set(keys_at(self.model, (*self.at, entry.key.text)))
+        return {key for one in self.types_of(entry.value) for key in keys_at(one, ())}
+
     def has_names_of(self, kind: str) -> bool:
         """Return whether its keys are names of a kind; everything that runs is a component, too."""
         return kind == self.names or (kind == COMPONENT and self.runs)
@@ -163,13 +145,13 @@ class Declaration(Generic[M]):
     def entry_type(self) -> Any:
         """Return the type of an entry: the model, or the word that abbreviates it."""
         model: Any = self.model
-        return _entry_type(model, self.short) if self.short and not self.short.only_over else model
+        return entry_type_of(model, self.short) if self.short and not self.short.only_over else model
 
     @property
     def short_type(self) -> Any:
         """Return the type of the word that abbreviates an entry."""
         model: Any = self.model
-        return _short_type(model, self.short.key) if self.short else str
+        return short_type_of(model, self.short.key) if self.short else str
 
     @property
     def type(self) -> Any:
@@ -260,6 +242,14 @@ class Contents:
         others = (entry.value for name, entry in self.root.entries.items() if name not in known)
         return frozenset(name for node in others if isinstance(node, MappingNode) for name in node.entries)
 
+    def is_misplaced(self, section: Section[Any, Any], entry: Entry) -> bool:
+        """Return whether an entry of a section is another section of the file, indented too far."""
+        other = next((one for one in self._sections if one.name == entry.key.text), None)
+        if other is None:
+            return False
+        keys = () if other.is_map else keys_at(other.model, ())
+        return is_misplaced(entry.value, keys, section.keys_of(entry))
+
     @cached_property
     def known(self) -> dict[str, Mapping[str, object]]:
         """Return the names of each kind, including entries with mistakes: references to them are not wrong."""
@@ -343,8 +333,12 @@ class Reading(Generic[M]):
         return self.contents.documents.writer(node.span, self.contents.file)
 
     def named(self) -> Iterator[tuple[str, Entry]]:
-        """Yield the entries by name, after a finding for each bad name."""
-        return named_entries(self.contents.root, (self.section.name, *self.section.at), self.report)
+        """Yield the entries by name, after a finding for each bad name, and for sections that were indented too far."""
+        for name, entry in named_entries(self.contents.root, (self.section.name, *self.section.at), self.report):
+            if self.contents.is_misplaced(self.section, entry):
+                self.report.add(misplaced(entry.key, self.section.name))
+            else:
+                yield name, entry
 
     def valid(self, model: type[T], name: str, node: TreeNode) -> T | None:
         """Return an entry as an instance of `model`, None after its findings."""
@@ -384,7 +378,7 @@ def named_entries(root: MappingNode, path: tuple[str, ...], report: Report) -> I
         return
     if not isinstance(node, MappingNode):
         message = f"'{path[-1]}' must be a map of named entries"
-        report.add(WRONG_TYPE.at(node.span, message, label=label_of(node)))
+        report.add(WRONG_TYPE.at(node.span, message, label=label_of(node), help=help_with_names(node)))
         return
     for name, entry in node.entries.items():
         if is_valid(Name, name) or validate(Name, replace(entry.key, plain=False), (*path, name), report) is not None:

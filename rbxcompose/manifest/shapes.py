@@ -25,8 +25,9 @@ def field_types(model: type[BaseModel]) -> dict[str, Any]:
 
 
 def keys_at(model: Any, path: KeyPath) -> list[str]:
-    """Return the keys of the map at `path` below `model`; none if the model does not name them."""
-    return sorted({name for one in _types_at(model, path) for shape in _models(one) for name in field_types(shape)})
+    """Return the keys of the map at `path` below `model` as declared; none if the model does not name them."""
+    shapes = (shape for one in _types_at(model, path) for shape in _models(one))
+    return list(dict.fromkeys(name for shape in shapes for name in field_types(shape)))
 
 
 def dimension_at(model: Any, path: KeyPath) -> Dimension | None:

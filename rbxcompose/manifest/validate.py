@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from functools import cache
@@ -13,8 +13,9 @@ from typing import Any, TypeVar, cast
 from pydantic import TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
-from rbxcompose.findings import SIMILAR, Finding, Report, Span, correction, kind
+from rbxcompose.findings import DID_YOU_MEAN, SIMILAR, Finding, Report, Span, correction, kind
 from rbxcompose.manifest.conversions import changed, repaired
+from rbxcompose.manifest.requirements import BOUNDS, EXPECTED
 from rbxcompose.manifest.scalars import describe, number_trouble, plain_value
 from rbxcompose.manifest.shapes import dimension_at, keys_at
 from rbxcompose.manifest.slips import RefusedValue, value_slip
@@ -154,6 +155,7 @@ KEYS = "keys that it takes"
 ENTRY_WORDS: dict[str, str] = {}
 """What an entry of a section is called: each section that is declared enters its own."""
 _MOST_FINDINGS = 100  # of one part: nobody makes more by mistake, and each costs a search for the nearest name
+_OF_A_MAP = ("missing", "extra_forbidden")  # errors about a key that its map lacks or should not have
 _ROUNDS = 8  # of repairs; each round goes at least one level deeper into a value
 
 
@@ -227,11 +229,12 @@ def _findings(
             known = [*keys_at(model, loc[:-1]), *(() if len(loc) > 1 else also)]
             finding, meant = _unknown_key(known, node, path, loc, lacking)
             said |= {loc, (*loc[:-1], meant)}  # a misspelt key is not missing as well
-            yield finding
+            yield _slip(model, node, path, loc, error, finding, known) or finding
     for loc, error in located:
         if loc not in said and not is_broken(at(node, loc)):
             said.add(loc)
-            yield _slip(model, node, path, loc, error) or _finding(model, node, path, loc, error)
+            finding = _finding(model, node, path, loc, error)
+            yield _slip(model, node, path, loc, error, finding) or finding
 
 
 def _locate(node: TreeNode, error: ErrorDetails) -> KeyPath:
@@ -298,13 +301,13 @@ def _finding(model: Any, node: TreeNode, path: KeyPath, loc: KeyPath, error: Err
             one, more = ("character", "characters") if "string" in error["type"] else ("entry", "entries")
             size = context[key]
             return OUT_OF_RANGE.at(span, f"'{name}' must have {words} {size} {one if size == 1 else more}")
-        case kind_of_error if kind_of_error in _BOUNDS:
-            words, key = _BOUNDS[kind_of_error]
+        case kind_of_error if kind_of_error in BOUNDS:
+            words, key = BOUNDS[kind_of_error]
             dimension = dimension_at(model, loc)
             bound = format_quantity(context[key], dimension) if dimension else context[key]
             return OUT_OF_RANGE.at(span, f"'{name}' must be {words} {bound}")
-        case kind_of_error if kind_of_error in _EXPECTED:
-            return WRONG_TYPE.at(span, f"'{name}' must be {_EXPECTED[kind_of_error]}", label=label_of(value))
+        case kind_of_error if kind_of_error in EXPECTED:
+            return WRONG_TYPE.at(span, f"'{name}' must be {EXPECTED[kind_of_error]}", label=label_of(value))
     if "valid" in context:  # a validator of ours that supplies the valid names
         message = error["msg"] if is_key else f"'{name}': {error['msg']}"
         return NOT_A_CHOICE.misspelt(place, message, context["name"], context["valid"], context["what"])
@@ -321,7 +324,7 @@ def not_a_choice(span: Span, name: str, value: TreeNode | None, choices: list[st
         fix = correction(written, choices, span)
         return NOT_A_CHOICE.at(span, f"'{name}' must be '{choices[0]}'", label=label, fix=fix)
     finding = NOT_A_CHOICE.misspelt(span, f"'{name}' must be one of {', '.join(choices)}", written, choices)
-    is_near = finding.help.startswith("did you mean")
+    is_near = finding.help.startswith(DID_YOU_MEAN)
     return finding if is_near else replace(finding, help="")  # the message lists all of them
 
 
@@ -347,20 +350,28 @@ def label_of(node: TreeNode | None) -> str:
 
 def unit_finding(error: UnitError, node: TreeNode, name: str) -> Finding:
     """Return the finding for a value that is not the required quantity."""
-    # If it does not even look like a number, help about numbers is no use.
+    # If it does not even look like a number, what is wrong with the number is no use.
     is_word = isinstance(node, ScalarNode) and node.filled is None and node.text[:1] not in "+-.0123456789"
     label = label_of(node) if is_word or not error.detail else error.detail
-    return WRONG_TYPE.at(node.span, f"'{name}' {error.message}", label=label, help="" if is_word else error.help)
+    return WRONG_TYPE.at(node.span, f"'{name}' {error.message}", label=label, help=error.help)
 
 
-def _slip(model: Any, node: TreeNode, path: KeyPath, loc: KeyPath, error: ErrorDetails) -> Finding | None:
+def _slip(
+    model: Any,
+    node: TreeNode,
+    path: KeyPath,
+    loc: KeyPath,
+    error: ErrorDetails,
+    finding: Finding,
+    keys: Sequence[str] = (),
+) -> Finding | None:
     """Return the finding about a slip, if the model accepts what was probably meant."""
-    refused_at = loc[:-1] if error["type"] == "missing" else loc
+    refused_at = loc[:-1] if error["type"] in _OF_A_MAP else loc
     written = at(node, refused_at)
     if written is None:
         return None
     for slip in value_slip.at(error["type"]):
-        repair = slip(RefusedValue((*path, *loc), _finding(model, node, path, loc, error)), written)
+        repair = slip(RefusedValue((*path, *loc), finding, keys), written)
         if repair and _takes(model, _with(to_plain(node), refused_at, to_plain(repair.node)), loc):
             return repair.findings[0]
     return None
@@ -377,23 +388,3 @@ def _takes(model: Any, data: object, loc: KeyPath) -> bool:
     except ValidationError as error:
         return not any(one["loc"][: len(loc)] == loc for one in error.errors(include_url=False))
     return True
-
-
-_BOUNDS = {
-    "greater_than": ("greater than", "gt"),
-    "greater_than_equal": ("at least", "ge"),
-    "less_than": ("less than", "lt"),
-    "less_than_equal": ("at most", "le"),
-    "multiple_of": ("a multiple of", "multiple_of"),
-}
-_EXPECTED = {
-    "string_type": "text",
-    "int_type": "a whole number",
-    "int_from_float": "a whole number",
-    "float_type": "a number",
-    "bool_type": "true or false",
-    "list_type": "a list",
-    "tuple_type": "a list",
-    "dict_type": "a map of keys and values",
-    **dict.fromkeys(("model_type", "model_attributes_type", "dataclass_type"), "a map of keys and values"),
-}

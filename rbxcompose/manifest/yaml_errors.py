@@ -127,7 +127,7 @@ def _unclosed_quote(trouble: Trouble) -> Finding:
 
 _ESCAPE = _plainly(
     "a backslash in double quotes starts an escape, but this is not one",
-    "write the backslash twice, or use single quotes",
+    "a path is written with '/'; elsewhere write the backslash twice, or use single quotes",
 )
 _ANSWERS: dict[str, Callable[[Trouble], Finding]] = {
     COLON: _colon,

@@ -6,7 +6,7 @@ import re
 from typing import Any
 
 from rbxcompose.expressions.types import Type, TypeKind
-from rbxcompose.units import DIMENSIONS, NUMBER_TEXT, UNITS, Dimension, bare_number_help, example
+from rbxcompose.units import DIMENSIONS, NUMBER_TEXT, Dimension, example, needs_unit, units_of
 
 Schema = dict[str, Any]
 
@@ -36,11 +36,6 @@ def computed(wanted: Type, what: str = "") -> Schema:
     return {"type": ["string", "number", "boolean"]}
 
 
-def units_of(dimension: Dimension) -> list[str]:
-    """Return the units of a dimension, the base unit first."""
-    return [name for name, unit in UNITS.items() if unit.dimension == dimension]
-
-
 def quantities() -> dict[str, Schema]:
     """Return the definition of each quantity, as a setting and as an expression."""
     settings = {one.name: _quantity(one, FILLED) for one in DIMENSIONS.values()}
@@ -54,7 +49,7 @@ def _expression(dimension: Dimension) -> str:
 def _quantity(dimension: Dimension, otherwise: str) -> Schema:
     sample = example(dimension)
     return {
-        "type": ["string"] if bare_number_help(dimension) else ["string", "number"],
+        "type": ["string"] if needs_unit(dimension) else ["string", "number"],
         "pattern": f"{_number_with_unit(dimension)}|{otherwise}",
         **_complaint(f"must be {dimension.phrase}, such as '{sample}'"),
         "examples": [sample],
@@ -69,7 +64,7 @@ def _complaint(message: str) -> Schema:
 
 def _number_with_unit(dimension: Dimension) -> str:
     units = "|".join(re.escape(unit) for unit in units_of(dimension))
-    unit = f"({units}){'' if bare_number_help(dimension) else '?'}" if units else ""
+    unit = f"({units}){'' if needs_unit(dimension) else '?'}" if units else ""
     return rf"^\s*[+-]?{NUMBER_TEXT}\s*{unit}\s*$"
 
 

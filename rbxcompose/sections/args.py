@@ -5,7 +5,8 @@ from __future__ import annotations
 from rbxcompose.findings import Span
 from rbxcompose.manifest.arguments import ArgumentModel, DeclaredArgument, read_argument
 from rbxcompose.manifest.registry import section
-from rbxcompose.manifest.section import Reading, Short
+from rbxcompose.manifest.section import Reading
+from rbxcompose.manifest.short_forms import Short
 from rbxcompose.references import ARGUMENT
 
 

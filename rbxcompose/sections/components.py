@@ -7,16 +7,16 @@ from dataclasses import replace
 from difflib import get_close_matches
 from typing import Any
 
-from rbxcompose.config import Config
+from rbxcompose.config import Config, Name
 from rbxcompose.dataclass import dataclass
-from rbxcompose.findings import SIMILAR, Report, Span, kind
+from rbxcompose.findings import DID_YOU_MEAN, SIMILAR, Finding, Report, Span, kind
 from rbxcompose.manifest.options import OPTIONS, ComponentOptions
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.renamer import Renames
 from rbxcompose.manifest.salvage import salvaged
 from rbxcompose.manifest.section import Contents, Reading, SetScope
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode, at
-from rbxcompose.manifest.validate import MISSING_KEY, UNKNOWN_KEY, WRONG_TYPE, is_broken, label_of, validate
+from rbxcompose.manifest.validate import MISSING_KEY, UNKNOWN_KEY, WRONG_TYPE, is_broken, is_valid, label_of, validate
 from rbxcompose.manifest.wanted_components import WantedComponent, Wiring
 from rbxcompose.plugins import BROKEN, LEFT_OUT, BrokenPluginError
 from rbxcompose.printable import plain
@@ -208,8 +208,7 @@ def _type_name(name: str, entry: Entry, node: MappingNode, report: Report) -> st
     if told := registry.PLUGINS.overshadowed(written.text):
         report.add(LEFT_OUT.at(written.span, told))
     if written.text not in registry.component_names():
-        message = f"component '{name}' has a type that does not exist: '{plain(written.text, 60)}'"
-        report.add(UNKNOWN_TYPE.misspelt(written.span, message, written.text, registry.component_names(), "types"))
+        report.add(_unknown_type(name, written))
         return None
     try:
         registry.component_type(written.text)
@@ -217,3 +216,19 @@ def _type_name(name: str, entry: Entry, node: MappingNode, report: Report) -> st
         report.add(BROKEN.at(written.span, str(error)))
         return None
     return written.text
+
+
+def _unknown_type(name: str, written: ScalarNode) -> Finding:
+    shown = plain(written.text, 60)
+    message = f"component '{name}' has a type that does not exist: '{shown}'"
+    finding = UNKNOWN_TYPE.misspelt(written.span, message, written.text, _types(), "types")
+    if finding.help.startswith(DID_YOU_MEAN) or not is_valid(Name, written.text):
+        return finding
+    elsewhere = f"if a package brings it, install that; 'rbxcompose new component {shown}' begins one of your own"
+    return replace(finding, help="; ".join(filter(None, (finding.help, elsewhere))))
+
+
+def _types() -> list[str]:
+    """Return the names of all types, first those that users list; types of other packages are not imported for it."""
+    names, foreign = registry.component_names(), registry.PLUGINS.third_party
+    return sorted(names, key=lambda one: one not in foreign and bool(registry.component_type(one).made_by))

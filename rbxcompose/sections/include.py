@@ -11,7 +11,8 @@ from rbxcompose.body.attachment import PieceAttachment
 from rbxcompose.config import Config, Name
 from rbxcompose.manifest.fields import FileName, TopicName
 from rbxcompose.manifest.registry import section
-from rbxcompose.manifest.section import Reading, Short
+from rbxcompose.manifest.section import Reading
+from rbxcompose.manifest.short_forms import Short
 from rbxcompose.manifest.tree import Entry
 from rbxcompose.references import INSTANCE, Refers
 

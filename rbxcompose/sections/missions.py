@@ -17,7 +17,8 @@ from rbxcompose.manifest.fill import SHOWN_SECRET
 from rbxcompose.manifest.mission_data import is_moderate
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.salvage import salvaged
-from rbxcompose.manifest.section import Reading, Short
+from rbxcompose.manifest.section import Reading
+from rbxcompose.manifest.short_forms import Short
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode, children
 from rbxcompose.references import ANYTHING, MISSION, Refers
 

@@ -2,11 +2,29 @@
 
 from __future__ import annotations
 
+from functools import partial
+from typing import Annotated
+
+from pydantic import AfterValidator
+from pydantic_core import PydanticCustomError
+
 from rbxcompose.config import Config
+from rbxcompose.expressions.types import TYPES
 from rbxcompose.manifest.fields import DottedName, PortName, TopicName
 from rbxcompose.manifest.registry import section
-from rbxcompose.manifest.section import Reading, Short
+from rbxcompose.manifest.section import Reading
+from rbxcompose.manifest.short_forms import Short
 from rbxcompose.references import VALUE
+from rbxcompose.units import UNITS
+
+_PLAIN = ("number", "count", "text", "flag")  # the first to be proposed
+
+
+def _known(what: str, valid: tuple[str, ...], name: str) -> str:
+    if name not in valid:
+        context = {"name": name, "valid": valid, "what": f"{what}s"}
+        raise PydanticCustomError(what, f"there is no {what} '{{name}}'", context)
+    return name
 
 
 class ValueModel(Config):
@@ -18,9 +36,9 @@ class ValueModel(Config):
     """Topic of data from outside."""
     field: DottedName | None = None
     """Field of its message; without it, `data`."""
-    type: str | None = None
+    type: Annotated[str, AfterValidator(partial(_known, "type", (*_PLAIN, *TYPES)))] | None = None
     """Its type: a dimension, `number`, `text`, `flag`, ..."""
-    unit: str | None = None
+    unit: Annotated[str, AfterValidator(partial(_known, "unit", tuple(UNITS)))] | None = None
     """Unit of the message, if it differs from that of the type."""
     event: bool | None = None
     """Whether each message is an event: a condition that waits counts it only if it came since its node began, and no

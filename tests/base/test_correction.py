@@ -71,4 +71,4 @@ def test_a_misspelt_name_brings_help_and_fix() -> None:
     assert finding.fix
     assert finding.fix.is_safe
     far = FindingKind("RBX0009", "Title").misspelt(PLACE, "unknown", "x", ["dock", "corner"], "places")
-    assert (far.help, far.fix) == ("places: corner, dock", None)
+    assert (far.help, far.fix) == ("places: dock, corner", None)

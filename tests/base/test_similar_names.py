@@ -20,8 +20,28 @@ def test_one_slip_is_found_among_thousands_as_among_few(slip: str) -> None:
 
 
 def test_among_thousands_what_is_far_away_is_listed_only() -> None:
-    listed = "battery_0, battery_1, battery_10, battery_100, battery_1000, battery_1001"
-    assert suggest("carger_two", ["charger", *MANY], "components") == f"components: {listed} and 4995 more"
+    listed = ", ".join(f"battery_{number}" for number in range(7))
+    assert suggest("carger_two", ["charger", *MANY], "components") == f"components: charger, {listed} and 4993 more"
+
+
+KEYS = ("model", "serial", "baud", "watchdog", "noise", "seed", "twin", "rate", "turn_rate", "max_turn_rate")
+
+
+@pytest.mark.parametrize(
+    ("name", "first"),
+    [
+        ("turn_velocity", ["turn_rate", "max_turn_rate"]),  # they share a word with it
+        ("baudrate_of_the_line", ["baud"]),
+        ("quick", ["model", "serial", "baud"]),  # nothing is like it: they keep their order
+    ],
+)
+def test_valid_names_are_listed_by_likeness_and_then_as_they_were_given(name: str, first: list[str]) -> None:
+    listed = suggest(name, KEYS, "keys").removeprefix("keys: ").removesuffix(" and 2 more").split(", ")
+    assert listed[: len(first)] == first
+
+
+def test_a_set_has_no_order_so_its_names_are_listed_by_the_alphabet() -> None:
+    assert suggest("xyz", frozenset({"dock", "base", "arm"})) == "valid names: arm, base, dock"
 
 
 @settings(max_examples=40, deadline=None)

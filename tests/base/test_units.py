@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 import pytest
 from hypothesis import given
@@ -110,16 +111,59 @@ def test_a_bare_number_is_si() -> None:
 @pytest.mark.parametrize(
     ("dimension", "fix"),
     [
-        (units.ANGLE, "write '90 deg' or '1.57 rad'"),
-        (units.RATIO, "write '50 %'"),
-        (units.TEMPERATURE, "write '50 degC'"),
+        (units.ANGLE, "write '45 deg' or '45 rad'"),
+        (units.RATIO, "write '45 %'"),
+        (units.TEMPERATURE, "write '45 degC'"),
     ],
 )
-@pytest.mark.parametrize("bare", [0, 1.5, "30", Quantity(1.0, units.NUMBER)])
-def test_a_bare_number_is_no_angle_ratio_or_temperature(dimension: Dimension, fix: str, bare: object) -> None:
+@pytest.mark.parametrize("bare", [45, 45.0, "45", Quantity(45.0, units.NUMBER)])
+def test_a_bare_number_is_no_angle_ratio_or_temperature_and_the_help_keeps_it(
+    dimension: Dimension, fix: str, bare: object
+) -> None:
     with pytest.raises(UnitError) as caught:
         to_si(bare, dimension)
+    assert (caught.value.help, caught.value.detail) == (fix, "the unit is missing")
+
+
+def test_a_bare_share_of_one_may_be_a_percentage_of_either_kind() -> None:
+    with pytest.raises(UnitError) as caught:
+        to_si(0.15, units.RATIO)
+    assert caught.value.help == "write '15 %', or '0.15 %' if it is that little"
+
+
+@pytest.mark.parametrize(
+    ("text", "dimension", "fix"),
+    [
+        ("0.3 mps", units.SPEED, "did you mean 'm/s'?"),
+        ("0.3 m/sec", units.SPEED, "did you mean 'm/s'?"),
+        ("1 m/s2", units.ACCELERATION, "did you mean 'm/s^2'?"),
+        ("1000 mm/s^2", units.ACCELERATION, "write '1 m/s^2', which is the same"),
+        ("6000 cm/min", units.SPEED, "write '1 m/s', which is the same"),
+        ("1234567 mm/s^2", units.ACCELERATION, "write '1234.567 m/s^2', which is the same"),
+        ("120/s", units.ANGULAR_SPEED, "write '120 deg/s' or '120 rad/s'"),
+        ("0.3 mps", units.TIME, "units of a time: s, ms, us, min, h"),
+        ("mps", units.SPEED, "write a number before 'm/s'"),
+        ("mps", units.TIME, ""),
+        ("45 grad", units.ANGLE, "did you mean 'rad'?"),
+    ],
+)
+def test_the_help_for_an_unknown_unit_is_of_the_wanted_dimension(text: str, dimension: Dimension, fix: str) -> None:
+    with pytest.raises(UnitError) as caught:
+        to_si(text, dimension)
     assert caught.value.help == fix
+
+
+@given(
+    number=st.integers(1, 999),
+    unit=st.text("mskgdeV/^2 ", min_size=1, max_size=8),
+    dimension=st.sampled_from(list(DIMENSIONS.values())),
+)
+def test_no_help_proposes_a_unit_of_another_dimension(number: int, unit: str, dimension: Dimension) -> None:
+    try:
+        to_si(f"{number} {unit}", dimension)
+    except UnitError as error:
+        proposed = re.findall(r"'([^']*)'", error.help)
+        assert all(units.UNITS[one.split(" ")[-1]].dimension == dimension for one in proposed if "," not in one)
 
 
 def test_a_wrong_dimension_says_what_must_stand_there_and_what_does() -> None:

@@ -8,9 +8,20 @@ import pytest
 
 from rbxcompose.check_runner import Check, all_checks
 from rbxcompose.compiler import compile_robot
+from rbxcompose.msgs.std_msgs import Empty
 from rbxcompose.rendering.text import render_text
+from rbxcompose.sdk import Component, Config, Out, component
 from rbxcompose.testing.golden import Golden
 from tests.checks import strangers
+
+
+@component("toy_heartbeat")
+class Heartbeat(Component[Config]):
+    """Sends ten times per second."""
+
+    rate = 10.0
+    beat = Out(Empty, "beat", qos="command")
+
 
 FOLDER = Path(__file__).parent / "golden"
 

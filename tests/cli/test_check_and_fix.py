@@ -217,6 +217,29 @@ def test_fix_never_writes_outside_of_the_project(project: Path, capsys: pytest.C
     assert library.read_bytes() == before
 
 
+ARBOTIX = "port: /dev/ttyUSB0\njoints:\n\tpan_joint: {id: 1, max_angle: 90}\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "is_written"),
+    [
+        (ARBOTIX.replace("\t", "  "), False),  # it would get 'rbx: 1' as its first line
+        (ARBOTIX, False),  # and spaces for its tabs
+        (f"kind: Deployment\n{ARBOTIX}", False),
+        ("name: bot\nplaces: {}\n", False),
+        ("kind: Robot\nname: bot\nplaces: {}\n", True),
+        ("rbx: 1\nkind: Robto\nname: bot\nplaces: {}\n", True),
+        ('{kind: Robot, rbx: 1, name: bot, "start": patrol, missions: {patrol: ../../missions/patrl.yaml}}\n', True),
+    ],
+)
+def test_fix_writes_only_files_of_a_kind_that_it_knows(
+    text: str, is_written: bool, project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    ROBOT.write_text(text, encoding="utf-8")
+    command.main(["check", "robots/bot", "--fix"])
+    assert (ROBOT.read_text(encoding="utf-8") != text) == is_written, capsys.readouterr().out
+
+
 def test_fix_never_writes_what_ships_with_the_package(capsys: pytest.CaptureFixture[str]) -> None:
     before = (ROOT / "robots/turtlebot/robot.yaml").read_bytes()
     output(capsys, "--fix", "rbx:robots/turtlebot", code=0)

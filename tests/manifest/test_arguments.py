@@ -50,7 +50,7 @@ MISTAKES = [
     ("{type: choice, default: a}", "RBX1002", "argument 'it' is a choice and needs 'choices'"),
     ("{type: choice, choices: [fast], default: slow}", "RBX1004", "'it' must be 'fast'"),
     ("{type: speed, default: 5 s}", "RBX1003", "'it' must be a speed, such as '0.3 m/s'"),
-    ("{type: ratio, default: 0.5}", "RBX1003", "'it' must be a ratio, such as '50 %'"),
+    ("{type: ratio, default: 0.5}", "RBX1003", "'it' must be a ratio"),
     ("{type: speed, default: 0.6 m/s, max: 0.5 m/s}", "RBX1005", "'it' must be at most 0.5 m/s"),
     ("{type: count, default: 0, min: 1}", "RBX1005", "'it' must be at least 1"),
     ("{type: count, default: -1}", "RBX1003", "'it' must be a whole number, not below 0"),

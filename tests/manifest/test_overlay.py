@@ -212,8 +212,8 @@ def test_a_set_that_leads_to_nothing_is_a_finding_with_the_nearest_name() -> Non
         ("RBX1302", "did you mean 'speed'?"),
         ("RBX1302", "a path starts with: speed"),
         ("RBX1303", "write --set battery.KEY=VALUE"),
-        ("RBX1303", "write --set battery.runtime='30 s'"),
-        ("RBX1303", "write --set battery.runtime='30 s'"),
+        ("RBX1303", "write --set nothing=VALUE"),
+        ("RBX1303", "write --set a.b=1"),
     ]
 
 

@@ -7,7 +7,8 @@ from typing import Annotated
 
 from rbxcompose.config import Config, Name, PlaceName
 from rbxcompose.manifest.registry import section
-from rbxcompose.manifest.section import Contents, Reading, Short
+from rbxcompose.manifest.section import Contents, Reading
+from rbxcompose.manifest.short_forms import Short
 from rbxcompose.manifest.wanted_components import WantedComponent, Wiring
 from rbxcompose.references import COMPONENT, Refers
 from rbxcompose.sdk import Component, component

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -9,11 +10,13 @@ from typing import Protocol
 
 from rbxcompose.atomic_files import replace_file
 from rbxcompose.edits import apply, safe_fixes
-from rbxcompose.findings import Finding, Fix, Report, Sources
+from rbxcompose.findings import Finding, Fix, Report, Sources, nearest
+from rbxcompose.manifest.header import KINDS
 from rbxcompose.manifest.limits import FILE_BYTES
 from rbxcompose.printable import plain
 from rbxcompose.regular_files import read_regular
 
+_KIND = re.compile(r"^[ \t]*+(?:[{,]\s*+|\{[^\n]*?,\s*+)?+['\"]?kind['\"]?\s*+:\s*+['\"]?(\w++)", re.MULTILINE)
 ROUNDS = 20  # one fix may reveal the next mistake
 _WORDS = 200  # characters of a title
 
@@ -44,16 +47,27 @@ def fix(check: Callable[[], CheckedTexts], say: PrintLine) -> None:
     say(f"stopped after {ROUNDS} rounds: each fix leads to another")
 
 
-def only_ours(findings: Iterable[Finding], projects: Collection[Path]) -> Iterator[Finding]:
-    """Yield the findings, but drop fixes that would change a file outside of `projects`."""
+def only_ours(findings: Iterable[Finding], sources: Sources, projects: Collection[Path]) -> Iterator[Finding]:
+    """Yield the findings, but drop fixes that would change a file outside of `projects`, or one that is not ours."""
     for finding in findings:
-        is_ours = finding.fix is None or _is_ours(finding.fix, projects)
+        is_ours = finding.fix is None or _is_ours(finding.fix, sources, projects)
         yield finding if is_ours else replace(finding, fix=None)
 
 
-def _is_ours(one: Fix, projects: Collection[Path]) -> bool:
-    paths = {Path(edit.span.file).resolve() for edit in one.edits}
+def _is_ours(one: Fix, sources: Sources, projects: Collection[Path]) -> bool:
+    files = {edit.span.file for edit in one.edits}
+    if not all(_has_known_kind(sources[file]) for file in files if file in sources):
+        return False
+    paths = {Path(file).resolve() for file in files}
     return all(any(path.is_relative_to(project) for project in projects) for path in paths)
+
+
+def _has_known_kind(text: str) -> bool:
+    """Return whether a text is XML, which a robot names as its body, or a manifest of a kind that there is."""
+    if text.lstrip().startswith("<"):
+        return True
+    written = _KIND.search(text)
+    return written is not None and bool(nearest(written[1], KINDS))  # a misspelt one may be corrected
 
 
 def _apply(fixes: list[Fix], sources: Sources, say: PrintLine) -> bool:

@@ -9,7 +9,7 @@ parser has stopped, and nobody knows what else is in a text that it cannot read.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from rbxcompose.findings import Finding
@@ -26,10 +26,14 @@ ANY = ""
 
 
 class RefusedValue(NamedTuple):
-    """A place that a model refuses: its path in the file, and the finding to report if it is not a slip."""
+    """A place that a model refuses: its path in the file, and the finding to report if it is not a slip.
+
+    For a key that is missing or unknown, the node is the map around it; `keys` are those that it takes, if unknown.
+    """
 
     path: KeyPath
     finding: Finding
+    keys: Sequence[str] = ()
 
 
 text_slip: Slips[Callable[[Trouble], Finding | None]] = Slips(__name__)

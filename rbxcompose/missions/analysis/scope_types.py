@@ -8,7 +8,7 @@ from dataclasses import field, replace
 from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.check import ExpressionProblem, check_value
 from rbxcompose.expressions.tree import Expression, Word
-from rbxcompose.expressions.types import PLACE, POSE, TEXT, UNKNOWN, Type, TypeKind
+from rbxcompose.expressions.types import PLACE, POSE, TEXT, UNKNOWN, Type, TypeKind, map_of
 from rbxcompose.findings import Finding, FindingKind, Span, nearest, replacement
 from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions import codes
@@ -72,7 +72,7 @@ def base_names(program: Program, robot: RobotNames) -> dict[str, Type]:
         POSE_NAME: POSE,
         **{name: one.type for name, one in program.inputs.items()},
         **{name: datum.type for name, datum in program.data.items()},
-        **{name: UNKNOWN for name in program.saved if name not in program.data},
+        **{name: map_of(UNKNOWN) for name in program.saved if name not in program.data},
     }
 
 
@@ -114,6 +114,8 @@ def findings_of(
             yield kind.at(span, message, help=help_text, fix=fix)
         elif unknown_word and wanted == TEXT and unknown_word not in scope.removed:
             yield _no_text(unknown_word, span, scope, kind)
+        elif unknown_word and problem.is_choice:
+            yield kind.at(span, problem.message, help=problem.help, fix=fix)
         elif unknown_word in scope.removed:
             yield codes.removed_place(span, unknown_word, scope.removed[unknown_word])
         elif unknown_word and scope.word(unknown_word) is None:

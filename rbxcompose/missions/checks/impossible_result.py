@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rbxcompose.expressions.tree import Comparison, ExpressionNode, Variable, Word, walk
+from rbxcompose.expressions.tree import walk
 from rbxcompose.findings import Finding, Severity
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.missions.language.spans import inner_span
+from rbxcompose.missions.program.branches import compared_with_word
 from rbxcompose.missions.program.outcomes import FAILS, SUCCEEDS, Outcomes
 from rbxcompose.rules import OWN
 
@@ -65,24 +66,14 @@ def impossible_result(mission: Examined) -> Iterator[Finding]:
         ends = mission.ending.of_branches(node)
         for outcome in node.step.branches.outcomes if node.step.branches else ():
             for tree, _ in walk(outcome.condition.tree) if outcome.condition else ():
-                compared = _compared(tree)
-                if outcome.asked and compared and _is_impossible(ends.get(compared[0]), compared[1]):
-                    branch, result = compared
+                branch, word = compared_with_word(tree) or ("", None)
+                result = word.name if word else ""
+                if outcome.asked and _is_impossible(ends.get(branch), result):
                     yield impossible_result.at(
                         inner_span(outcome.asked.scalar, tree.start, tree.end),
                         f"the branch '{branch}' never ends with '{result}'",
                         help=f"it ends with {' or '.join(ends[branch].words) or 'nothing: it runs for ever'}",
                     )
-
-
-def _compared(tree: ExpressionNode) -> tuple[str, str] | None:
-    """Return the name and the word that are compared."""
-    match tree:
-        case Comparison(operator="==", left=Variable(name=name), right=Word(name=word)):
-            return name, word
-        case Comparison(operator="==", left=Word(name=word), right=Variable(name=name)):
-            return name, word
-    return None
 
 
 def _is_impossible(ends: Outcomes | None, result: str) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 
 from rbxcompose.expressions.types import TypeKind
 from rbxcompose.findings import Finding, suggest
@@ -12,9 +12,11 @@ from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.missions.analysis.scope_types import View
 from rbxcompose.missions.language.argument_types import check_written
 from rbxcompose.missions.language.asked import WrittenArgument
+from rbxcompose.missions.language.written_poses import help_with_place, is_pose, nodes_of
 from rbxcompose.missions.program.program import Skill
 from rbxcompose.units import example
 
+PLACED = (TypeKind.PLACE, TypeKind.POSE)
 STRUCTURED = (TypeKind.LIST, TypeKind.MAP)
 
 
@@ -44,9 +46,24 @@ def wrong_argument(mission: Examined) -> Iterator[Finding]:
     for view in mission.views:
         skill = mission.robot.skills.get(view.node.skill)
         if skill:
+            if pose := _written_pose(skill, view.node.step.arguments):
+                yield pose
+                continue
             for argument in view.node.step.arguments:
                 yield from _argument(view, skill, argument)
             yield from _missing(view, skill)
+
+
+def _written_pose(skill: Skill, arguments: Collection[WrittenArgument]) -> Finding | None:
+    """Return the one finding about coordinates in the place of the argument that takes a place."""
+    main = skill.arguments.get(skill.main)
+    unknown = {one.name: one for one in arguments if one.name not in skill.arguments}
+    if main is None or main.kind not in PLACED or len(unknown) != len(arguments) or not is_pose(unknown):
+        return None
+    message = f"the skill '{skill.name}' takes {main.phrase}, not its coordinates"
+    first = next(iter(unknown.values()))
+    help_text = help_with_place({name: one.value for name, one in unknown.items()})
+    return wrong_argument.at(first.span, message, help=help_text)
 
 
 def _missing(view: View, skill: Skill) -> Iterator[Finding]:
@@ -80,4 +97,6 @@ def _argument(view: View, skill: Skill, argument: WrittenArgument) -> Iterator[F
             yield from check_written(view, argument.value, skill.arguments[name], wrong_argument)
     elif skill.arguments[name].kind not in STRUCTURED:
         message = f"the argument '{name}' of '{skill.name}' must be {skill.arguments[name].phrase}"
-        yield wrong_argument.at(argument.span, message)
+        is_place = skill.arguments[name].kind in PLACED
+        help_text = help_with_place(nodes_of(argument.value)) if is_place else ""
+        yield wrong_argument.at(argument.span, message, help=help_text)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from rbxcompose.expressions.check import check
-from rbxcompose.expressions.tree import Number
+from rbxcompose.expressions.tree import Number, walk
 from rbxcompose.expressions.types import COUNT, PLACE, TEXT, UNKNOWN, Type, TypeKind, choice_of, quantity_of
 from rbxcompose.findings import Finding
 from rbxcompose.missions.analysis.check_runner import mission_check
@@ -15,8 +15,10 @@ from rbxcompose.missions.analysis.endings import Ending
 from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.missions.analysis.scope_types import View, findings_of
 from rbxcompose.missions.codes import UNKNOWN_NAME, WRONG_TYPE
-from rbxcompose.missions.language.asked import Assignment
-from rbxcompose.missions.program.branches import RESULTS
+from rbxcompose.missions.language.asked import Asked, Assignment
+from rbxcompose.missions.language.spans import inner_span
+from rbxcompose.missions.program.branches import RESULTS, compared_with_word
+from rbxcompose.missions.program.outcomes import Outcomes
 from rbxcompose.units import NUMBER
 
 LISTED = (TypeKind.LIST, TypeKind.MAP, TypeKind.UNKNOWN)
@@ -89,12 +91,24 @@ def _outcomes(view: View, ending: Ending) -> Iterator[Finding]:
     branches = view.node.step.branches
     if branches is None or not branches.outcomes:
         return
-    names = dict(view.scope.names)
-    for branch, ends in ending.of_branches(view.node).items():
+    names, branch_ends = dict(view.scope.names), ending.of_branches(view.node)
+    for branch, ends in branch_ends.items():
         names[branch] = choice_of(*RESULTS, *(word for word in ends.named if word not in RESULTS))
     scope = replace(view.scope, names=names)
     for outcome in branches.outcomes:
         if asked := outcome.asked:
             found = list(findings_of(asked.expression, asked.wanted, asked.scalar, scope, WRONG_TYPE))
             unknown = [one for one in found if one.code == UNKNOWN_NAME.code]
-            yield from unknown or found  # the word compared with a misspelt branch would count as an unknown place
+            others = (_with_results(one, asked, branch_ends) for one in found)
+            yield from unknown or others  # the word compared with a misspelt branch would count as an unknown place
+
+
+def _with_results(finding: Finding, asked: Asked, ends: Mapping[str, Outcomes]) -> Finding:
+    """Return a finding about a word that is no result, with the results of the branch that it is compared with."""
+    for part, _ in walk(asked.expression.tree):
+        branch, word = compared_with_word(part) or ("", None)
+        if word and branch in ends and finding.span == inner_span(asked.scalar, word.start, word.end):
+            results = ends[branch].words
+            told = f"it ends with {' or '.join(results)}" if results else "it never ends"
+            return replace(finding, message=f"the branch '{branch}' never ends with '{word.name}'", help=told)
+    return finding

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from typing import Protocol
 
 from rbxcompose.expressions.text import Template, TextSlot, parse_template
 from rbxcompose.expressions.tree import Expression, ExpressionError, Number
-from rbxcompose.expressions.types import COUNT, FLAG, UNKNOWN, Type, quantity_of
+from rbxcompose.expressions.types import COUNT, FLAG, TEXT, UNKNOWN, Type, quantity_of
+from rbxcompose.expressions.written import quotes_needed
 from rbxcompose.findings import Finding, Span
 from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
@@ -19,6 +21,7 @@ from rbxcompose.units import NUMBER, TIME
 
 FOREVER = "forever"
 WORDS = "it can be"
+_WORDS = re.compile(r"[^\W\d][\w'-]*+(?: (?!(?:and|or|not|in|is)\b)[^\W\d][\w'-]*+[.!?]?)+")  # several words of a text
 
 # Replaces an expression that could not be read, so that the rest can be read nevertheless.
 UNREADABLE = Expression("", Number(0, 0, 0.0, NUMBER))
@@ -48,13 +51,15 @@ class Nodes(Protocol):
         ...
 
 
-def read_expression(scalar: ScalarNode, nodes: Nodes) -> Expression | None:
-    """Return the expression in a scalar; None, with a finding, if there is none."""
+def read_expression(scalar: ScalarNode, nodes: Nodes, wanted: Type = FLAG) -> Expression | None:
+    """Return the expression in a scalar; None, with a finding, if there is none. What is `wanted` is for the help."""
     try:
         return expression_of(scalar)
     except ExpressionError as error:
         span = inner_span(scalar, error.start, error.end) if scalar.text else scalar.span
-        nodes.add(codes.NO_EXPRESSION.at(span, error.message, help=error.help))
+        is_text = wanted in (TEXT, UNKNOWN) and _WORDS.fullmatch(scalar.text)
+        help_text = error.help or (quotes_needed(scalar.text) if is_text else "")
+        nodes.add(codes.NO_EXPRESSION.at(span, error.message, help=help_text))
         return None
 
 
@@ -181,7 +186,7 @@ class ValueReader:
         return True
 
     def _asked(self, scalar: ScalarNode, wanted: Type, *, is_watched: bool = False) -> Expression:
-        expression = read_expression(scalar, self.nodes)
+        expression = read_expression(scalar, self.nodes, wanted)
         if expression is None:
             return UNREADABLE
         self.asked.append(Asked(expression, wanted, scalar, is_watched=is_watched))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from rbxcompose.dataclass import dataclass
-from rbxcompose.expressions.tree import Expression
+from rbxcompose.expressions.tree import Comparison, Expression, ExpressionNode, Variable, Word
 from rbxcompose.expressions.values import NotArrived, Value
 from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions import codes
@@ -17,6 +17,16 @@ from rbxcompose.missions.program.statuses import FAILURE, NAMES, SKIPPED, SUCCES
 ALL, ANY = "all", "any"
 OTHERWISE, HALTED = "otherwise", "halted"
 RESULTS = (NAMES[SUCCESS], NAMES[FAILURE], NAMES[SKIPPED], HALTED)
+
+
+def compared_with_word(tree: ExpressionNode) -> tuple[str, Word] | None:
+    """Return the `$name` and the word that a comparison tests for equality, None for anything else."""
+    match tree:
+        case Comparison(operator="==", left=Variable(name=name), right=Word() as word):
+            return name, word
+        case Comparison(operator="==", left=Word() as word, right=Variable(name=name)):
+            return name, word
+    return None
 
 
 @dataclass(frozen=True, slots=True)

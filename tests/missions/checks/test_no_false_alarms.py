@@ -50,7 +50,7 @@ def codes(text: str) -> list[str]:
         "do: {fallback: [{if: $door, then: {wait: 1 s}}, a]}",
         "do: {fallback: [[{wait: 1 s, skip_if: $door}], a]}",
         "data: {n: 0}\noutputs: {n: $n}\ndo: {go_to: dock, on_success: {set: {n: $n + 1}}}",
-        "data: {n: 0}\noutputs: {n: $n}\ndo: {look: {}, save: n}",
+        "data: {n: {}}\noutputs: {n: $n}\ndo: {look: {}, save: n}",
         "outputs: {level: $battery}\ndo: a",
         "data: {room: dock}\ndo: [{choose: $room, cases: {dock: a, kitchen: b}}, {set: {room: kitchen}}]",
         "do: {choose: $door, cases: {true: a, false: b}}",
@@ -71,7 +71,7 @@ def test_nothing_is_said_of(text: str) -> None:
 def test_what_a_hook_sets_or_a_node_keeps_is_no_constant() -> None:
     program = program_of(
         """
-        data: {a_number: 0, kept: 0, left: [dock], fixed: 3}
+        data: {a_number: 0, kept: {}, left: [dock], fixed: 3}
         do:
           - {go_to: dock, on_failure: {set: {a_number: 1}}}
           - {look: {}, save: kept}

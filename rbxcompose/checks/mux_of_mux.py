@@ -1,0 +1,58 @@
+"""A mux that takes from a mux, or from itself."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.check_runner import check
+from rbxcompose.findings import Finding, Related
+from rbxcompose.model.robot import Robot
+
+
+@check("RBX3111")
+def mux_of_mux(robot: Robot) -> Iterator[Finding]:
+    """An input of a mux takes from a mux
+
+    A mux publishes on the topic that it is named after, and `from:` cannot give its output another one, so nothing
+    would arrive. With its own output it would command itself.
+
+    Bad:
+    ```yaml
+    muxes:
+      cmd_vel:
+        inputs:
+          again:
+            from: cmd_vel
+            priority: 20
+            timeout: 0.5 s
+          navigation:
+            from: go_to
+            priority: 10
+            timeout: 0.5 s
+    ```
+    Good:
+    ```yaml
+    muxes:
+      cmd_vel:
+        inputs:
+          navigation:
+            from: go_to
+            priority: 10
+            timeout: 0.5 s
+    ```
+    """
+    muxes = robot.manifest.muxes
+    for mux, entry in muxes.items():
+        for name, one in entry.inputs.items():
+            source = (one.source or "").partition(".")[0]
+            if source not in muxes:
+                continue
+            is_loop = source == mux
+            message = "takes its own output" if is_loop else f"takes from the mux '{source}'"
+            inputs = ", ".join(f"'{each}'" for each in muxes[source].inputs)
+            yield mux_of_mux.at(
+                robot.value("muxes", mux, "inputs", name, "from"),
+                f"input '{name}' of mux '{mux}' {message}",
+                help="remove this input" if is_loop else f"give this mux the inputs of that one: {inputs}",
+                related=[Related(robot.key("muxes", source), "the mux that it takes from")],
+            )

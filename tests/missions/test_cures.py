@@ -1,0 +1,72 @@
+"""What is said to somebody who wrote one wrong thing in a mission: each finding names the cure."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from textwrap import dedent
+
+import pytest
+
+from rbxcompose.testing.manifests import check_text
+from tests.misconfig.corpus import HERE, VALUES
+
+ROBOT = (HERE / "robot.yaml").read_text(encoding="utf-8") + VALUES
+HEAD = "rbx: 1\nkind: Mission\nname: work\n"
+OUTCOMES = """\
+do:
+  parallel:
+    drive: {go_to: kitchen}
+    watch: {wait_for: $battery < 20 %}
+  succeed_when: any
+  outcomes:
+    done: $drive == never
+    low: $watch == too_low
+    other: otherwise
+"""
+PLACE = "declare 'NAME: {x: 1 m, y: 20 cm, heading: 90 deg}' under 'places' of the robot, and write its name"
+
+CURES = [
+    (
+        "do: {for: guest, in: [anna, bob], do: {log: $guest}}",
+        ["a text needs quotes: write '\"anna\"'; places: ", "a text needs quotes: write '\"bob\"'; places: "],
+    ),
+    ("do: {for: room, in: [dock, kitchn], do: {go_to: $room}}", ["did you mean 'kitchen'?"]),
+    (
+        "do: {for: guest, in: [anna, uncle bob], do: {log: $guest}}",
+        ["a text needs quotes: write '\"anna\"'", "a text needs quotes: write '\"uncle bob\"'"],
+    ),
+    ("data: {n: 0}\ndo: {set: {n: $n $n}}", [""]),
+    ("do: {wait: five seconds}", [""]),
+    (OUTCOMES, ["it ends with success or failure", "it ends with success"]),
+    (
+        "do: {go_to: {pose: {header: {frame_id: odom}, pose: {position: {x: 1, y: 0.2}}}}}",
+        ["there are no poses in 'odom', all are in 'map': declare 'NAME: {x: 1 m, y: 0.2 m}' under 'places' of the "],
+    ),
+    ("do: {go_to: {x: 1 m, y: 20 cm, heading: 90 deg}}", [PLACE]),
+    ("do: {go_to: {pose: {x: 1 m, y: 20 cm, heading: 90 deg}}}", [PLACE]),
+    ("do: {go_to: [1, 2]}", ["declare 'NAME: {x: 1 m, y: 2 m}' under 'places' of the robot, and write its name"]),
+    ("do: {go_to: {pose: {frame: map}}}", ["declare a place under 'places' of the robot, and write its name"]),
+    ("do: {go_to: {plce: dock}}", ["its arguments: pose, behavior_tree"]),
+    ("do: {wait: $(arg time)}", ["write '$time', and declare 'time' under 'inputs'"]),
+    (
+        "data: {got: 0}\ndo:\n  - {recharge: {}, save: got}\n  - check: $got > 1",
+        ["write 'got: {}' under 'data', and read an entry of it as '$got.NAME'; or save it under another name"],
+    ),
+]
+
+
+@pytest.mark.parametrize(("text", "cures"), CURES)
+def test_every_finding_about_a_mission_tells_the_cure(text: str, cures: list[str], tmp_path: Path) -> None:
+    checked = check_text(ROBOT, tmp_path, others={"mission.yaml": HEAD + dedent(text)})
+    found = [one for one in checked.compilation.report if one.span and one.span.file.endswith("mission.yaml")]
+    assert len(found) == len(cures), found
+    for finding, cure in zip(found, cures, strict=True):
+        assert finding.help.startswith(cure)
+        assert bool(finding.help) == bool(cure)
+
+
+def test_what_was_saved_is_a_map_so_it_is_no_number(tmp_path: Path) -> None:
+    text = f"{HEAD}do:\n  - {{recharge: {{}}, save: got}}\n  - check: $got > 1\n  - check: $got.level > 1\n"
+    (finding,) = (one for one in check_text(ROBOT, tmp_path, others={"mission.yaml": text}).compilation.report)
+    assert (finding.code, finding.message) == ("RBX4106", "this must be a number; it is a map")
+    assert finding.help == "read an entry of it: '$got.NAME'"
