@@ -91,9 +91,9 @@ def test_topics_and_services_of_the_robot_can_be_used(tmp_path: Path) -> None:
     assert {"publishes_diagnostics", "calls_set_battery_level"} <= ports
 
 
-def test_a_mission_that_commands_the_base_past_a_mux_is_told_like_any_other_writer(tmp_path: Path) -> None:
+def test_a_mission_that_commands_the_base_beside_a_component_is_told_like_any_other_writer(tmp_path: Path) -> None:
     out = compiled(tmp_path, a="do:\n  publish: cmd_vel\n")
-    assert told(out, "RBX3001") == ["'go_to' and 'mission' both write commands on '/cmd_vel'"]
+    assert told(out, "RBX3001") == ["this mission and 'go_to' both write commands on '/cmd_vel'"]
 
 
 def test_a_skill_in_python_is_there_for_who_names_it(tmp_path: Path) -> None:
