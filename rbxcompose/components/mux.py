@@ -71,7 +71,8 @@ class Mux(Component[MuxConfig]):
     @classmethod
     def capabilities(cls, config: MuxConfig) -> tuple[Capability, ...]:
         """Declare which inputs it forwards."""
-        return (Forwards(tuple(config.inputs), "output"),)
+        ranked = sorted(config.inputs, key=lambda name: config.inputs[name].priority, reverse=True)
+        return (Forwards(tuple(ranked), "output"),)
 
     def configure(self) -> None:
         """Build the core; a mux restarted while the robot is stopped starts closed."""

@@ -77,6 +77,7 @@ class RobotState:
     domain: int = 0
     batteries: Mapping[str, Gauge] = field(default_factory=dict)  # by component
     executive: str | None = None  # the component that runs missions
+    teleoperated: Mapping[str, str] = field(default_factory=dict)  # base -> topic that takes a person's commands
     rest_time: float = 1.0  # [s] that it may take to come to rest when it goes down
 
     def to_text(self) -> str:
