@@ -12,7 +12,7 @@ import json
 import sys
 
 from rbxcompose.cli.output.console import misused, refuse, tell, tell_report
-from rbxcompose.cli.project.robot_options import add_layer_options, compiled
+from rbxcompose.cli.project.robot_options import add_layer_options, chosen_layers, compiled
 from rbxcompose.cli.robots.lookup import REFUSED, NotDoneError
 from rbxcompose.cli.robots.proposal import Proposal
 
@@ -33,7 +33,7 @@ def run(arguments: argparse.Namespace) -> int:
     if compilation.plan is None or compilation.robot is None:
         return 1
     try:
-        proposal = Proposal.of(compilation.plan, compilation.robot)
+        proposal = Proposal.of(compilation.plan, compilation.robot, chosen_layers(arguments))
         tell(json.dumps(proposal.data) if arguments.json else proposal.text())
         return _carry_out(proposal, arguments)
     except NotDoneError as error:

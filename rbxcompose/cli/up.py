@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 
 from rbxcompose.cli.output.console import FINDINGS, refuse, tell_report
-from rbxcompose.cli.project.robot_options import add_layer_options, compiled, layers_of
+from rbxcompose.cli.project.robot_options import add_layer_options, chosen_layers, compiled, layers_of
 from rbxcompose.cli.robots.live_reload import LiveReload
 from rbxcompose.cli.robots.run_view import run_plan
 from rbxcompose.cli.robots.this_machine import is_fit
@@ -61,6 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
         duration=arguments.duration,
         is_detached=arguments.detach,
         record=arguments.record.absolute() if arguments.record else None,
+        layers=chosen_layers(arguments),
     )
     if options.record is not None and not options.is_stepped:
         sys.stderr.write(
@@ -74,7 +75,9 @@ def run(arguments: argparse.Namespace) -> int:
         return USAGE
     if not is_fit(compilation):
         return FINDINGS
-    reload = LiveReload(lambda: compiled(arguments.path, arguments), compilation) if arguments.watch else None
+    reload = None
+    if arguments.watch:
+        reload = LiveReload(lambda: compiled(arguments.path, arguments), compilation, options.layers)
     return run_plan(compilation.plan, options, reload)
 
 

@@ -69,12 +69,13 @@ def _manifest(
         return None  # else everything that the missing part brings would be reported as missing
     documents.check(file_model(ROBOT), composed.root)
     names = names_of(_name(composed.root), sim, environment, Secrets(project_of(file), environment))
-    root, include = fill_scopes(composed, names)
-    manifest = read_sections(root, file, sim, documents)
+    filled = fill_scopes(composed, names)
+    manifest = read_sections(filled.root, file, sim, documents)
     return replace(
         manifest,
         parts=included_parts(composed.instances),
-        include=include,
+        include=filled.include,
+        bounds=filled.bounds,
         history=composed.history,
         files=documents.files,
         inclusions=composed.parts.inclusions,

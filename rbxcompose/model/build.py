@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from bisect import bisect_left, insort
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from rbxcompose.composition.robot_manifest import RobotManifest
-from rbxcompose.config import Config
+from rbxcompose.config import Config, is_live
 from rbxcompose.findings import Report
 from rbxcompose.levels import LOG_LEVELS
 from rbxcompose.manifest.registry import sections
@@ -139,7 +139,7 @@ def _component(manifest: RobotManifest, wanted: WantedComponent, given: Mapping[
     process, log = options.process or cls.process, LOG_LEVELS[options.log]
     names = (end.name for end in ends)
     capabilities = require_declared(wanted.type_name, cls.capabilities(config), names, type(config))
-    return RobotComponent(
+    made = RobotComponent(
         wanted.name,
         wanted.type_name,
         cls,
@@ -153,6 +153,9 @@ def _component(manifest: RobotManifest, wanted: WantedComponent, given: Mapping[
         capabilities,
         wanted.places,
     )
+    live = (name for name, one in type(config).model_fields.items() if is_live(one))
+    bounds = {name: manifest.bounds_at(made.place(name)) for name in live}
+    return replace(made, bounds={name: each for name, each in bounds.items() if each})
 
 
 def values_of(manifest: RobotManifest, components: Mapping[str, RobotComponent]) -> dict[str, ValueSource]:

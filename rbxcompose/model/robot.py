@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Any, TypeVar
 
 from rbxcompose.composition.robot_manifest import RobotManifest
-from rbxcompose.config import Config
+from rbxcompose.config import Bound, Config
 from rbxcompose.expressions.types import UNKNOWN
 from rbxcompose.findings import Span
 from rbxcompose.levels import Level
@@ -43,6 +43,7 @@ class RobotComponent:
     log: Level = Level.OK  # the lowest level that is logged
     capabilities: tuple[Capability, ...] = ()
     places: Mapping[str, KeyPath] = field(default_factory=dict)  # of fields and ports that are written elsewhere
+    bounds: Mapping[str, tuple[Bound, ...]] = field(default_factory=dict)  # of live settings, from arguments
     _by_port: dict[str, PortEnd] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:

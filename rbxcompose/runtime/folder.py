@@ -16,6 +16,7 @@ from pathlib import Path
 
 from rbxcompose.atomic_files import TEMPORARY, replace_file
 from rbxcompose.regular_files import open_regular
+from rbxcompose.runtime.options import NO_LAYERS, ChosenLayers
 from rbxcompose.runtime.processes import Process, boot_id
 from rbxcompose.typed_json import UnreadableError, from_data, to_data
 
@@ -78,6 +79,7 @@ class RobotState:
     batteries: Mapping[str, Gauge] = field(default_factory=dict)  # by component
     executive: str | None = None  # the component that runs missions
     teleoperated: Mapping[str, str] = field(default_factory=dict)  # base -> topic that takes a person's commands
+    layers: ChosenLayers = NO_LAYERS
     rest_time: float = 1.0  # [s] that it may take to come to rest when it goes down
 
     def to_text(self) -> str:

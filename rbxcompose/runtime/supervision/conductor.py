@@ -45,7 +45,7 @@ class Conductor:
         self.states: dict[str, tuple[str, int]] = {one.name: ("unconfigured", 0) for one in plan.instances}
         self.is_real_time = not options.is_stepped and not plan.follows_clock
         self.blocked: dict[str, str] = {}  # blocked component -> failed component
-        self.plan = plan
+        self.plan, self.layers = plan, options.layers
         self.generation = 0  # of the plan: how often it was changed
         self._changing: Changing | None = None
         self._repeated: dict[str, list[dict[str, Any]]] = {}  # requests that components get again after a restart

@@ -339,6 +339,7 @@ class Supervisor:
             batteries=gauges_of(plan),
             executive=_executive(plan),
             teleoperated=teleoperated(plan),
+            layers=self.conductor.layers,
             rest_time=rest_time(plan),
         )
 
