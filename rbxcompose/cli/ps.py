@@ -1,10 +1,10 @@
-"""Show the components of a running robot: state, process, restarts."""
+"""Show the components of running robots: state, process, restarts; and who has stopped the robot."""
 
 from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -13,6 +13,7 @@ from rbxcompose.cli.robots.lookup import NotDoneError, add_robot_option, answer_
 from rbxcompose.runtime.folder import SUSPENDED, ComponentState, RobotFolder, RobotState
 from rbxcompose.runtime.processes import Process
 from rbxcompose.runtime.requests import RobotStatus
+from rbxcompose.typed_json import to_data
 
 _COLUMNS = ("name", "type", "state", "process", "pid", "restarts")
 _ANSWER = 0.4  # [s] for a supervisor to answer; its state file is as recent, except for what died since
@@ -57,6 +58,7 @@ def _data(state: RobotState, supervisor: int | None) -> dict[str, Any]:
         "robot": state.robot,
         "supervisor": {"pid": supervisor},
         "router": {"endpoint": state.router},
+        "stop": None if state.stop is None else to_data(state.stop),
         "components": [_component(one) for one in state.components],
     }
 
@@ -93,7 +95,15 @@ def _table(shown: Mapping[str, Any]) -> str:
     blocked = [one for one in shown["components"] if "waits_for" in one]
     waiting = [f"{one['name']} waits for {one['waits_for']}, which failed" for one in blocked]
     left = [] if pid else [_NO_SUPERVISOR.format(shown["robot"])]
-    return "\n".join([head, *lines, *waiting, *left])
+    return "\n".join([head, *_stop_lines(shown["stop"]), *lines, *waiting, *left])
+
+
+def _stop_lines(stop: Mapping[str, Any] | None) -> Iterator[str]:
+    """Yield who stopped the robot, and what is needed before it can be released."""
+    if stop is not None:
+        yield f"STOPPED at {stop['time']:.1f} s by {stop['by']}"
+        reasons = [f"'{name}': {reason}" for name, reason in stop["holds"].items()]
+        yield f"'release' is refused, because of {', '.join(reasons)}" if reasons else "'release' allows motion again"
 
 
 def _cell(value: object) -> str:

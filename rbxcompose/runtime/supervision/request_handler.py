@@ -96,7 +96,7 @@ class RequestHandler:
 
     def _stop(self) -> str:
         self._tell("stop: all motion is held until 'release'")
-        self._supervisor.conductor.stop()
+        self._supervisor.conductor.stop("the command 'stop'")
         return "stopped; 'release' allows motion again"
 
     def _release(self) -> str:

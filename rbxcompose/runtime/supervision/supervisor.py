@@ -340,6 +340,7 @@ class Supervisor:
             executive=_executive(plan),
             teleoperated=teleoperated(plan),
             layers=self.conductor.layers,
+            stop=self.conductor.latch.state,
             rest_time=rest_time(plan),
         )
 
