@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
 from rbxcompose.cli.output.console import refuse, tell
-from rbxcompose.cli.robots.lookup import NotDoneError, add_robot_option, answer_of, find_robot, known_state
+from rbxcompose.cli.robots.lookup import NotDoneError, add_robot_option, answer_of, find_robot, known_state, robots_up
 from rbxcompose.runtime.folder import SUSPENDED, ComponentState, RobotFolder, RobotState
 from rbxcompose.runtime.processes import Process
 from rbxcompose.runtime.requests import RobotStatus
@@ -23,20 +23,36 @@ _BLOCKED = "blocked"  # the state of a component that runs but cannot do its wor
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("path", nargs="?", metavar="ROBOT|PATH", help="the robot, by name or file")
+    parser.add_argument("path", nargs="?", metavar="ROBOT|PATH", help="only this robot, by name or file")
     add_robot_option(parser)
-    parser.add_argument("--json", action="store_true", help="answer with one JSON object")
+    parser.add_argument("--json", action="store_true", help="answer in JSON; several robots are a list 'robots'")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Show the supervisor's answer or, if it does not answer, the last state that it wrote."""
+    wanted = arguments.robot or arguments.path
     try:
-        folder = find_robot(arguments.robot or arguments.path)
-        shown = _shown(folder)
+        several = robots_up() if wanted is None else []
+        if len(several) > 1:
+            return _tell_all(several, in_json=arguments.json)
+        shown = _shown(find_robot(wanted))
     except NotDoneError as error:
         return refuse(error.finding)
     tell(json.dumps(shown) if arguments.json else _table(shown))
     return 0
+
+
+def _tell_all(folders: Iterable[RobotFolder], *, in_json: bool) -> int:
+    """Show all robots; report those that nothing is known of."""
+    shown, lost = [], []
+    for folder in folders:
+        try:
+            shown.append(_shown(folder))
+        except NotDoneError as error:
+            lost.append(error.finding)
+    if shown:
+        tell(json.dumps({"robots": shown}) if in_json else "\n\n".join(map(_table, shown)))
+    return max((refuse(one) for one in lost), default=0)
 
 
 def _shown(folder: RobotFolder) -> dict[str, Any]:

@@ -109,6 +109,18 @@ def test_ps_shows_what_a_dead_supervisor_last_wrote(capsys: pytest.CaptureFixtur
     assert "'rbxcompose down a', or the next 'up', cleans up" in out
 
 
+def test_ps_lists_all_robots_that_are_up(capsys: pytest.CaptureFixture[str]) -> None:
+    written("a")
+    written("b")
+    assert command.main(["ps"]) == 0
+    heads = [line.partition(":")[0] for line in capsys.readouterr().out.splitlines() if "supervisor dead" in line]
+    assert heads == ["a", "b"]
+    assert command.main(["ps", "--json"]) == 0
+    assert [one["robot"] for one in json.loads(capsys.readouterr().out)["robots"]] == ["a", "b"]
+    assert command.main(["ps", "b", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["robot"] == "b"
+
+
 @pytest.mark.parametrize(
     ("holds", "line"),
     [
