@@ -30,10 +30,9 @@ def command_topic(topics: Sequence[GraphName], wanted: str | None, inputs: Mappi
             return full
         words = f"nothing takes velocities on '{full}'"
         raise NotDoneError(NO_NAME.misspelt(None, words, full, names, "topics that take velocities"))
-    free = [one.name for one in taking if one.name in names and not one.givers]
     if inputs is not None:
-        known = {name for name in inputs.values() if any(one.name == name for one in taking)}
-        return _only(sorted(known), inputs)
+        return _only(sorted(set(inputs.values())), inputs)
+    free = [one.name for one in taking if one.name in names and not one.givers]
     usual = [name for name in free if name.endswith(_USUAL)]
     return _only(usual if len(usual) == 1 else free, {})
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from rbxcompose.msgs.geometry_msgs import Twist
 from rbxcompose.plan.model import Instance, Plan
 from rbxcompose.sdk.capabilities import Drives, Forwards
 from rbxcompose.sdk.ports import Out
@@ -11,7 +12,7 @@ from rbxcompose.sdk.registry import component_type, declared
 
 
 def teleoperated(plan: Plan) -> dict[str, str]:
-    """Return the topic that takes a person's commands, by base; a base that no input is free for is left out.
+    """Return the topic that takes a person's velocities, by base; a base that no input is free for is left out.
 
     If a mux decides who commands the base, this is its open input of the highest priority on which nothing in the
     robot publishes. An input that another mux feeds leads to the inputs of that one.
@@ -19,8 +20,8 @@ def teleoperated(plan: Plan) -> dict[str, str]:
     found = dict[str, str]()
     for base in plan.instances:
         for drives in declared(base.type, base.config, Drives):
-            first = next(_free(plan, base.topic(drives.commands), ()), None)
-            if first is not None:
+            wire = next(one for one in base.wires if one.port == drives.commands)
+            if wire.type == Twist.TYPE and (first := next(_free(plan, wire.topic, ()), None)):
                 found[base.name] = first
     return found
 
