@@ -14,6 +14,7 @@ from types import MappingProxyType
 from rbxcompose.check_runner import run_checks
 from rbxcompose.composition.overlay import SET
 from rbxcompose.composition.robot_file import load_robot
+from rbxcompose.config import Config
 from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Related, Report, Severity, Span, kind
 from rbxcompose.manifest.limits import LEAST_STEPS, PROFILE_STEPS, STEP_BYTES, STEP_VALUES
@@ -103,6 +104,17 @@ def compile_robot(
     if out.robot is not None and not out.report.has_errors:
         out.plan = build_plan(out.robot)
     return out
+
+
+def check_settings(robot: Robot, configs: Mapping[str, Config]) -> Report:
+    """Check a compiled robot again, where some components have other configurations, such as those they have now."""
+    components = dict(robot.components)
+    for name, config in configs.items():
+        one = components[name]
+        components[name] = replace(one, config=config, capabilities=one.cls.capabilities(config))
+    report = Report()
+    run_checks(replace(robot, components=components), report)
+    return report
 
 
 def _steps_to_read(sources: Mapping[str, str]) -> int:

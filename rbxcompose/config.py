@@ -16,6 +16,7 @@ from pydantic import (
     StringConstraints,
     WithJsonSchema,
 )
+from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from rbxcompose import units
@@ -49,8 +50,22 @@ class Dimensioned:
 
 
 @dataclass(frozen=True, slots=True)
+class Bound:
+    """Limits of a setting beside those of its field, in SI, and what sets them."""
+
+    least: float | None
+    most: float | None
+    by: str
+
+
+@dataclass(frozen=True, slots=True)
 class Live:
     """Marks a field that may change while the robot runs: `speed: Annotated[Speed, Live()] = 0.3`."""
+
+
+def is_live(field: FieldInfo) -> bool:
+    """Return whether a field may change while the robot runs."""
+    return any(isinstance(mark, Live) for mark in field.metadata)
 
 
 def _reads(dimension: Dimension) -> BeforeValidator:

@@ -325,6 +325,12 @@ def parse_quantity(text: str, wanted: Dimension | None = None) -> Quantity:
     return quantity(number, UNITS.get(unit))
 
 
+def written_unit(text: str) -> str | None:
+    """Return the unit of a quantity as it is written, None if there is none: `cm/s` of `20 cm/s`."""
+    match = _QUANTITY.fullmatch(text.strip())
+    return match[2] if match and match[2] in UNITS else None
+
+
 def _shortened(text: str) -> str:
     return text if len(text) <= 20 else f"{text[:20]}..."
 

@@ -11,15 +11,16 @@ import argparse
 import json
 import sys
 
-from rbxcompose.cli.output.console import misused, refuse, tell, tell_report
-from rbxcompose.cli.project.robot_options import add_layer_options, compiled
+from rbxcompose.cli.output.console import FINDINGS, misused, refuse, tell, tell_report
+from rbxcompose.cli.project.robot_choice import add_path_argument, robot_path
+from rbxcompose.cli.project.robot_options import add_layer_options, chosen_layers, compiled
 from rbxcompose.cli.robots.lookup import REFUSED, NotDoneError
 from rbxcompose.cli.robots.proposal import Proposal
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("path", metavar="PATH", help="the robot's file, its folder, or rbx:robots/NAME of the library")
+    add_path_argument(parser)
     add_layer_options(parser)
     parser.add_argument("-y", "--yes", action="store_true", help="do not ask")
     parser.add_argument("--dry-run", action="store_true", help="show the difference and what prevents it")
@@ -28,12 +29,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Compile the robot, show what would change in the running one, and apply the change."""
-    compilation = compiled(arguments.path, arguments)
+    path = robot_path(arguments.path)
+    if path is None:
+        return FINDINGS
+    compilation = compiled(path, arguments)
     tell_report(compilation.report, compilation.sources)
     if compilation.plan is None or compilation.robot is None:
         return 1
     try:
-        proposal = Proposal.of(compilation.plan, compilation.robot)
+        proposal = Proposal.of(compilation.plan, compilation.robot, chosen_layers(arguments))
         tell(json.dumps(proposal.data) if arguments.json else proposal.text())
         return _carry_out(proposal, arguments)
     except NotDoneError as error:

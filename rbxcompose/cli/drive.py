@@ -1,7 +1,8 @@
 """Drive with the keyboard: arrows or w, a, s, d; space stops, q quits.
 
-It publishes on the input `teleop` of the mux for `cmd_vel`. The robot moves only while a key is pressed: 0.3 s after
-the last one it is sent a stop. Then nothing more is published, so that the mux lets other inputs through.
+It publishes on the open input of the base's mux that has the highest priority. The robot moves only while a key is
+pressed: 0.3 s after the last one it is sent a stop. Then nothing more is published, so that the mux lets other inputs
+through.
 """
 
 from __future__ import annotations
@@ -11,22 +12,21 @@ import math
 import os
 import select
 import sys
-from collections.abc import Iterable
+from collections.abc import Mapping
 
-from rbxcompose.bus.graph import GraphName
 from rbxcompose.bus.topics import Publisher
+from rbxcompose.cli.bus.command_topic import command_topic
 from rbxcompose.cli.bus.dead_man import PERIOD, DeadMan, Velocity, is_end, keys
-from rbxcompose.cli.bus.entities import NO_NAME, NOBODY, add_timeout_option, positive, visit
+from rbxcompose.cli.bus.entities import NOBODY, add_timeout_option, positive, visit
 from rbxcompose.cli.bus.guest import NAME, Guest
 from rbxcompose.cli.bus.place import add_bus_options
 from rbxcompose.cli.output.console import refuse, tell
 from rbxcompose.cli.output.terminal import NO_TERMINAL, raw
-from rbxcompose.cli.robots.lookup import NotDoneError
+from rbxcompose.cli.robots.lookup import find_robot, known_state
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.qos import Qos
 from rbxcompose.units import ANGULAR_SPEED, SPEED
 
-_INPUT = "/cmd_vel/teleop"
 _HELP = "ready: arrows or w a s d: drive   space: stop   q: quit"
 _MOST_READ = 4096  # bytes of keys per read
 
@@ -38,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--turn", type=turn, default=math.radians(45.0), metavar="V", help="left and right (default: 45 deg/s)"
     )
-    parser.add_argument("--topic", metavar="TOPIC", help="the topic that takes velocities (default: cmd_vel/teleop)")
+    parser.add_argument("--topic", metavar="TOPIC", help="the topic that takes velocities (default: found)")
     add_timeout_option(parser, "2s")
     add_bus_options(parser)
 
@@ -51,7 +51,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _drive(guest: Guest, arguments: argparse.Namespace) -> int:
-    name = _input(guest.graph().topics, arguments.topic)
+    name = command_topic(guest.graph().topics, arguments.topic, _inputs(arguments))
     publisher = guest.bus().publisher(NAME, name, Twist, Qos.COMMAND)
     if not guest.run(lambda: publisher.has_match, arguments.timeout):
         return refuse(NOBODY.at(None, f"nothing takes velocities on '{name}'"))
@@ -69,16 +69,12 @@ def _drive(guest: Guest, arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _input(topics: Iterable[GraphName], wanted: str | None) -> str:
-    """Return the topic that takes the keyboard's commands; with a namespace, it lies below that."""
-    taking = [one.name for one in topics if one.takers and Twist.TYPE in one.types]
-    fitting = [name for name in taking if name.endswith(_INPUT)] if wanted is None else [f"/{wanted.lstrip('/')}"]
-    if len(fitting) == 1 and fitting[0] in taking:
-        return fitting[0]
-    words = (
-        f"several topics end in '{_INPUT}'" if len(fitting) > 1 else f"nothing takes velocities on '{wanted or _INPUT}'"
-    )
-    raise NotDoneError(NO_NAME.misspelt(None, words, wanted or _INPUT, taking, "topics that take velocities"))
+def _inputs(arguments: argparse.Namespace) -> Mapping[str, str] | None:
+    """Return the open input of each base; None on the bus of a robot that is not of this machine."""
+    if arguments.router is not None:
+        return None
+    state = known_state(find_robot(arguments.robot))
+    return None if state is None else state.teleoperated
 
 
 class _Wheel:

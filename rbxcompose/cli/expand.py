@@ -10,6 +10,7 @@ import argparse
 import json
 
 from rbxcompose.cli.output.console import FINDINGS, tell, tell_report
+from rbxcompose.cli.project.robot_choice import add_path_argument, robot_path
 from rbxcompose.cli.project.robot_options import add_layer_options, layers_of
 from rbxcompose.compiler import compile_robot
 from rbxcompose.inspection.expand import expand, expand_data
@@ -18,7 +19,7 @@ from rbxcompose.printable import escaped
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("path", metavar="PATH", help="the robot's file, its folder, or rbx:robots/NAME of the library")
+    add_path_argument(parser)
     add_layer_options(parser)
     parser.add_argument("--no-origins", action="store_true", help="omit where each value comes from")
     parser.add_argument("--json", action="store_true", help="write values and origins as JSON")
@@ -26,7 +27,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the robot to stdout and its findings to stderr; if it has mistakes, as far as it could be read."""
-    compilation = compile_robot(arguments.path, **layers_of(arguments))
+    path = robot_path(arguments.path)
+    if path is None:
+        return FINDINGS
+    compilation = compile_robot(path, **layers_of(arguments))
     tell_report(compilation.report, compilation.sources)
     if compilation.robot is not None:
         manifest = compilation.robot.manifest

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from rbxcompose.atomic_files import replace_file
 from rbxcompose.cli.output.console import FINDINGS, refuse, tell, tell_report
+from rbxcompose.cli.project.robot_choice import add_path_argument, robot_path
 from rbxcompose.cli.project.robot_options import add_layer_options, layers_of
 from rbxcompose.compiler import compile_robot
 from rbxcompose.inspection.diagram import diagram_of
@@ -25,7 +26,7 @@ FORMATS = {"mermaid": mermaid, "dot": dot, "html": html}
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("path", metavar="PATH", help="the robot's file, its folder, or rbx:robots/NAME of the library")
+    add_path_argument(parser)
     add_layer_options(parser)
     parser.add_argument("--format", choices=list(FORMATS), default="mermaid", help="output format")
     parser.add_argument("--out", metavar="FILE", help="write it to this file")
@@ -33,7 +34,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the graph; draw a robot with mistakes as far as it could be read, and write its findings to stderr."""
-    compilation = compile_robot(arguments.path, **layers_of(arguments))
+    path = robot_path(arguments.path)
+    if path is None:
+        return FINDINGS
+    compilation = compile_robot(path, **layers_of(arguments))
     tell_report(compilation.report, compilation.sources)
     if compilation.robot is not None:
         try:

@@ -1,44 +1,38 @@
 """List, get or set the parameters of components while the robot runs, and of ROS 2 nodes.
 
-Numbers are SI. `set` takes text with a unit as well (`param set battery runtime "30 s"`). A change lasts until
-the process ends; write it in the manifest to keep it.
+A value is written as in a manifest (`param set battery runtime "30 s"`); a bare number is SI, and so is JSON. `set`
+refuses what `check` would refuse, with the values that all components have now. A change lasts until the process ends;
+write it in the manifest to keep it.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping, Sequence
-from typing import Any, TypeVar
+import sys
 
-from rbxcompose.bus.graph import GraphName
-from rbxcompose.bus.services import Client
 from rbxcompose.cli.bus.entities import (
     NO_NAME,
-    NOBODY,
     SAID_NO,
     add_json_option,
     add_timeout_option,
     table,
     visit,
 )
-from rbxcompose.cli.bus.guest import NAME, Guest
-from rbxcompose.cli.bus.messages import to_json, type_of
+from rbxcompose.cli.bus.messages import to_json
+from rbxcompose.cli.bus.parameter_nodes import ParameterNodes
 from rbxcompose.cli.bus.place import add_bus_options
 from rbxcompose.cli.output.console import refuse, tell
-from rbxcompose.cli.robots.lookup import NotDoneError
+from rbxcompose.cli.robots.lookup import find_robot, known_state
+from rbxcompose.findings import Finding
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.manifest.validate import to_plain
 from rbxcompose.msgs import rcl_interfaces as rcl
-from rbxcompose.msgs import registry
-from rbxcompose.msgs.types import Message, Service
+from rbxcompose.params.core import shown, told_dimension
 from rbxcompose.params.values import from_message, to_message
-from rbxcompose.sdk.bound import Reply
+from rbxcompose.runtime.folder import RobotState
+from rbxcompose.units import UNITS, written_unit
 
-Q = TypeVar("Q", bound=Message)
-R = TypeVar("R", bound=Message)
-
-_GET = "/get_parameters"
 _WIDEST = 40  # characters of a value in a table
 _KEYS = ("node", "name", "value", "read_only", "about")
 
@@ -65,60 +59,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the chosen subcommand."""
-    return visit(arguments, lambda guest: int(arguments.do(_Nodes(guest, arguments.timeout), arguments)))
+    return visit(arguments, lambda guest: int(arguments.do(ParameterNodes(guest, arguments.timeout), arguments)))
 
 
-class _Nodes:
-    """The nodes on the bus that have parameters."""
-
-    def __init__(self, guest: Guest, timeout: float) -> None:
-        self._guest, self._timeout = guest, timeout
-        self._services: Mapping[str, GraphName] = {one.name: one for one in guest.graph().services if one.givers}
-        self.names = sorted(name.removesuffix(_GET) for name in self._services if name.endswith(_GET))
-
-    def find(self, wanted: str) -> str:
-        """Return the full name of a node.
-
-        Raises:
-            NotDoneError: if no node of that name has parameters.
-        """
-        full = wanted if wanted.startswith("/") else f"/{wanted}"
-        near = [name for name in self.names if name.endswith(full)]
-        if full in self.names or len(near) == 1:
-            return full if full in self.names else near[0]
-        bare = [name.removeprefix("/") for name in self.names]
-        words = f"no component '{wanted}' has parameters"
-        raise NotDoneError(NO_NAME.misspelt(None, words, wanted.removeprefix("/"), bare, "components"))
-
-    def ask(self, nodes: Sequence[str], what: str, service: type[Service[Q, R]], requests: Sequence[Q]) -> list[R]:
-        """Request `what` from all `nodes` in parallel, and return their answers.
-
-        Raises:
-            NotDoneError: if one of them does not answer.
-        """
-        guest, replies = self._guest, dict[str, Reply[R]]()
-        clients = [self._client(node, what) for node in nodes]
-        guest.run(lambda: all(client.is_available for client in clients), self._timeout)
-        for node, client, request in zip(nodes, clients, requests, strict=True):
-            client(request, lambda reply, node=node: replies.update({node: reply}), timeout=self._timeout)  # type: ignore[misc]
-        guest.run(lambda: len(replies) == len(nodes))
-        return [_response(node, replies[node]) for node in nodes]
-
-    def _client(self, node: str, what: str) -> Client[Any, Any]:
-        found = self._services.get(f"{node}/{what}")
-        if found is None:
-            raise NotDoneError(NOBODY.at(None, f"'{node}' has no service '{what}'"))
-        kind = found.kinds[0]
-        return self._guest.bus(kind).client(NAME, found.name, type_of(kind, "srv", registry.service))
-
-
-def _response(node: str, reply: Reply[R]) -> R:
-    if reply.response is None:
-        raise NotDoneError(SAID_NO.at(None, f"'{node}': {reply.error}"))
-    return reply.response
-
-
-def _ls(nodes: _Nodes, arguments: argparse.Namespace) -> int:
+def _ls(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
     wanted = [nodes.find(arguments.component)] if arguments.component else nodes.names
     listed = nodes.ask(wanted, "list_parameters", rcl.ListParameters, [rcl.ListParameters.Request()] * len(wanted))
     having = {node: one.result.names for node, one in zip(wanted, listed, strict=True) if one.result.names}
@@ -141,14 +85,14 @@ def _ls(nodes: _Nodes, arguments: argparse.Namespace) -> int:
         tell(to_json([dict(zip(_KEYS, one, strict=True)) for one in found]))
         return 0
     rows = [
-        (node, name, _shown(value)[:_WIDEST], "" if fixed else "live", about)
+        (node, name, shown(value, told_dimension(about))[:_WIDEST], "" if fixed else "live", about)
         for node, name, value, fixed, about in found
     ]
     tell(table([("component", "parameter", "value", "", "about"), *rows]))
     return 0
 
 
-def _get(nodes: _Nodes, arguments: argparse.Namespace) -> int:
+def _get(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
     node = nodes.find(arguments.component)
     request = rcl.GetParameters.Request(names=(arguments.name,))
     (answer,) = nodes.ask([node], "get_parameters", rcl.GetParameters, [request])
@@ -158,19 +102,39 @@ def _get(nodes: _Nodes, arguments: argparse.Namespace) -> int:
         words = f"'{node}' has no value for a parameter '{arguments.name}'"
         return refuse(NO_NAME.misspelt(None, words, arguments.name, listed.result.names, "parameters"))
     value = from_message(values[0])
-    tell(to_json(value) if arguments.json else _shown(value))
+    tell(to_json(value) if arguments.json else _as_written(nodes, node, arguments, value))
     return 0
 
 
-def _set(nodes: _Nodes, arguments: argparse.Namespace) -> int:
+def _as_written(nodes: ParameterNodes, node: str, arguments: argparse.Namespace, value: object) -> str:
+    """Return a value for people, in the unit in which it was given."""
+    request = rcl.DescribeParameters.Request(names=(arguments.name,))
+    (answer,) = nodes.ask([node], "describe_parameters", rcl.DescribeParameters, [request])
+    dimension = told_dimension(answer.descriptors[0].description) if answer.descriptors else None
+    unit = written_unit(getattr(arguments, "value", ""))
+    return shown(value, dimension, unit if unit and UNITS[unit].dimension == dimension else None)
+
+
+def _set(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
     node = nodes.find(arguments.component)
     parameter = rcl.Parameter(name=arguments.name, value=_value(arguments.value))
+    state = None if arguments.router else known_state(find_robot(arguments.robot))
+    if state is None:
+        sys.stderr.write("the rules of the robot are not checked: its files are not known on this bus\n")
+    elif broken := _broken_rules(nodes, node, parameter, state):
+        return refuse(broken)
     request = rcl.SetParameters.Request(parameters=(parameter,))
     (answer,) = nodes.ask([node], "set_parameters", rcl.SetParameters, [request])
     result = answer.results[0] if answer.results else rcl.SetParametersResult(reason="its answer was empty")
     if not result.successful:
         return refuse(SAID_NO.at(None, f"'{node}': {result.reason}"))
     return _get(nodes, arguments)
+
+
+def _broken_rules(nodes: ParameterNodes, node: str, parameter: rcl.Parameter, state: RobotState) -> Finding | None:
+    from rbxcompose.cli.robots.live_rules import why_not  # it imports the compiler, which only `set` needs
+
+    return why_not(nodes, node, parameter, state)
 
 
 def _value(text: str) -> rcl.ParameterValue:
@@ -180,7 +144,3 @@ def _value(text: str) -> rcl.ParameterValue:
     return to_message(text if data is None else data) or rcl.ParameterValue(
         type=rcl.ParameterType.PARAMETER_STRING, string_value=text
     )
-
-
-def _shown(value: object) -> str:
-    return value if isinstance(value, str) else to_json(value)

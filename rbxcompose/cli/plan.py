@@ -10,6 +10,7 @@ import json
 from pathlib import Path
 
 from rbxcompose.cli.output.console import FINDINGS, refuse, tell, tell_report
+from rbxcompose.cli.project.robot_choice import add_path_argument, robot_path
 from rbxcompose.cli.project.robot_options import add_layer_options, layers_of
 from rbxcompose.compiler import compile_robot
 from rbxcompose.findings import Finding, kind
@@ -36,7 +37,7 @@ SAVED = ".json"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("path", metavar="PATH", help="the robot's file, its folder, or rbx:robots/NAME of the library")
+    add_path_argument(parser)
     add_layer_options(parser)
     parser.add_argument("--json", action="store_true", help="write the plan, or the difference, as JSON")
     parser.add_argument("--keys", action="store_true", help="show the keys on the wire, too")
@@ -45,7 +46,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the plan of a robot without errors, or its difference from another plan."""
-    after = _compiled(arguments.path, arguments, is_layered=True)
+    path = robot_path(arguments.path)
+    if path is None:
+        return FINDINGS
+    after = _compiled(path, arguments, is_layered=True)
     if after is None:
         return FINDINGS
     if arguments.diff is None:

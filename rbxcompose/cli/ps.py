@@ -1,18 +1,19 @@
-"""Show the components of a running robot: state, process, restarts."""
+"""Show the components of running robots: state, process, restarts; and who has stopped the robot."""
 
 from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
 from rbxcompose.cli.output.console import refuse, tell
-from rbxcompose.cli.robots.lookup import NotDoneError, add_robot_option, answer_of, find_robot, known_state
+from rbxcompose.cli.robots.lookup import NotDoneError, add_robot_option, answer_of, find_robot, known_state, robots_up
 from rbxcompose.runtime.folder import SUSPENDED, ComponentState, RobotFolder, RobotState
 from rbxcompose.runtime.processes import Process
 from rbxcompose.runtime.requests import RobotStatus
+from rbxcompose.typed_json import to_data
 
 _COLUMNS = ("name", "type", "state", "process", "pid", "restarts")
 _ANSWER = 0.4  # [s] for a supervisor to answer; its state file is as recent, except for what died since
@@ -22,20 +23,36 @@ _BLOCKED = "blocked"  # the state of a component that runs but cannot do its wor
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("path", nargs="?", metavar="ROBOT|PATH", help="the robot, by name or file")
+    parser.add_argument("path", nargs="?", metavar="ROBOT|PATH", help="only this robot, by name or file")
     add_robot_option(parser)
-    parser.add_argument("--json", action="store_true", help="answer with one JSON object")
+    parser.add_argument("--json", action="store_true", help="answer in JSON; several robots are a list 'robots'")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Show the supervisor's answer or, if it does not answer, the last state that it wrote."""
+    wanted = arguments.robot or arguments.path
     try:
-        folder = find_robot(arguments.robot or arguments.path)
-        shown = _shown(folder)
+        several = robots_up() if wanted is None else []
+        if len(several) > 1:
+            return _tell_all(several, in_json=arguments.json)
+        shown = _shown(find_robot(wanted))
     except NotDoneError as error:
         return refuse(error.finding)
     tell(json.dumps(shown) if arguments.json else _table(shown))
     return 0
+
+
+def _tell_all(folders: Iterable[RobotFolder], *, in_json: bool) -> int:
+    """Show all robots; report those that nothing is known of."""
+    shown, lost = [], []
+    for folder in folders:
+        try:
+            shown.append(_shown(folder))
+        except NotDoneError as error:
+            lost.append(error.finding)
+    if shown:
+        tell(json.dumps({"robots": shown}) if in_json else "\n\n".join(map(_table, shown)))
+    return max((refuse(one) for one in lost), default=0)
 
 
 def _shown(folder: RobotFolder) -> dict[str, Any]:
@@ -57,6 +74,7 @@ def _data(state: RobotState, supervisor: int | None) -> dict[str, Any]:
         "robot": state.robot,
         "supervisor": {"pid": supervisor},
         "router": {"endpoint": state.router},
+        "stop": None if state.stop is None else to_data(state.stop),
         "components": [_component(one) for one in state.components],
     }
 
@@ -93,7 +111,15 @@ def _table(shown: Mapping[str, Any]) -> str:
     blocked = [one for one in shown["components"] if "waits_for" in one]
     waiting = [f"{one['name']} waits for {one['waits_for']}, which failed" for one in blocked]
     left = [] if pid else [_NO_SUPERVISOR.format(shown["robot"])]
-    return "\n".join([head, *lines, *waiting, *left])
+    return "\n".join([head, *_stop_lines(shown["stop"]), *lines, *waiting, *left])
+
+
+def _stop_lines(stop: Mapping[str, Any] | None) -> Iterator[str]:
+    """Yield who stopped the robot, and what is needed before it can be released."""
+    if stop is not None:
+        yield f"STOPPED at {stop['time']:.1f} s by {stop['by']}"
+        reasons = [f"'{name}': {reason}" for name, reason in stop["holds"].items()]
+        yield f"'release' is refused, because of {', '.join(reasons)}" if reasons else "'release' allows motion again"
 
 
 def _cell(value: object) -> str:

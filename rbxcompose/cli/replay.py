@@ -1,7 +1,8 @@
 """Publish a recording again on a robot's bus, or show what is in it.
 
 Messages come at the recorded intervals. Topics of the class `command` make a robot move: they are
-left out unless `--topics` names them. Topics that are being published now are refused without `--over`.
+left out unless `--topics` names them. So are topics that are being published now, unless `--over` mixes them, or
+`--namespace` keeps them apart. With --alone, or if no robot is up, it brings a router of its own.
 
 With --into, nothing is published: it runs one component of a run that `up --rate max --record` has recorded again, with
 its recorded inputs, and compares its outputs with the recording. The settings are those of the run, or those of
@@ -15,11 +16,13 @@ import json
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
+from rbxcompose.bus.names import resolve
 from rbxcompose.cli.bus.entities import seconds
 from rbxcompose.cli.bus.guest import Guest
-from rbxcompose.cli.bus.place import add_bus_options, find_place
+from rbxcompose.cli.bus.place import BusPlace, add_bus_options
 from rbxcompose.cli.output.console import misused, refuse, tell
 from rbxcompose.cli.project.robot_options import add_layer_options
 from rbxcompose.cli.recordings.component_replay import run_again
@@ -30,9 +33,10 @@ from rbxcompose.cli.recordings.options import (
     selection_of,
     warn,
 )
+from rbxcompose.cli.recordings.replay_bus import replay_bus
 from rbxcompose.cli.recordings.tap import Player
 from rbxcompose.cli.robots.lookup import NotDoneError
-from rbxcompose.findings import MOST_NAMES, Finding
+from rbxcompose.findings import MOST_NAMES, Finding, Severity
 from rbxcompose.printable import plain
 from rbxcompose.qos import Qos
 from rbxcompose.recording.codes import DAMAGED, NOT_REPLAYED, NOTHING, SENT_ALREADY, UNREADABLE
@@ -54,6 +58,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_selection_options(parser)
     parser.add_argument("--rate", type=_rate, default=1.0, metavar="2x", help="faster or slower than it was")
     parser.add_argument("--from", type=seconds, default=0.0, dest="start", metavar="10s", help="skip everything before")
+    parser.add_argument("--alone", action="store_true", help="on a router of its own, away from robots that are up")
+    parser.add_argument("--namespace", type=_namespace, metavar="NAME", help="put it before all topics")
     parser.add_argument("--over", action="store_true", help="also topics that are being published now")
     parser.add_argument("--loop", action="store_true", help="start again at the end, until Ctrl-C")
     parser.add_argument(
@@ -96,6 +102,8 @@ def _misused(arguments: argparse.Namespace) -> str:
         return "options that change the robot's file need --into and --robot PATH"
     if arguments.json and not (arguments.info or arguments.into):
         return "--json needs --info or --into"
+    if arguments.alone and (arguments.router or arguments.robot):
+        return "--alone has a bus of its own, so no robot and no router is named"
     return "--write needs --into" if arguments.write and not arguments.into else ""
 
 
@@ -128,14 +136,22 @@ def _replay(arguments: argparse.Namespace, path: Path, summary: RecordingSummary
     if not topics or arguments.start > summary.duration:
         why = "none of the chosen topics can be replayed" if not topics else f"it lasts {summary.duration:.1f} s"
         return refuse(NOTHING.at(None, f"nothing of '{plain(str(path))}' is replayed: {why}"))
-    place = find_place(arguments)
-    if not arguments.over:
-        with Guest(place) as looking:  # its router knows everyone; a guest that stays has to make its own links first
-            finding = _sent_already(looking, topics)
-        if finding:
-            return refuse(finding)
+    with replay_bus(arguments) as place:
+        if not arguments.over:
+            with Guest(place) as looking:  # its router knows all; a guest that stays has to make its own links first
+                sent = _sent_already(looking, topics, arguments.namespace or "")
+            topics = [one for one in topics if one.name not in sent]
+            if sent:
+                finding = _left_out(sent)
+                if not topics:
+                    return refuse(finding)
+                warn(replace(finding, severity=Severity.WARNING))
+        return _replay_on(place, topics, arguments, path)
+
+
+def _replay_on(place: BusPlace, topics: list[RecordedTopic], arguments: argparse.Namespace, path: Path) -> int:
     with Guest(place, stays=True) as guest, guest.interruptible():
-        player = Player(guest, topics)
+        player = Player(guest, topics, arguments.namespace or "")
         player.wait_for_subscribers()
         tell(f"replaying {len(topics)} topics of {plain(str(path))}; Ctrl-C ends it")
         count = _play(path, player, topics, arguments, guest)
@@ -145,15 +161,16 @@ def _replay(arguments: argparse.Namespace, path: Path, summary: RecordingSummary
     return 0
 
 
-def _sent_already(guest: Guest, topics: list[RecordedTopic]) -> Finding | None:
-    """Return the finding for topics that are already being published; None if there are none."""
-    chosen = {one.name for one in topics}
-    names = [one.name for one in guest.graph().topics if one.givers and one.name in chosen]
-    if not names:
-        return None
+def _sent_already(guest: Guest, topics: list[RecordedTopic], namespace: str) -> list[str]:
+    """Return the recorded names of topics that somebody publishes now."""
+    given = {one.name for one in guest.graph().topics if one.givers}
+    return list(dict.fromkeys(one.name for one in topics if f"{namespace}{one.name}" in given))
+
+
+def _left_out(names: list[str]) -> Finding:
     rest = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
     message = f"these topics are being published now: {plain(', '.join(names[:MOST_NAMES]))}{rest}"
-    return SENT_ALREADY.at(None, message, help="choose others with '--topics', or replay alongside with '--over'")
+    return SENT_ALREADY.at(None, message, help="'--namespace old' keeps them apart, '--over' mixes them")
 
 
 def _chosen(summary: RecordingSummary, wanted: Selection) -> list[RecordedTopic]:
@@ -211,6 +228,14 @@ def _fields(summary: RecordingSummary) -> dict[str, object]:
         "duration": summary.duration,
         "topics": topics,
     }
+
+
+def _namespace(text: str) -> str:
+    """Read `old` or `/old/run`, as what stands before the name of a topic."""
+    try:
+        return resolve(text.strip("/"))
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def _rate(text: str) -> float:

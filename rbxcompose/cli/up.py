@@ -12,7 +12,8 @@ import sys
 from pathlib import Path
 
 from rbxcompose.cli.output.console import FINDINGS, refuse, tell_report
-from rbxcompose.cli.project.robot_options import add_layer_options, compiled, layers_of
+from rbxcompose.cli.project.robot_choice import add_path_argument, robot_path
+from rbxcompose.cli.project.robot_options import add_layer_options, chosen_layers, compiled, layers_of
 from rbxcompose.cli.robots.live_reload import LiveReload
 from rbxcompose.cli.robots.run_view import run_plan
 from rbxcompose.cli.robots.this_machine import is_fit
@@ -26,7 +27,7 @@ USAGE = 2
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("path", metavar="PATH", help="the robot's file, its folder, or rbx:robots/NAME of the library")
+    add_path_argument(parser)
     add_layer_options(parser)
     parser.add_argument(
         "--rate", type=_rate, default=RunOptions(), metavar="20x|max|1x", help="robot time per real time, reproducible"
@@ -48,7 +49,10 @@ def run(arguments: argparse.Namespace) -> int:
         other = "-d" if arguments.detach else "--rate"
         sys.stderr.write(f"rbxcompose up: --watch is for the foreground in real time, without {other}\n")
         return USAGE
-    compilation = compile_robot(arguments.path, **layers_of(arguments))
+    path = robot_path(arguments.path, may_run=False)
+    if path is None:
+        return FINDINGS
+    compilation = compile_robot(path, **layers_of(arguments))
     tell_report(compilation.report, compilation.sources)
     if compilation.plan is None or compilation.report.has_errors:
         return 1
@@ -61,6 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
         duration=arguments.duration,
         is_detached=arguments.detach,
         record=arguments.record.absolute() if arguments.record else None,
+        layers=chosen_layers(arguments),
     )
     if options.record is not None and not options.is_stepped:
         sys.stderr.write(
@@ -74,7 +79,9 @@ def run(arguments: argparse.Namespace) -> int:
         return USAGE
     if not is_fit(compilation):
         return FINDINGS
-    reload = LiveReload(lambda: compiled(arguments.path, arguments), compilation) if arguments.watch else None
+    reload = None
+    if arguments.watch:
+        reload = LiveReload(lambda: compiled(path, arguments), compilation, options.layers)
     return run_plan(compilation.plan, options, reload)
 
 

@@ -10,6 +10,7 @@ import argparse
 import json
 
 from rbxcompose.cli.output.console import FINDINGS, refuse, tell, tell_report
+from rbxcompose.cli.project.robot_choice import robot_path
 from rbxcompose.cli.project.robot_options import add_layer_options, layers_of
 from rbxcompose.compiler import compile_robot
 from rbxcompose.findings import Finding
@@ -19,14 +20,19 @@ from rbxcompose.inspection.why import why
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("path", metavar="VALUE", help="its path: battery.runtime, muxes.cmd_vel, go_to.cmd_vel")
-    parser.add_argument("robot", metavar="ROBOT", help="the robot's file, its folder, or rbx:robots/NAME")
+    parser.add_argument(
+        "robot", nargs="?", metavar="ROBOT", help="the robot's file, its folder, or rbx:robots/NAME; else the only one"
+    )
     add_layer_options(parser)
     parser.add_argument("--json", action="store_true", help="write the answer as JSON")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Write what is known about a path; explain a robot with mistakes as far as it could be read."""
-    compilation = compile_robot(arguments.robot, **layers_of(arguments))
+    robot = robot_path(arguments.robot)
+    if robot is None:
+        return FINDINGS
+    compilation = compile_robot(robot, **layers_of(arguments))
     if compilation.robot is None:
         tell_report(compilation.report, compilation.sources)
         return FINDINGS

@@ -264,7 +264,8 @@ class Mission(Component[MissionConfig]):
 
     def finish(self, name: str, end: MissionEnded) -> None:
         """Report that a mission has ended; after the start mission, the robot may go down."""
-        self.show(Level.ERROR if end.result == "failure" else Level.OK, f"{name}: {end.result}")
+        level = Level.ERROR if end.result == "failure" else Level.WARN if end.doubt else Level.OK
+        self.show(level, ": ".join(filter(None, (name, end.result, end.doubt))))
         self.keep()
         if name == self.config.start:
             self.context.notify(MissionOver(name, end.result, end.words))

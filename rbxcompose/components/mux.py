@@ -72,7 +72,8 @@ class Mux(Component[MuxConfig]):
     @classmethod
     def capabilities(cls, config: MuxConfig) -> tuple[Capability, ...]:
         """Declare which inputs it forwards."""
-        return (Forwards(tuple(config.inputs), "output"),)
+        ranked = sorted(config.inputs, key=lambda name: config.inputs[name].priority, reverse=True)
+        return (Forwards(tuple(ranked), "output"),)
 
     def configure(self) -> None:
         """Build the core; a mux restarted while the robot is stopped starts closed."""
@@ -149,10 +150,11 @@ class Mux(Component[MuxConfig]):
             self.context.wake_at(deadline)
         active = "stop" if self.core.stopped else self.core.active
         locked, refused = self.core.locked_out(self.now), self.core.refused(self.now)
-        if (active, locked) != self.told:
-            self.told = active, locked
+        why = self.core.why(self.now)
+        if (why, active, locked) != self.told:
+            self.told = why, active, locked
             level = Level.WARN if locked else Level.OK
-            self.status(level, self.core.why(self.now), active=active or "none", locked_out=", ".join(locked) or "none")
+            self.status(level, why, active=active or "none", locked_out=", ".join(locked) or "none")
         if refused and not self.refused:
-            self.warn(f"commands are blocked: {self.core.why(self.now)}")
+            self.warn(f"commands are blocked: {why}")
         self.refused = refused

@@ -72,16 +72,17 @@ def _manifest(
 ) -> RobotManifest | None:
     documents.check(file_model(ROBOT), composed.root)
     names = names_of(_name(composed.root), sim, environment, Secrets(project_of(file), environment))
-    root, include = fill_scopes(composed, names)
+    filled = fill_scopes(composed, names)
     read_so_far = len(documents.report.findings)
     is_whole = composed.parts.is_complete and not _has_a_section_twice(documents.report)
-    manifest = read_sections(root, file, sim, documents, is_whole=is_whole)
+    manifest = read_sections(filled.root, file, sim, documents, is_whole=is_whole)
     if not is_whole:
-        _drop_what_may_be_there(documents.report, root, include, read_so_far)
+        _drop_what_may_be_there(documents.report, filled.root, filled.include, read_so_far)
     return replace(
         manifest,
         parts=included_parts(composed.instances),
-        include=include,
+        include=filled.include,
+        bounds=filled.bounds,
         history=composed.history,
         files=documents.files,
         inclusions=composed.parts.inclusions,

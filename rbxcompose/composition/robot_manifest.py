@@ -8,13 +8,14 @@ from enum import StrEnum
 from pathlib import Path
 
 from rbxcompose.body.description import Description
+from rbxcompose.composition.argument_bounds import ScopedBounds, bounds_of
 from rbxcompose.composition.history import History
 from rbxcompose.composition.inclusions import Inclusions
-from rbxcompose.config import Place
+from rbxcompose.config import Bound, Place
 from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Span
 from rbxcompose.manifest.section import Contents
-from rbxcompose.manifest.tree import MappingNode
+from rbxcompose.manifest.tree import KeyPath, MappingNode
 from rbxcompose.sections.body import body
 from rbxcompose.sections.bus import BusModel, bus
 from rbxcompose.sections.components import ComponentEntry, components
@@ -78,6 +79,12 @@ class RobotManifest:
     overlays: tuple[str, ...] = ()  # the files of `-f`, by their names in findings
     files: Mapping[str, Path] = field(default_factory=dict)  # every file that was read, by its shown name
     inclusions: Inclusions = field(default_factory=Inclusions)
+    bounds: ScopedBounds = field(default_factory=dict)  # of arguments, by scope and name
+
+    def bounds_at(self, path: KeyPath) -> tuple[Bound, ...]:
+        """Return what bounds the value at a path beside its type: those of the argument that it is taken from."""
+        steps = self.history.of(path)
+        return bounds_of(steps[-1].node, self.bounds) if steps else ()
 
     @property
     def components(self) -> Mapping[str, ComponentEntry]:

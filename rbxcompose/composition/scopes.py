@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
+from rbxcompose.composition.argument_bounds import ScopedBounds, bounds_of, own_bounds
 from rbxcompose.composition.history import ROBOT_LAYER, History
-from rbxcompose.composition.includes import PartInstance, Parts
+from rbxcompose.composition.includes import PartInstance
 from rbxcompose.composition.layers import Composed, only
 from rbxcompose.expressions.types import UNKNOWN
 from rbxcompose.findings import Related, Report, Span, kind
@@ -42,8 +44,20 @@ args:
 )
 
 
-def fill_scopes(composed: Composed, names: Names) -> tuple[MappingNode, MappingNode]:
-    """Return the robot's sections and its `include:` with every `${...}` filled in.
+@dataclass(frozen=True, slots=True)
+class FilledScopes:
+    """The robot's sections and its `include:` with every `${...}` filled in.
+
+    `bounds` are those of arguments, by scope and name.
+    """
+
+    root: MappingNode
+    include: MappingNode
+    bounds: ScopedBounds
+
+
+def fill_scopes(composed: Composed, names: Names) -> FilledScopes:
+    """Fill in every `${...}` of a robot.
 
     The arguments' own values come first: those of the robot, then those of each instance, which are given in the scope
     of the file that includes it.
@@ -53,16 +67,22 @@ def fill_scopes(composed: Composed, names: Names) -> tuple[MappingNode, MappingN
     arguments = fill(only(root, args.name), names, report)
     declared = Contents(arguments, parts.robot, parts.documents).of(args)
     values = {name: _own_value(name, one, composed.history, report) for name, one in declared.items()}
+    bounds = {"": {name: own_bounds(name, one, "the robot") for name, (one, _) in declared.items()}}
     whole = Contents(root, parts.robot, parts.documents, sections(ROBOT))
     may_have = (lambda name: whole.may_have(ARGUMENT, name)) if whole.stray or args.is_unreadable(root) else None
     names = with_arguments(names, values, "", may_have)
     include = fill(composed.include, names, report)
     for instance in reversed(composed.instances):  # an instance follows those that it includes
+        declared = Contents(fill(instance.arguments, names, report), parts.robot, parts.documents).of(args)
+        bounds[instance.name] = {
+            name: own_bounds(name, one, f"the part '{instance.name}'") + bounds_of(instance.given.get(name), bounds)
+            for name, (one, _) in declared.items()
+        }
         may_have = (lambda name: True) if args.is_unreadable(instance.arguments) else None
-        names = with_arguments(names, _given_values(instance, names, parts), instance.name, may_have)
+        names = with_arguments(names, _given_values(instance, declared, names, report), instance.name, may_have)
     others = {name: entry for name, entry in root.entries.items() if name != args.name}
     filled = {**arguments.entries, **fill(replace(root, entries=others), names, report).entries}
-    return replace(root, entries={name: filled[name] for name in root.entries}), include
+    return FilledScopes(replace(root, entries={name: filled[name] for name in root.entries}), include, bounds)
 
 
 def _own_value(name: str, declared: tuple[DeclaredArgument | None, Span], history: History, report: Report) -> Typed:
@@ -77,10 +97,13 @@ def _own_value(name: str, declared: tuple[DeclaredArgument | None, Span], histor
     return Typed(argument.type, argument.read(argument.default, report), argument.default.span if is_given else None)
 
 
-def _given_values(instance: PartInstance, names: Names, parts: Parts) -> dict[str, Typed]:
+def _given_values(
+    instance: PartInstance,
+    declared: Mapping[str, tuple[DeclaredArgument | None, Span]],
+    names: Names,
+    report: Report,
+) -> dict[str, Typed]:
     """Return the values of a part's arguments: those given by `with:`, else their defaults."""
-    report = parts.documents.report
-    declared = Contents(fill(instance.arguments, names, report), parts.robot, parts.documents).of(args)
     given = fill(instance.given, names, report)
     for name, entry in given.entries.items():
         if name not in declared:

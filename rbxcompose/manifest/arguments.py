@@ -59,7 +59,7 @@ class DeclaredArgument:
         """Return the typed value of a node, `BROKEN` after a finding: see `read_value`."""
         value = read_value(node, self.type, self.name, report)
         for words, bound, sign in (("at least", self.least, 1), ("at most", self.most, -1)):
-            if BROKEN not in (value, bound) and bound is not None and (_size(value) - _size(bound)) * sign < 0:
+            if BROKEN not in (value, bound) and bound is not None and (size_of(value) - size_of(bound)) * sign < 0:
                 message = f"'{self.name}' must be {words} {show(bound)}"
                 report.add(OUT_OF_RANGE.at(node.span, message, label=f"this is {show(value)}"))
                 return BROKEN
@@ -146,7 +146,8 @@ def _quantity(node: TreeNode, dimension: Dimension, name: str, report: Report) -
         return BROKEN
 
 
-def _size(value: object) -> float:
+def size_of(value: object) -> float:
+    """Return a typed value as a number, in SI; what has no size is 0."""
     if isinstance(value, Quantity):
         return value.value
     return float(value) if isinstance(value, int | float) else 0.0

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from bisect import bisect_left, insort
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import field, replace
 
 from rbxcompose.composition.robot_manifest import RobotManifest
-from rbxcompose.config import Config
+from rbxcompose.config import Config, is_live
 from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Report
 from rbxcompose.levels import LOG_LEVELS
@@ -141,7 +141,7 @@ def _component(manifest: RobotManifest, wanted: WantedComponent, given: Mapping[
     names = (end.name for end in ends)
     capable = cls.capabilities(config) if wanted.is_sound else ()
     capabilities = require_declared(wanted.type_name, capable, names, type(config))
-    return RobotComponent(
+    made = RobotComponent(
         wanted.name,
         wanted.type_name,
         cls,
@@ -156,6 +156,9 @@ def _component(manifest: RobotManifest, wanted: WantedComponent, given: Mapping[
         wanted.places,
         wanted.is_sound,
     )
+    live = (name for name, one in type(config).model_fields.items() if is_live(one))
+    bounds = {name: manifest.bounds_at(made.place(name)) for name in live}
+    return replace(made, bounds={name: each for name, each in bounds.items() if each})
 
 
 def values_of(manifest: RobotManifest, components: Mapping[str, RobotComponent]) -> dict[str, ValueSource]:

@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Any, TypeVar
 
 from rbxcompose.composition.robot_manifest import RobotManifest
-from rbxcompose.config import Config, Place
+from rbxcompose.config import Bound, Config, Place
 from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.types import UNKNOWN, Type
 from rbxcompose.findings import Span
@@ -53,6 +53,7 @@ class RobotComponent:
     capabilities: tuple[Capability, ...] = ()
     places: Mapping[str, KeyPath] = field(default_factory=dict)  # of fields and ports that are written elsewhere
     is_sound: bool = True
+    bounds: Mapping[str, tuple[Bound, ...]] = field(default_factory=dict)  # of live settings, from arguments
     _by_port: dict[str, PortEnd] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:

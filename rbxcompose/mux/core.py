@@ -172,7 +172,10 @@ class MuxCore(Generic[M]):
         return [name for name in locked if self._is_live(name, now) and name not in self._waiting]
 
     def why(self, now: float) -> str:
-        """Return a sentence for people on what controls the output at `now`."""
+        """Return a sentence for people on what controls the output at `now`.
+
+        It has no times: each message of a source would make them wrong, and no status is worth sending that often.
+        """
         if self._closed:
             return "closed: the robot is going down"
         if self._stopped:
@@ -185,7 +188,7 @@ class MuxCore(Generic[M]):
     def _who_holds(self, now: float) -> str:
         winner = self._winner(now)
         if winner is not None:
-            return f"{winner} holds until {self._input_until[winner]:.2f} s"
+            return f"{winner} holds"
         resting = [name for name in self._inputs if self._is_live(name, now) and name in self._waiting]
         return f"{' and '.join(resting)} must come to rest once after the stop" if resting else ""
 

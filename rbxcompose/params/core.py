@@ -7,13 +7,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from types import MappingProxyType
 from typing import Any, Literal, get_args, get_origin
 
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from rbxcompose.config import Config, Dimensioned, Live
+from rbxcompose.config import Bound, Config, Dimensioned, is_live
 from rbxcompose.dataclass import dataclass
 from rbxcompose.field_docs import field_docs
 from rbxcompose.findings import suggest
@@ -26,9 +28,12 @@ from rbxcompose.msgs.rcl_interfaces import (
     ParameterValue,
 )
 from rbxcompose.params.values import HIGHEST, LOWEST, from_message, parameter_type, to_message
-from rbxcompose.units import RATIO, UNITS, Dimension, Quantity, UnitError, format_quantity
+from rbxcompose.units import RATIO, UNITS, Dimension, Quantity, UnitError, format_number, format_quantity
 
 SEPARATOR = "."
+SettingBounds = Mapping[str, Sequence[Bound]]  # what bounds settings beside their fields, by name
+NO_BOUNDS: SettingBounds = MappingProxyType({})
+_RATIO = "0 to 1"  # in the place of a unit
 _BOUNDS = {"gt": "greater than", "ge": "at least", "lt": "less than", "le": "at most"}
 
 
@@ -44,11 +49,15 @@ class ParameterField:
     value: object
     field: FieldInfo | None = None
     model: type[Config] | None = None  # whose field it is
+    is_whole: bool = True
+    """Whether it is a field of the configuration itself."""
+    bounds: Sequence[Bound] = ()
+    """What bounds it beside its field."""
 
     @property
     def is_live(self) -> bool:
         """Return whether it may change while the robot runs."""
-        return any(isinstance(mark, Live) for mark in self._marks)
+        return self.is_whole and self.field is not None and is_live(self.field)
 
     @property
     def dimension(self) -> Dimension | None:
@@ -74,7 +83,7 @@ class ParameterField:
         return self.field.metadata if self.field else ()
 
     def _description(self) -> str:
-        text = field_docs(self.model).get(self.name, "") if self.model else ""
+        text = field_docs(self.model).get(self.name.rpartition(SEPARATOR)[2], "") if self.model else ""
         return f"{text} [{unit}]".strip() if (unit := _si_unit(self.dimension)) else text
 
     def _bounds(self) -> Iterator[tuple[str, float]]:
@@ -82,6 +91,10 @@ class ParameterField:
             for key in _BOUNDS:
                 if (bound := getattr(mark, key, None)) is not None:
                     yield key, bound
+        for one in self.bounds:
+            for key, limit in (("ge", one.least), ("le", one.most)):
+                if limit is not None:
+                    yield key, limit
 
     def _ranges(self) -> tuple[tuple[FloatingPointRange, ...], tuple[IntegerRange, ...]]:
         low = [bound for key, bound in self._bounds() if key in ("gt", "ge")]
@@ -104,19 +117,44 @@ class ParameterField:
         return format_quantity(bound, self.dimension) if self.dimension else f"{bound:g}"
 
 
+def told_dimension(description: str) -> Dimension | None:
+    """Return the dimension that a description tells by the unit at its end; None if it tells none."""
+    _, bracket, unit = description.removesuffix("]").rpartition("[")
+    if not bracket or not description.endswith("]"):
+        return None
+    return RATIO if unit == _RATIO else UNITS[unit].dimension if unit in UNITS else None
+
+
+def shown(value: object, dimension: Dimension | None, unit: str | None = None) -> str:
+    """Return the value of a parameter as a person writes it: with its `unit`, else the usual one of the dimension."""
+    match value:
+        case bool():
+            return "true" if value else "false"
+        case float() if dimension is not None:
+            return format_quantity(value, dimension, unit)
+        case int() | float():
+            return format_number(value)
+        case tuple():
+            return f"[{', '.join(shown(each, dimension, unit) for each in value)}]"
+        case None:
+            return "-"
+    return str(value)
+
+
 def _si_unit(dimension: Dimension | None) -> str:
     """Return the unit of a parameter's values; ratios go from 0 to 1."""
     if dimension == RATIO:
-        return "0 to 1"
+        return _RATIO
     return next((name for name, unit in UNITS.items() if unit.dimension == dimension and unit.to_si(1.0) == 1.0), "")
 
 
-def settings(config: Config) -> dict[str, ParameterField]:
+def settings(config: Config, bounds: SettingBounds = NO_BOUNDS) -> dict[str, ParameterField]:
     """Return all parameters by name; fields without a plain value, such as a secret, are omitted."""
     found: dict[str, ParameterField] = {}
     for name, field in type(config).model_fields.items():
         for one in _settings_of(name, getattr(config, name), field, type(config)):
-            found[one.name] = one
+            is_whole = one.name == name
+            found[one.name] = replace(one, is_whole=is_whole, bounds=bounds.get(name, ()) if is_whole else ())
     return found
 
 
@@ -125,8 +163,8 @@ def _settings_of(
 ) -> Iterator[ParameterField]:
     match value:
         case Config():
-            for key in type(value).model_fields:
-                yield from _settings_of(f"{name}{SEPARATOR}{key}", getattr(value, key))
+            for key, inner in type(value).model_fields.items():
+                yield from _settings_of(f"{name}{SEPARATOR}{key}", getattr(value, key), inner, type(value))
         case Mapping():
             for key, each in value.items():
                 yield from _settings_of(f"{name}{SEPARATOR}{key}", each)
@@ -154,7 +192,7 @@ def listed(known: Iterable[str], prefixes: Sequence[str], depth: int) -> ListPar
     return ListParametersResult(names=tuple(names), prefixes=tuple(above))
 
 
-def changed(config: Config, parameters: Sequence[Parameter]) -> Config:
+def changed(config: Config, parameters: Sequence[Parameter], bounds: SettingBounds = NO_BOUNDS) -> Config:
     """Return the configuration with all of `parameters` set.
 
     Raises:
@@ -168,9 +206,21 @@ def changed(config: Config, parameters: Sequence[Parameter]) -> Config:
         value = _with_unit(wanted.get(name, getattr(config, name)), dimension_of(field))
         data[field.alias or name] = value
     try:
-        return type(config).model_validate(data, strict=True)
+        new = type(config).model_validate(data, strict=True)
     except ValidationError as error:
         raise UnsettableError(_reason(error.errors(include_url=False)[0])) from error
+    for name in wanted:
+        _require_within(name, getattr(new, name), dimension_of(fields[name]), bounds.get(name, ()))
+    return new
+
+
+def _require_within(name: str, value: object, dimension: Dimension | None, bounds: Iterable[Bound]) -> None:
+    """Refuse a value beyond a bound that is not one of the field's own."""
+    for one in bounds:
+        for words, limit, sign in (("at least", one.least, 1), ("at most", one.most, -1)):
+            if limit is not None and isinstance(value, int | float) and (value - limit) * sign < 0:
+                told = format_quantity(limit, dimension) if dimension else format_number(limit)
+                raise UnsettableError(f"'{name}' must be {words} {told}: {one.by} says so")
 
 
 def _wanted(known: Mapping[str, ParameterField], parameter: Parameter) -> object:

@@ -31,5 +31,13 @@ def _instance(component: RobotComponent) -> Instance:
     wires = tuple(Wire(end.name, end.port.kind, end.topic, end.type_name) for end in component.ends)
     after, restart = component.starts_after, component.restart
     return Instance(
-        component.name, component.type_name, component.config, component.process, after, wires, restart, component.log
+        component.name,
+        component.type_name,
+        component.config,
+        component.process,
+        after,
+        wires,
+        restart,
+        component.log,
+        component.bounds,
     )

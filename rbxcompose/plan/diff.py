@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any
 
-from rbxcompose.config import Config
+from rbxcompose.config import Bound, Config
 from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.types import Type
 from rbxcompose.levels import log_word
@@ -18,6 +18,7 @@ from rbxcompose.plan.model import Instance, Plan
 from rbxcompose.units import Quantity, format_number, format_quantity, to_si
 
 EMPTY = "{}"
+BOUNDS = "limits of "  # begins the keys of what bounds settings that may change while the robot runs
 LONGEST = 1000  # characters of a text that a person would still read in a difference
 WHOLE = ("robot", "bus", "is_simulated")  # keys whose change restarts every process
 
@@ -141,7 +142,19 @@ def _of_instance(one: Instance) -> dict[str, str]:
     wires = {f"topic of {wire.port}": f"{wire.topic} ({wire.type})" for wire in one.wires if wire.topic}
     options = {"type": one.type, "process": one.process, "starts_after": ", ".join(one.starts_after) or "nothing"}
     options["log"] = log_word(one.log)
-    return {**options, **dict(_flat(one.restart, "restart")), **dict(_flat(one.config, "")), **wires}
+    bounds = {f"{BOUNDS}{name}": _bounds(one.config, name, each) for name, each in one.bounds.items()}
+    return {**options, **dict(_flat(one.restart, "restart")), **dict(_flat(one.config, "")), **wires, **bounds}
+
+
+def _bounds(config: Config, name: str, bounds: Iterable[Bound]) -> str:
+    dimension = dimension_at(type(config), (name,))
+
+    def shown(value: float) -> str:
+        return _text(Quantity(value, dimension) if dimension else value)
+
+    words = (("at least", "least"), ("at most", "most"))
+    pairs = ((word, getattr(one, key)) for one in bounds for word, key in words)
+    return ", ".join(f"{word} {shown(value)}" for word, value in pairs if value is not None)
 
 
 def _flat(value: Any, path: str) -> Iterator[tuple[str, str]]:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import field, replace
 
-from rbxcompose.config import Config
+from rbxcompose.config import Bound, Config
 from rbxcompose.dataclass import dataclass
 from rbxcompose.levels import Level
 from rbxcompose.restarts import DEFAULT, Restart
@@ -34,6 +35,7 @@ class Instance:
     wires: tuple[Wire, ...] = ()
     restart: Restart = DEFAULT
     log: Level = Level.OK  # the lowest level that goes to the log
+    bounds: Mapping[str, tuple[Bound, ...]] = field(default_factory=dict)  # of live settings, beside those of fields
 
     def topic(self, port: str) -> str:
         """Return the absolute name at a port.

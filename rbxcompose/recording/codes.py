@@ -59,11 +59,12 @@ SENT_ALREADY = kind(
     """Topics of the recording are being published now
 
 Old messages would mix with new ones: an old `/tf` misleads a robot that drives, an old status hides what is wrong. A
-stopped robot publishes too. Choose other topics with `--topics` or `--class`, replay where no robot runs, or use
-`--over` if you want old and new messages side by side.
+stopped robot publishes too. Such topics are left out, and it is an error if nothing else is to be replayed. Use
+`--namespace old` to see old messages beside new ones, `--alone` to replay them away from the robot, or `--over` to mix
+them.
 
-Bad: `rbxcompose replay run.mcap` while the robot is up
-Good: `rbxcompose replay run.mcap --topics '/camera/*'`
+Bad: `rbxcompose replay run.mcap --topics odom` while the robot is up
+Good: `rbxcompose replay run.mcap --topics odom --namespace old`
 """,
 )
 NOT_ENOUGH = kind(

@@ -17,6 +17,7 @@ from pathlib import Path
 from rbxcompose.atomic_files import TEMPORARY, replace_file
 from rbxcompose.dataclass import dataclass
 from rbxcompose.regular_files import open_regular
+from rbxcompose.runtime.options import NO_LAYERS, ChosenLayers
 from rbxcompose.runtime.processes import Process, boot_id
 from rbxcompose.typed_json import UnreadableError, from_data, to_data
 
@@ -65,6 +66,15 @@ class Gauge:
 
 
 @dataclass(frozen=True, slots=True)
+class StopState:
+    """A latched stop: who stopped the robot and at what robot time [s], and why `release` would be refused."""
+
+    by: str
+    time: float
+    holds: Mapping[str, str]  # by component that needs the robot to stand still
+
+
+@dataclass(frozen=True, slots=True)
 class RobotState:
     """What is known about a robot from outside, even if its supervisor is dead."""
 
@@ -78,6 +88,9 @@ class RobotState:
     domain: int = 0
     batteries: Mapping[str, Gauge] = field(default_factory=dict)  # by component
     executive: str | None = None  # the component that runs missions
+    teleoperated: Mapping[str, str] = field(default_factory=dict)  # base -> topic that takes a person's commands
+    layers: ChosenLayers = NO_LAYERS
+    stop: StopState | None = None
     rest_time: float = 1.0  # [s] that it may take to come to rest when it goes down
 
     def to_text(self) -> str:

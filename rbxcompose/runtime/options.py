@@ -8,6 +8,19 @@ from rbxcompose.dataclass import dataclass
 
 
 @dataclass(frozen=True, slots=True)
+class ChosenLayers:
+    """What was put over the robot's file when its plan was compiled: profiles, overlays by path, `--set`, `--real`."""
+
+    profiles: tuple[str, ...] = ()
+    overlays: tuple[str, ...] = ()
+    sets: tuple[str, ...] = ()
+    real: bool = False
+
+
+NO_LAYERS = ChosenLayers()
+
+
+@dataclass(frozen=True, slots=True)
 class RunOptions:
     """Real time (`is_stepped` false) or stepped time at `rate` times real time (None: as fast as it goes).
 
@@ -20,3 +33,4 @@ class RunOptions:
     duration: float | None = None
     is_detached: bool = False
     record: Path | None = None
+    layers: ChosenLayers = NO_LAYERS

@@ -5,6 +5,7 @@ from __future__ import annotations
 from rbxcompose.dataclass import dataclass
 from rbxcompose.plan.diff import Change
 from rbxcompose.requests import Command, Query
+from rbxcompose.runtime.options import NO_LAYERS, ChosenLayers
 from rbxcompose.runtime.requests import ROBOT
 from rbxcompose.runtime.supervision.changes import Changes, Fate
 
@@ -54,8 +55,12 @@ class ComparePlan(Query[PlanComparison]):
 
 @dataclass(frozen=True, slots=True)
 class ApplyPlan(Command):
-    """Apply a plan that was compared in this generation; answered when everything new is active."""
+    """Apply a plan that was compared in this generation; answered when everything new is active.
+
+    `layers` are those that it was compiled with.
+    """
 
     about = ROBOT
     plan: str
     generation: int
+    layers: ChosenLayers = NO_LAYERS

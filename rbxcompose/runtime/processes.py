@@ -181,6 +181,10 @@ def titled(prefix: str) -> Iterator[Process]:
                 yield process
 
 
+KILLED = f"was killed by {signal.SIGKILL.name}"
+"""How a process ended that was killed, by whomever."""
+
+
 def describe_exit(status: int) -> str:
     """Return in words how a process ended, from its wait status."""
     code = os.waitstatus_to_exitcode(status)

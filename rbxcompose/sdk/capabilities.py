@@ -124,7 +124,7 @@ class Charges(Capability):
 
 @dataclass(frozen=True, slots=True)
 class Forwards(Capability):
-    """A mux: it forwards messages from one of `inputs` to `output`."""
+    """A mux: it forwards messages from one of `inputs` to `output`; the first of them has the highest priority."""
 
     inputs: tuple[str, ...]
     output: str

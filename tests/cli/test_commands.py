@@ -15,7 +15,7 @@ import pytest
 from rbxcompose.cli import main as command
 from rbxcompose.cli import verbs
 from rbxcompose.levels import Level
-from rbxcompose.runtime.folder import ComponentState, RobotFolder, RobotState
+from rbxcompose.runtime.folder import ComponentState, RobotFolder, RobotState, StopState
 from rbxcompose.runtime.log import start_new
 from rbxcompose.runtime.processes import Process, boot_id
 from rbxcompose.runtime.records import Record
@@ -30,15 +30,14 @@ def base(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def written(name: str, supervisor: Process | None = None) -> RobotFolder:
+def written(name: str, stop: StopState | None = None, supervisor: Process | None = None) -> RobotFolder:
     """Write down a robot whose supervisor has gone."""
     folder = RobotFolder.of(name)
     folder.make()
     component = ComponentState("base", "toy", "active", "robot", 77, 1)
     gone = supervisor or Process(os.getpid(), 1)
-    folder.write_state(
-        RobotState(name, f"/robots/{name}/robot.yaml", gone, {"robot": gone}, (component,), None, boot_id())
-    )
+    file = f"/robots/{name}/robot.yaml"
+    folder.write_state(RobotState(name, file, gone, {"robot": gone}, (component,), boot=boot_id(), stop=stop))
     return folder
 
 
@@ -98,6 +97,7 @@ def test_ps_shows_what_a_dead_supervisor_last_wrote(capsys: pytest.CaptureFixtur
         "robot": "a",
         "supervisor": {"pid": None},
         "router": {"endpoint": None},
+        "stop": None,
         "components": [
             {"name": "base", "type": "toy", "state": "dead", "process": "robot", "pid": None, "restarts": 1}
         ],
@@ -107,6 +107,34 @@ def test_ps_shows_what_a_dead_supervisor_last_wrote(capsys: pytest.CaptureFixtur
     assert "base  toy   dead   robot    -    1" in out
     assert "its supervisor has died" in out.splitlines()[-1]
     assert "'rbxcompose down a', or the next 'up', cleans up" in out
+
+
+def test_ps_lists_all_robots_that_are_up(capsys: pytest.CaptureFixture[str]) -> None:
+    written("a")
+    written("b")
+    assert command.main(["ps"]) == 0
+    heads = [line.partition(":")[0] for line in capsys.readouterr().out.splitlines() if "supervisor dead" in line]
+    assert heads == ["a", "b"]
+    assert command.main(["ps", "--json"]) == 0
+    assert [one["robot"] for one in json.loads(capsys.readouterr().out)["robots"]] == ["a", "b"]
+    assert command.main(["ps", "b", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["robot"] == "b"
+
+
+@pytest.mark.parametrize(
+    ("holds", "line"),
+    [
+        ({}, "'release' allows motion again"),
+        ({"estop": "'estop' is pressed"}, "'release' is refused, because of 'estop': 'estop' is pressed"),
+    ],
+)
+def test_ps_shows_who_has_stopped_a_robot(holds: dict[str, str], line: str, capsys: pytest.CaptureFixture[str]) -> None:
+    written("a", StopState("the command 'stop'", 12.34, holds))
+    assert command.main(["ps"]) == 0
+    assert capsys.readouterr().out.splitlines()[1:3] == ["STOPPED at 12.3 s by the command 'stop'", line]
+    assert command.main(["ps", "--json"]) == 0
+    expected = {"by": "the command 'stop'", "time": 12.34, "holds": holds}
+    assert json.loads(capsys.readouterr().out)["stop"] == expected
 
 
 @pytest.mark.parametrize("wanted", ["a", "/robots/a/robot.yaml", "/robots/a"])

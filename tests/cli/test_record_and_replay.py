@@ -137,6 +137,35 @@ def test_a_loop_goes_on_until_it_is_interrupted_and_commands_are_left_out(shell:
     assert {one.topic.name for one in found} == {"/odom", "/map"}
 
 
+def test_without_a_robot_it_is_replayed_on_a_router_of_its_own_below_a_namespace(shell: Shell) -> None:
+    (shell.folder / "a.mcap").write_bytes(written(MESSAGES))
+    player = shell.start("replay", "a.mcap", "--loop", "--namespace", "old/run")
+    assert player.stdout
+    endpoint = next(line for line in player.stdout if "--router" in line).partition("--router ")[2].strip("'\n")
+    try:
+        shell.do("record", "--router", endpoint, "-o", "b.mcap", "--for", "2s")
+    finally:
+        player.send_signal(signal.SIGINT)
+        player.communicate(timeout=PATIENCE)
+    assert player.returncode == 0
+    found, _ = shell.messages("b.mcap")
+    assert {one.topic.name for one in found} == {"/old/run/odom", "/old/run/map"}
+
+
+@pytest.mark.parametrize(
+    "words", [["--alone", "--robot", "x"], ["--alone", "--router", "tcp/127.0.0.1:1"], ["--namespace", "no name"]]
+)
+def test_a_bus_of_its_own_is_no_other_and_a_namespace_is_a_name(
+    words: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    try:
+        code = command.main(["replay", "a.mcap", *words])
+    except SystemExit as end:
+        code = int(str(end.code))
+    assert code == 2
+    assert "replay" in capsys.readouterr().err
+
+
 def test_a_full_disk_ends_the_recording_with_a_finding_and_what_was_written_is_recovered(
     shell: Shell, router: str
 ) -> None:
@@ -173,6 +202,14 @@ def test_two_seconds_of_a_robot_and_a_recorder_that_is_killed(robot: Shell) -> N
     assert player.returncode == 1
     assert "error[RBX9210]: these topics are being published now: /odom, /tf_static" in output
     assert "replayed" in robot.do("replay", "whole.mcap", "--topics", "odom", "--rate", "20x", "--over")
+    assert "replayed" in robot.do("replay", "whole.mcap", "--topics", "odom", "--rate", "20x", "--namespace", "old")
+    alone = robot.do("replay", "whole.mcap", "--topics", "odom", "tf_static", "--rate", "20x", "--alone")
+    assert "a router of its own" in alone
+    assert "RBX9210" not in alone
+    (robot.folder / "some.mcap").write_bytes(written(MESSAGES))
+    partly = robot.do("replay", "some.mcap", "--rate", "20x")
+    assert "warning[RBX9210]: these topics are being published now: /odom\n" in partly
+    assert "replaying 1 topics" in partly
 
     recorder = robot.start("record", "-o", "cut.mcap")
     part = robot.folder / "cut.mcap.part"

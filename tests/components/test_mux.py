@@ -136,3 +136,29 @@ def test_an_open_lock_and_commands_above_it_are_told_nowhere() -> None:
     robot.publish("/cmd_vel/deadman", Empty())
     robot.publish("/cmd_vel/navigation", SLOW)
     assert robot.texts() == []
+
+
+def test_its_status_has_no_time_that_the_next_message_or_none_would_make_wrong() -> None:
+    robot = bench()
+    told = robot.statuses("cmd_vel")
+    for _ in range(30):
+        robot.publish("/cmd_vel/navigation", SLOW)
+        robot.advance(0.1)
+    robot.advance(3.0)
+    assert told[-1].message == "no input"
+    assert "navigation holds" in {one.message for one in told}
+    assert not any(letter.isdigit() for one in told for letter in one.message)
+
+
+def test_its_status_tells_when_a_source_need_no_longer_come_to_rest() -> None:
+    robot = bench()
+    told = robot.statuses("cmd_vel")
+    robot.publish("/cmd_vel/teleop", FAST)
+    robot.host.stop()
+    robot.host.release()
+    for _ in range(12):
+        robot.publish("/cmd_vel/teleop", FAST)
+        robot.advance(0.1)
+    assert told[-1].message == "teleop must come to rest once after the stop"
+    robot.advance(3.0)
+    assert told[-1].message == "no input"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,7 @@ from rbxcompose.compiler import compile_robot
 from rbxcompose.inspection.expand import expand, expand_data, leaves
 from rbxcompose.model.robot import Robot
 from rbxcompose.plan.diff import difference
+from rbxcompose.plan.model import Plan
 from rbxcompose.printable import FORBIDDEN
 from rbxcompose.testing import Checked, Golden, check_file, check_text
 from tests.conftest import ROOT
@@ -47,6 +49,11 @@ def test_each_value_has_its_origin_behind_it(repository: Path, golden: Golden) -
     golden.check("twins.txt", expand(robot_of(check_file(Path(TWINS), profiles=["tired"])).manifest))
 
 
+def without_arguments(plan: Plan) -> Plan:
+    """Return a plan without the limits of arguments, which are filled in."""
+    return replace(plan, instances=tuple(replace(one, bounds={}) for one in plan.instances))
+
+
 @pytest.mark.parametrize("file", [TURTLEBOT, TWINS])
 @pytest.mark.parametrize("profiles", [(), ("tired",)])
 @pytest.mark.parametrize("has_origins", [True, False])
@@ -57,7 +64,7 @@ def test_what_it_writes_is_the_same_robot(
     text = expand(robot_of(first).manifest, has_origins=has_origins)
     second = again(text, tmp_path)
     assert second.codes == [], second.text
-    assert difference(first.plan, second.plan).is_empty
+    assert difference(without_arguments(first.plan), second.plan).is_empty
     assert [one.name for one in first.plan.instances] == [one.name for one in second.plan.instances]
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import itertools
 
+import pytest
+
 from tests.missions.simulated import simulate
 from tests.missions.test_composites import fails, skills
 
@@ -18,6 +20,33 @@ def test_optional_counts_a_failure_as_success() -> None:
     simulated = simulate("do:\n  - a:\n    optional: true\n  - b", fails={"a": fails(1)})
     assert simulated.advance(10) == "success"
     assert skills(simulated) == ["0 a", "1 b"]
+
+
+OPTIONAL = "do:\n  - a:\n    optional: true\n  - b:\n    optional: true\n  - c"
+
+
+@pytest.mark.parametrize(
+    ("failing", "words"),
+    [("a b", "success: all 2 optional steps failed"), ("a", "success"), ("b", "success"), ("", "success")],
+)
+def test_a_mission_whose_optional_steps_all_failed_says_so_at_its_end(failing: str, words: str) -> None:
+    simulated = simulate(OPTIONAL, fails={name: fails(1) for name in failing.split()})
+    assert simulated.advance(10) == "success"
+    assert simulated.told[-1] == f"3 mission test: {words}"
+
+
+def test_an_optional_step_that_was_skipped_or_is_not_optional_after_all_is_no_reason_for_doubt() -> None:
+    skipped = "  - b:\n    optional: true\n    only_if: 1 > 2"
+    text = f"do:\n  - a:\n    optional: true\n{skipped}\n  - c:\n    optional: false"
+    simulated = simulate(text, fails={"a": fails(1)})
+    assert simulated.advance(10) == "success"
+    assert simulated.told[-1] == "2 mission test: success: its only optional step failed"
+
+
+def test_an_optional_step_of_a_loop_that_succeeded_once_is_no_reason_for_doubt() -> None:
+    simulated = simulate("do:\n  repeat: 2\n  do:\n    - a:\n      optional: true", fails={"a": fails(1)})
+    assert simulated.advance(10) == "success"
+    assert simulated.told[-1] == "2 mission test: success"
 
 
 def test_a_timeout_halts_the_leaf_and_fails_the_node() -> None:

@@ -205,7 +205,7 @@ def test_closing_sends_one_zero_and_nothing_more() -> None:
 def test_it_says_who_holds_the_output() -> None:
     core = mux()
     core.receive("navigation", 1.0, 2.81)
-    assert core.why(3.0) == "navigation holds until 3.31 s"
+    assert core.why(3.0) == "navigation holds"
 
 
 def test_it_says_why_nothing_passes() -> None:
@@ -226,9 +226,9 @@ def test_it_says_why_nothing_passes() -> None:
 def test_an_input_above_a_silent_lock_holds_while_the_others_are_locked_out() -> None:
     core = mux(locks=LOCKS)
     core.receive("safety", 3.0, 0.1)
-    assert core.why(0.1).startswith("safety holds until 0.30 s; door gives no heartbeat: ")
+    assert core.why(0.1).startswith("safety holds; door gives no heartbeat: ")
     core.heartbeat("door", 0.2)
-    assert (core.why(0.2), core.locked_out(0.2)) == ("safety holds until 0.30 s", [])
+    assert (core.why(0.2), core.locked_out(0.2)) == ("safety holds", [])
 
 
 def test_a_lock_that_falls_silent_is_told_in_time_though_nothing_moves() -> None:

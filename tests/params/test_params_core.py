@@ -10,9 +10,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import Field, model_validator
 
-from rbxcompose.config import Angle, Config, Live, Place, PlaceName, Ratio, Secret, Speed, Time
+from rbxcompose.config import Angle, Bound, Config, Live, Place, PlaceName, Ratio, Secret, Speed, Time
 from rbxcompose.msgs.rcl_interfaces import Parameter, ParameterType, ParameterValue
-from rbxcompose.params.core import UnsettableError, changed, differences, listed, settings, values_of
+from rbxcompose.params.core import (
+    UnsettableError,
+    changed,
+    differences,
+    listed,
+    settings,
+    shown,
+    told_dimension,
+    values_of,
+)
 from rbxcompose.params.values import from_message, to_message
 
 
@@ -180,3 +189,26 @@ def test_a_value_comes_back_from_its_message(value: object) -> None:
 def test_a_message_of_any_type_but_of_no_speed_is_refused(message: ParameterValue) -> None:
     with pytest.raises(UnsettableError, match="'speed' "):
         changed(SAMPLE, [Parameter(name="speed", value=message)])
+
+
+def test_a_bound_beside_the_field_holds_and_is_told() -> None:
+    bounds = {"speed": [Bound(0.1, 0.4, "an argument")]}
+    (told,) = settings(SAMPLE, bounds)["speed"].descriptor.floating_point_range
+    assert (told.from_value, told.to_value) == (0.1, 0.4)
+    assert changed(SAMPLE, [parameter("speed", 0.4)], bounds) != SAMPLE
+    for value, words in ((0.05, "at least 0.1 m/s"), (0.41, "at most 0.4 m/s")):
+        with pytest.raises(UnsettableError, match=f"'speed' must be {words}: an argument says so"):
+            changed(SAMPLE, [parameter("speed", value)], bounds)
+
+
+def test_values_are_shown_in_the_unit_that_their_description_tells() -> None:
+    known = settings(SAMPLE)
+    found = {name: shown(one.value, told_dimension(one.descriptor.description)) for name, one in known.items()}
+    assert found["heading"] == "28.6479 deg"
+    assert (found["speed"], found["low"], found["count"], found["mode"]) == ("0.3 m/s", "20 %", "3", "calm")
+    assert (found["inputs.door.timeout"], found["nothing"], found["turns"]) == ("0.5 s", "-", "[]")
+
+
+@pytest.mark.parametrize("description", ["", "[", "]", "speed", "of [its] kind", "a list [x]"])
+def test_other_descriptions_tell_no_unit(description: str) -> None:
+    assert told_dimension(description) is None

@@ -182,7 +182,7 @@ def test_a_dead_process_is_forked_again_and_the_others_hear_of_it() -> None:
 
 def test_a_process_that_comes_again_to_a_stopped_robot_is_told_so() -> None:
     stage = Stage().start()
-    stage.conductor.stop()
+    stage.conductor.stop("a person")
     assert stage.told(say.Stop) == ["world", "robot", "mission"]
     stage.exit("mission")
     stage.scheduler.advance(stage.scheduler.now + 0.1)
@@ -206,7 +206,7 @@ def test_a_stop_reaches_a_process_that_was_being_started_before_any_of_it_is_act
     stage = Stage().start()
     stage.exit("robot")
     stage.scheduler.advance(stage.scheduler.now + 0.1)
-    stage.conductor.stop()
+    stage.conductor.stop("a person")
     stage.configure("robot")
     orders = [message for process, message in stage.sent if process == "robot"]
     assert orders[-2:] == [say.Stop(), say.Activate(["mux", "go_to"])]
@@ -214,7 +214,7 @@ def test_a_stop_reaches_a_process_that_was_being_started_before_any_of_it_is_act
 
 def test_a_release_reaches_a_process_that_was_being_started_during_a_stop() -> None:
     stage = Stage().start()
-    stage.conductor.stop()
+    stage.conductor.stop("a person")
     stage.exit("robot")
     stage.scheduler.advance(stage.scheduler.now + 0.1)
     stage.conductor.release()
@@ -306,6 +306,8 @@ def test_a_process_that_a_signal_suspends_is_told_at_once_and_ended_after_two_se
     assert stage.killed == []
     stage.pass_time(2.0)
     assert stage.killed == ["robot"]
+    stage.exit("robot")
+    assert stage.records[-1][1] == "process 'robot' was suspended by a signal for 2 s and was killed; restarting it"
 
 
 def test_a_process_that_is_suspended_while_it_gets_ready_is_ended_and_one_that_takes_long_is_not() -> None:

@@ -219,7 +219,10 @@ class WholeRobot:
     def set_stopped(self, is_stopped: bool) -> None:
         """Stop the robot, or release it."""
         self.told.append(Ordered(self.clock.now(), ROBOT, "stop" if is_stopped else "release"))
-        (self.conductor.stop if is_stopped else self.conductor.release)()
+        if is_stopped:
+            self.conductor.stop("a person")
+        else:
+            self.conductor.release()
 
     # What the weather does
 

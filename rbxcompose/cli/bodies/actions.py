@@ -12,6 +12,7 @@ from rbxcompose.atomic_files import replace_file
 from rbxcompose.body.description import Description
 from rbxcompose.cli.bodies.source import DescribedBody, MisuseError, add_source_options, described, is_description
 from rbxcompose.cli.output.console import FINDINGS, misused, refuse, tell, tell_report
+from rbxcompose.cli.project.robot_choice import robot_path
 from rbxcompose.findings import Finding, kind
 
 NO_BODY = kind(
@@ -59,6 +60,9 @@ def add_reader(actions: Actions, name: str, about: str, do: Read) -> argparse.Ar
 
 def read(arguments: argparse.Namespace, do: Read) -> int:
     """Do something with what was read at PATH; return the exit code."""
+    arguments.path = robot_path(arguments.path)
+    if arguments.path is None:
+        return FINDINGS
     try:
         found = described(arguments)
     except MisuseError as error:

@@ -72,7 +72,7 @@ def _faces(text: str) -> int:
 
 def _run(arguments: argparse.Namespace) -> int:
     """Simplify a bare mesh, or those of a body."""
-    if arguments.path.lower().endswith(FORMATS):
+    if arguments.path is not None and arguments.path.lower().endswith(FORMATS):
         path = find(arguments.path)
         if isinstance(path, Finding):
             return refuse(path)

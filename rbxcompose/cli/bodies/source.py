@@ -40,7 +40,7 @@ class MisuseError(Exception):
 def add_source_options(parser: argparse.ArgumentParser, also: str = "") -> None:
     """Declare PATH, which may name something else, `also`, and the options that belong to it."""
     words = "the robot's file, its folder, or rbx:robots/NAME; or a .urdf or .xacro file without a robot"
-    parser.add_argument("path", metavar="PATH", help=f"{words}{also}")
+    parser.add_argument("path", nargs="?", metavar="PATH", help=f"{words}{also}; without it, the only robot")
     add_layer_options(parser)
     parser.add_argument(
         "--with", action="append", default=[], dest="with_", metavar="NAME=VALUE", help="an argument of the xacro file"

@@ -12,7 +12,8 @@ from typing import Any
 
 from rbxcompose.cli.bus.entities import table
 from rbxcompose.cli.output.console import FINDINGS, refuse, tell, tell_report
-from rbxcompose.cli.robots.lookup import NotDoneError, answer_of, find_robot, known_state
+from rbxcompose.cli.project.robot_choice import only_path
+from rbxcompose.cli.robots.lookup import NotDoneError, answer_of, known_state, robots_up
 from rbxcompose.compiler import compile_robot
 from rbxcompose.executive.requests import ListMissions, LookAtAll
 from rbxcompose.findings import kind, suggest
@@ -47,18 +48,24 @@ Good: `rbxcompose mission show patrol robots/turtlebot`
 
 
 def robot_of(path: str | None) -> Robot | None:
-    """Compile the robot at a path, or the running one; if it has mistakes, report them and return None.
+    """Compile a robot; if it has mistakes, report them and return None.
+
+    Without a path it is the running one, else the only one of this folder.
 
     Raises:
         NotDoneError: if no path is given and it is not clear which robot to use.
     """
     if path is None:
-        folder = find_robot(None)
-        state = known_state(folder)
-        path = state.file if state else folder.path.name
+        path = _running_file() or only_path(may_run=False)
     out = compile_robot(path, environment=os.environ)
     tell_report(out.report, out.sources)
     return None if out.report.has_errors else out.robot
+
+
+def _running_file() -> str | None:
+    found = robots_up()
+    state = known_state(found[0]) if len(found) == 1 else None
+    return state.file if state is not None else None
 
 
 def show(arguments: argparse.Namespace) -> int:
@@ -86,7 +93,9 @@ def show(arguments: argparse.Namespace) -> int:
 
 def _live(name: str) -> tuple[MissionPicture, Sequence[int]] | None:
     """Return the picture of a mission that has been running, and the states or outcomes of its nodes."""
-    folder = find_robot(None)
+    if len(found := robots_up()) != 1:
+        return None
+    folder = found[0]
     if not any(one.name == name and one.state != NAMES[IDLE] for one in answer_of(folder, ListMissions())):
         return None
     seen = answer_of(folder, LookAtAll(name))

@@ -8,6 +8,8 @@ from collections.abc import Mapping, Sequence
 from typing import TypedDict
 
 from rbxcompose.compiler import Compilation, compile_robot
+from rbxcompose.manifest.library import PREFIX
+from rbxcompose.runtime.options import ChosenLayers
 
 
 class Layers(TypedDict):
@@ -39,6 +41,12 @@ def layers_of(arguments: argparse.Namespace) -> Layers:
         "real": arguments.real,
         "environment": os.environ,
     }
+
+
+def chosen_layers(arguments: argparse.Namespace) -> ChosenLayers:
+    """Return the same layers for the robot to remember; from any folder they mean the same files."""
+    overlays = tuple(one if one.startswith(PREFIX) else os.path.abspath(one) for one in arguments.overlays)
+    return ChosenLayers(tuple(arguments.profile), overlays, tuple(arguments.sets), arguments.real)
 
 
 def compiled(robot: str, arguments: argparse.Namespace) -> Compilation:

@@ -80,9 +80,9 @@ def _recorded(topic: RecordedTopic, stamp: int, arrival: Arrival) -> Recorded:
 
 
 class Player:
-    """Publishes recorded messages as the node `replay`."""
+    """Publishes recorded messages as the node `replay`, below a namespace (`/old`) if there is one."""
 
-    def __init__(self, guest: Guest, topics: Iterable[RecordedTopic]) -> None:
+    def __init__(self, guest: Guest, topics: Iterable[RecordedTopic], namespace: str = "") -> None:
         self._guest = guest
         self._sequence = count(1)
         transport, domain = guest.transport, guest.domain
@@ -91,9 +91,10 @@ class Player:
         self._publishers: dict[RecordedTopic, tuple[RemotePublisher, bytes]] = {}
         for number, topic in enumerate(topics, 1):
             qos = WIRE_PROFILES["jazzy"].qos_text(ros_qos(topic.qos))
-            place = (EntityKind.PUBLISHER, number, topic.name, dds_type(topic.type), topic.hash, qos)
+            name = f"{namespace}{topic.name}"
+            place = (EntityKind.PUBLISHER, number, name, dds_type(topic.type), topic.hash, qos)
             token = node.endpoint_key(*place)
-            publisher = transport.publisher(data_key(domain, topic.name, topic.type, topic.hash), topic.qos)
+            publisher = transport.publisher(data_key(domain, name, topic.type, topic.hash), topic.qos)
             transport.announce(token)
             self._publishers[topic] = publisher, gid(token)
 

@@ -13,6 +13,7 @@ from rbxcompose.cli.robots.proposal import Proposal
 from rbxcompose.compiler import Compilation
 from rbxcompose.composition.overlay import SET
 from rbxcompose.manifest.library import PREFIX
+from rbxcompose.runtime.options import ChosenLayers
 
 _LOOK = 0.25  # [s] between checks of the files; a change is taken at the second check that finds it unchanged
 _AGAIN = 0.5  # [s] between retries of what the robot cannot do now
@@ -21,8 +22,9 @@ _AGAIN = 0.5  # [s] between retries of what the robot cannot do now
 class LiveReload:
     """Follows the files of a running robot. Changes that are impossible while it moves wait; that is reported once."""
 
-    def __init__(self, compiled: Callable[[], Compilation], first: Compilation) -> None:
-        self._compiled, self._newest = compiled, first
+    def __init__(self, compiled: Callable[[], Compilation], first: Compilation, layers: ChosenLayers) -> None:
+        """`compiled` compiles the files again, with the same `layers` as at `first`."""
+        self._compiled, self._newest, self._layers = compiled, first, layers
         self._files = FileWatch(files_of(first))
         self._is_pending = False  # the newest is to be applied as soon as possible
         self._told = ""  # the reported reason for waiting
@@ -54,7 +56,7 @@ class LiveReload:
         if self._newest.plan is None or self._newest.robot is None:
             return
         try:
-            proposal = Proposal.of(self._newest.plan, self._newest.robot)
+            proposal = Proposal.of(self._newest.plan, self._newest.robot, self._layers)
             is_impossible = bool(proposal.found.impossible)
             self._is_pending = bool(proposal.why_not) and not is_impossible
             if proposal.is_empty:

@@ -11,6 +11,7 @@ from rbxcompose.model.robot import Robot
 from rbxcompose.plan.dump import dump
 from rbxcompose.plan.model import Plan
 from rbxcompose.runtime.folder import RobotFolder
+from rbxcompose.runtime.options import ChosenLayers
 from rbxcompose.runtime.plan_requests import ApplyPlan, ComparePlan, PlanComparison
 from rbxcompose.runtime.supervision.changes import Fate
 from rbxcompose.runtime.supervision.plan_change import LONGEST
@@ -27,19 +28,20 @@ class Proposal:
     folder: RobotFolder
     plan: str
     found: PlanComparison
+    layers: ChosenLayers
     data: dict[str, Any]
     """What was found, with places in the robot's files, for programs."""
 
     @classmethod
-    def of(cls, plan: Plan, robot: Robot) -> Proposal:
-        """Ask the running robot of this name what the plan would change.
+    def of(cls, plan: Plan, robot: Robot, layers: ChosenLayers) -> Proposal:
+        """Ask the running robot of this name what the plan, compiled with these layers, would change.
 
         Raises:
             NotDoneError: if none is up, or it does not answer.
         """
         folder, text = find_robot(plan.robot), dump(plan, reveals_secrets=True)  # the socket is this user's alone
         found = answer_of(folder, ComparePlan(text), timeout=_COMPARE)
-        return cls(folder, text, found, with_places(to_data(found), robot))
+        return cls(folder, text, found, layers, with_places(to_data(found), robot))
 
     @property
     def is_empty(self) -> bool:
@@ -61,4 +63,4 @@ class Proposal:
         Raises:
             NotDoneError: if the robot refuses, applies them only in part, or does not answer.
         """
-        return answer_of(self.folder, ApplyPlan(self.plan, self.found.generation), timeout=_APPLY)
+        return answer_of(self.folder, ApplyPlan(self.plan, self.found.generation, self.layers), timeout=_APPLY)

@@ -136,7 +136,16 @@ class Engine(EngineBase):
     def _finish(self, status: int) -> None:
         self.status = status
         message = self._why() if status == FAILURE else self.main.message
-        self.say(MissionEnded(NAMES[status], message, self.outcome or NAMES[status]))
+        doubt = self._doubt() if status == SUCCESS else ""
+        self.say(MissionEnded(NAMES[status], message, self.outcome or NAMES[status], doubt))
+
+    def _doubt(self) -> str:
+        """Return that all steps which may fail have failed; empty if one succeeded each time it could."""
+        failed = [task.only_failed() for task in self.tasks]
+        if False in failed or True not in failed:
+            return ""
+        count = failed.count(True)
+        return f"all {count} optional steps failed" if count > 1 else "its only optional step failed"
 
     def _why(self) -> str:
         """Return the path of the node that made the mission fail and its reason; empty if the outcome says it all."""

@@ -115,18 +115,22 @@ class Reported:
 
 @dataclass(frozen=True, slots=True)
 class MissionEnded:
-    """The mission ended in `success` or `failure`, or was `halted` from outside; `outcome` may be an end's name."""
+    """The mission ended in `success` or `failure`, or was `halted` from outside; `outcome` may be an end's name.
+
+    `doubt` is what a success would hide.
+    """
 
     result: str
     message: str = ""
     outcome: str = ""
+    doubt: str = ""
 
     @property
     def words(self) -> str:
-        """Return its end's own name, if it has one, and why it ended; empty if there is nothing to say."""
+        """Return its end's own name, if it has one, why it ended, and what to doubt; empty if nothing is to be said."""
         is_told = self.outcome in ("", self.result) or self.message.endswith(self.outcome)
         own = "" if is_told else f"ended in {self.outcome}"
-        return ": ".join(text for text in (own, self.message) if text)
+        return ": ".join(text for text in (own, self.message, self.doubt) if text)
 
 
 MissionEvent = (

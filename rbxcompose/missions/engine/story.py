@@ -72,7 +72,8 @@ class MissionStory:
                 return Level.WARN, f"{path}: {message}"
             case MissionEnded(result=result):
                 text = f"mission {self._mission}: {result}"
-                return Level.ERROR if result == "failure" else Level.OK, _with(text, event.words)
+                otherwise = Level.WARN if event.doubt else Level.OK
+                return Level.ERROR if result == "failure" else otherwise, _with(text, event.words)
         assert_never(event)
 
     def skills(self) -> str:

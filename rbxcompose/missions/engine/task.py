@@ -115,6 +115,10 @@ class Task(ABC):
     def restored(self) -> None:  # noqa: B027 - most kinds have nothing to do
         """Recompute what follows from the state, after it was restored."""
 
+    def only_failed(self) -> bool | None:
+        """Return whether it is a step that may fail and failed each time; None if that means nothing here."""
+        return None
+
     def result(self) -> Value:
         """Return what `save` keeps of this node."""
         return None

@@ -52,7 +52,30 @@ class Turning(Modifier):
         return cls(reader.flag(key))
 
 
-@modifier("optional", TurningTask)
+class OptionalTask(TurningTask):
+    """Keeps in mind whether its node failed, and whether it ever succeeded."""
+
+    __slots__ = ("failed", "succeeded")
+    saved = told = ("failed", "succeeded")
+
+    def __init__(self, site: Site, options: Optional, inner: Task) -> None:
+        super().__init__(site, options, inner)
+        self.failed = self.succeeded = False
+
+    def advance(self, child: Task) -> int:
+        """Start the child or continue with it, and keep in mind how it ended."""
+        status = super().advance(child)
+        if self.turned:
+            self.failed |= status == FAILURE
+            self.succeeded |= status == SUCCESS
+        return status
+
+    def only_failed(self) -> bool | None:
+        """Return whether its node failed each time; None if it has not ended yet, or is not optional."""
+        return not self.succeeded if self.failed or self.succeeded else None
+
+
+@modifier("optional", OptionalTask)
 class Optional(Turning):
     """Count a failure as success.
 

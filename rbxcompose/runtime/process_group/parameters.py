@@ -60,7 +60,7 @@ class _Served:
 
     @property
     def _settings(self) -> dict[str, core.ParameterField]:
-        return core.settings(self._hosted.config)
+        return core.settings(self._hosted.config, self._hosted.instance.bounds)
 
     def list(self, request: rcl.ListParameters.Request) -> rcl.ListParameters.Response:
         found = core.listed(self._settings, request.prefixes, request.depth)
@@ -88,7 +88,7 @@ class _Served:
 
     def _set(self, parameters: Sequence[rcl.Parameter]) -> rcl.SetParametersResult:
         try:
-            self.follow(core.changed(self._hosted.config, parameters))
+            self.follow(core.changed(self._hosted.config, parameters, self._hosted.instance.bounds))
         except (core.UnsettableError, Refused) as refusal:
             return rcl.SetParametersResult(successful=False, reason=str(refusal))
         return rcl.SetParametersResult(successful=True)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping
 from enum import StrEnum
 
-from rbxcompose.config import HIDDEN, Config, Live, Secret
+from rbxcompose.config import HIDDEN, Config, Secret, is_live
 from rbxcompose.dataclass import dataclass
-from rbxcompose.plan.diff import WHOLE, Change, difference
+from rbxcompose.plan.diff import BOUNDS, WHOLE, Change, difference
 from rbxcompose.plan.model import Instance, Plan
 from rbxcompose.runtime.supervision.dependents import is_commanding
 
@@ -123,10 +123,12 @@ def _fated(before: Instance | None, after: Instance, reasons: tuple[Change, ...]
 
 def _is_live(one: Instance, key: str) -> bool:
     head = key.partition(".")[0]
+    if key.startswith(BOUNDS):
+        return True
     if head in _OPTIONS:
         return head in _TAKEN_OVER
     field = type(one.config).model_fields.get(head)
-    return field is not None and any(isinstance(mark, Live) for mark in field.metadata)
+    return field is not None and is_live(field)
 
 
 def _secrets(value: object, path: str) -> Iterator[tuple[str, Secret]]:

@@ -45,7 +45,7 @@ class Conductor:
         self.states: dict[str, tuple[str, int]] = {one.name: ("unconfigured", 0) for one in plan.instances}
         self.is_real_time = not options.is_stepped and not plan.follows_clock
         self.blocked: dict[str, str] = {}  # blocked component -> failed component
-        self.plan = plan
+        self.plan, self.layers = plan, options.layers
         self.generation = 0  # of the plan: how often it was changed
         self._changing: Changing | None = None
         self._repeated: dict[str, list[dict[str, Any]]] = {}  # requests that components get again after a restart
@@ -53,7 +53,7 @@ class Conductor:
         self._scheduler, self._effects = scheduler, effects
         names = [*([router] if router else []), *plan.groups]
         self.members = {name: Member(name) for name in names}
-        self.latch = StopLatch(effects, lambda: [self.members[group] for group in self.plan.groups])
+        self.latch = StopLatch(effects, self._holding, lambda: scheduler.now if self.is_real_time else self.time)
         self._is_running = False  # everything has been active
         self._silence = Silence(effects, self._tell_lost, scheduler.now)
         self._closing: Closing | None = None  # set once the robot goes down
@@ -150,7 +150,7 @@ class Conductor:
                 self.go_down(FINE, "the time is up")
             case say.StoppedByBus() if not self.is_stopped:
                 self._effects.log(Level.WARN, "stop over the bus: everything that moves is held until 'release'")
-                self.stop()
+                self.stop("the command 'stop', over the bus")
             case RobotHeld():
                 self.latch.heard(member, message)
             case say.AtRest():
@@ -199,8 +199,7 @@ class Conductor:
     def exited(self, name: str, how: str, detail: str = "") -> None:
         """Handle the end of a process: `how` it ended in words, and what it printed."""
         member = self.members[name]
-        member.is_there = member.is_configured = False
-        member.moves, member.runs = (), {}
+        how = member.exited(how)
         if self._closing:
             self._closing.exited()
             return
@@ -260,9 +259,9 @@ class Conductor:
         self._look_who_is_blocked()
         commanding = [one.name for one in self.plan.instances if one.name in new and is_commanding(one)]
         if commanding and not self.is_stopped and self.phase is Phase.RUNNING:
-            text = f"'{commanding[0]}' failed on the path of commands: all motion is held until 'release'"
-            self._effects.log(Level.ERROR, text)
-            self.stop()
+            text = f"'{commanding[0]}' failed on the path of commands"
+            self._effects.log(Level.ERROR, f"{text}: all motion is held until 'release'")
+            self.stop(text)
 
     def _look_who_is_blocked(self) -> None:
         before, failed = self.blocked, {name for name, (state, _) in self.states.items() if state == "failed"}
@@ -310,18 +309,22 @@ class Conductor:
 
     # What people want
 
-    def stop(self) -> None:
-        """Hold everything that moves until `release`."""
-        self.latch.set(True)
+    def stop(self, by: str) -> None:
+        """Hold everything that moves until `release`; `by` tells people who wants it."""
+        self.latch.set(by)
 
     def release(self) -> None:
         """Allow motion again."""
-        self.latch.set(False)
+        self.latch.release()
+
+    def _holding(self) -> list[Member]:
+        """Return the processes that hold components."""
+        return [self.members[group] for group in self.plan.groups]
 
     def _to_configured(self, message: say.ChannelOrder) -> None:
-        for group in self.plan.groups:
-            if self.members[group].is_configured:
-                self._effects.send(group, message)
+        for member in self._holding():
+            if member.is_configured:
+                self._effects.send(member.name, message)
 
     # Another plan
 

@@ -11,6 +11,7 @@ from rbxcompose.dataclass import dataclass
 from rbxcompose.levels import Level
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.faults import RestartPolicy
+from rbxcompose.runtime.processes import KILLED
 
 
 class ConductorEffects(Protocol):
@@ -81,15 +82,22 @@ class Member:
     is_stopped: bool = False  # as last sent to it
     is_given_up: bool = False  # it is gone, and nothing in it is ever restarted
     last_word: float = 0.0  # [s]
+    killed_for: str = ""  # why it was killed, in words that follow its name
     restarts: int = 0
     moves: Sequence[str] = ()  # what moves the robot or is about to move it, in words
     runs: dict[str, str] = field(default_factory=dict)  # components whose work a restart would cut off -> that work
     requested: set[str] = field(default_factory=set)  # components that were ordered to become active
     policy: RestartPolicy = field(default_factory=RestartPolicy)
 
+    def exited(self, how: str) -> str:
+        """Note its end; return how it ended in words, with the reason if it was killed for one."""
+        self.is_there = self.is_configured = False
+        self.moves, self.runs = (), {}
+        return self.killed_for if self.killed_for and how == KILLED else how
+
     def forked(self, now: float) -> None:
         """Reset the state for a newly forked process."""
         self.is_there, self.last_word = True, now
         self.is_configured = self.is_started = self.is_at_rest = self.is_told_lost = False
-        self.moves, self.runs = (), {}
+        self.moves, self.runs, self.killed_for = (), {}, ""
         self.requested.clear()

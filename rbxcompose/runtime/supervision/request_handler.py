@@ -96,7 +96,7 @@ class RequestHandler:
 
     def _stop(self) -> str:
         self._tell("stop: all motion is held until 'release'")
-        self._supervisor.conductor.stop()
+        self._supervisor.conductor.stop("the command 'stop'")
         return "stopped; 'release' allows motion again"
 
     def _release(self) -> str:
@@ -155,7 +155,13 @@ class RequestHandler:
             raise Refused("it was changed by someone else meanwhile: look at the difference again")
         if why_not := conductor.why_not(found):
             raise Refused(why_not)
-        conductor.change(found, lambda text, is_refused: self._applied(number, text, is_refused=is_refused))
+
+        def applied(text: str, is_refused: bool) -> None:
+            if not is_refused:
+                conductor.layers = request.layers
+            self._applied(number, text, is_refused=is_refused)
+
+        conductor.change(found, applied)
 
     def _changes(self, plan: str) -> Changes:
         conductor = self._supervisor.conductor

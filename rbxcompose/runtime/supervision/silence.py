@@ -9,6 +9,7 @@ from rbxcompose.runtime.supervision.members import ConductorEffects, Member
 SILENT = 1.0  # [s] without a sign of life after which the others are informed
 DEAD = 2.0  # [s] without a sign of life after which a process is killed
 LOOK = 0.25  # [s] between checks for signs of life
+_STATE = {True: "suspended by a signal", False: "silent"}
 
 
 class Silence:
@@ -30,6 +31,7 @@ class Silence:
             self._tell_lost(member, "does not answer")
         if silence > DEAD:
             member.is_configured, member.last_word = False, now  # one kill is enough
+            member.killed_for = f"was {_STATE[is_suspended]} for {DEAD:g} s and was killed"
             self._effects.kill(member.name)
 
     def held_up(self, now: float) -> float:

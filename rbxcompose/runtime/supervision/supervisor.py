@@ -32,6 +32,7 @@ from rbxcompose.runtime.supervision.prefork import ROUTER, Exited, Fork, Forked,
 from rbxcompose.runtime.supervision.request_handler import RequestHandler
 from rbxcompose.runtime.supervision.shutdown import rest_time
 from rbxcompose.runtime.supervision.silence import DEAD, LOOK
+from rbxcompose.runtime.supervision.teleoperation import teleoperated
 from rbxcompose.scheduler import Scheduler
 from rbxcompose.sdk.capabilities import RunsMissions
 from rbxcompose.sdk.registry import declared
@@ -337,6 +338,9 @@ class Supervisor:
             domain=self._launch.plan.bus.domain,
             batteries=gauges_of(plan),
             executive=_executive(plan),
+            teleoperated=teleoperated(plan),
+            layers=self.conductor.layers,
+            stop=self.conductor.latch.state,
             rest_time=rest_time(plan),
         )
 

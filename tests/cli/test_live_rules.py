@@ -1,0 +1,89 @@
+"""Rules across components, for the values that they have while they run."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from rbxcompose.cli.robots.live_rules import broken_rules
+from rbxcompose.config import Bound, Config
+from rbxcompose.model.robot import Robot
+from rbxcompose.msgs.rcl_interfaces import Parameter
+from rbxcompose.params.core import changed
+from rbxcompose.params.values import to_message
+from rbxcompose.plan.diff import difference
+from rbxcompose.plan.dump import dump, load
+from rbxcompose.runtime.supervision.changes import Fate, changes
+from rbxcompose.testing import check_text
+
+ROBOT = """rbx: 1
+kind: Robot
+name: one
+args:
+  speed: {type: speed, default: 0.3 m/s, min: 5 cm/s, max: 0.6 m/s}
+components:
+  base: {type: diff_drive_sim, max_speed: 0.5 m/s}
+  go_to: {type: go_to, speed: "${args.speed}", turn_rate: "60 deg/s"}
+"""
+PART = """rbx: 1
+kind: Part
+name: legs
+args:
+  fast: {type: speed, default: 0.2 m/s, max: 0.55 m/s}
+components:
+  go_to: {type: go_to, speed: "${ args.fast }"}
+"""
+
+
+@pytest.fixture
+def robot(tmp_path: Path) -> Robot:
+    found = check_text(ROBOT, tmp_path).compilation.robot
+    assert found is not None
+    return found
+
+
+def set_to(config: Config, name: str, value: object) -> Config:
+    message = to_message(value)
+    assert message is not None
+    return changed(config, [Parameter(name=name, value=message)])
+
+
+def test_a_value_that_breaks_a_rule_across_components_is_found(robot: Robot) -> None:
+    go_to = robot.components["go_to"].config
+    assert broken_rules(robot, {}, "go_to", set_to(go_to, "speed", "0.4 m/s")) == []
+    (broken,) = broken_rules(robot, {}, "go_to", set_to(go_to, "speed", "0.55 m/s"))
+    assert broken.code == "RBX3503"
+
+
+def test_what_other_components_have_now_counts(robot: Robot) -> None:
+    now = {"base": set_to(robot.components["base"].config, "max_speed", "0.9 m/s")}
+    new = set_to(robot.components["go_to"].config, "speed", "0.55 m/s")
+    assert broken_rules(robot, now, "go_to", new) == []
+
+
+def test_what_was_broken_before_is_not_the_fault_of_a_change(robot: Robot) -> None:
+    go_to = robot.components["go_to"].config
+    now = {"go_to": set_to(go_to, "speed", "0.6 m/s")}
+    assert broken_rules(robot, now, "go_to", set_to(go_to, "speed", "0.55 m/s")) == []
+
+
+def test_the_limits_of_an_argument_are_in_the_plan_and_change_live(tmp_path: Path) -> None:
+    plan = check_text(ROBOT, tmp_path).plan
+    go_to = next(one for one in plan.instances if one.name == "go_to")
+    assert go_to.bounds == {"speed": (Bound(0.05, 0.6, "the argument 'speed' of the robot"),)}
+    assert load(dump(plan)) == plan
+    wider = check_text(ROBOT.replace("max: 0.6", "max: 0.7"), tmp_path).plan
+    (change,) = difference(plan, wider).changed["go_to"]
+    assert str(change) == "limits of speed: at least 0.05 m/s, at most 0.6 m/s -> at least 0.05 m/s, at most 0.7 m/s"
+    assert changes(plan, wider).names(Fate.LIVE) == ["go_to"]
+
+
+def test_the_argument_of_a_part_is_bounded_by_the_one_that_it_is_given(tmp_path: Path) -> None:
+    head, _, _ = ROBOT.partition("  go_to:")
+    text = head + "include:\n  legs: {part: legs.yaml, with: {fast: '${args.speed}'}}\n"
+    plan = check_text(text, tmp_path, others={"legs.yaml": PART}).plan
+    (instance,) = (one for one in plan.instances if one.type == "go_to")
+    assert [one.most for one in instance.bounds["speed"]] == [0.55, 0.6]
+    assert replace(instance.bounds["speed"][0], most=None).by == "the argument 'fast' of the part 'legs'"

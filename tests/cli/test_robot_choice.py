@@ -1,0 +1,91 @@
+"""Which robot a verb means that is not told: the only one of the folder, else the only one that is up."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+
+from rbxcompose.cli import main as command
+from rbxcompose.cli.project.robot_choice import only_path
+from rbxcompose.cli.robots.lookup import NotDoneError
+from rbxcompose.runtime.folder import RobotFolder, RobotState
+from rbxcompose.runtime.processes import Process, boot_id
+
+ROBOT = "rbx: 1\nkind: Robot\nname: one\ncomponents:\n  base: {type: diff_drive_sim}\n"
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "run"))
+    (tmp_path / "run").mkdir(mode=0o700)
+    project = tmp_path / "project"
+    project.mkdir()
+    monkeypatch.chdir(project)
+    return project
+
+
+def add_robot(path: Path) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(ROBOT, encoding="utf-8")
+
+
+def start(name: str, file: Path) -> None:
+    """Write down a robot that is up."""
+    robot = RobotFolder.of(name)
+    robot.make()
+    gone = Process(os.getpid(), 1)
+    robot.write_state(RobotState(name, str(file), gone, {}, (), boot=boot_id()))
+
+
+@pytest.mark.parametrize("file", ["robot.yaml", "robots/one/robot.yaml", "one/robot.yaml", "one.yaml"])
+def test_the_only_robot_of_the_folder_is_meant(file: str, folder: Path) -> None:
+    add_robot(folder / file)
+    start("other", folder / "elsewhere.yaml")
+    assert only_path(may_run=True) == file
+
+
+def test_the_robot_of_the_folder_itself_comes_before_those_below_it(folder: Path) -> None:
+    add_robot(folder / "robot.yaml")
+    add_robot(folder / "old/robot.yaml")
+    assert only_path(may_run=False) == "robot.yaml"
+
+
+def test_of_a_folder_without_robots_the_only_one_that_is_up_is_meant_but_not_to_start_it(folder: Path) -> None:
+    start("one", folder / "far/robot.yaml")
+    assert only_path(may_run=True) == str(folder / "far/robot.yaml")
+    with pytest.raises(NotDoneError, match="no robot is named, and this folder has no robot"):
+        only_path(may_run=False)
+    start("two", folder / "two/robot.yaml")
+    with pytest.raises(NotDoneError):
+        only_path(may_run=True)
+
+
+def test_several_robots_are_named(folder: Path) -> None:
+    for name in ("a", "b"):
+        add_robot(folder / f"robots/{name}/robot.yaml")
+    with pytest.raises(NotDoneError, match=r"several robots: robots/a/robot\.yaml, robots/b/robot\.yaml"):
+        only_path(may_run=False)
+
+
+@pytest.mark.parametrize(
+    "words", ["up", "plan", "expand", "graph", "apply", "why base.max_speed", "mission skills", "body show"]
+)
+def test_a_verb_without_a_robot_is_refused_with_what_it_needs(words: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert command.main(words.split()) == 1
+    assert "error[RBX9031]: no robot is named" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("words", ["plan --json", "expand --json", "why base.max_speed --json", "mission skills"])
+def test_verbs_take_the_only_robot(words: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    add_robot(folder / "robot.yaml")
+    assert command.main(words.split()) == 0
+    assert "--json" not in words or json.loads(capsys.readouterr().out)
+
+
+def test_up_takes_the_only_robot_of_the_folder(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    add_robot(folder / "robot.yaml")
+    assert command.main(["up", "--rate", "max", "--for", "1s"]) == 0
+    assert "one is up" in capsys.readouterr().out
