@@ -19,7 +19,7 @@ from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Related, Report, Severity, Span, kind
 from rbxcompose.manifest.limits import LEAST_STEPS, PROFILE_STEPS, STEP_BYTES, STEP_VALUES
 from rbxcompose.manifest.reader import ParsedText, Texts
-from rbxcompose.model.build import build_robot
+from rbxcompose.model.build import build_robot, with_missions
 from rbxcompose.model.robot import Robot
 from rbxcompose.per_compile import one_compile
 from rbxcompose.plan.build import build_plan
@@ -104,6 +104,32 @@ def compile_robot(
     if out.robot is not None and not out.report.has_errors:
         out.plan = build_plan(out.robot)
     return out
+
+
+def robot_for_mission(out: Compilation, name: str) -> tuple[Robot, Plan] | None:
+    """Return a robot and its plan for one mission; None if anything but its other missions has errors."""
+    if out.robot is None or out.plan is not None:
+        return (out.robot, out.plan) if out.robot is not None and out.plan is not None else None
+    robot, wanted = out.robot, _with_used(out.robot, name)
+    others = {entry.path for other, entry in robot.manifest.missions.items() if other not in wanted}
+    others -= {robot.manifest.missions[one].path for one in wanted if one in robot.manifest.missions}
+    errors = (one.span for one in out.report if one.severity is Severity.ERROR)
+    if not wanted <= robot.missions.keys() or any(
+        one is None or Path(one.file).resolve() not in others for one in errors
+    ):
+        return None
+    left = with_missions(robot, wanted)
+    return left, build_plan(left)
+
+
+def _with_used(robot: Robot, name: str) -> set[str]:
+    """Return a mission and those that it uses."""
+    found, waiting = set[str](), [name]
+    while waiting:
+        found.add(one := waiting.pop())
+        nodes = robot.missions[one].program.nodes if one in robot.missions else ()
+        waiting += [node.step.uses.text for node in nodes if node.step.uses and node.step.uses.text not in found]
+    return found
 
 
 def check_settings(robot: Robot, configs: Mapping[str, Config]) -> Report:

@@ -7,7 +7,7 @@ from dataclasses import field, replace
 from pathlib import Path
 from typing import Any
 
-from rbxcompose.compiler import Compilation, compile_robot
+from rbxcompose.compiler import Compilation, compile_robot, robot_for_mission
 from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Report
 from rbxcompose.manifest.documents import Documents
@@ -74,10 +74,10 @@ class TrialReader:
         if root is None:
             return None
         Documents(report, self.sources).check(TrialFile, _without_values(root))
-        compilation = self._robot(root, written.path, report)
-        if compilation is None or compilation.robot is None or compilation.plan is None:
+        found = self._robot(root, written.path, report)
+        if found is None:
             return None
-        trial = _read(root, compilation.robot, compilation.plan, report)
+        trial = _read(root, *found, report)
         return None if report.has_errors else trial
 
     def summed_up(self, findings: Iterable[Finding]) -> Iterator[Finding]:
@@ -92,8 +92,8 @@ class TrialReader:
             which = "the test" if len(ones) == 1 else f"{len(ones)} tests"
             yield replace(ones[0], message=_no_robot(robot, which))
 
-    def _robot(self, root: MappingNode, path: Path, report: Report) -> Compilation | None:
-        """Return the compilation of the robot; None if its file cannot be found."""
+    def _robot(self, root: MappingNode, path: Path, report: Report) -> tuple[Robot, Plan] | None:
+        """Return the robot and its plan; None if it cannot be found, or has errors outside of its other missions."""
         written = _text(root, "robot", "the robot's file", report)
         if written is None:
             return None
@@ -107,8 +107,9 @@ class TrialReader:
             self._robots[name] = compile_robot(shown, environment=self.environment)
             self.report.extend(self._robots[name].report)
             self.sources.update(self._robots[name].sources)
-        found = self._robots[name]
-        if found.plan is None:
+        mission = root.get("mission")
+        found = robot_for_mission(self._robots[name], mission.text if isinstance(mission, ScalarNode) else "")
+        if found is None:
             why = codes.NEVER.at(written.span, _no_robot(shown, "the test"), help="see the findings of the robot")
             self._kept_back[why] = shown
             report.add(why)

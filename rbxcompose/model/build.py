@@ -6,7 +6,7 @@ Parts that do not fit together are left out here; the checks report them.
 from __future__ import annotations
 
 from bisect import bisect_left, insort
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import field, replace
 
 from rbxcompose.composition.robot_manifest import RobotManifest
@@ -49,6 +49,14 @@ def build_robot(
     if manifest.missions:
         components[MISSION] = mission_component(robot)
     return robot
+
+
+def with_missions(robot: Robot, names: Collection[str]) -> Robot:
+    """Return a robot that has no missions but these."""
+    missions = {name: one for name, one in robot.missions.items() if name in names}
+    left = replace(robot, missions=missions, unread=frozenset())
+    runs = {MISSION: mission_component(left)} if MISSION in robot.components else {}
+    return replace(left, components={**robot.components, **runs})
 
 
 def written_components(manifest: RobotManifest) -> dict[str, RobotComponent]:

@@ -88,6 +88,28 @@ def test_a_mistake_of_a_robot_is_told_once_for_all_of_its_tests(
     assert [len(one["problems"]) for one in tests] == [1, 1, 1]  # each test has its own reason
 
 
+def test_a_mission_with_a_mistake_keeps_only_its_own_tests_from_running(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    texts = {
+        "robot": "kind: Robot\nname: two\nmissions: {good: good.yaml, bad: bad.yaml, both: both.yaml}\nstart: bad\n",
+        "good": "kind: Mission\nname: good\ndo: {wait: 1 s}\n",
+        "bad": "kind: Mission\nname: bad\ndo: {wiat: 1 s}\n",
+        "both": "kind: Mission\nname: both\ndo: [{use: good}, {use: bad}]\n",
+    }
+    for name in ("good", "bad", "both"):
+        texts[f"{name}.test"] = (
+            f"kind: Test\nname: of_{name}\nrobot: robot.yaml\nmission: {name}\nexpect: {{outcome: success}}\n"
+        )
+    for name, text in texts.items():
+        (tmp_path / f"{name}.yaml").write_text(f"rbx: 1\n{text}")
+    assert command(["test", str(tmp_path), "--json"]) == 1
+    captured = capsys.readouterr()
+    passed = {one["file"].rpartition("/")[2]: one["passed"] for one in json.loads(captured.out)["tests"]}
+    assert passed == {"good.test.yaml": True, "bad.test.yaml": False, "both.test.yaml": False}
+    assert "wiat" in captured.err
+
+
 def test_traces_coverage_and_junit(repository: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "out.xml"
     assert command(["test", PATROL, "-v", "--coverage", "--junit", str(file)]) == 0
