@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -13,6 +15,7 @@ from rbxcompose.cli.project.robot_choice import only_path
 from rbxcompose.cli.robots.lookup import NotDoneError
 from rbxcompose.runtime.folder import RobotFolder, RobotState
 from rbxcompose.runtime.processes import Process, boot_id
+from tests.conftest import ROOT
 
 ROBOT = "rbx: 1\nkind: Robot\nname: one\ncomponents:\n  base: {type: diff_drive_sim}\n"
 
@@ -85,7 +88,9 @@ def test_verbs_take_the_only_robot(words: str, folder: Path, capsys: pytest.Capt
     assert "--json" not in words or json.loads(capsys.readouterr().out)
 
 
-def test_up_takes_the_only_robot_of_the_folder(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_up_takes_the_only_robot_of_the_folder(folder: Path) -> None:
     add_robot(folder / "robot.yaml")
-    assert command.main(["up", "--rate", "max", "--for", "1s"]) == 0
-    assert "one is up" in capsys.readouterr().out
+    words = [sys.executable, "-m", "rbxcompose", "up", "--rate", "max", "--for", "1s"]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True, timeout=30.0)
+    assert (done.returncode, "one is up" in done.stdout) == (0, True), done.stderr
