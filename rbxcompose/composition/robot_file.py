@@ -74,7 +74,7 @@ def _manifest(
     names = names_of(_name(composed.root), sim, environment, Secrets(project_of(file), environment))
     filled = fill_scopes(composed, names)
     read_so_far = len(documents.report.findings)
-    is_whole = composed.parts.is_complete and not _has_a_section_twice(documents.report)
+    is_whole = composed.parts.is_complete and not _has_a_section_twice(documents.report, composed.root)
     manifest = read_sections(filled.root, file, sim, documents, is_whole=is_whole)
     if not is_whole:
         _drop_what_may_be_there(documents.report, filled.root, filled.include, read_so_far)
@@ -89,9 +89,11 @@ def _manifest(
     )
 
 
-def _has_a_section_twice(report: Report) -> bool:
-    """Return whether a file has a section twice, so that what stands in the second one is not read."""
-    return any(one.code == TWICE.code and one.span is not None and one.span.column == 1 for one in report.findings)
+def _has_a_section_twice(report: Report, root: MappingNode) -> bool:
+    """Return whether a file has a section with names twice, so that what stands in the second one is not read."""
+    words = {entry.key.span for entry in root.entries.values() if isinstance(entry.value, ScalarNode)}
+    twice = (one for one in report.findings if one.code == TWICE.code and one.span is not None and one.span.column == 1)
+    return any(words.isdisjoint(other.span for other in one.related) for one in twice)
 
 
 def _drop_what_may_be_there(report: Report, root: MappingNode, given: MappingNode, start: int) -> None:
