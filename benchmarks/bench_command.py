@@ -35,5 +35,6 @@ def rows() -> list[Row]:
             p99=checked.p99 * 1e3,
             peer=bare.median * 1e3,
             against="python -c pass",
+            most_ratio=20,
         ),
     ]
