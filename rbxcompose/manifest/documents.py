@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from rbxcompose.dataclass import dataclass
-from rbxcompose.findings import Finding, Related, Report, Span, kind
+from rbxcompose.findings import DID_YOU_MEAN, Finding, Related, Report, Span, kind, replacement
 from rbxcompose.manifest.files import shown_name
+from rbxcompose.manifest.foreign_words import FOREIGN
 from rbxcompose.manifest.header import ManifestHeader
 from rbxcompose.manifest.meant_keys import meant_keys, with_keys
 from rbxcompose.manifest.reader import Texts, read_file
@@ -74,9 +75,13 @@ class Documents:
     def meant(self, model: type[ManifestHeader], root: MappingNode) -> MappingNode:
         """Return a file with its misspelt keys corrected, after a finding for each."""
         meant = meant_keys(root, model.model_fields)
-        for name in meant:
+        for name, ours in meant.items():
             span, message = root.entries[name].key.span, f"unknown key '{plain(name, 60)}' in {where(())}"
-            self.report.add(UNKNOWN_KEY.misspelt(span, message, name, model.model_fields, KEYS, taken=root.entries))
+            if name in FOREIGN:  # a word of another tool, not one that is spelt like ours
+                fix = replacement(span, name, ours, is_safe=False)  # what stands below may have another form
+                self.report.add(UNKNOWN_KEY.at(span, message, help=f"{DID_YOU_MEAN} '{ours}'?", fix=fix))
+            else:
+                self.report.add(UNKNOWN_KEY.misspelt(span, message, name, model.model_fields, KEYS, taken=root.entries))
         return with_keys(root, meant)
 
     def check(self, model: type[ManifestHeader], root: MappingNode) -> None:

@@ -1,4 +1,4 @@
-"""Misspelt keys at the top of a file: what stands below one is read as it was meant."""
+"""Misspelt keys at the top of a file, or those of other tools: what stands below one is read as it was meant."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 from rbxcompose.findings import surely_meant
+from rbxcompose.manifest.foreign_words import FOREIGN
 from rbxcompose.manifest.tree import MappingNode
 
 
@@ -13,7 +14,7 @@ def meant_keys(root: MappingNode, keys: Collection[str]) -> dict[str, str]:
     """Return the misspelt keys of a map, each with the one of `keys` that it was surely meant to be."""
     found: dict[str, str] = {}
     for name in root.entries.keys() - {*keys}:
-        meant = surely_meant(name, keys)
+        meant = FOREIGN[name] if FOREIGN.get(name) in keys else surely_meant(name, keys)
         if meant is not None and meant not in root and meant not in found.values():
             found[name] = meant
     return found

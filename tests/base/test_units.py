@@ -270,3 +270,10 @@ def test_the_quotient_of_like_things_is_compared_with_ratios_and_with_numbers() 
 def test_a_frequency_is_no_angular_speed_and_bytes_are_no_bits() -> None:
     assert not units.FREQUENCY.is_comparable(units.ANGULAR_SPEED)
     assert not (units.DATA / units.TIME).is_comparable(units.BIT_RATE)
+
+
+@pytest.mark.parametrize(("written", "cure"), [("45 m", "if these are minutes, write '45 min'"), ("45 cm", "")])
+def test_metres_for_a_time_may_be_minutes(written: str, cure: str) -> None:
+    with pytest.raises(UnitError) as refused:
+        to_si(written, units.TIME)
+    assert refused.value.help == cure

@@ -2,27 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 from rbxcompose.findings import DID_YOU_MEAN, replacement
+from rbxcompose.manifest.foreign_words import FOREIGN
 from rbxcompose.manifest.slips import RefusedValue, value_slip
 from rbxcompose.manifest.tree import Entry, MappingNode, TreeNode
 from rbxcompose.slips import Repair
-
-_OURS = {
-    "starts_after": "depends_on requires",
-    "connect": "remap remapping remappings",
-    "restart": "respawn restart_policy",
-    "log": "log_level loglevel",
-    "speed": "velocity vel",
-    "max_speed": "max_velocity max_vel",
-    "max_turn_rate": "max_angular_velocity max_rotation_speed",
-    "turn_rate": "angular_velocity rotation_speed",
-    "heading": "yaw theta",
-    "colour": "color",
-}
-FOREIGN: Mapping[str, str] = {name: ours for ours, names in _OURS.items() for name in names.split()}
 
 
 @value_slip("extra_forbidden")
