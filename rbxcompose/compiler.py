@@ -111,12 +111,11 @@ def robot_for_mission(out: Compilation, name: str) -> tuple[Robot, Plan] | None:
     if out.robot is None or out.plan is not None:
         return (out.robot, out.plan) if out.robot is not None and out.plan is not None else None
     robot, wanted = out.robot, _with_used(out.robot, name)
-    others = {entry.path for other, entry in robot.manifest.missions.items() if other not in wanted}
-    others -= {robot.manifest.missions[one].path for one in wanted if one in robot.manifest.missions}
-    errors = (one.span for one in out.report if one.severity is Severity.ERROR)
-    if not wanted <= robot.missions.keys() or any(
-        one is None or Path(one.file).resolve() not in others for one in errors
-    ):
+    files = {name: entry.path for name, entry in robot.manifest.missions.items()}
+    others = {*files.values()} - {files[name] for name in wanted & files.keys()}
+    errors = [one.span for one in out.report if one.severity is Severity.ERROR]
+    is_elsewhere = all(span is not None and Path(span.file).resolve() in others for span in errors)
+    if not is_elsewhere or not wanted <= robot.missions.keys():
         return None
     left = with_missions(robot, wanted)
     return left, build_plan(left)

@@ -172,7 +172,13 @@ class _Declared:
             self._entity.undeclare()
 
 
-class _Publisher(_Declared):
+class _Sender(_Declared):
+    def _put(self, payload: bytes, attachment: bytes) -> None:
+        if self in self._declared:
+            self._entity.put(payload, attachment=attachment)
+
+
+class _Publisher(_Sender):
     def __init__(
         self, declared: dict[_Declared, None], declare: Callable[[], Any], on_own: OnOwn, *, blocks: bool
     ) -> None:
@@ -184,10 +190,6 @@ class _Publisher(_Declared):
         if self._blocks or self._entity is None:
             self._on_own(partial(self._put, payload, attachment))
         else:
-            self._entity.put(payload, attachment=attachment)
-
-    def _put(self, payload: bytes, attachment: bytes) -> None:
-        if self in self._declared:
             self._entity.put(payload, attachment=attachment)
 
     def _declare(self, declare: Callable[[], Any]) -> None:
@@ -205,11 +207,11 @@ class _Publisher(_Declared):
         self.has_match = status.matching
 
 
-class _LatchedPublisher(_Declared):
+class _LatchedPublisher(_Sender):
     has_match = True  # if nobody now, then somebody later
 
     def put(self, payload: bytes, attachment: bytes) -> None:
-        self._on_own(lambda: self._entity.put(payload, attachment=attachment))
+        self._on_own(partial(self._put, payload, attachment))
 
 
 class _Arrival:

@@ -39,7 +39,7 @@ from rbxcompose.missions.engine.logbook import INPUTS, LogRecord
 from rbxcompose.missions.engine.world import World
 from rbxcompose.missions.program.program import Program, RobotNames
 from rbxcompose.missions.program.results import Result
-from rbxcompose.missions.program.sources import SkillSource, TopicSource, ValueSource
+from rbxcompose.missions.program.sources import SkillSource, TopicSource, ValueSource, events_of
 from rbxcompose.missions.program.statuses import IDLE
 from rbxcompose.msgs.std_msgs import String
 from rbxcompose.robot_events import MissionOver, MissionWaits
@@ -106,7 +106,7 @@ class MissionConfig(Config):
             {name: program for name, program in self.programs.items() if name not in broken},
             {name: topic.message for name, topic in self.topics.items()},
             self.services,
-            events=frozenset(name for name, source in self.values.items() if source.is_event),
+            events=events_of(self.values),
         )
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from rbxcompose.composition.argument_bounds import ScopedBounds, bounds_of, own_bounds
 from rbxcompose.composition.history import ROBOT_LAYER, History
 from rbxcompose.composition.includes import PartInstance
 from rbxcompose.composition.layers import Composed, only
+from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.types import UNKNOWN
 from rbxcompose.findings import Related, Report, Span, kind
 from rbxcompose.manifest.arguments import DeclaredArgument

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from rbxcompose.composition.robot_manifest import RobotManifest
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Severity, Span
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.manifest.header import ManifestHeader

@@ -17,7 +17,7 @@ from rbxcompose.manifest.open_names import OpenNames
 from rbxcompose.manifest.registry import naming, sections
 from rbxcompose.manifest.tree import KeyPath, at, key_span, value_span
 from rbxcompose.missions.program.program import Program, RobotNames
-from rbxcompose.missions.program.sources import SkillSource, TopicSource, ValueSource
+from rbxcompose.missions.program.sources import SkillSource, TopicSource, ValueSource, events_of
 from rbxcompose.model.doubts import doubts_of
 from rbxcompose.model.wires import PortEnd
 from rbxcompose.references import COMPONENT, PLACE
@@ -110,7 +110,7 @@ class Robot:
             topics={name: topic.message for name, topic in self.topics.items()},
             services=self.services,
             unread=self.unread,
-            events=frozenset(name for name, source in self.values.items() if source.is_event),
+            events=events_of(self.values),
             is_complete=self.is_complete,
             may_have=self.manifest.contents.may_have,
         )

@@ -233,6 +233,16 @@ def test_what_only_the_own_thread_may_do_waits_for_it_within_a_lent_turn(process
     assert did == [False, False]
 
 
+def test_what_the_own_thread_does_for_a_component_fails_as_its_own(process: Process) -> None:
+    def fail() -> None:
+        raise ValueError("no")
+
+    process.rest()
+    process.bring("a", partial(process.turns.on_own, fail))
+    process.resume()
+    assert process.errors == ["a: no"]
+
+
 def is_awake(inbox: CallbackInbox) -> bool:
     with selectors.SelectSelector() as selector:
         selector.register(inbox, selectors.EVENT_READ)

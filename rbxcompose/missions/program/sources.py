@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from enum import StrEnum
 
 from rbxcompose.dataclass import dataclass
@@ -28,6 +29,11 @@ class ValueSource:
     type: Type = UNKNOWN
     group: str = ""
     is_event: bool = False
+
+
+def events_of(values: Mapping[str, ValueSource]) -> frozenset[str]:
+    """Return the names of the values that are events."""
+    return frozenset(name for name, source in values.items() if source.is_event)
 
 
 class SkillWay(StrEnum):

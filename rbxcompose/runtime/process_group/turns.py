@@ -32,6 +32,7 @@ class Turns:
         self._is_wanted = True  # by the scheduler's thread, which must not be kept waiting by one turn after the other
         self._until = 0.0  # [s] of robot time, when that thread wakes by itself
         self._helper: int | None = None  # the thread that has been lent the turn
+        self._owner = ""  # for whom it runs
         self._slow: dict[str, float] = {}  # owners of slow callbacks, and until when they get no turns [s]
 
     def open(self) -> None:
@@ -73,9 +74,16 @@ class Turns:
     def on_own(self, callback: Callable[[], None]) -> None:
         """Run `callback` at once or, within a lent turn, in the scheduler's thread afterwards."""
         if self._helper == threading.get_ident():
-            self._inbox.put("", callback)
+            # Not in the name of the owner: what it has begun must be done even if it is closed meanwhile.
+            self._inbox.put("", partial(self._do_for, self._owner, callback))
         else:
             callback()
+
+    def _do_for(self, owner: str, callback: Callable[[], None]) -> None:
+        try:
+            callback()
+        except Exception as error:  # the failure of the component alone, as if it had done it itself
+            self._scheduler.on_error(owner, error)
 
     def _take(self, owner: str, callback: Callable[[], None], now: float) -> None:
         self._scheduler.begin(now)
@@ -96,6 +104,7 @@ class Turns:
 
     def _run(self, owner: str, callback: Callable[[], None], began: float) -> float:
         """Run a callback that begins at `began` [s] and return when it has ended [s]."""
+        self._owner = owner
         try:
             self._scheduler.observe(owner, callback)
         except BaseException as error:  # to be handled, or to end the process, where all others are
