@@ -53,7 +53,7 @@ class BatterySim(Component[BatterySimConfig]):
     rate = 1.0
     process = "world"
     simulated = True
-    battery_level = Out(Float32, "battery_level", unit="%")
+    battery_level = Out(Float32, "battery_level", unit="%", rate=rate)
     set_battery_level = Serves(SetBatteryLevel, "set_battery_level")
 
     @classmethod

@@ -64,7 +64,7 @@ class DiffDriveSim(Component[DiffDriveSimConfig]):
     process = "world"
     simulated = True
     cmd_vel = In(geometry.Twist, "cmd_vel", qos="command")
-    odom = Out(Odometry, "odom")
+    odom = Out(Odometry, "odom", rate=rate)
     tf = Out(TFMessage, "/tf")
 
     @classmethod

@@ -62,7 +62,8 @@ class ServoBusDriver(Component[ServoBusConfig]):
     @classmethod
     def ports(cls, config: ServoBusConfig) -> dict[str, Port[Any]]:
         """Return the ports: for each joint, for all, and those of the controllers."""
-        found = super().ports(config) | joint_ports(config)
+        states = Out(JointState, "joint_states", rate=config.rate)
+        found = super().ports(config) | {"joint_states": states} | joint_ports(config)
         for name, setup in config.controllers.items():
             ports = controller_type(setup.type).ports(name, setup.config)
             found |= {f"{name}_{port}": one for port, one in ports.items()}

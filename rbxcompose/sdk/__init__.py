@@ -19,6 +19,7 @@ from rbxcompose.config import (
     Speed,
     Time,
 )
+from rbxcompose.diagnostics.updater import CompositeTask, FrequencyTask, StampTask, TaskStatus, heartbeat
 from rbxcompose.geometry import Pose2
 from rbxcompose.levels import Level
 from rbxcompose.msgs.entries import ArrayEntries
@@ -60,12 +61,14 @@ __all__ = [
     "Command",
     "CommandsMotion",
     "Component",
+    "CompositeTask",
     "Config",
     "Drains",
     "Drives",
     "Ended",
     "Forwards",
     "Frequency",
+    "FrequencyTask",
     "In",
     "JointName",
     "Later",
@@ -102,9 +105,12 @@ __all__ = [
     "ServesTopic",
     "Setting",
     "Speed",
+    "StampTask",
+    "TaskStatus",
     "Time",
     "WritesFrame",
     "answers",
     "component",
+    "heartbeat",
     "skill",
 ]

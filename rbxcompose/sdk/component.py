@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Generic, Protocol, Self, TypeVar, get_args
 
 from rbxcompose.clock import Clock
 from rbxcompose.config import Config
+from rbxcompose.diagnostics.updater import DiagnosticTask
 from rbxcompose.levels import Level
 from rbxcompose.requests import Command, Query, Refused, Request, Requests, answering, requests
 from rbxcompose.robot_events import RobotEvent
@@ -36,6 +37,10 @@ class Context(Protocol):
 
     def status(self, level: Level, message: str, values: Mapping[str, object]) -> None:
         """Report the component's state to diagnostics."""
+        ...
+
+    def watch(self, name: str, task: DiagnosticTask) -> None:
+        """Report how `task` stands to diagnostics, once a second while the component is active."""
         ...
 
     def wake_at(self, time: float) -> None:
@@ -72,6 +77,7 @@ class Component(Generic[C]):
     simulated: ClassVar[bool] = False  # exists only in simulation
     made_by: ClassVar[str] = ""  # says which section creates it, for a type that users do not list themselves
     type_name: ClassVar[str] = ""  # set by the decorator
+    hardware_id: str = ""  # which device it is, such as a serial number, in what it reports to diagnostics
 
     def __init__(self, name: str, config: C, context: Context) -> None:
         self.name = name
@@ -141,6 +147,13 @@ class Component(Generic[C]):
     def status(self, level: Level, message: str, /, **values: object) -> None:
         """Report this component's state to diagnostics."""
         self.context.status(level, message, values)
+
+    def add_diagnostic(self, name: str, task: DiagnosticTask) -> None:
+        """Report `task` as `component: name` to diagnostics, once a second while the component is active.
+
+        `configure` adds what it wants to be reported: a `FrequencyTask(least=10.0).status`, or a function of the time.
+        """
+        self.context.watch(name, task)
 
     def configure(self) -> None:
         """Prepare: import heavy packages, build the core, open devices. Nothing moves yet."""

@@ -61,13 +61,19 @@ class Port(Generic[B]):
 
 
 class Out(Port[Sender[M]]):
-    """Publishes messages: call it with one. `unit` says what a bare number in the message means (`%`)."""
+    """Publishes messages: call it with one. `unit` says what a bare number in the message means (`%`).
+
+    With a `rate` [Hz], diagnostics tell whether it publishes at least that often, and whether the stamps of its
+    messages are of now.
+    """
 
     kind = "out"
 
-    def __init__(self, message: type[M], topic: str, *, qos: Qos | str = Qos.STATE, unit: str = "") -> None:
+    def __init__(
+        self, message: type[M], topic: str, *, qos: Qos | str = Qos.STATE, unit: str = "", rate: float | None = None
+    ) -> None:
         super().__init__(topic)
-        self.interface, self.qos, self.unit = message, Qos(qos), unit
+        self.interface, self.qos, self.unit, self.rate = message, Qos(qos), unit, rate
 
 
 class In(Port[Latest[M]]):

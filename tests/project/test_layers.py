@@ -86,10 +86,11 @@ ABOVE = {
     "recording": "bus.attachment bus.classes bus.names bus.tokens bus.transport bus.witness",
     "rendering": "",
     "replay": "bus plan.model recording runtime.process_group runtime.records sdk",
-    "runtime": "body.transform_errors body.transforms bus missions.program.sources params plan recording sdk",
+    "runtime": "body.transform_errors body.transforms bus diagnostics.updater missions.program.sources params plan "
+    "recording sdk",
     "scaffold": "actuation.bus_load actuation.servo_models actuation.torques composition missions sdk",
     "schema": "controller_interface missions sdk sections",
-    "sdk": "",
+    "sdk": "diagnostics.updater",
     "sections": "actuation.bus_types actuation.control_tables actuation.serial_ports actuation.servo_models "
     "actuation.torques body control.calibration control.limits controller_interface sdk twins.servo_faults",
     "servo_bus_config": "actuation control controller_interface sdk.ports twins.fault_script",

@@ -11,6 +11,7 @@ from functools import partial
 from typing import Any
 
 from rbxcompose.clock import Clock
+from rbxcompose.diagnostics.updater import DiagnosticTask
 from rbxcompose.levels import Level
 from rbxcompose.requests import Command, Query
 from rbxcompose.robot_events import RobotEvent
@@ -169,6 +170,10 @@ class HandedOver:
     def status(self, level: Level, message: str, values: Mapping[str, object]) -> None:
         """Report the component's state to diagnostics."""
         self._worker.send(lambda: self._context.status(level, message, values))
+
+    def watch(self, name: str, task: DiagnosticTask) -> None:
+        """Report how `task` stands to diagnostics, once a second."""
+        self._worker.send(lambda: self._context.watch(name, task))
 
     def wake_at(self, time: float) -> None:
         """Call the component's `wake` at robot time `time` [s]."""

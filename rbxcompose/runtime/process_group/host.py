@@ -79,6 +79,7 @@ class Host:
         self._rosout = Rosout(self.owner, bus, clock)
         self.frames = self._frames(instances)
         self.hosted = {one.name: Hosted(self, one) for one in instances}
+        self.statuses.is_active = self._is_active
         self._policies = {one.name: RestartPolicy(one.restart) for one in instances}
         self._retired: dict[str, Component[Any]] = {}  # those that another one may replace
         self.at_work: str | None = None  # the component that runs in the scheduler's thread
@@ -189,6 +190,9 @@ class Host:
         if isinstance(request, Command):
             self._told("command", instance, as_data(request))
         return self._idle(instance).handle(request)
+
+    def _is_active(self, name: str) -> bool:
+        return name in self.hosted and self.hosted[name].state is Lifecycle.ACTIVE
 
     def _idle(self, instance: str) -> Component[Any]:
         """Return a component that can take a request now."""

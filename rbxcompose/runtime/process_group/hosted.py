@@ -13,6 +13,7 @@ from rbxcompose.bus.bus import Bus
 from rbxcompose.bus.names import admin_key
 from rbxcompose.clock import Clock
 from rbxcompose.config import Config
+from rbxcompose.diagnostics.updater import DiagnosticTask
 from rbxcompose.levels import Level
 from rbxcompose.plan.model import Instance, Plan
 from rbxcompose.requests import Command, Query, Refused, Request, as_data
@@ -129,6 +130,7 @@ class Hosted:
         self.worker = self.host.worker(self.instance.name) if cls.blocking else None
         made = cls(self.instance.name, self.config, self if self.worker is None else HandedOver(self, self.worker))
         self.component = made
+        self.host.statuses.forget_tasks(self.instance.name)
         bind(made, self.instance, self.host.bus, self.host.frames, self)
         self._ends = dict(made.bound)
         ports = cls.ports(self.config)
@@ -300,7 +302,12 @@ class Hosted:
 
     def status(self, level: Level, message: str, values: Mapping[str, object]) -> None:
         """Report the component's state to diagnostics."""
-        self.host.statuses.set(self.instance.name, level, message, values)
+        made = self.component
+        self.host.statuses.set(self.instance.name, level, message, values, made.hardware_id if made is not None else "")
+
+    def watch(self, name: str, task: DiagnosticTask) -> None:
+        """Report how `task` stands to diagnostics, once a second while the component is active."""
+        self.host.statuses.watch(self.instance.name, name, task)
 
     def wake_at(self, time: float) -> None:
         """Call the component's `wake` at robot time `time` [s]."""

@@ -10,12 +10,15 @@ from rbxcompose.bus.action_server import ActionServer
 from rbxcompose.bus.bus import Bus
 from rbxcompose.bus.classes import queue_depth
 from rbxcompose.bus.services import ServedRequest
+from rbxcompose.clock import Clock
+from rbxcompose.diagnostics.updater import DiagnosticTask
 from rbxcompose.levels import Level
 from rbxcompose.missions.program.sources import PAUSE
 from rbxcompose.msgs.std_srvs import SetBool
 from rbxcompose.plan.model import Instance
 from rbxcompose.requests import Refused
 from rbxcompose.runtime.process_group.frames import Frames, Lookup
+from rbxcompose.runtime.process_group.paced import paced
 from rbxcompose.runtime.process_group.worker import Call, Worker
 from rbxcompose.sdk.bound import Later
 from rbxcompose.sdk.component import Component
@@ -36,6 +39,8 @@ from rbxcompose.sdk.ports import (
 class Handling(Protocol):
     """What runs the handlers of a component."""
 
+    clock: Clock
+
     @property
     def worker(self) -> Worker | None:
         """Return the component's own thread, if it has one."""
@@ -51,6 +56,10 @@ class Handling(Protocol):
 
     def log(self, level: Level, text: str) -> None:
         """Write one event of the robot's story."""
+        ...
+
+    def watch(self, name: str, task: DiagnosticTask) -> None:
+        """Report how `task` stands to diagnostics."""
         ...
 
 
@@ -76,7 +85,8 @@ def _end(
         case SendsOrders():
             return bus.orders(owner, instance.topic(name), interface, port.qos, port.servers)
         case Out():
-            return bus.publisher(owner, instance.topic(name), interface, port.qos)
+            publisher = bus.publisher(owner, instance.topic(name), interface, port.qos)
+            return paced(publisher, port, handling.clock, handling.watch)
         case In():
             topic, handler = instance.topic(name), _on_message(component, name, port, handling)
             waits = isinstance(port, ServesTopic)  # like goals: a sender that waits for a listener relies on it

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 from rbxcompose.bus.bus import Bus
 from rbxcompose.clock import Clock
 from rbxcompose.dataclass import dataclass
+from rbxcompose.diagnostics.updater import DiagnosticTask
 from rbxcompose.levels import Level
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray, DiagnosticStatus, KeyValue
 from rbxcompose.msgs.stamps import to_time
@@ -41,14 +43,18 @@ class Statuses:
         self._blocked: dict[str, str] = {}
         self._busy: dict[str, str] = {}
         self._slow: dict[str, _Slow] = {}
+        self._tasks: dict[str, dict[str, DiagnosticTask]] = {}  # by component and name
+        self.is_active: Callable[[str], bool] = lambda name: True  # tells whose tasks are asked
         self._is_due = False
-        scheduler.every(PERIOD, owner, lambda dt: self.publish())
+        scheduler.every(PERIOD, owner, lambda dt: self._report())
 
-    def set(self, name: str, level: Level, message: str, values: Mapping[str, object]) -> None:
+    def set(self, name: str, level: Level, message: str, values: Mapping[str, object], hardware_id: str = "") -> None:
         """Keep a status; publish it at this instant if its level is new."""
         before = self._statuses.get(name)
         pairs = tuple(KeyValue(key=key, value=str(value)) for key, value in values.items())
-        self._statuses[name] = DiagnosticStatus(level=int(level), name=name, message=message, values=pairs)
+        self._statuses[name] = DiagnosticStatus(
+            level=int(level), name=name, message=message, hardware_id=hardware_id, values=pairs
+        )
         if before is None or before.level != level:
             self._publish_soon()
 
@@ -56,6 +62,16 @@ class Statuses:
         """Stop reporting on a component that no longer exists."""
         for known in (self._statuses, self._busy, self._slow):
             known.pop(name, None)
+        self.forget_tasks(name)
+
+    def watch(self, component: str, name: str, task: DiagnosticTask) -> None:
+        """Ask `task` once a second while the component is active, and report it as `component: name`."""
+        self._tasks.setdefault(component, {})[name] = task
+
+    def forget_tasks(self, component: str) -> None:
+        """Ask the tasks of a component no more."""
+        for name in self._tasks.pop(component, {}):
+            self._statuses.pop(f"{component}: {name}", None)
 
     def block(self, causes: Mapping[str, str]) -> None:
         """Show exactly these components as blocked, at least as a warning, whatever their own status."""
@@ -79,6 +95,17 @@ class Statuses:
         longest = max((before.longest, before.callback), (seconds, callback))
         self._slow[name] = _Slow(before.number + 1, *longest)
 
+    def _report(self) -> None:
+        now = self._clock.now()
+        for component, tasks in self._tasks.items():
+            for name, task in tasks.items():
+                if self.is_active(component):
+                    told = task(now)
+                    self.set(f"{component}: {name}", told.level, told.message, told.values)
+                else:
+                    self._statuses.pop(f"{component}: {name}", None)
+        self.publish()
+
     def _publish_soon(self) -> None:
         if not self._is_due:
             self._is_due = True
@@ -91,7 +118,7 @@ class Statuses:
             return status
         level = status.level if cause is None else max(status.level, int(Level.WARN))
         values = (*status.values, *(slow.values() if slow is not None else ()))
-        return DiagnosticStatus(level=level, name=status.name, message=cause or status.message, values=values)
+        return replace(status, level=level, message=cause or status.message, values=values)
 
     def publish(self) -> None:
         """Send all statuses."""
