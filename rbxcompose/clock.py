@@ -20,6 +20,8 @@ JUMPS, DISPUTE = 3, 2.0  # this many jumps within this much real time [s]: sever
 class Clock(Protocol):
     """A clock: robot time for decisions, a stamp for messages."""
 
+    is_real: bool  # whether robot time is that of this computer
+
     def now(self) -> float:
         """Return robot time [s] since the robot's start."""
         ...
@@ -31,6 +33,8 @@ class Clock(Protocol):
 
 class MonotonicClock:
     """Real time: `CLOCK_MONOTONIC` counted from `start`, shared by all processes of one robot."""
+
+    is_real = True
 
     def __init__(self, start: float | None = None) -> None:
         self.start = time.monotonic() if start is None else start
@@ -46,6 +50,8 @@ class MonotonicClock:
 
 class SteppedClock:
     """Simulated time: stands still until `advance_to` moves it; never runs backwards."""
+
+    is_real = False
 
     def __init__(self, start: float = 0.0) -> None:
         self._now = start

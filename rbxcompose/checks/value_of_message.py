@@ -9,7 +9,8 @@ from rbxcompose.expressions.types import TYPES, TypeKind
 from rbxcompose.findings import Finding
 from rbxcompose.missions.program.sources import ValueSource
 from rbxcompose.model.robot import Robot
-from rbxcompose.model.values import NoFieldError, field_type, fitting_kinds
+from rbxcompose.model.values import fitting_kinds
+from rbxcompose.msgs.field_paths import NoFieldError, field_type
 from rbxcompose.sections.values import ValueModel
 from rbxcompose.units import UNITS
 

@@ -62,7 +62,7 @@ class ServoBusDriver(Component[ServoBusConfig]):
     @classmethod
     def ports(cls, config: ServoBusConfig) -> dict[str, Port[Any]]:
         """Return the ports: for each joint, for all, and those of the controllers."""
-        states = Out(JointState, "joint_states", rate=config.rate)
+        states = Out(JointState, "joint_states", rate=config.rate / math.ceil(config.rate / PUBLISHED - 1e-9))
         found = super().ports(config) | {"joint_states": states} | joint_ports(config)
         for name, setup in config.controllers.items():
             ports = controller_type(setup.type).ports(name, setup.config)

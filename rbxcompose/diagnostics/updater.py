@@ -76,7 +76,7 @@ class StampTask:
 
     def tick(self, stamp: float, now: float) -> None:
         """Take the stamp of a message that came at `now`, both in seconds of the clock that makes stamps."""
-        if stamp:
+        if stamp or now <= self._oldest:  # simulated time begins at 0
             self._ages.append(now - stamp)
         else:
             self._zero += 1

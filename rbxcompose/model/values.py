@@ -10,7 +10,8 @@ from rbxcompose.missions.program.sources import ValueSource
 from rbxcompose.model.robot import RobotComponent
 from rbxcompose.model.wires import PortEnd, resolve
 from rbxcompose.msgs import registry
-from rbxcompose.msgs.definitions import FieldShape, FieldType, parse_type
+from rbxcompose.msgs.definitions import FieldShape, FieldType
+from rbxcompose.msgs.field_paths import NoFieldError, field_type
 from rbxcompose.sdk.ports import In, Out
 from rbxcompose.sections.values import ValueModel
 from rbxcompose.units import UNITS
@@ -77,34 +78,6 @@ def _plain_type(message: str, field: str) -> Type:
         return UNKNOWN
     plain = {TypeKind.TEXT: TYPES["text"], TypeKind.FLAG: TYPES["flag"]}
     return plain.get(fitting[0], TYPES["number"])
-
-
-class NoFieldError(Exception):
-    """Raised when a message has no field of a name; `fields` are those of the message `message`."""
-
-    def __init__(self, message: str, name: str, fields: Collection[str]) -> None:
-        super().__init__(f"{message} has no field '{name}'")
-        self.message = message
-        self.name = name
-        self.fields = fields
-
-
-def field_type(message: str, path: str) -> FieldType:
-    """Return the type of a field of a message; a field of a field is written with a dot.
-
-    Raises:
-        NoFieldError: if there is none.
-    """
-    first, *others = path.split(".")
-    fields = registry.message(message).FIELDS
-    if first not in fields:
-        raise NoFieldError(message, first, fields)
-    found = parse_type(fields[first])
-    if not others:
-        return found
-    if not found.is_message or found.shape is not FieldShape.SINGLE:
-        raise NoFieldError(str(found), others[0], ())
-    return field_type(found.base, ".".join(others))
 
 
 def fitting_kinds(field: FieldType) -> tuple[TypeKind, ...]:

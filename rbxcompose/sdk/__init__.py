@@ -40,9 +40,11 @@ from rbxcompose.sdk.capabilities import (
     RollsOn,
     RunsMissions,
     Setting,
+    Warns,
     WritesFrame,
 )
 from rbxcompose.sdk.component import Component
+from rbxcompose.sdk.messages import MessageName
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Looks, Out, Port, Serves, ServesAction, ServesTopic
 from rbxcompose.sdk.registry import component
 from rbxcompose.sdk.skills import Activity, skill
@@ -77,6 +79,7 @@ __all__ = [
     "LinkName",
     "Live",
     "Looks",
+    "MessageName",
     "MissionOver",
     "MissionWaits",
     "Name",
@@ -108,6 +111,7 @@ __all__ = [
     "StampTask",
     "TaskStatus",
     "Time",
+    "Warns",
     "WritesFrame",
     "answers",
     "component",

@@ -110,6 +110,16 @@ class Drains(Capability):
 
 
 @dataclass(frozen=True, slots=True)
+class Warns(Capability):
+    """It compares a number with limits: its status is WARN beyond one of them, and ERROR beyond the other."""
+
+    warn: Setting[float] | None
+    error: Setting[float] | None
+    is_above: bool
+    """Whether more is worse."""
+
+
+@dataclass(frozen=True, slots=True)
 class Charges(Capability):
     """It charges the robot's battery, by the skill at its port `goals`."""
 

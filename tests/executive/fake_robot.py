@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 
 from rbxcompose.clock import Clock, SteppedClock
 from rbxcompose.components.mission import Mission, MissionConfig
+from rbxcompose.diagnostics.updater import DiagnosticTask
 from rbxcompose.expressions.types import FLAG, TEXT, TYPES
 from rbxcompose.findings import Report
 from rbxcompose.geometry import Pose2, Transform3
@@ -227,6 +228,9 @@ class Robot:
 
     def status(self, level: Level, message: str, values: Mapping[str, object]) -> None:
         self.statuses.append(message)
+
+    def watch(self, name: str, task: DiagnosticTask) -> None:
+        """Ask for nothing: a mission has no tasks."""
 
     def wake_at(self, time: float) -> None:
         self.wakes.append(time)

@@ -62,7 +62,7 @@ ABOVE = {
     "controllers": "control controller_interface sdk",
     "compiler": "check_runner composition model plan",
     "components": "actuation body control controller_interface controller_manager controller_requests diagnostics "
-    "executive missions mux.core navigation sdk servo_bus_config servo_bus_line servo_report sim "
+    "executive missions monitors mux.core navigation sdk servo_bus_config servo_bus_line servo_report sim "
     "twins.fault_script",
     "servo_report": "actuation control",
     "composition": "body.description sections",
@@ -78,6 +78,7 @@ ABOVE = {
     "mission_tests": "compiler components.mission composition executive missions model plan.model sdk sections.faults "
     "testing.bench twins.fault_script twins.servo_faults",
     "missions": "",
+    "monitors": "diagnostics.limits sdk",
     "model": "actuation body.model composition missions sdk sections servo_bus_config",
     "mux": "",
     "navigation": "",

@@ -1,0 +1,40 @@
+"""Names of message types, and of their fields, in configurations."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import AfterValidator
+from pydantic_core import PydanticCustomError
+
+from rbxcompose.msgs import registry
+from rbxcompose.msgs.definitions import FieldShape
+from rbxcompose.msgs.field_paths import NoFieldError, field_type
+
+
+def _known(name: str) -> str:
+    try:
+        return registry.message(name).TYPE
+    except KeyError:
+        context = {"name": name, "valid": tuple(registry.names("msg")), "what": "message types"}
+        raise PydanticCustomError("message", "there is no message type '{name}'", context) from None
+
+
+MessageName = Annotated[str, AfterValidator(_known)]
+"""The ROS name of a message type: `std_msgs/Float32`; read as its full name, `std_msgs/msg/Float32`."""
+
+
+def number_field(message: str, path: str) -> str:
+    """Return `path` if it names a number in messages of type `message`.
+
+    Raises:
+        PydanticCustomError: if it does not; for use in validators of configurations.
+    """
+    try:
+        found = field_type(message, path)
+    except NoFieldError as error:
+        context = {"name": error.name, "valid": tuple(error.fields), "what": f"fields of {error.message}"}
+        raise PydanticCustomError("field", f"{error.message} has no field '{{name}}'", context) from None
+    if found.is_message or found.shape is not FieldShape.SINGLE or found.base in ("string", "bool"):
+        raise PydanticCustomError("field", "'{path}' is a {type}, not a number", {"path": path, "type": str(found)})
+    return path
