@@ -50,6 +50,9 @@ class JointDrive(ABC):
         self.effort = math.nan
         """Load of its first servo, as a fraction of the most or as a current [A]."""
         self.temperature: float | None = None
+        """Of its warmest servo [degC]."""
+        self.warmest: float | None = None
+        """The temperature that it goes by: its own, or that of the warmest joint of its bus [degC]."""
         self.voltage: float | None = None
         self.refused = ""
         """Why the last command was refused; empty after one that was not."""
@@ -111,7 +114,7 @@ class JointDrive(ABC):
             self.effort = model.to_si("present_load", raw) * (-1.0 if servo.is_inverted else 1.0)
         if (raw := values.get("present_temperature")) is not None:
             self._warmth[id] = model.to_si("present_temperature", raw)
-            self.temperature = max(self._warmth.values())
+            self.temperature = self.warmest = max(self._warmth.values())
         if (raw := values.get("present_voltage")) is not None:
             self.voltage = model.to_si("present_voltage", raw)
         if model.protocol == 1 or "hardware_error" in values:  # in 2.0, not each reading tells of errors
@@ -182,9 +185,12 @@ class JointDrive(ABC):
     def step(self, now: float, dt: float) -> list[Writes]:
         """Return what is to be written in the cycle that ends `dt` [s] from `now`, one after the other."""
         found = tuple(self._requests)
-        inputs = JointInputs(self.measured.position, self.measured_at, self.temperature, self.error, found)
+        inputs = JointInputs(self.measured.position, self.measured_at, self.warmest, self.error, found)
         self._requests.clear()
+        was_blocked = self.condition.is_blocked
         self.condition, actions = step_joint(self.condition, inputs, now, self.policy)
+        if was_blocked and not self.condition.is_blocked:
+            self.refused = ""  # the reason is over
         writes: list[Writes] = []
         for action in actions:
             match action:

@@ -77,7 +77,7 @@ class ServoCycle:
                 (one.temperature for one in self.drives.values() if one.temperature is not None), default=None
             )
             for drive in self.drives.values():
-                drive.temperature = warmest
+                drive.warmest = warmest
         self._write([drive.step(now, dt) for drive in self.drives.values()])
         use_next(self.items, self.bus, now)
 
