@@ -64,15 +64,17 @@ def locate(text: str, line: int, column: int) -> Cursor | None:
     if line >= len(lines):
         return None
     before, after = lines[line][:column], lines[line][column:]
-    if _is_comment(before):
-        return None
     with paused_collection():
         # An alias needs its anchor, which may be anywhere.
         around = near(lines, line) if len(lines) > LARGE and "&" not in text else lines
         for candidate in _candidates(around, line, before, after):
             tree = quick_tree(candidate)
-            if isinstance(tree, MappingNode) and (found := _marked(tree, (), set())):
+            if not isinstance(tree, MappingNode):
+                continue
+            if found := _marked(tree, (), set()):
                 return _cursor(tree, *found, before, after)
+            if _COMMENT.search(before):
+                return None  # whether a `#` stands in a text, in quotes or without, only the parser knows
     return None
 
 
@@ -133,11 +135,6 @@ def _without_mark(node: TreeNode, path: KeyPath) -> TreeNode:
 def _after_token(after: str) -> str:
     match = _TOKEN_BEHIND.match(after)
     return after[match.end() :] if match else after
-
-
-def _is_comment(before: str) -> bool:
-    found = _COMMENT.search(before)
-    return found is not None and before[: found.start()].count('"') % 2 == 0
 
 
 def _candidates(lines: list[str], line: int, before: str, after: str) -> Iterator[str]:

@@ -37,6 +37,10 @@ def at(text: str) -> Cursor | None:
         ("a:\n  - b: c\n    |\n", ("a", 0), "", "", True),
         ("a:\n  - b\n  - |\n", ("a", 1), "", "", True),
         ('a: "b $c|"\n', ("a",), "b $c", "", False),
+        ('a: "b # c|"\n', ("a",), "b # c", "", False),
+        ("a: 'b # c|'\n", ("a",), "b # c", "", False),
+        ("a: {b: 'it''s # c|'}\n", ("a", "b"), "it's # c", "", False),
+        ("a: |-\n  # b\n  # c|\nb: d\n".replace("|-", ">-", 1), ("a",), "# b # c", "", False),
         ("a: $b < 5| and $c\n", ("a",), "$b < 5", " and $c", False),
         ("a:\n  b: |\nx: [unclosed\n", ("a", "b"), "", "", False),  # what follows is wrong
         ("|", (), "", "", True),
@@ -51,7 +55,7 @@ def test_a_position_is_found_in_finished_and_in_unfinished_text(
     assert MARK not in str(found.root)
 
 
-@pytest.mark.parametrize("text", ["a: b  # c|\n", "# |\na: b\n", "a: [\n  }\nb: |\n", "x\ny: |"])
+@pytest.mark.parametrize("text", ["a: b  # c|\n", "a: it's  # c|\n", "a: 'b'  # c 'd|\n", "# |\na: b\n", "a: [\n  }\nb: |\n", "x\ny: |"])
 def test_in_comments_and_behind_what_cannot_be_read_there_is_nothing(text: str) -> None:
     assert at(text) is None
 
