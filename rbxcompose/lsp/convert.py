@@ -13,6 +13,9 @@ from pygls.workspace.position_codec import ServerTextPosition
 from rbxcompose.findings import Finding, Severity, Span
 from rbxcompose.lsp.completion import CompletionItem
 from rbxcompose.lsp.fixes import CodeAction, TextChange
+from rbxcompose.lsp.outline import OutlineEntry
+from rbxcompose.lsp.renaming import Renamed
+from rbxcompose.lsp.symbols import Mention, TextPlaces
 
 SOURCE = "rbxcompose"
 _SEVERITIES = {
@@ -25,6 +28,13 @@ _SORTS = {
     "word": types.CompletionItemKind.EnumMember,
     "unit": types.CompletionItemKind.Unit,
     "variable": types.CompletionItemKind.Variable,
+}
+_OUTLINED = {
+    "section": types.SymbolKind.Namespace,
+    "name": types.SymbolKind.Object,
+    "step": types.SymbolKind.Event,
+    "state": types.SymbolKind.Class,
+    "value": types.SymbolKind.Property,
 }
 
 
@@ -110,3 +120,28 @@ class Converter:
 
     def _edit(self, path: Path, change: TextChange) -> types.TextEdit:
         return types.TextEdit(self.range(self.text(path), change.start, change.end), change.text)
+
+    def mention(self, text: str, mention: Mention) -> types.Location:
+        """Return the place of a name in the text of its file."""
+        places = TextPlaces(text)
+        start, end = places.position(mention.start), places.position(mention.end)
+        return types.Location(self.uri(mention.file), self.range(text, start, end))
+
+    def renamed(self, renamed: Renamed, text: Callable[[Path], str]) -> types.WorkspaceEdit:
+        """Return the changes of a rename in the texts that it was made for."""
+        found = {
+            self.uri(path): [types.TextEdit(self.range(text(path), one.start, one.end), one.text) for one in changes]
+            for path, changes in renamed.changes.items()
+        }
+        return types.WorkspaceEdit(changes=found)
+
+    def outlined(self, text: str, entry: OutlineEntry) -> types.DocumentSymbol:
+        """Return a line of an outline, with those below it."""
+        return types.DocumentSymbol(
+            name=entry.name or "''",
+            kind=_OUTLINED[entry.sort],
+            range=self._span(text, entry.span),
+            selection_range=self._span(text, entry.key),
+            detail=entry.detail or None,
+            children=[self.outlined(text, one) for one in entry.below],
+        )

@@ -39,6 +39,16 @@ class Newest:
         """Return whether the editor's text of a file replaces the saved one."""
         return self._waiting.get(path) is not None or (path in self.project.unsaved and path not in self._waiting)
 
+    def text(self, path: Path) -> str:
+        """Return the newest text of a file."""
+        return waiting if (waiting := self._waiting.get(path)) is not None else self.project.text(path)
+
+    @property
+    def unsaved(self) -> dict[Path, str]:
+        """Return the newest texts that are in the editor only."""
+        there = {**self.project.unsaved, **self._waiting}
+        return {path: text for path, text in there.items() if text is not None}
+
     def is_compiled(self, path: Path, text: str) -> bool:
         """Return whether the project was compiled with this text of a file."""
         return not self._waiting and self.project.text(path) == text

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import logging
 import sys
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Protocol, TypeVar
 
 from lsprotocol import types
+from pygls.exceptions import JsonRpcException
 from pygls.lsp.server import LanguageServer
+from pygls.protocol import json_rpc
 
 import rbxcompose
 from rbxcompose.lsp.completion import complete
@@ -17,12 +21,23 @@ from rbxcompose.lsp.document import Document
 from rbxcompose.lsp.fixes import actions
 from rbxcompose.lsp.hover import describe
 from rbxcompose.lsp.newest import PAUSE, Newest
+from rbxcompose.lsp.outline import outline
 from rbxcompose.lsp.project import FoundByFile, Project
+from rbxcompose.lsp.project_files import ProjectFiles
+from rbxcompose.lsp.renaming import CannotRenameError, compiler, prepare, rename
+from rbxcompose.lsp.symbol_index import SymbolIndex, references
+from rbxcompose.model.robot import Robot
 
 P = TypeVar("P")
 R = TypeVar("R")
 SWITCH = 0.001  # [s] that an answer waits for the other thread, which may be compiling
 TRIGGERS = (" ", ":", "$", "{", ".", "-", "[", ",")
+
+
+class RefusedRenameError(JsonRpcException):
+    """Raised to answer a rename that is refused with the reason, which editors show."""
+
+    CODE = types.LSPErrorCodes.RequestFailed.value
 
 
 class Session:
@@ -109,6 +124,60 @@ class Session:
         text = describe(document, *self.convert.position(document.text, params.position)) if document else ""
         return types.Hover(types.MarkupContent(types.MarkupKind.Markdown, text)) if text else None
 
+    def document_symbol(self, params: types.DocumentSymbolParams) -> list[types.DocumentSymbol]:
+        """Return the outline of a document."""
+        document = self.document(params.text_document.uri)
+        return [self.convert.outlined(document.text, one) for one in outline(document.text)] if document else []
+
+    def references(self, params: types.ReferenceParams) -> list[types.Location]:
+        """Return where the name at a position is written."""
+        document = self.document(params.text_document.uri)
+        if document is None:
+            return []
+        index, place = self._index(document), self.convert.position(document.text, params.position)
+        is_whole = params.context.include_declaration
+        found = references(index, document.path, *place, with_definitions=is_whole)
+        return [self.convert.mention(index.files.text(one.file), one) for one in found]
+
+    def prepare_rename(self, params: types.PrepareRenameParams) -> types.PrepareRenamePlaceholder | None:
+        """Return the range of the name at a position, if it can be renamed."""
+        document = self.document(params.text_document.uri)
+        if document is None:
+            return None
+        try:
+            found = prepare(
+                self._index(document), document.path, *self.convert.position(document.text, params.position)
+            )
+        except CannotRenameError as error:
+            raise RefusedRenameError(str(error)) from None
+        place = self.convert.mention(document.text, found).range
+        return types.PrepareRenamePlaceholder(place, found.symbol.name)
+
+    def rename(self, params: types.RenameParams) -> types.WorkspaceEdit | None:
+        """Rename what is at a position, in all files of the project."""
+        document = self.document(params.text_document.uri)
+        if document is None:
+            return None
+        index, place = self._index(document), self.convert.position(document.text, params.position)
+        compiled = compiler(self.project.environment, self.newest.unsaved)
+        try:
+            made = rename(index, document.path, *place, params.new_name, compiled)
+        except CannotRenameError as error:
+            raise RefusedRenameError(str(error)) from None
+        return self.convert.renamed(made, index.files.text)
+
+    def _index(self, document: Document) -> SymbolIndex:
+        """Return all names of the project around a document."""
+        compiled = compiler(self.project.environment, self.newest.unsaved)
+
+        def robot_of(path: Path) -> Robot | None:
+            return self.project.robot_of(path) or compiled(path, {}).robot
+
+        def text(path: Path) -> str:
+            return document.text if path == document.path else self.newest.text(path)
+
+        return SymbolIndex(ProjectFiles(document.path, text), robot_of)
+
     def code_action(self, params: types.CodeActionParams) -> list[types.CodeAction]:
         """Offer the fixes of the findings here."""
         path, text = self.convert.path(params.text_document.uri), self._text(params.text_document.uri)
@@ -122,6 +191,7 @@ class Session:
 def make_server(environment: Mapping[str, str]) -> LanguageServer:
     """Return a server; `environment` is what `${env.NAME}` sees."""
     sys.setswitchinterval(SWITCH)
+    logging.getLogger(json_rpc.__name__).addFilter(_is_no_refusal)
     server = LanguageServer("rbxcompose", rbxcompose.__version__)
     session = Session(server, environment)
 
@@ -139,8 +209,17 @@ def make_server(environment: Mapping[str, str]) -> LanguageServer:
     server.feature(types.TEXT_DOCUMENT_COMPLETION, triggers)(_function(session.completion))
     server.feature(types.TEXT_DOCUMENT_DEFINITION)(_function(session.definition))
     server.feature(types.TEXT_DOCUMENT_HOVER)(_function(session.hover))
+    server.feature(types.TEXT_DOCUMENT_DOCUMENT_SYMBOL)(_function(session.document_symbol))
+    server.feature(types.TEXT_DOCUMENT_REFERENCES)(_function(session.references))
+    server.feature(types.TEXT_DOCUMENT_PREPARE_RENAME)(_function(session.prepare_rename))
+    server.feature(types.TEXT_DOCUMENT_RENAME, types.RenameOptions(prepare_provider=True))(_function(session.rename))
     server.feature(types.TEXT_DOCUMENT_CODE_ACTION, fixes)(_function(session.code_action))
     return server
+
+
+def _is_no_refusal(record: logging.LogRecord) -> bool:
+    """Return whether a line belongs in the log: pygls takes every refusal for an exception of ours."""
+    return not (record.exc_info and isinstance(record.exc_info[1], RefusedRenameError))
 
 
 class _Notice(Protocol):

@@ -53,6 +53,15 @@ class Client:
 
     def ask(self, method: str, **params: Any) -> Any:
         """Send a request and return its result."""
+        message = self._answer(method, **params)
+        assert "error" not in message, message
+        return message["result"]
+
+    def refusal(self, method: str, **params: Any) -> str:
+        """Send a request that is refused and return the reason."""
+        return str(self._answer(method, **params)["error"]["message"])
+
+    def _answer(self, method: str, **params: Any) -> dict[str, Any]:
         self.number += 1
         self._send({"jsonrpc": "2.0", "id": self.number, "method": method, "params": params or None})
         while "id" not in (message := self._receive()) or "method" in message:
@@ -62,8 +71,7 @@ class Client:
             else:
                 self.told.append(message)
         assert message["id"] == self.number
-        assert "error" not in message, message
-        return message["result"]
+        return message
 
     def diagnostics(self, uri: str) -> list[dict[str, Any]]:
         """Wait for the next findings of a document."""

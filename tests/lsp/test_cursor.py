@@ -55,7 +55,9 @@ def test_a_position_is_found_in_finished_and_in_unfinished_text(
     assert MARK not in str(found.root)
 
 
-@pytest.mark.parametrize("text", ["a: b  # c|\n", "a: it's  # c|\n", "a: 'b'  # c 'd|\n", "# |\na: b\n", "a: [\n  }\nb: |\n", "x\ny: |"])
+@pytest.mark.parametrize(
+    "text", ["a: b  # c|\n", "a: it's  # c|\n", "a: 'b'  # c 'd|\n", "# |\na: b\n", "a: [\n  }\nb: |\n", "x\ny: |"]
+)
 def test_in_comments_and_behind_what_cannot_be_read_there_is_nothing(text: str) -> None:
     assert at(text) is None
 

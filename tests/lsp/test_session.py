@@ -90,6 +90,38 @@ def test_a_mistake_in_a_mission_is_told_where_it_was_made_although_the_robot_is_
     assert client.process.returncode == 0
 
 
+def test_a_name_is_found_and_renamed_in_the_texts_of_the_editor_and_in_files_that_are_not_open(project: Path) -> None:
+    path, mission = project / "robots/turtlebot/robot.yaml", project / "missions/patrol.yaml"
+    text = path.read_text("utf-8").replace("colour: yellow}", 'colour: "🟡"}  # dock')
+    with Client(project) as client:
+        document = opened(client, path, text)
+        spot = {"textDocument": document, "position": place(text, "dock: {x", 1)}
+
+        (args, *_, profiles) = client.ask("textDocument/documentSymbol", textDocument=document)
+        assert (args["name"], profiles["name"]) == ("args", "profiles")
+        assert args["children"][0]["selectionRange"]["start"] == place(text, "speed:")
+
+        found = client.ask("textDocument/references", **spot, context={"includeDeclaration": True})
+        assert [one["uri"] for one in found].count(mission.as_uri()) == 1
+        assert [one["range"]["start"] for one in found if one["uri"] == path.as_uri()] == [
+            place(text, "dock: {x"),
+            place(text, "dock: dock", 6),
+        ]
+        asked = client.ask("textDocument/prepareRename", **spot)
+        assert asked["placeholder"] == "dock"
+        assert asked["range"] == {"start": place(text, "dock: {x"), "end": place(text, "dock: {x", 4)}
+
+        made = client.ask("textDocument/rename", **spot, newName="home")
+        assert [one["newText"] for one in made["changes"][path.as_uri()]] == ["home", "home"]
+        assert mission.as_uri() in made["changes"]
+
+        assert "taken" in client.refusal("textDocument/rename", **spot, newName="corner_1")
+        skill = {"textDocument": document, "position": place(text, "type: charger", 8)}
+        assert "no name of this project" in client.refusal("textDocument/prepareRename", **skill)
+    assert client.process.returncode == 0
+    assert client.errors == b""
+
+
 def test_columns_count_in_utf_16_units(project: Path) -> None:
     path = project / "robots/turtlebot/robot.yaml"
     text = path.read_text("utf-8").replace("colour: yellow}", 'colour: "🟡🟡", heigt: 3 m}')

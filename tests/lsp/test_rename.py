@@ -1,0 +1,227 @@
+"""A name is found in all files of a project and renamed there; what cannot be right is refused with the reason."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from rbxcompose.compiler import Compilation, compile_robot
+from rbxcompose.lsp.project_files import ROBOT, ProjectFiles
+from rbxcompose.lsp.renaming import CannotRenameError, Renamed, compiler, prepare, rename
+from rbxcompose.lsp.symbol_index import SymbolIndex, references
+from rbxcompose.lsp.symbols import Symbol
+from rbxcompose.plan.dump import dump
+from tests.conftest import ROOT
+from tests.soak import Soak
+
+FRESH = "zqjxw"  # letters of which some makes a new name out of any other
+
+
+class Names:
+    """The names of a project, asked about by the text around them."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.before = {one: compile_robot(str(one), environment={}) for one in self._files().of_kind(ROBOT)}
+        self.plans = {one: dump(made.plan) for one, made in self.before.items() if made.plan}
+        self.after: dict[tuple[Path, int], Compilation] = {}
+        self.index = SymbolIndex(self._files(), lambda path: self.before[path].robot)
+
+    def _files(self) -> ProjectFiles:
+        return ProjectFiles(self.folder / "robots/turtlebot/robot.yaml", lambda path: path.read_text(encoding="utf-8"))
+
+    def compiled(self, robot: Path, texts: Mapping[Path, str]) -> Compilation:
+        """Return a robot with other texts; it is compiled once for each."""
+        if all(self.index.files.text(path) == text for path, text in texts.items()):
+            return self.before[robot]
+        key = robot, hash(tuple(sorted(texts.items())))
+        if key not in self.after:
+            self.after[key] = compiler({}, {})(robot, texts)
+        return self.after[key]
+
+    def at(self, file: str, words: str) -> tuple[Path, int, int]:
+        """Return the position of the bar in some words of a file."""
+        path = (self.folder / file).resolve()
+        before, _, after = words.partition("|")
+        text = self.index.files.text(path)
+        assert before + after in text
+        return path, *self.index.files.places(path).position(text.index(before + after) + len(before))
+
+    def rename(self, file: str, words: str, new: str) -> Renamed:
+        return rename(self.index, *self.at(file, words), new, self.compiled)
+
+    def refusal(self, file: str, words: str, new: str = "other") -> str:
+        with pytest.raises(CannotRenameError) as told:
+            self.rename(file, words, new)
+        return str(told.value)
+
+    def lines(self, made: Renamed) -> dict[str, list[str]]:
+        """Return the lines that a rename changed, by file."""
+        found = {}
+        for path, changes in made.changes.items():
+            lines = made.texts[path].split("\n")
+            numbers = sorted({one.start[0] for one in changes})
+            found[path.relative_to(self.folder).as_posix()] = [lines[number].strip() for number in numbers]
+        return found
+
+
+@pytest.fixture(scope="module")
+def shipped() -> Names:
+    return Names(ROOT)
+
+
+@pytest.fixture
+def project(tmp_path: Path) -> Path:
+    for name in ("robots/turtlebot", "robots/house", "missions"):
+        shutil.copytree(ROOT / name, tmp_path / name)
+    return tmp_path
+
+
+def test_the_names_of_a_part_are_found_behind_the_names_of_its_instances(shipped: Names) -> None:
+    found = references(shipped.index, *shipped.at("parts/battery.yaml", "values:\n  |level:"), with_definitions=True)
+    places = [f"{one.file.relative_to(ROOT).as_posix()}:{one.start}" for one in found]
+    assert sum(place.startswith("missions/haul.yaml") for place in places) == 2  # $drive_level and $lift_level
+    assert sum(place.startswith("parts/battery.yaml") for place in places) == 2
+    others = references(shipped.index, *shipped.at("parts/battery.yaml", "values:\n  |level:"), with_definitions=False)
+    assert len(others) == len(found) - 1
+
+
+def test_an_instance_is_renamed_in_all_names_that_begin_with_it(shipped: Names) -> None:
+    made = shipped.rename("robots/twins/robot.yaml", "  |lift:\n", "hoist")
+    assert shipped.lines(made) == {
+        "missions/haul.yaml": ["when: $hoist_level < $low"],
+        "robots/twins/robot.yaml": ["hoist:", "hoist_battery:"],
+    }
+
+
+def test_a_place_is_renamed_in_all_robots_that_share_a_mission(shipped: Names) -> None:
+    found = shipped.lines(shipped.rename("missions/patrol.yaml", "[corner_1, corner|_2", "far"))
+    assert {"robots/turtlebot/robot.yaml", "robots/patroller/robot.yaml"} <= found.keys()
+    assert found["missions/patrol.yaml"] == ["in: [corner_1, far, corner_3, corner_4]"]
+    assert "robots/rover/robot.yaml" not in found  # it has places of these names, but none of these missions
+    assert "missions/tests/patrol.test.yaml" in found
+
+
+def test_a_place_is_renamed_where_data_are_made_of_places_but_not_in_texts(shipped: Names) -> None:
+    found = shipped.lines(shipped.rename("robots/house/robot.yaml", "  |kitchen: {", "galley"))
+    assert found["missions/clean_house.yaml"] == ["galley:"]
+    assert found["missions/clean_house_machine.yaml"] == ["go_to: galley"]  # its state and its text stay
+
+
+def test_an_argument_is_renamed_in_its_part_and_where_it_is_given(shipped: Names) -> None:
+    found = shipped.lines(shipped.rename("parts/battery.yaml", "${args.|runtime}", "lasts"))
+    assert found["parts/battery.yaml"] == ["lasts:", "runtime: ${args.lasts}"]
+    assert found["robots/twins/robot.yaml"] == ["lasts: 60 s", "lasts: 90 s", "lasts: 45 s"]
+    assert found["robots/house/robot.yaml"] == ["lasts: ${args.runtime}"]
+
+
+def test_a_state_a_loop_and_an_input_are_renamed_where_they_are_meant(shipped: Names) -> None:
+    machine = "missions/patrol_machine.yaml"
+    assert shipped.lines(shipped.rename(machine, "    |dock:\n", "home")) == {
+        machine: ["low: home", "home:"],
+        "missions/tests/patrol_machine.test.yaml": ["- home"],
+    }
+    room = shipped.lines(shipped.rename("missions/clean_house.yaml", "restart: |room", "place"))
+    assert room["missions/clean_house.yaml"][:2] == [
+        "restart: place                   # drive back to the room before the next chore",
+        "for: place",
+    ]
+    given = shipped.lines(shipped.rename("missions/patrol.yaml", "repeat: $|rounds", "turns"))
+    assert given["missions/tests/patrol.test.yaml"] == ["turns: 1"]
+
+
+@pytest.mark.parametrize(
+    ("file", "words", "new", "reason"),
+    [
+        ("missions/patrol.yaml", "- |recharge", "load", "names from plug-ins, such as types and skills"),
+        ("robots/turtlebot/robot.yaml", "type: |charger", "load", "names from plug-ins, such as types and skills"),
+        ("missions/patrol.yaml", "|repeat: $", "load", "words of the language"),
+        ("missions/patrol.yaml", "a corner that |cannot", "load", "there is no name"),
+        ("robots/turtlebot/robot.yaml", "  |cmd_vel:", "load", "is a topic"),
+        ("robots/turtlebot/robot.yaml", "  |dock: {", "Home", "write 'home'"),
+        ("robots/turtlebot/robot.yaml", "  |dock: {", "9", "names start with a lower-case letter"),
+        ("robots/turtlebot/robot.yaml", "  |dock: {", "corner_1", "'corner_1' is taken"),
+        ("missions/patrol.yaml", "$|low", "battery", "then `check` would say"),
+        ("robots/box_robot/robot.yaml", "  |base: rbx", "chassis", "then `check` would say"),
+    ],
+)
+def test_what_cannot_be_right_is_refused_with_the_reason(
+    shipped: Names, file: str, words: str, new: str, reason: str
+) -> None:
+    assert reason in shipped.refusal(file, words, new)
+
+
+def test_what_the_library_brings_is_refused(project: Path) -> None:
+    names = Names(project)
+    assert "does not belong to this project" in names.refusal("robots/house/robot.yaml", "battery_|battery.")
+    assert names.lines(names.rename("robots/house/robot.yaml", "values:\n  |battery:", "charge"))
+
+
+def test_a_name_of_several_meanings_and_a_folded_text_are_refused(project: Path) -> None:
+    mission = project / "missions/patrol.yaml"
+    text = mission.read_text(encoding="utf-8")
+    mission.write_text(text.replace("afterwards: continue", "afterwards: {restart: corner}") + "      name: corner\n")
+    assert "several meanings (item, node)" in Names(project).refusal("missions/patrol.yaml", "for: |corner")
+    folded = 'when: "$battery < \\\n      $\\x6cow"'
+    mission.write_text(text.replace("when: $battery < $low", folded))
+    assert "folded or has escapes" in Names(project).refusal("missions/patrol.yaml", "  |low:\n")
+
+
+def test_comments_quotes_and_line_ends_stay(project: Path) -> None:
+    mission = project / "missions/patrol.yaml"
+    text = mission.read_text(encoding="utf-8").replace("$battery < $low", '"$battery < $low"  # not below low')
+    mission.write_text(text + "# low\n", encoding="utf-8")
+    made = Names(project).rename("missions/patrol.yaml", "  |low:\n", "least")
+    new = made.texts[mission]
+    assert new == text.replace("  low:\n", "  least:\n").replace("< $low", "< $least") + "# low\n"
+
+
+def fresh(names: Names, old: str) -> str:
+    """Return a name of the same length that is nowhere: columns are in plans, too."""
+    texts = [names.index.files.text(path) for path in names.index.files.all]
+    found = (f"{old[:-length]}{letter * length}" for length in (1, 2) for letter in FRESH)
+    return next(new for new in found if len(new) == len(old) and not any(new in text for text in texts))
+
+
+def check_renaming(names: Names, symbol: Symbol) -> None:
+    """Check that a rename changes nothing but a name, and that renaming back restores each byte."""
+    files, new = names.index.files, fresh(names, symbol.name)
+    mention = next((one for one in names.index.of(symbol) if one.is_definition), names.index.of(symbol)[0])
+    place = files.places(mention.file).position(mention.start)
+    try:
+        prepare(names.index, mention.file, *place)
+        made = rename(names.index, mention.file, *place, new, names.compiled)
+    except CannotRenameError as error:
+        assert "is a topic" in str(error) or "base_footprint" in str(error)  # noqa: PT017 - all others can be renamed
+        return
+    for path, text in made.texts.items():
+        assert text.replace(new, symbol.name) == files.text(path)
+    for robot, before in names.before.items():
+        concerned = {*files.within(robot)}
+        concerned |= {mission for one in tuple(concerned) for _, mission in files.missions(one)}
+        if not concerned.isdisjoint(made.texts):
+            after = names.compiled(robot, made.texts)
+            assert [one.code for one in after.report] == [one.code for one in before.report]
+            assert after.plan is not None
+            text = dump(after.plan).replace(new, symbol.name)
+            assert sorted(text.split('"')) == sorted(names.plans[robot].split('"'))  # some order is theirs
+
+
+def test_after_any_rename_a_robot_is_the_same_but_for_the_name(shipped: Names, soak: Soak) -> None:
+    symbols = sorted(shipped.index.symbols, key=str)
+
+    @settings(
+        max_examples=400 if soak.is_on else 6,
+        deadline=None,
+        suppress_health_check=[HealthCheck.function_scoped_fixture],
+    )
+    @given(st.sampled_from(symbols))
+    def holds(symbol: Symbol) -> None:
+        check_renaming(shipped, symbol)
+
+    holds()
