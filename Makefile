@@ -30,10 +30,11 @@ soak: $(VENV)/.test  ## Try many more random manifests and expressions, and fuzz
 bench: $(VENV)/.test  ## Measure, beside peers where they are installed, and write docs/benchmarks.md
 	$(BIN)/python -m benchmarks.run
 
-docs: $(VENV)/.test  ## Write the generated pages, tables and schemas, and the picture of docs/
+docs: $(VENV)/.test  ## Write the generated pages, tables and schemas, and the pictures of docs/
 	$(BIN)/python -m docs.generate
 	$(BIN)/python -m benchmarks.misconfig --write
 	$(BIN)/python docs/draw_patrol.py
+	$(BIN)/python docs/draw_screens.py
 	$(BIN)/python -m rbxcompose.schema.documents schemas
 
 messages: $(VENV)/.test  ## Write rbxcompose/msgs/ from the interface texts

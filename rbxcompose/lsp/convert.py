@@ -14,8 +14,8 @@ from rbxcompose.findings import Finding, Severity, Span
 from rbxcompose.lsp.completion import CompletionItem
 from rbxcompose.lsp.fixes import CodeAction, TextChange
 from rbxcompose.lsp.outline import OutlineEntry
-from rbxcompose.lsp.renaming import Renamed
-from rbxcompose.lsp.symbols import Mention, TextPlaces
+from rbxcompose.lsp.rename import Renamed
+from rbxcompose.lsp.symbols import Mention, ScalarPlaces
 
 SOURCE = "rbxcompose"
 _SEVERITIES = {
@@ -123,7 +123,7 @@ class Converter:
 
     def mention(self, text: str, mention: Mention) -> types.Location:
         """Return the place of a name in the text of its file."""
-        places = TextPlaces(text)
+        places = ScalarPlaces(text)
         start, end = places.position(mention.start), places.position(mention.end)
         return types.Location(self.uri(mention.file), self.range(text, start, end))
 

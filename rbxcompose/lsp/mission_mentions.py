@@ -34,16 +34,16 @@ _WORDS = (TypeKind.CHOICE, TypeKind.TEXT)  # types whose bare words are no place
 
 
 @dataclass(frozen=True, slots=True)
-class Around:
+class StepSurroundings:
     """What the names at a place of a mission may mean: those of the loops and branches around it."""
 
     path: KeyPath = ()
     items: Mapping[str, Symbol] = field(default_factory=dict)
     are_steps: bool = True
 
-    def below(self, key: str | int, *, are_steps: bool = True) -> Around:
+    def below(self, key: str | int, *, are_steps: bool = True) -> StepSurroundings:
         """Return what is around the value of a key."""
-        return Around((*self.path, key), self.items, self.are_steps and are_steps)
+        return StepSurroundings((*self.path, key), self.items, self.are_steps and are_steps)
 
 
 class MissionMentions:
@@ -63,7 +63,7 @@ class MissionMentions:
                 yield self._mention(entry.key, Symbol(self.path, VARIABLE, name), is_definition=True)
         for key in ("data", "interrupts", "outputs", *BODIES):
             if (node := self.root.get(key)) is not None:
-                around = Around((key,), are_steps=key not in ("data", "outputs"))
+                around = StepSurroundings((key,), are_steps=key not in ("data", "outputs"))
                 if key == "machine":
                     yield from self._machine(node, around)
                 elif key == "interrupts":
@@ -85,7 +85,7 @@ class MissionMentions:
         for name, entry in node.entries.items() if isinstance(node, MappingNode) else ():
             yield self._mention(entry.key, Symbol(self.path, sort, name, place), is_definition=True)
 
-    def _walk(self, node: TreeNode, around: Around) -> Iterator[Mention]:
+    def _walk(self, node: TreeNode, around: StepSurroundings) -> Iterator[Mention]:
         if isinstance(node, ScalarNode):
             yield from self._scalar(node, around)
         elif isinstance(node, SequenceNode):
@@ -93,20 +93,20 @@ class MissionMentions:
             for index, item in enumerate(node.items):
                 inner = around.below(index)
                 steps = around.are_steps or (is_held and isinstance(item, MappingNode))
-                yield from self._walk(item, Around(inner.path, inner.items, steps))
+                yield from self._walk(item, StepSurroundings(inner.path, inner.items, steps))
         elif around.are_steps:
             yield from self._step(node, around)
         else:
             for name, entry in node.entries.items():
                 yield from self._walk(entry.value, around.below(name, are_steps=False))
 
-    def _walk_named(self, node: TreeNode, around: Around) -> Iterator[Mention]:
+    def _walk_named(self, node: TreeNode, around: StepSurroundings) -> Iterator[Mention]:
         for name, entry in node.entries.items() if isinstance(node, MappingNode) else ():
             yield from self._walk(entry.key, around)
             yield from self._walk(entry.value, around.below(name))
 
-    def _step(self, node: MappingNode, around: Around) -> Iterator[Mention]:
-        around = Around(around.path, {**around.items, **self._brought(node, around.path)})
+    def _step(self, node: MappingNode, around: StepSurroundings) -> Iterator[Mention]:
+        around = StepSurroundings(around.path, {**around.items, **self._brought(node, around.path)})
         for key, entry in node.entries.items():
             value, inner = entry.value, around.below(key)
             if key == "for" and isinstance(value, ScalarNode):
@@ -132,7 +132,7 @@ class MissionMentions:
             found[name] = Symbol(self.path, BRANCH, name, path)
         return found
 
-    def _word(self, key: str, value: TreeNode, around: Around) -> Iterator[Mention]:
+    def _word(self, key: str, value: TreeNode, around: StepSurroundings) -> Iterator[Mention]:
         """Yield the name that a word of the language takes."""
         if key == "set" and isinstance(value, MappingNode):
             for name, entry in value.entries.items():
@@ -160,7 +160,7 @@ class MissionMentions:
     def _files_of(self, mission: str) -> set[Path]:
         return {file for robot in self.robots for file in mission_files(self.files, robot, mission)}
 
-    def _skill(self, key: ScalarNode, value: TreeNode, around: Around) -> Iterator[Mention]:
+    def _skill(self, key: ScalarNode, value: TreeNode, around: StepSurroundings) -> Iterator[Mention]:
         """Yield the names in the call of a skill: a controller is one, and its arguments are its joints."""
         found = list(self._of_robot(CONTROLLER, key, 0, key.text))
         yield from found
@@ -168,7 +168,7 @@ class MissionMentions:
             yield from self._of_robot(JOINT, argument.key, 0, argument.key.text)
         yield from self._walk(value, around.below("", are_steps=False))
 
-    def _machine(self, node: TreeNode, around: Around) -> Iterator[Mention]:
+    def _machine(self, node: TreeNode, around: StepSurroundings) -> Iterator[Mention]:
         states = at(node, ("states",))
         yield from self._keys(states, STATE, around.path)
         known = states.entries if isinstance(states, MappingNode) else {}
@@ -183,7 +183,7 @@ class MissionMentions:
             if isinstance(target, ScalarNode) and target.text in known:
                 yield self._mention(target, Symbol(self.path, STATE, target.text, around.path))
 
-    def _scalar(self, scalar: ScalarNode, around: Around) -> Iterator[Mention]:
+    def _scalar(self, scalar: ScalarNode, around: StepSurroundings) -> Iterator[Mention]:
         """Yield the `$names` of a text or an expression."""
         for name in dollar_names(scalar.text):
             start = name.start + 1

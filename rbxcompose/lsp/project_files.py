@@ -12,7 +12,7 @@ from pathlib import Path
 
 from rbxcompose.lsp.project import kind_of
 from rbxcompose.lsp.quick import quick_tree
-from rbxcompose.lsp.symbols import NamePiece, Symbol, TextPlaces
+from rbxcompose.lsp.symbols import NamePiece, ScalarPlaces, Symbol
 from rbxcompose.manifest.files import ROBOT_FILE, project_of, resolve
 from rbxcompose.manifest.registry import naming, section_named, sections
 from rbxcompose.manifest.tree import NOWHERE, MappingNode, ScalarNode, TreeNode, at
@@ -38,8 +38,10 @@ class ProjectFiles:
         self._text = text
         self._texts: dict[Path, str] = {}
         self._trees: dict[Path, MappingNode] = {}
-        self._places: dict[Path, TextPlaces] = {}
+        self._places: dict[Path, ScalarPlaces] = {}
         self._visible: dict[tuple[Path, str], dict[str, Meanings]] = {}
+        self._parts: dict[Path, dict[str, tuple[Path, ...]]] = {}
+        self._missions: dict[Path, tuple[tuple[str, Path], ...]] = {}
         self._opened = path
 
     def text(self, path: Path) -> str:
@@ -55,10 +57,10 @@ class ProjectFiles:
             self._trees[path] = tree if isinstance(tree, MappingNode) else MappingNode()
         return self._trees[path]
 
-    def places(self, path: Path) -> TextPlaces:
+    def places(self, path: Path) -> ScalarPlaces:
         """Return the places in the text of a file."""
         if path not in self._places:
-            self._places[path] = TextPlaces(self.text(path))
+            self._places[path] = ScalarPlaces(self.text(path))
         return self._places[path]
 
     def kind(self, path: Path) -> str:
@@ -114,6 +116,8 @@ class ProjectFiles:
 
     def parts(self, scope: Path) -> dict[str, tuple[Path, ...]]:
         """Return the files of the parts that a file includes, by instance; profiles may give one another part."""
+        if scope in self._parts:
+            return self._parts[scope]
         found: dict[str, dict[Path, None]] = {}
         for layer in self._all_layers(scope):
             named = layer.get(include.name)
@@ -121,10 +125,16 @@ class ProjectFiles:
                 file = self._file(at(entry.value, ("part",)) or entry.value, scope)
                 if file is not None and file != scope:
                     found.setdefault(name, {})[file] = None
-        return {name: tuple(files) for name, files in found.items()}
+        self._parts[scope] = {name: tuple(files) for name, files in found.items()}
+        return self._parts[scope]
 
-    def missions(self, scope: Path) -> Iterator[tuple[str, Path]]:
-        """Yield the missions that a file lists, with their files."""
+    def missions(self, scope: Path) -> tuple[tuple[str, Path], ...]:
+        """Return the missions that a file lists, with their files."""
+        if scope not in self._missions:
+            self._missions[scope] = tuple(self._listed(scope))
+        return self._missions[scope]
+
+    def _listed(self, scope: Path) -> Iterator[tuple[str, Path]]:
         for layer in self._all_layers(scope):
             named = layer.get(missions.name)
             for name, entry in named.entries.items() if isinstance(named, MappingNode) else ():

@@ -24,7 +24,7 @@ from rbxcompose.lsp.newest import PAUSE, Newest
 from rbxcompose.lsp.outline import outline
 from rbxcompose.lsp.project import FoundByFile, Project
 from rbxcompose.lsp.project_files import ProjectFiles
-from rbxcompose.lsp.renaming import CannotRenameError, compiler, prepare, rename
+from rbxcompose.lsp.rename import CannotRenameError, compiler, prepare, rename
 from rbxcompose.lsp.symbol_index import SymbolIndex, references
 from rbxcompose.model.robot import Robot
 

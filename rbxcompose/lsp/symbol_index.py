@@ -13,7 +13,7 @@ from rbxcompose.lsp.symbols import Mention, Symbol
 from rbxcompose.lsp.trial_mentions import TrialMentions
 from rbxcompose.model.robot import Robot
 
-Place = tuple[Path, int, int]
+MentionPlace = tuple[Path, int, int]
 
 
 class SymbolIndex:
@@ -28,7 +28,7 @@ class SymbolIndex:
         self._robot_of = cache(robot_of)
         self.mentions = list(dict.fromkeys(one for path in files.all for one in self._of(path)))
         self._of_symbol: dict[Symbol, list[Mention]] = {}
-        self._at: dict[Place, list[Mention]] = {}
+        self._at: dict[MentionPlace, list[Mention]] = {}
         for one in self.mentions:
             self._of_symbol.setdefault(one.symbol, []).append(one)
             if one.start >= 0:

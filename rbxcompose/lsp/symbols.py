@@ -48,7 +48,7 @@ class Mention:
     is_definition: bool = False
 
 
-class TextPlaces:
+class ScalarPlaces:
     """Finds the places of scalars in a text."""
 
     def __init__(self, text: str) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 import pytest
@@ -11,10 +11,13 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rbxcompose.compiler import Compilation, compile_robot
+from rbxcompose.lsp.manifest_mentions import ManifestMentions
+from rbxcompose.lsp.mission_mentions import MissionMentions
 from rbxcompose.lsp.project_files import ROBOT, ProjectFiles
-from rbxcompose.lsp.renaming import CannotRenameError, Renamed, compiler, prepare, rename
+from rbxcompose.lsp.rename import CannotRenameError, Renamed, compiler, prepare, rename
 from rbxcompose.lsp.symbol_index import SymbolIndex, references
-from rbxcompose.lsp.symbols import Symbol
+from rbxcompose.lsp.symbols import Mention, Symbol
+from rbxcompose.lsp.trial_mentions import TrialMentions
 from rbxcompose.plan.dump import dump
 from tests.conftest import ROOT
 from tests.soak import Soak
@@ -181,6 +184,35 @@ def test_comments_quotes_and_line_ends_stay(project: Path) -> None:
     assert new == text.replace("  low:\n", "  least:\n").replace("< $low", "< $least") + "# low\n"
 
 
+def test_an_overlay_a_local_part_and_its_patterns_follow(project: Path) -> None:
+    robot, overlay = project / "robots/turtlebot/robot.yaml", project / "robots/turtlebot/slow.yaml"
+    part = project / "parts/lamp.yaml"
+    part.parent.mkdir()
+    part.write_text(
+        "rbx: 1\nkind: Part\nname: lamp\ncomponents:\n  cell: {type: battery_sim, runtime: 9 s}\n"
+        "values:\n  left: cell.battery_level\nprovides:\n  values: [left]\n"
+    )
+    text = robot.read_text(encoding="utf-8").replace("match: [base,", "match: [front_*, base,")
+    included = "include:\n  front:\n    part: ../../parts/lamp.yaml\n    connect: {battery_level: lamp}\n\ncomponents:"
+    robot.write_text(text.replace("\ncomponents:", f"\n{included}", 1), encoding="utf-8")
+    header = "rbx: 1\nkind: Overlay\nname: slow\n"
+    overlay.write_text(f"{header}components:\n  go_to:\n    speed: ${{args.speed / 2}}\n  front_cell: {{warn: 40 %}}\n")
+    names = Names(project)
+    file = "robots/turtlebot/slow.yaml"
+    assert names.lines(names.rename("robots/turtlebot/robot.yaml", "  |go_to:\n", "drive"))[file] == ["drive:"]
+    assert names.lines(names.rename(file, "${args.|speed", "pace"))[file] == ["speed: ${args.pace / 2}"]
+    assert names.lines(names.rename("parts/lamp.yaml", "  |cell: {", "battery"))[file] == [
+        "front_battery: {warn: 40 %}"
+    ]
+    assert names.lines(names.rename("parts/lamp.yaml", "[|left]", "rest"))["parts/lamp.yaml"] == [
+        "rest: cell.battery_level",
+        "values: [rest]",
+    ]
+    found = names.lines(names.rename("robots/turtlebot/robot.yaml", "  |front:\n", "rear"))
+    assert found["robots/turtlebot/robot.yaml"] == ["match: [rear_*, base, go_to, cmd_vel]", "rear:"][::-1]
+    assert found[file] == ["rear_cell: {warn: 40 %}"]
+
+
 def fresh(names: Names, old: str) -> str:
     """Return a name of the same length that is nowhere: columns are in plans, too."""
     texts = [names.index.files.text(path) for path in names.index.files.all]
@@ -225,3 +257,23 @@ def test_after_any_rename_a_robot_is_the_same_but_for_the_name(shipped: Names, s
         check_renaming(shipped, symbol)
 
     holds()
+
+
+@given(st.data())
+@settings(max_examples=30, deadline=None)
+def test_texts_that_are_being_typed_make_no_trouble(data: st.DataObject) -> None:
+    files = ("robots/turtlebot/robot.yaml", "missions/patrol_machine.yaml", "missions/tests/patrol.test.yaml")
+    path = ROOT / data.draw(st.sampled_from(files))
+    text = path.read_text(encoding="utf-8")
+    cut, end = sorted((data.draw(st.integers(60, len(text))), data.draw(st.integers(60, len(text)))))
+    typed = text[:cut] + data.draw(st.text("ab:-{}[]\"'$ \n#|>&*!?%@", max_size=4)) + text[end:]
+    files_typed = ProjectFiles(path, lambda one: typed if one == path else one.read_text(encoding="utf-8"))
+    mentions = MENTIONS.get(files_typed.kind(path), lambda files, path: ())(files_typed, path)
+    assert all(typed[one.start : one.end] == one.symbol.name for one in mentions if one.start >= 0)
+
+
+MENTIONS: dict[str, Callable[[ProjectFiles, Path], Iterable[Mention]]] = {
+    "Robot": lambda files, path: ManifestMentions(files, path).all(),
+    "Mission": lambda files, path: MissionMentions(files, path, {}).all(),
+    "Test": lambda files, path: TrialMentions(files, path, {}).all(),
+}
