@@ -6,7 +6,7 @@ brings has the name of its instance in front, and both are names of their own.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
 
@@ -43,6 +43,10 @@ class ProjectFiles:
         self._parts: dict[Path, dict[str, tuple[Path, ...]]] = {}
         self._missions: dict[Path, tuple[tuple[str, Path], ...]] = {}
         self._opened = path
+
+    def changed(self, texts: Mapping[Path, str]) -> ProjectFiles:
+        """Return the same project with other texts."""
+        return ProjectFiles(self._opened, lambda path: texts[path] if path in texts else self.text(path))
 
     def text(self, path: Path) -> str:
         """Return the text of a file."""

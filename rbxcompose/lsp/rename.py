@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 
 from rbxcompose.compiler import Compilation, compile_robot
@@ -73,7 +73,17 @@ def rename(index: SymbolIndex, path: Path, line: int, column: int, new: str, com
     for one in (one for symbol in symbols for one in index.of(symbol)):
         places.setdefault(one.file, set()).add((one.start, one.end))
     made = _made(index.files, places, new)
-    _refuse_changed(index.files, made.texts, compiled)
+    robots: dict[tuple[Path, bool], Compilation] = {}
+
+    def once(robot: Path, texts: Mapping[Path, str]) -> Compilation:
+        key = robot, texts is made.texts
+        if key not in robots:
+            robots[key] = compiled(robot, texts)
+        return robots[key]
+
+    _refuse_changed(index.files, made.texts, once)
+    after = SymbolIndex(index.files.changed(made.texts), lambda robot: once(robot, made.texts).robot)
+    _refuse_other_meanings(index, after, symbols, new)
     return made
 
 
@@ -155,6 +165,22 @@ def _refuse_changed(files: ProjectFiles, texts: Mapping[Path, str], compiled: Co
         concerned |= {mission for one in tuple(concerned) for _, mission in files.missions(one)}
         if not concerned.isdisjoint(texts):
             _refuse_other(robot, compiled(robot, before), compiled(robot, texts))
+
+
+def _refuse_other_meanings(index: SymbolIndex, after: SymbolIndex, symbols: Collection[Symbol], new: str) -> None:
+    """Refuse what makes a word mean the new name that meant something else before, or the other way round."""
+    was = Counter(
+        (one.file, one.symbol.file, one.symbol.sort, new if one.symbol in symbols else one.symbol.name)
+        for one in index.mentions
+    )
+    now = {(one.file, one.symbol.file, one.symbol.sort, one.symbol.name): one for one in after.mentions}
+    found = Counter((one.file, one.symbol.file, one.symbol.sort, one.symbol.name) for one in after.mentions)
+    for key in (found - was) | (was - found):
+        place = ""
+        if (one := now.get(key)) and one.start >= 0:
+            line, column = after.files.places(one.file).position(one.start)
+            place = f", as at {shown_name(one.file)}:{line + 1}:{column + 1}"
+        raise CannotRenameError(f"'{new}' has another meaning already{place}")
 
 
 def _refuse_other(robot: Path, old: Compilation, new: Compilation) -> None:

@@ -150,6 +150,7 @@ def test_a_state_a_loop_and_an_input_are_renamed_where_they_are_meant(shipped: N
         ("robots/turtlebot/robot.yaml", "  |dock: {", "9", "names start with a lower-case letter"),
         ("robots/turtlebot/robot.yaml", "  |dock: {", "corner_1", "'corner_1' is taken"),
         ("missions/patrol.yaml", "$|low", "battery", "then `check` would say"),
+        ("missions/patrol_machine.yaml", "    |count:\n", "finished", "'finished' has another meaning already, as at"),
         ("robots/box_robot/robot.yaml", "  |base: rbx", "chassis", "then `check` would say"),
     ],
 )
@@ -268,7 +269,8 @@ def test_texts_that_are_being_typed_make_no_trouble(data: st.DataObject) -> None
     cut, end = sorted((data.draw(st.integers(60, len(text))), data.draw(st.integers(60, len(text)))))
     typed = text[:cut] + data.draw(st.text("ab:-{}[]\"'$ \n#|>&*!?%@", max_size=4)) + text[end:]
     files_typed = ProjectFiles(path, lambda one: typed if one == path else one.read_text(encoding="utf-8"))
-    mentions = MENTIONS.get(files_typed.kind(path), lambda files, path: ())(files_typed, path)
+    made = MENTIONS.get(files_typed.kind(path))
+    mentions = made(files_typed, path) if made else ()
     assert all(typed[one.start : one.end] == one.symbol.name for one in mentions if one.start >= 0)
 
 
