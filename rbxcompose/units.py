@@ -355,13 +355,13 @@ def to_si(value: object, dimension: Dimension) -> float:
     if read.dimension == NUMBER and (fix := bare_number_help(dimension, read.value)):
         raise UnitError(f"must be {dimension.phrase}", detail="the unit is missing", help=fix)
     if read.dimension not in (dimension, NUMBER):
-        help_text = _minutes(value) if dimension == TIME else ""
+        help_text = minutes_help(value) if dimension == TIME else ""
         raise UnitError(_must_be(dimension), detail=f"this is {read.dimension.phrase}", help=help_text)
     _require_moderate(read.value)
     return read.value
 
 
-def _minutes(written: object) -> str:
+def minutes_help(written: object) -> str:
     """Return what to write for minutes, if metres may be meant as these."""
     found = _QUANTITY.fullmatch(written) if isinstance(written, str) else None
     return f"if these are minutes, write '{found[1]} min'" if found is not None and found[2] == "m" else ""

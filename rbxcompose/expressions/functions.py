@@ -94,6 +94,14 @@ def _rounded(value: Value) -> float:
 
 _MANY = 1000  # no expression is long enough to have more
 
+FOREIGN: Mapping[str, str] = {
+    "range": "to do something a number of times, write 'repeat: 3'; a list is written '[1, 2, 3]'",
+    "enumerate": "a loop over a list gives its items only",
+    **dict.fromkeys(("len", "size", "length"), "write 'count(...)'"),
+    **dict.fromkeys(("int", "float", "str"), "values need no conversion; 'round(...)' gives a whole number"),
+    **dict.fromkeys(("dist", "norm", "hypot"), "write 'distance(a, b)'"),
+}
+"""Functions of other languages, and what to write instead."""
 FUNCTIONS: Mapping[str, Function] = {
     "count": Function(1, 1, "count(list)", "How many items a list has, or entries a map.", _count),
     "age": Function(1, 1, "age($name)", "The time since the last message of a value."),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import lru_cache
 
-from rbxcompose.expressions.functions import FUNCTIONS
+from rbxcompose.expressions.functions import FOREIGN, FUNCTIONS
 from rbxcompose.expressions.operators import OPERATORS
 from rbxcompose.expressions.tokens import KEYWORDS, Token, TokenKind, tokens
 from rbxcompose.expressions.tree import (
@@ -219,7 +219,7 @@ class _Parser:
 
     def call(self, name: Token) -> FunctionCall:
         if name.text not in FUNCTIONS:
-            help_text = suggest(name.text, FUNCTIONS, "the functions are")
+            help_text = FOREIGN.get(name.text) or suggest(name.text, FUNCTIONS, "the functions are")
             raise ExpressionError(f"unknown function '{name.text}'", name.start, name.end, help_text)
         arguments, end = self.items(")", self.take())
         return FunctionCall(name.start, end, name.text, arguments)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from rbxcompose.expressions.tree import ExpressionNode, Minus, Number
+from rbxcompose.expressions.tree import ExpressionNode, Minus, Number, Variable
 from rbxcompose.expressions.types import Type
-from rbxcompose.units import DIMENSIONS, NUMBER, Dimension, bare_number_help, units_of
+from rbxcompose.units import DIMENSIONS, NUMBER, Dimension, bare_number_help, example, units_of
 
 
 def _written(node: ExpressionNode) -> Number | None:
@@ -29,11 +29,15 @@ def missing_unit(node: ExpressionNode, dimension: Dimension) -> str:
 
 
 def other_unit(left: tuple[ExpressionNode, Type], right: tuple[ExpressionNode, Type]) -> str:
-    """Return the units of a literal quantity next to one that is not; nothing if both are alike."""
-    for (written, _), (other, kind) in ((left, right), (right, left)):
+    """Return the units of a literal quantity next to one that is not, or where a name gets its unit."""
+    for (written, bare), (other, kind) in ((left, right), (right, left)):
         dimension = kind.dimension
-        if dimension in DIMENSIONS.values() and dimension and _written(written) and not _written(other):
+        if dimension not in DIMENSIONS.values() or not dimension or _written(other):
+            continue
+        if _written(written):
             return f"units of {kind.phrase}: {', '.join(units_of(dimension)) or 'none'}"
+        if isinstance(written, Variable) and bare.measure == NUMBER and dimension != NUMBER:
+            return f"give '{written.name}' a unit where it is declared, such as '{example(dimension)}'"
     return ""
 
 

@@ -162,7 +162,7 @@ def test_a_sound_condition_has_no_problems(text: str) -> None:
         ("$battery < 30", "$battery < 30", "a ratio is compared with a bare number", "write '30 %'"),
         ("0.3 > $battery", "0.3 > $battery", "a ratio is compared with a bare number", "write '30 %'"),
         ("$battery + 1 < $low", "$battery + 1", "a ratio is added to a bare number", "write '1 %'"),
-        ("$battery < $n", "$battery < $n", "a ratio is compared with a number", ""),
+        ("$battery < $n", "$battery < $n", "a ratio is compared with a number", "give 'n' a unit"),
         ("$turn < 45", "$turn < 45", "an angle is compared with a bare number", "write '45 deg' or '45 rad'"),
         ("$turn < -45", "$turn < -45", "an angle is compared with a bare number", "write '-45 deg' or '-45 rad'"),
         ("$speed - $wait > 0", "$speed - $wait", "a speed is reduced by a time", ""),

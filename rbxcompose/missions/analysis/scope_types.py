@@ -16,6 +16,7 @@ from rbxcompose.missions.engine.condition_watches import POSE as POSE_NAME
 from rbxcompose.missions.language.spans import inner_span
 from rbxcompose.missions.program.program import MissionNode, Program, RobotNames
 from rbxcompose.references import VALUE
+from rbxcompose.units import TIME, minutes_help
 
 _MEASURED = (TypeKind.QUANTITY, TypeKind.COUNT, TypeKind.FLAG)  # types that no place can have
 
@@ -126,7 +127,8 @@ def findings_of(
         ):
             yield codes.UNKNOWN_NAME.at(span, problem.message, help=problem.help, fix=fix)
         else:
-            yield kind.at(span, problem.message, help=problem.help, fix=fix)
+            help_text = problem.help or (minutes_help(written) if wanted.dimension == TIME else "")
+            yield kind.at(span, problem.message, help=help_text, fix=fix)
 
 
 def _no_text(word: str, span: Span, scope: NodeScope, kind: FindingKind) -> Finding:

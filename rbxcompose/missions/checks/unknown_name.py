@@ -21,6 +21,11 @@ def unknown_name(mission: Examined) -> Iterator[Finding]:
             name = assignment.name
             if name not in data and not (mission.program.is_open and name not in mission.program.inputs):
                 message = f"only data can be set; the mission has no datum '{name}'"
+                if name in mission.program.inputs or name in mission.robot.values:
+                    what = "an input" if name in mission.program.inputs else "a value of the robot"
+                    help_text = f"'{name}' is {what}, which nobody sets here: declare a datum of another name under 'data'"
+                    yield UNKNOWN_NAME.at(assignment.span, message, help=help_text)
+                    continue
                 help_text = suggest(name, data, "its data") or f"write '{name}: ...' under 'data'"
                 fix = correction(name, data, assignment.span, taken=[one.name for one in set_here])
                 yield UNKNOWN_NAME.at(assignment.span, message, help=help_text, fix=fix)

@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator
 
 from rbxcompose.expressions.types import TypeKind
 from rbxcompose.findings import Finding, suggest
-from rbxcompose.manifest.tree import ScalarNode
+from rbxcompose.manifest.tree import ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.missions.analysis.scope_types import View
@@ -14,6 +14,7 @@ from rbxcompose.missions.language.argument_types import check_written
 from rbxcompose.missions.language.asked import WrittenArgument
 from rbxcompose.missions.language.written_poses import help_with_place, is_pose, nodes_of
 from rbxcompose.missions.program.program import Skill
+from rbxcompose.printable import plain
 from rbxcompose.units import example
 
 PLACED = (TypeKind.PLACE, TypeKind.POSE)
@@ -80,11 +81,29 @@ def _missing(view: View, skill: Skill) -> Iterator[Finding]:
         yield wrong_argument.at(view.node.span, message, help=help_text)
 
 
+def _one_by_one(view: View, skill: Skill, value: TreeNode) -> str:
+    """Return how to do it for each item of a list of words, names or quantities; nothing if that is not meant."""
+    items = value.items if isinstance(value, SequenceNode) else ()
+    words = [item.text for item in items if isinstance(item, ScalarNode) and not _is_number(item.text)]
+    if not words or len(words) != len(items):
+        return ""
+    if len(words) == 1:
+        return f"write '{skill.name}: {plain(words[0], 60)}', without brackets"
+    shown = plain(", ".join(words), 60)
+    return f"to do it for each: 'for: one', 'in: [{shown}]', 'do: {{{skill.name}: $one}}', each on a line of its own"
+
+
+def _is_number(text: str) -> bool:
+    return text[:1] in "+-.0123456789"
+
+
 def _argument(view: View, skill: Skill, argument: WrittenArgument) -> Iterator[Finding]:
     name = argument.name or skill.main
     if not name:
         message = f"the skill '{skill.name}' takes no single value"
-        yield wrong_argument.at(argument.span, message, help=suggest("", skill.arguments, "its arguments"))
+        none = f"it has no arguments: write '{skill.name}:' with nothing behind it"
+        help_text = suggest("", skill.arguments, "its arguments") or none
+        yield wrong_argument.at(argument.span, message, help=help_text)
     elif name not in skill.arguments:
         message = f"the skill '{skill.name}' has no argument '{name}'"
         taken = {one.name for one in view.node.step.arguments}
@@ -97,6 +116,7 @@ def _argument(view: View, skill: Skill, argument: WrittenArgument) -> Iterator[F
             yield from check_written(view, argument.value, skill.arguments[name], wrong_argument)
     elif skill.arguments[name].kind not in STRUCTURED:
         message = f"the argument '{name}' of '{skill.name}' must be {skill.arguments[name].phrase}"
-        is_place = skill.arguments[name].kind in PLACED
-        help_text = help_with_place(nodes_of(argument.value)) if is_place else ""
+        help_text = _one_by_one(view, skill, argument.value)
+        if not help_text and skill.arguments[name].kind in PLACED:
+            help_text = help_with_place(nodes_of(argument.value))
         yield wrong_argument.at(argument.span, message, help=help_text)

@@ -70,7 +70,9 @@ def _not_listed(view: View) -> Iterator[Finding]:
         found, _ = check(items, view.scope)
         if found.kind not in LISTED:
             message = f"'in' must be a list or a map; it is {found.phrase}"
-            yield WRONG_TYPE.at(view.node.asked[0].scalar.span, message)
+            times = f"to do it {items.text} times, write 'repeat: {items.text}' instead of 'for' and 'in'"
+            help_text = times if found == COUNT else "write a list: '[...]'"
+            yield WRONG_TYPE.at(view.node.asked[0].scalar.span, message, help=help_text)
 
 
 def _other_cases(view: View) -> Iterator[Finding]:

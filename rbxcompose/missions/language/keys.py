@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 
-from rbxcompose.manifest.tree import MappingNode
+from rbxcompose.manifest.tree import MappingNode, ScalarNode
 from rbxcompose.missions import codes
 from rbxcompose.missions.language.grammar import is_told
 from rbxcompose.missions.language.value_reader import Nodes
@@ -18,6 +18,16 @@ def anywhere() -> tuple[str, ...]:
     return ("name", *modifier_keys())
 
 
+def _cure(step: MappingNode) -> str:
+    """Return what to do with a step that has only settings, or nothing at all."""
+    first = next(iter(step.entries), "")
+    if not first:
+        return "a step is a word such as 'sequence' or 'wait', or the name of a skill"
+    value = step.entries[first].value
+    shown = f" {value.text}" if isinstance(value, ScalarNode) and value.text else ""
+    return f"'{first}' is a setting of a step: write '{first}:{shown}' without a dash, right below the word of its step"
+
+
 def find_key(step: MappingNode, nodes: Nodes) -> tuple[str, StepType | None]:
     """Return the key of a step and its kind, None for a skill; if there is neither, an empty key, with a finding."""
     if is_told(step):
@@ -25,8 +35,7 @@ def find_key(step: MappingNode, nodes: Nodes) -> tuple[str, StepType | None]:
     own = [key for key in step.entries if key not in anywhere()]
     key = next((key for key in own if key in kinds()), own[0] if own else "")
     if not own:
-        help_text = "a step is a word such as 'sequence' or 'wait', or the name of a skill"
-        nodes.add(codes.WRONG_SHAPE.at(step.span, "there is no step here", help=help_text))
+        nodes.add(codes.WRONG_SHAPE.at(step.span, "there is no step here", help=_cure(step)))
     elif not key.strip():
         nodes.add(codes.MISSING.at(step.entries[key].key.span, "a step is missing here"))
         return "", None

@@ -16,7 +16,7 @@ from rbxcompose.expressions.types import (
     quantity_of,
 )
 from rbxcompose.expressions.values import Value
-from rbxcompose.findings import suggest
+from rbxcompose.findings import DID_YOU_MEAN, surely_meant
 from rbxcompose.manifest.scalars import describe, plain_value
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions.program.data import Datum
@@ -82,7 +82,10 @@ def _scalar(scalar: ScalarNode, wanted: Type) -> Value:
         return value
     text = scalar.text if scalar.filled is None else str(scalar.filled)
     if wanted.kind is TypeKind.CHOICE and text not in wanted.choices:
-        raise WrongValue(f"is not one of the choices: '{text}'", help=suggest(text, wanted.choices, "choices"))
+        choices = ", ".join(wanted.choices)
+        near = surely_meant(text, wanted.choices)
+        help_text = f"{DID_YOU_MEAN} '{near}'?" if near else f"choices: {choices}"
+        raise WrongValue(f"is not one of the choices: '{text}'", help=help_text)
     return text
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from typing import Protocol
 
 from rbxcompose.expressions.text import Template, TextSlot, parse_template
 from rbxcompose.expressions.tree import Expression, ExpressionError, Number
 from rbxcompose.expressions.types import COUNT, FLAG, TEXT, UNKNOWN, Type, quantity_of
 from rbxcompose.expressions.written import quotes_needed
-from rbxcompose.findings import Finding, Span
+from rbxcompose.findings import Finding, Span, surely_meant
 from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions import codes
@@ -150,7 +151,9 @@ class ValueReader:
         scalar = self.scalar(key, " or ".join(f"'{choice}'" for choice in choices))
         if scalar and scalar.text not in choices:
             message = f"'{key}' cannot be '{scalar.text}'"
-            self.nodes.add(codes.NOT_A_CHOICE.misspelt(scalar.span, message, scalar.text, choices, WORDS))
+            found = codes.NOT_A_CHOICE.misspelt(scalar.span, message, scalar.text, choices, WORDS)
+            is_sure = surely_meant(scalar.text, choices) is not None
+            self.nodes.add(found if is_sure else replace(found, help=f"{WORDS}: {', '.join(choices)}"))
         return scalar.text if scalar else choices[0]
 
     def template(self, key: str) -> Template:

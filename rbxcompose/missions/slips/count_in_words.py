@@ -13,7 +13,10 @@ from rbxcompose.missions.language.grammar import GrammarPlace, Takes
 from rbxcompose.missions.slips import slip
 from rbxcompose.slips import Repair
 
-ENDLESS: Mapping[str, str] = dict.fromkeys(("always", "endless", "endlessly", "infinite", "unlimited"), "forever")
+ENDLESS: Mapping[str, str] = {
+    **dict.fromkeys(("always", "endless", "endlessly", "infinite", "unlimited", "inf", "true"), "forever"),
+    "-1": "forever",
+}
 _NUMBERS = ("one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve")
 NUMBERS: Mapping[str, str] = {
     **{word: str(number) for number, word in enumerate(_NUMBERS, start=1)},

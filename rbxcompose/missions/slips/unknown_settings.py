@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from rbxcompose.findings import Finding, nearest
+from rbxcompose.findings import DID_YOU_MEAN, Finding, nearest
 from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode
 from rbxcompose.missions import codes
@@ -16,12 +16,16 @@ from rbxcompose.units import UnitError, parse_quantity
 FOREIGN: Mapping[str, str] = {
     "delay": "wait",
     "if": "only_if",
+    "interval": "every",
     "limit": "timeout",
     "max_time": "timeout",
     "otherwise": "else",
+    "period": "every",
     "retries": "attempts",
     "retry": "attempts",
     "sleep": "wait",
+    "success_count": "succeed_when",
+    "success_threshold": "succeed_when",
     "tries": "attempts",
     "unless": "skip_if",
     "when": "only_if",
@@ -29,6 +33,7 @@ FOREIGN: Mapping[str, str] = {
 }
 """Words of other languages, each with ours: a setting of a step, or a step of its own."""
 STEPS = ("wait",)  # those of our words that are steps
+_CHAINED = ("elif", "elseif", "elsif", "else_if", "else if")
 
 
 @slip(Takes.STEP)
@@ -61,7 +66,7 @@ def _is_stray(step: MappingNode, key: str, settings: Iterable[str], words: Words
     """Return whether a key beside a step is an unknown setting rather than a second step."""
     if key in words.skills or (key in words.kinds and key not in FOREIGN):
         return False
-    return key in FOREIGN or bool(nearest(key, settings)) or is_setting(step.entries[key].value)
+    return key in FOREIGN or key in _CHAINED or bool(nearest(key, settings)) or is_setting(step.entries[key].value)
 
 
 def _is_only_option(key: str, words: Words) -> bool:
@@ -74,6 +79,8 @@ def _finding(step: MappingNode, kind: str, key: str, words: Words) -> Finding:
     span, message = step.entries[key].key.span, f"unknown key '{key}' beside {beside}"
     if not kind and words.is_option(key):
         return codes.UNKNOWN_KEY.at(span, message, help=f"it belongs to {words.owners(key)}")
+    if key in _CHAINED and kind == "if":
+        return codes.UNKNOWN_KEY.at(span, message, help="write 'else:', and below it another 'if' with its own 'then'")
     settings = {*words.kinds.get(kind, ()), *words.modifiers} - {kind}
     ours = FOREIGN.get(key, "")
     if ours in STEPS:
@@ -81,7 +88,9 @@ def _finding(step: MappingNode, kind: str, key: str, words: Words) -> Finding:
         shown = value.text if isinstance(value, ScalarNode) and value.text else "..."
         return codes.UNKNOWN_KEY.at(span, message, help=f"a pause is a step of its own: '- {ours}: {shown}'")
     if ours in settings:
-        return codes.UNKNOWN_KEY.at(span, message, help=f"did you mean '{ours}'?")
+        return codes.UNKNOWN_KEY.at(span, message, help=f"{DID_YOU_MEAN} '{ours}'?")
+    if ours and (owners := words.owners(ours)):
+        return codes.UNKNOWN_KEY.at(span, message, help=f"{DID_YOU_MEAN} '{ours}'? It belongs to {owners}")
     what = "settings of a step" if _is_stray(step, key, settings, words) else "its settings"
     return codes.UNKNOWN_KEY.misspelt(span, message, key, settings, what, taken=step.entries)
 
