@@ -26,7 +26,7 @@ from rbxcompose.controller_interface import Controller, ControllerConfig, contro
 from rbxcompose.msgs.control_msgs import GripperCommand
 from rbxcompose.msgs.rbxcompose_msgs import Grip
 from rbxcompose.msgs.types import Message
-from rbxcompose.sdk import Port, ServedGoal, ServesAction
+from rbxcompose.sdk import BoundsGoals, Capability, Port, ServedGoal, ServesAction, Setting
 from rbxcompose.units import LENGTH
 
 COMMAND, GRIP = "command", "grip"  # the ports
@@ -149,6 +149,12 @@ class GripperController(Controller[GripperConfig]):
                 outcomes={"stalled": counts_as},
             ),
         }
+
+    @classmethod
+    def capabilities(cls, name: str, config: GripperConfig) -> tuple[Capability, ...]:
+        """Return that it refuses to open farther than its model can."""
+        field = "calibration" if config.calibration is not None else "opening"
+        return (BoundsGoals(GRIP, ranges=Setting({"opening": model_of(config).openings}, field)),)
 
     @classmethod
     def mistake(cls, config: GripperConfig) -> tuple[str, str] | None:

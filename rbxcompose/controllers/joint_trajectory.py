@@ -23,7 +23,7 @@ from rbxcompose.msgs.control_msgs import FollowJointTrajectory
 from rbxcompose.msgs.entries import ArrayEntries
 from rbxcompose.msgs.rbxcompose_msgs import MoveJoints
 from rbxcompose.msgs.stamps import to_nanoseconds
-from rbxcompose.sdk import Port, ServesAction
+from rbxcompose.sdk import BoundsGoals, Capability, Port, ServesAction, Setting
 
 Follow = FollowJointTrajectory
 FOLLOW, MOVE = "follow_joint_trajectory", "move"  # its ports
@@ -82,6 +82,12 @@ class JointTrajectoryController(Controller[JointTrajectoryConfig]):
             FOLLOW: ServesAction(Follow, f"{name}/{FOLLOW}", claims=name, skill=None),
             MOVE: ServesAction(MoveJoints, f"{name}/{MOVE}", claims=name, skill=name, entries=entries),
         }
+
+    @classmethod
+    def capabilities(cls, name: str, config: JointTrajectoryConfig) -> tuple[Capability, ...]:
+        """Return that it refuses what its joints cannot reach, unless it goes to the nearest position."""
+        led = Setting({joint: joint for joint in config.joints}, "joints")
+        return (BoundsGoals(MOVE, joints=led),) if config.outside == "refuse" else ()
 
     def prepare(self) -> None:
         """Set up the follower."""

@@ -14,7 +14,18 @@ from rbxcompose.controller_interface import Controller, ControllerConfig, contro
 from rbxcompose.msgs.control_msgs import SingleJointPosition as Move
 from rbxcompose.msgs.stamps import to_seconds, to_time
 from rbxcompose.msgs.std_msgs import Float64, Header
-from rbxcompose.sdk import In, Length, Port, ServedGoal, ServesAction, Speed, Time
+from rbxcompose.sdk import (
+    BoundsGoals,
+    Capability,
+    In,
+    Length,
+    Port,
+    ServedGoal,
+    ServesAction,
+    Setting,
+    Speed,
+    Time,
+)
 from rbxcompose.units import LENGTH, SPEED
 
 MEASURES = {"position": LENGTH, "max_velocity": SPEED}
@@ -61,6 +72,11 @@ class LinearController(Controller[LinearConfig]):
             "command": In(Float64, f"{name}/command", qos="command", is_open=True),
             "move": ServesAction(Move, f"{name}/move", claims=name, skill=name, measures=MEASURES),
         }
+
+    @classmethod
+    def capabilities(cls, name: str, config: LinearConfig) -> tuple[Capability, ...]:
+        """Return that it refuses what its joint cannot reach."""
+        return (BoundsGoals("move", joints=Setting({"position": config.joint}, "joint")),)
 
     def prepare(self) -> None:
         """Set up how it moves."""

@@ -205,6 +205,8 @@ class _Checker:
     def part(self, node: FieldAccess | Index) -> Type:
         whole = self.type_of(node.of)
         if isinstance(node, FieldAccess):
+            if whole.names and node.name not in whole.names:
+                return self.wrong(node, f"there is no entry '{node.name}'", f"entries: {', '.join(whole.names)}")
             if whole.kind in (TypeKind.MAP, TypeKind.UNKNOWN):
                 return whole.entry
             return self.wrong(node, f"{whole.phrase} has no fields")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import field
 from enum import Enum
 from types import MappingProxyType
 
@@ -33,6 +34,8 @@ class Type:
     dimension: Dimension | None = None
     choices: tuple[str, ...] = ()
     of: Type | None = None
+    names: tuple[str, ...] = field(default=(), compare=False)
+    """The only entries that a map can have, if they are known."""
 
     @property
     def phrase(self) -> str:
@@ -82,9 +85,9 @@ def list_of(entry: Type) -> Type:
     return Type(TypeKind.LIST, of=entry)
 
 
-def map_of(entry: Type) -> Type:
-    """Return the type of maps from names to `entry`."""
-    return Type(TypeKind.MAP, of=entry)
+def map_of(entry: Type, names: tuple[str, ...] = ()) -> Type:
+    """Return the type of maps from names to `entry`; `names` are the only ones, if they are known."""
+    return Type(TypeKind.MAP, of=entry, names=names)
 
 
 TYPES: Mapping[str, Type] = MappingProxyType(

@@ -55,17 +55,18 @@ def calls(robot: Robot, mission: RobotMission) -> Iterator[ChargeInterrupt]:
 
 def charger_of(robot: Robot, skill: str) -> tuple[RobotComponent, Charges] | None:
     """Return the component at which a skill charges, None if it does not charge."""
-    found = (one for one in robot.declared(Charges) if _is_served(robot, skill, one[0], one[1].goals))
+    found = (one for one in robot.declared(Charges) if is_served(robot, skill, one[0], one[1].goals))
     return next(found, None)
 
 
 def navigator_of(robot: Robot, skill: str) -> tuple[RobotComponent, Navigates] | None:
     """Return the component that drives to places as this skill, None if it does not drive."""
-    found = (one for one in robot.declared(Navigates) if _is_served(robot, skill, one[0], one[1].goals))
+    found = (one for one in robot.declared(Navigates) if is_served(robot, skill, one[0], one[1].goals))
     return next(found, None)
 
 
-def _is_served(robot: Robot, skill: str, component: RobotComponent, port: str) -> bool:
+def is_served(robot: Robot, skill: str, component: RobotComponent, port: str) -> bool:
+    """Return whether a port of a component serves a skill."""
     source, end = robot.skills.get(skill), component.end(port)
     return source is not None and end is not None and end.topic == source.topic
 

@@ -28,6 +28,7 @@ from rbxcompose.requests import Command, Query, Refused, answers
 from rbxcompose.robot_events import MissionOver, MissionWaits, RobotHeld
 from rbxcompose.sdk.bound import Ended, Later, Outcome, Reply, SentGoal, ServedGoal
 from rbxcompose.sdk.capabilities import (
+    BoundsGoals,
     Capability,
     Charges,
     CommandsMotion,
@@ -56,6 +57,7 @@ __all__ = [
     "AngularAcceleration",
     "AngularSpeed",
     "ArrayEntries",
+    "BoundsGoals",
     "Calls",
     "CallsAction",
     "Capability",

@@ -6,7 +6,7 @@ text in a capability is the name of a port of the component; everything else is 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields, replace
 from typing import Any, Generic, TypeVar
 
@@ -138,6 +138,17 @@ class Forwards(Capability):
 
     inputs: tuple[str, ...]
     output: str
+
+
+@dataclass(frozen=True, slots=True)
+class BoundsGoals(Capability):
+    """It refuses goals at its port `goals` whose arguments are beyond limits: those of joints, or its own."""
+
+    goals: str
+    joints: Setting[Mapping[str, str]] | None = None
+    """Arguments that are positions of joints, with the joint of each."""
+    ranges: Setting[Mapping[str, tuple[float, float]]] | None = None
+    """Arguments with the least and the greatest value of each, in SI."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,7 +20,7 @@ from tests.misconfig.corpus import Case, cases, run
 
 # The codes of all rules that need to know what a component can do.
 CODES = {
-    *("RBX3001", "RBX3013", "RBX3014", "RBX3102", "RBX3501", "RBX3502", "RBX3503", "RBX3504", "RBX3505"),
+    *("RBX3001", "RBX3013", "RBX3014", "RBX3102", "RBX3501", "RBX3502", "RBX3503", "RBX3504", "RBX3505", "RBX3509"),
     *("RBX4120", "RBX4121", "RBX4122", "RBX4123", "RBX4124", "RBX4130", "RBX4160"),
 }
 TYPES = {"battery_sim": "cell", "diff_drive_sim": "wheels", "go_to": "pilot", "charger": "filler"}

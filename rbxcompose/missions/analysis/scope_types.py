@@ -73,8 +73,19 @@ def base_names(program: Program, robot: RobotNames) -> dict[str, Type]:
         POSE_NAME: POSE,
         **{name: one.type for name, one in program.inputs.items()},
         **{name: datum.type for name, datum in program.data.items()},
-        **{name: map_of(UNKNOWN) for name in program.saved if name not in program.data},
+        **{name: map_of(UNKNOWN, _entries(program, robot, name)) for name in program.saved - program.data.keys()},
     }
+
+
+def _entries(program: Program, robot: RobotNames, name: str) -> tuple[str, ...]:
+    """Return the entries that a saved result can have; none if they are not known."""
+    found = [_result_names(node, robot) for node in program.nodes if node.saved and node.saved.text == name]
+    return tuple(dict.fromkeys(entry for names in found for entry in names)) if all(found) else ()
+
+
+def _result_names(node: MissionNode, robot: RobotNames) -> tuple[str, ...]:
+    used = robot.missions.get(node.step.uses.text) if node.step.uses else None
+    return tuple(used.outputs) if used and not used.is_open else node.step.result_names
 
 
 def base_scope(program: Program, robot: RobotNames) -> NodeScope:

@@ -7,11 +7,12 @@ from collections.abc import Iterator
 from rbxcompose.findings import Finding, Severity
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.examined import Examined
-from rbxcompose.missions.analysis.facts import place_in_text
+from rbxcompose.missions.analysis.facts import Constants, constants_of, number_of, place_in_text
 from rbxcompose.missions.program.answers import ModifierScope
 from rbxcompose.missions.program.outcomes import FAILS
 from rbxcompose.missions.program.program import CONTINUE, MissionNode, Program
 from rbxcompose.rules import OWN
+from rbxcompose.units import TIME, format_quantity
 
 
 @mission_check("RBX4127", Severity.WARNING, closed=(OWN,))
@@ -19,7 +20,8 @@ def idle_modifier(mission: Examined) -> Iterator[Finding]:
     """A modifier changes nothing
 
     `optional` and `attempts` are for steps that can fail. On a step that cannot, they probably belong to another step.
-    `once` and `cooldown` are for steps that run repeatedly, in a loop or a machine.
+    `once` and `cooldown` are for steps that run repeatedly, in a loop or a machine. An `attempt_timeout` that is not
+    shorter than the `timeout` never passes.
 
     Bad:
     ```yaml
@@ -36,7 +38,9 @@ def idle_modifier(mission: Examined) -> Iterator[Finding]:
       - wait: 2 s
     ```
     """
+    known = constants_of(mission.program, {})
     for node in mission.program.nodes:
+        yield from _attempt(node, known)
         for key, modifier in node.modifiers.items():
             if modifier.serves is ModifierScope.FAILING and not mission.ending.inside_of(node, key).counting_as(FAILS):
                 yield idle_modifier.at(
@@ -50,6 +54,18 @@ def idle_modifier(mission: Examined) -> Iterator[Finding]:
                     f"'{key}' changes nothing here: this step is done only once anyway",
                     help="it belongs to a step inside a loop or a machine",
                 )
+
+
+def _attempt(node: MissionNode, known: Constants) -> Iterator[Finding]:
+    """Yield the finding about a limit of each attempt that the limit of all forestalls."""
+    each = next((one.attempt_limit for one in node.modifiers.values() if one.attempt_limit), None)
+    one, whole = number_of(each, known), number_of(node.limit, known)
+    if each is not None and one is not None and whole is not None and one >= whole:
+        yield idle_modifier.at(
+            place_in_text(node, each),
+            f"'attempt_timeout' changes nothing here: all attempts together end after {format_quantity(whole, TIME)}",
+            help="'timeout' counts all attempts: make it longer than 'attempt_timeout' times 'attempts'",
+        )
 
 
 def _comes_again(program: Program, node: MissionNode) -> bool:

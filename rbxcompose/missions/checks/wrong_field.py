@@ -15,7 +15,9 @@ from rbxcompose.missions.language.argument_types import check_written
 from rbxcompose.missions.program.messages import MessageTemplate, TemplateShape, WrittenValue
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.definitions import FieldShape, parse_type
+from rbxcompose.msgs.measures import measure_of
 from rbxcompose.msgs.types import Message
+from rbxcompose.units import NUMBER, QUOTIENT, Dimension, example
 
 FITTING = {  # the types of expressions that fit a field, by its ROS type; all others are numbers
     "bool": (TypeKind.FLAG,),
@@ -30,7 +32,7 @@ def wrong_field(mission: Examined) -> Iterator[Finding]:
     """A message of a mission does not fit its type
 
     The fields of a message are those of its ROS type, and each field has its own type. `rbxcompose msg show TYPE` lists
-    them.
+    them. What some fields measure is known: those of a Twist are speeds, so a length does not fit there.
 
     Bad:
 
@@ -82,6 +84,7 @@ def _check_fields(
     ros: type[Message],
     keys: Mapping[tuple[str, ...], Span],
     path: tuple[str, ...] = (),
+    measured: Dimension | None = None,
 ) -> Iterator[Finding]:
     for name, shape in body.items():
         span = keys[(*path, name)]
@@ -90,9 +93,11 @@ def _check_fields(
             yield wrong_field.misspelt(span, told, name, ros.FIELDS, "its fields", taken=body)
         elif isinstance(shape, Mapping) and "/" in parse_type(ros.FIELDS[name]).base:
             inner = registry.message(parse_type(ros.FIELDS[name]).base)
-            yield from _check_fields(view, shape, inner, keys, (*path, name))
+            below = measure_of(ros.TYPE, name) or measured
+            yield from _check_fields(view, shape, inner, keys, (*path, name), below)
         else:
-            yield from _check_value(view, shape, ros.FIELDS[name], span)
+            found = list(_check_value(view, shape, ros.FIELDS[name], span))
+            yield from found or _measured(view, shape, measure_of(ros.TYPE, name) or measured)
 
 
 def _check_value(view: View, shape: TemplateShape, ros_type: str, span: Span) -> Iterator[Finding]:
@@ -108,6 +113,16 @@ def _check_value(view: View, shape: TemplateShape, ros_type: str, span: Span) ->
     else:
         for item in shape if not field.is_message else ():
             yield from _check_value(view, item, field.base, span)
+
+
+def _measured(view: View, shape: TemplateShape, wanted: Dimension | None) -> Iterator[Finding]:
+    """Yield a finding if a value with a unit is no value of what a field measures."""
+    if wanted is None or not isinstance(shape, WrittenValue) or shape.expression is None:
+        return
+    given, _ = check(shape.expression, view.scope)
+    if given.dimension not in (None, NUMBER, QUOTIENT, wanted):
+        message = f"this must be {wanted.phrase}; it is {given.phrase}"
+        yield wrong_field.at(shape.scalar.span, message, help=f"write {wanted.phrase}, such as '{example(wanted)}'")
 
 
 def _check_list(view: View, shape: WrittenValue, ros_type: str) -> Iterator[Finding]:
@@ -127,8 +142,18 @@ def _check_written(view: View, shape: WrittenValue, base: str, ros_type: str) ->
         found = list(view.typed(shape.expression, UNKNOWN, shape.scalar, wrong_field))
         yield from found
         given, _ = check(shape.expression, view.scope)
+        if not found and "/" in base and given.kind in (*NUMBERS, TypeKind.FLAG, TypeKind.TEXT, TypeKind.CHOICE):
+            yield _no_message(shape, base)
         if not found and given.kind not in (*FITTING.get(base, NUMBERS), TypeKind.UNKNOWN) and "/" not in base:
             yield wrong_field.at(shape.scalar.span, f"this must be of the type {ros_type}; it is {given.phrase}")
+
+
+def _no_message(shape: WrittenValue, base: str) -> Finding:
+    """Return the finding about a single value in the place of a message."""
+    fields = registry.message(base).FIELDS
+    first = next(iter(fields), "")
+    help_text = f"write '{{{first}: {shape.scalar.text}}}'; its fields are {', '.join(fields)}" if first else ""
+    return wrong_field.at(shape.scalar.span, f"this must be a {base}, not a single value", help=help_text)
 
 
 def _span_of(shape: TemplateShape) -> Span | None:

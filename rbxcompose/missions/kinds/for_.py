@@ -32,6 +32,7 @@ from rbxcompose.missions.program.statuses import FAILURE, RUNNING, SKIPPED, SUCC
 WRITTEN, RANDOM, NEAREST = "written", "random", "nearest"
 STOP, NEXT = "stop", "next"
 ALL, ANY = "all", "any"
+DONE, FAILED = "done", "failed"
 
 
 class ForTask(Task):
@@ -96,7 +97,7 @@ class ForTask(Task):
 
     def result(self) -> Value:
         """Return the items that succeeded and those that failed."""
-        return {"done": list(self.done), "failed": list(self.failed)}
+        return {DONE: list(self.done), FAILED: list(self.failed)}
 
     def _decides(self, status: int) -> bool:
         """Record the result of an item, and return whether it decides the result of the loop."""
@@ -177,6 +178,7 @@ class ForStep(Loop):
     removes_done: bool
 
     has_result = True
+    result_names = (DONE, FAILED)
     flow = NodeFlow.PER_ITEM
     look = NodeLook("↻")
 

@@ -31,6 +31,9 @@ def read_machine(reader: NodeReader) -> tuple[MachineStates, str]:
     if isinstance(states, MappingNode) and states.entries:
         names = tuple(states.entries)
         for name, entry in states.entries.items():
+            if name in ENDS:
+                message = f"a state cannot be named '{name}': that is an end of every machine"
+                reader.add(codes.NAME_CLASH.at(entry.key.span, message, help="give the state another name"))
             reader.state(name, entry)
     else:
         span = inner.key_span("states") if "states" in value else reader.span

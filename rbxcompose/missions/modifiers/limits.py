@@ -245,6 +245,11 @@ class Attempts(Modifier):
         return advice if self.value is None and not takes_time(self.pause) else None
 
     @property
+    def attempt_limit(self) -> Expression | None:
+        """Return the time limit of each attempt."""
+        return self.timeout
+
+    @property
     def numbers(self) -> tuple[Counted, ...]:
         """Return the number of attempts."""
         return (Counted("'attempts'", self.value, 1),)

@@ -72,6 +72,11 @@ class Modifier(ABC):
         return None
 
     @property
+    def attempt_limit(self) -> Expression | None:
+        """Return the time limit of each attempt."""
+        return None
+
+    @property
     def forgives(self) -> bool:
         """Return whether a failure may count as success."""
         return False

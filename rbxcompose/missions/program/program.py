@@ -116,6 +116,7 @@ class Step(ABC):
     name: ClassVar[str]  # the word of the language
     options: ClassVar[Mapping[str, str]]  # the keys that belong to it, each with its purpose
     is_inner: ClassVar[bool]  # it occurs only inside another one, like a state in a machine: it has no word
+    result_names: ClassVar[tuple[str, ...]] = ()  # entries of its result, if these are always the same
 
     @classmethod
     @abstractmethod
@@ -179,8 +180,6 @@ class Step(ABC):
     @abstractmethod
     def look(self) -> NodeLook:
         """Return how it is drawn."""
-
-    # Capabilities: what only some kinds have.
 
     @property
     def word(self) -> str:

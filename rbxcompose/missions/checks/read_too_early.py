@@ -1,0 +1,86 @@
+"""Results that are read before anything can have saved them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.findings import Finding, Related, Severity
+from rbxcompose.missions.analysis.check_runner import mission_check
+from rbxcompose.missions.analysis.examined import Examined
+from rbxcompose.missions.program.answers import NodeFlow
+from rbxcompose.missions.program.program import CONTINUE, MissionNode, Program
+from rbxcompose.rules import OWN
+
+
+@mission_check("RBX4164", Severity.WARNING, closed=(OWN,))
+def read_too_early(mission: Examined) -> Iterator[Finding]:
+    """A result is read before it is saved
+
+    `save` keeps the result of a step when this step has ended. An earlier step has nothing to read: its condition does
+    not hold, and a text or an argument that needs the result fails.
+
+    Bad:
+    ```yaml
+    do:
+      - log: $tour.failed could not be reached
+      - for: corner
+        in: [corner_1, corner_2]
+        do:
+          go_to: $corner
+        save: tour
+    ```
+    Good:
+    ```yaml
+    do:
+      - for: corner
+        in: [corner_1, corner_2]
+        do:
+          go_to: $corner
+        save: tour
+      - log: $tour.failed could not be reached
+    ```
+    """
+    program = mission.program
+    if any(one.afterwards != CONTINUE for one in program.interrupts):
+        return  # what is restarted may read what an earlier run of it saved
+    savers: dict[str, list[MissionNode]] = {}
+    for node in program.nodes:
+        if node.saved and node.saved.text not in program.data:
+            savers.setdefault(node.saved.text, []).append(node)
+    for node in program.nodes if savers else ():
+        for asked in node.asked:
+            for name in sorted({one.name for one in asked.expression.names} & savers.keys()):
+                if all(_is_later(program, node, saver) for saver in savers[name]):
+                    yield read_too_early.at(
+                        asked.scalar.span,
+                        f"nothing has saved '{name}' when this is read",
+                        help="read it after the step that saves it, or give it a first value under 'data'",
+                        related=[Related(one.saved.span, "saved here") for one in savers[name] if one.saved],
+                    )
+
+
+def _is_later(program: Program, reader: MissionNode, saver: MissionNode) -> bool:
+    """Return whether a step surely begins after another one has ended, and neither comes again."""
+    before, after = _above(program, reader), _above(program, saver)
+    shared = [one for one in before if one in after]
+    if not shared or reader.number in after or saver.number in before:
+        return False  # in different reactions, or one is within the other
+    around = program.nodes[shared[0]]
+    if around.step.flow is not NodeFlow.IN_TURN or around.step.goes_on_after != "success":
+        return False
+    if any(_comes_again(program.nodes[one]) for one in shared):
+        return False
+    return reader.number < saver.number
+
+
+def _above(program: Program, node: MissionNode) -> list[int]:
+    """Return the numbers of a node and all around it, from the inside out."""
+    found, here = [node.number], node.parent
+    while here is not None:
+        found.append(here)
+        here = program.nodes[here].parent
+    return found
+
+
+def _comes_again(node: MissionNode) -> bool:
+    return node.step.comes_again or any(one.repeats for one in node.modifiers.values())
