@@ -215,13 +215,19 @@ def suggest(name: str, valid: Iterable[str], what: str = VALID) -> str:
     if not may_guess():
         return ""
     names = _ordered(valid)
-    near = nearest(name, names)
+    near = _completed(name, names) or nearest(name, names)
     if near:
         return f"{DID_YOU_MEAN} '{near[0]}'?"
     if not names:
         return ""
     rest = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
     return f"{what}: {', '.join(_by_likeness(name, names)[:MOST_NAMES])}{rest}"
+
+
+def _completed(name: str, names: list[str]) -> list[str]:
+    """Return the only name that begins with the words of a shorter one: `XL430` is that of `XL430-W250`."""
+    longer = [one for one in names if len(name) > LEAST_WORD and one.startswith(name) and not one[len(name)].isalnum()]
+    return longer if len(longer) == 1 and name not in names else []
 
 
 def _ordered(names: Iterable[str]) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Collection, Iterator
 
 from rbxcompose.body.masses import mass_mistakes
@@ -125,10 +126,21 @@ def _shapes(link: BodyLink, meshes: Collection[str]) -> Iterator[Finding]:
     for shape in (*link.visuals, *link.collisions):
         geometry = shape.geometry
         if geometry.kind == "mesh" and geometry.file not in meshes:
-            yield NO_MESH.at(shape.span, f"the mesh '{plain(geometry.file)}' does not exist")
+            message = f"the mesh '{plain(geometry.file)}' does not exist"
+            yield NO_MESH.at(shape.span, message, help=_where_meshes_are(geometry.file))
         if largest := _extent(shape):
             message = f"a {geometry.kind} of link '{plain(link.name, _SHOWN)}' is {largest:g} m long"
             yield MILLIMETRES.at(shape.span, message, help="are these millimetres, or does a size lack its unit?")
+
+
+def _where_meshes_are(file: str) -> str:
+    """Return how to name the file of a mesh."""
+    package = re.match(r"package://([^/]+)/", file)
+    beside = "write a path from the folder of this file"
+    if package is None:
+        return f"{beside}, or 'package://NAME/...' with NAME below 'packages' of the 'body'"
+    name = plain(package[1], _SHOWN)
+    return f"give the folder of '{name}' below 'packages' of the 'body', '{name}: FOLDER', or {beside}"
 
 
 def _extent(shape: Shape) -> float:

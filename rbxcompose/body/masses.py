@@ -82,7 +82,10 @@ def mass_mistakes(body: Body) -> Iterator[Finding]:
     """Yield links that lack a mass, and masses and inertias that nothing has."""
     for link in body.links.values():
         if link.inertial is not None and (problem := _impossible(link.inertial)):
-            yield NO_INERTIA.at(link.inertial.span, f"link '{plain(link.name, _SHOWN)}' {problem}")
+            one, is_mass = link.inertial, link.inertial.mass < 0.0
+            span = one.mass_span if is_mass and one.mass_span else one.span
+            help_text = "a mass is above 0 kg" if is_mass else ""
+            yield NO_INERTIA.at(span, f"link '{plain(link.name, _SHOWN)}' {problem}", help=help_text)
     for links in _rigid_bodies(body):
         yield from _mistakes_of_one(body, links)
 
@@ -100,7 +103,8 @@ def _rigid_bodies(body: Body) -> list[list[BodyLink]]:
 def _mistakes_of_one(body: Body, links: Sequence[BodyLink]) -> Iterator[Finding]:
     first = links[0]
     heavy = [link for link in links if link.inertial is not None and link.inertial.mass > 0.0]
-    if not heavy and first.name in body.joint_above and any(link.visuals or link.collisions for link in links):
+    is_light = not any(link.inertial is not None and link.inertial.mass != 0.0 for link in links)
+    if is_light and first.name in body.joint_above and any(link.visuals or link.collisions for link in links):
         yield NO_MASS.at(first.span, f"link '{plain(first.name, _SHOWN)}' moves and has no mass")
     parts = [link.inertial for link in heavy if link.inertial is not None]
     if any(_impossible(one) for one in parts) or not all(_is_thin(one.mass, _tensor(one)) for one in parts):

@@ -49,6 +49,8 @@ class Inertial:
     origin: Transform3
     inertia: tuple[float, ...]
     span: Span
+    mass_span: Span | None = None
+    """The place of the mass, if it is known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +98,8 @@ class BodyJoint:
     span: Span
     limits: JointLimits | None = None
     mimic: Mimic | None = None
+    link_spans: tuple[Span, ...] = ()
+    """The places of its parent and its child, if they are known."""
 
     @property
     def moves(self) -> bool:

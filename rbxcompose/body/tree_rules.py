@@ -72,10 +72,11 @@ def tree_mistakes(body: Body, whole: Span) -> Iterator[Finding]:
 
 def _unknown_links(body: Body) -> Iterator[Finding]:
     for joint in body.joints.values():
-        for role, link in (("parent", joint.parent), ("child", joint.child)):
+        spans = joint.link_spans or (joint.span, joint.span)
+        for role, link, span in zip(("parent", "child"), (joint.parent, joint.child), spans, strict=True):
             if link not in body.links:
                 message = f"the {role} of joint '{plain(joint.name, _SHOWN)}' does not exist: '{plain(link, _SHOWN)}'"
-                yield NO_LINK.misspelt(joint.span, message, link, body.links, "links")
+                yield NO_LINK.misspelt(span, message, link, body.links, "links")
 
 
 def _wrong_mimics(body: Body) -> Iterator[Finding]:

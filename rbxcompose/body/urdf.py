@@ -6,6 +6,7 @@ The format is that of https://wiki.ros.org/urdf/XML: links, joints, materials; w
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import field
 from functools import partial
@@ -151,6 +152,7 @@ class _BodyReader:
         if kind_ not in KINDS:
             words = f"a joint cannot be of type '{plain(kind_, _SHOWN)}'"
             raise _MistakeError(WRONG_VALUE.misspelt(element.span, words, kind_, KINDS, "types of joints"))
+        parent, child = needed(element, "parent"), needed(element, "child")
         limit, mimic, axis = element.first("limit"), element.first("mimic"), element.first("axis")
         if kind_ in ("revolute", "prismatic") and limit is None:
             message = f"joint '{plain(name, _SHOWN)}' is {kind_} and needs '<limit>'"
@@ -160,20 +162,21 @@ class _BodyReader:
         return BodyJoint(
             name,
             kind_,
-            text(needed(element, "parent"), "link"),
-            text(needed(element, "child"), "link"),
+            text(parent, "link"),
+            text(child, "link"),
             _origin(element),
             _unit(axis) if axis is not None else (1.0, 0.0, 0.0),
             element.span,
             _limits(limit, name) if limit is not None else None,
             _mimic(mimic) if mimic is not None else None,
+            (parent.span, child.span),
         )
 
 
 def _inertial(element: XmlElement) -> Inertial:
     mass, inertia = needed(element, "mass"), needed(element, "inertia")
     moments = tuple(number(inertia, name) for name in _INERTIA)
-    return Inertial(number(mass, "value"), _origin(element), moments, element.span)
+    return Inertial(number(mass, "value"), _origin(element), moments, element.span, mass.span)
 
 
 def _geometry(element: XmlElement) -> Geometry:
@@ -257,8 +260,17 @@ def numbers(element: XmlElement, name: str, count: int) -> tuple[float, ...]:
         what = "a finite number" if count == 1 else f"{count} finite numbers"
         what += f" up to {LARGEST:g}" if all(map(math.isfinite, found)) and len(found) == count else ""
         message = f"'{name}' of '<{element.name}>' must be {what}, not '{plain(written, _SHOWN)}'"
-        raise _MistakeError(WRONG_VALUE.at(element.span, message))
+        raise _MistakeError(WRONG_VALUE.at(element.span, message, help=_cure(name, written, count)))
     return found
+
+
+def _cure(name: str, written: str, count: int) -> str:
+    """Return what to write instead of numbers in another form."""
+    spaced = " ".join(re.split(r"[\s,;]+", written.strip("[]() ")))
+    if (found := [*_numbers_in(spaced)]) and len(found) == count and all(map(math.isfinite, found)):
+        return f"numbers have spaces between them: write '{name}=\"{plain(spaced, _SHOWN)}\"'"
+    is_measured = re.fullmatch(r"[-+.\deE]+\s*[a-zA-Z%]+", written) is not None
+    return "values in a URDF have no unit: they are in metres, radians and kilograms" if is_measured else ""
 
 
 def _numbers_in(written: str) -> Iterator[float]:

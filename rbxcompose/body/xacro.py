@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import field
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from rbxcompose.body.xacro_answer import XacroAnswer
 from rbxcompose.body.xacro_answers import XacroRequest, answers
 from rbxcompose.body.xml_reader import PLACE, span_of_place
 from rbxcompose.dataclass import dataclass
-from rbxcompose.findings import Finding, Severity, Span, kind
+from rbxcompose.findings import Finding, Severity, Span, kind, suggest
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.printable import plain
 
@@ -43,6 +44,13 @@ Good:
 ```
 """,
 )
+_NAMESPACE = "http://www.ros.org/wiki/xacro"
+_UNKNOWN = (
+    (re.compile(r"unknown macro name: (?:xacro:)?(\w+)"), "macro", "macros"),
+    (re.compile(r"name '(\w+)' is not defined"), "property", "properties"),
+    (re.compile(r"Undefined substitution argument (\w+)"), "arg", "arguments"),
+)
+"""What an error of xacro says of a name, the element that declares such names, and what they are called."""
 _PLACES = re.compile(rf' {PLACE}="[^"]*"')
 
 
@@ -116,8 +124,27 @@ def _told(xacro: XacroFile, answer: XacroAnswer | None) -> tuple[Expanded | Find
     files = tuple(dict.fromkeys(map(Path, answer.files)))
     if answer.error:
         place = span_of_place(answer.place) if answer.place else xacro.span
-        return NOT_EXPANDED.at(place, plain(" ".join(answer.error.split()), 300)), files
+        message = " ".join(answer.error.split())
+        return NOT_EXPANDED.at(place, plain(message, 300), help=_cure(message, files)), files
     return Expanded(answer.text, (*missing_prefixes(answer.bare), *_unused(xacro, answer))), files
+
+
+def _cure(message: str, files: Sequence[Path]) -> str:
+    """Return what to do about an error of xacro: the name that was probably meant, or what is missing."""
+    if "unbound prefix" in message:
+        return f"write '<robot xmlns:xacro=\"{_NAMESPACE}\" ...>'"
+    for asked, element, what in _UNKNOWN:
+        if found := asked.search(message):
+            declared = re.compile(rf'<xacro:{element}\s[^>]*?\bname="(\w+)"')
+            names = dict.fromkeys(name for text in _texts(files) for name in declared.findall(text))
+            return suggest(found[1], names, what)
+    return ""
+
+
+def _texts(files: Sequence[Path]) -> Iterator[str]:
+    for file in files:
+        with suppress(OSError, ValueError):  # the file was read a moment ago; without it there is only no suggestion
+            yield file.read_text(encoding="utf-8")
 
 
 def _unused(xacro: XacroFile, answer: XacroAnswer) -> Iterator[Finding]:

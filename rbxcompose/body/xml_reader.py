@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import field
 from pathlib import Path
@@ -125,6 +126,7 @@ class _Reader:
         self.open: list[XmlElement] = []
         self.root: XmlElement | None = None
         self.elements = 0
+        self.lines: list[str] = []
         self.parser = expat.ParserCreate("utf-8")
         self.parser.XmlDeclHandler = self._declared
         self.parser.StartDoctypeDeclHandler = self._doctype
@@ -138,6 +140,7 @@ class _Reader:
         Raises:
             _RefusedError: with the first mistake.
         """
+        self.lines = text.split("\n")
         try:
             self.parser.Parse(text, True)
         except expat.ExpatError as error:
@@ -190,10 +193,22 @@ class _Reader:
         begun = Related(self.open[-1].span, f"'<{shown}>' starts here")
         told = expat.ErrorString(error.code)
         if told == expat.errors.XML_ERROR_TAG_MISMATCH:
-            return NOT_XML.at(span, f"another element ends here before '<{shown}>' does", related=[begun])
+            return self._mismatch(span, shown, begun)
         if told == expat.errors.XML_ERROR_NO_ELEMENTS:
             return NOT_XML.at(span, f"the file ends before '<{shown}>' does", related=[begun])
         return NOT_XML.at(span, _words(error))
+
+    def _mismatch(self, span: Span, shown: str, begun: Related) -> Finding:
+        """Return the finding about an end tag: the innermost element is not closed, or the end tag is misspelt."""
+        line = self.lines[span.line - 1].encode() if span.line <= len(self.lines) else b""
+        ends = re.match(rb"/?\s*([^\s>]+)", line[span.column - 1 :])
+        closing = ends[1].decode(errors="replace") if ends else ""
+        if closing in [one.name for one in self.open[:-1]]:
+            help_text = f"end it with '/>', or write '</{shown}>' before '</{plain(closing, _SHOWN)}>'"
+            ended = [Related(span, "another element ends here")]
+            return NOT_XML.at(begun.span, f"'<{shown}>' is never closed", help=help_text, related=ended)
+        message = f"another element ends here before '<{shown}>' does"
+        return NOT_XML.at(span, message, help=f"write '</{shown}>'", related=[begun])
 
     def _tag(self, name: str) -> Span:
         return self._here(f"<{name}")

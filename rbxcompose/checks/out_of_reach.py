@@ -13,6 +13,7 @@ from rbxcompose.model.robot import Robot
 from rbxcompose.rules import WIRING
 
 _SCALES = ("calibration", "travel", "ratio", "offset")
+_TURNS = 4 * math.tau  # [rad] of a limit that no joint with a servo has
 _TICK = 1.01  # ticks that a limit may lie outside: that of 150 deg is one beyond the last tick of an AX-12
 
 
@@ -44,12 +45,26 @@ def _told(one: DrivenJoint) -> Iterator[Finding]:
     wanted = "turns without end" if is_free else f"may go from {bounds}"
     servo = "its servo reaches" if len(joint.servos) == 1 else "its servos reach"
     body = one.body.limits if one.body else None
+    message = f"'{one.name}' {wanted}, but {servo} {one.position(first)} to {one.position(last)}"
+    if body and not is_free and (meant := _in_degrees(one)):
+        yield out_of_reach.at(body.span, message, help=f"limits in a URDF are in radians: for degrees, write {meant}")
+        return
     yield out_of_reach.at(
         _place(one),
-        f"'{one.name}' {wanted}, but {servo} {one.position(first)} to {one.position(last)}",
+        message,
         help=_remedy(one, max(first, limits.least), min(last, limits.greatest)),
         related=[Related(body.span, "its limits in the body")] if body else [],
     )
+
+
+def _in_degrees(one: DrivenJoint) -> str:
+    """Return what to write if the limits in the body are no angles in radians, but may be some in degrees."""
+    body = one.body.limits if one.body else None
+    own = at(one.robot.manifest.root, ("joints", one.name, "limits", "position"))
+    if one.slides or own is not None or body is None or max(abs(body.lower or 0.0), abs(body.upper or 0.0)) < _TURNS:
+        return ""
+    lower, upper = (math.radians(limit or 0.0) for limit in (body.lower, body.upper))
+    return f'\'lower="{lower:.4g}" upper="{upper:.4g}"\''
 
 
 def _place(one: DrivenJoint) -> Span:

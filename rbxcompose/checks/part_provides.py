@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from rbxcompose.check_runner import check
 from rbxcompose.checks.part_needs import is_type, own_instances, short
 from rbxcompose.composition.robot_manifest import About, Claim
-from rbxcompose.findings import Finding, Related
+from rbxcompose.findings import Finding, Related, suggest
+from rbxcompose.manifest.library import PREFIX
 from rbxcompose.manifest.tree import at
 from rbxcompose.model.robot import Robot
 from rbxcompose.model.wires import PortEnd, resolve
@@ -50,7 +51,13 @@ def part_provides(robot: Robot) -> Iterator[Finding]:
         for claim in part.claims:
             if claim.about is not About.NEED and (what := _lacking(robot, claim, ends)):
                 message = f"part '{part.name}' does not have {what}, which it says it provides"
-                yield part_provides.at(part.span, message, related=[Related(claim.span, "promised here")])
+                is_own = part.components <= robot.components.keys() and not claim.span.file.startswith(PREFIX)
+                if not is_own:  # something of it was removed or changed
+                    yield part_provides.at(part.span, message, related=[Related(claim.span, "promised here")])
+                    continue
+                known = [end.skill for end in ends if _serves(end, end.skill)] if claim.about is About.SKILL else []
+                help_text = suggest(claim.name, known, "its skills")
+                yield part_provides.at(claim.span, message, help=help_text)
 
 
 def _serves(end: PortEnd, skill: str) -> bool:

@@ -7,10 +7,12 @@ from collections.abc import Iterator
 from rbxcompose.check_runner import check
 from rbxcompose.checks.needed_port import is_unheard
 from rbxcompose.findings import Finding, Related, Severity, suggest
+from rbxcompose.manifest.tree import at
 from rbxcompose.model.robot import Robot
 from rbxcompose.model.wires import PortEnd
 from rbxcompose.rules import NAMES, WIRING
 
+WAITING = "topics that wait for such commands"
 _MOST_SHOWN = 8  # subscribers that are pointed at
 
 
@@ -46,6 +48,18 @@ def unheard_command(robot: Robot) -> Iterator[Finding]:
             yield unheard_command.at(
                 robot.end_span(end),
                 f"nothing subscribes to the commands of '{end.instance}' on '{end.topic}'",
-                help=suggest(end.topic.strip("/"), topics, "topics that wait for such commands"),
+                help=_cure(robot, end, starving) or suggest(end.topic.strip("/"), topics, WAITING),
                 related=[Related(robot.end_span(one), f"listens to '{one.topic}'") for one in starving[:_MOST_SHOWN]],
             )
+
+
+def _cure(robot: Robot, end: PortEnd, starving: list[PortEnd]) -> str:
+    """Return what to do if the only one that waits was connected to another topic than its own."""
+    if len(starving) != 1:
+        return ""
+    [one] = starving
+    connect = (*robot.components[one.instance].path, "connect", one.name)
+    if at(robot.manifest.root, connect) is None:
+        return ""
+    topic = end.topic.strip("/")
+    return f"let '{one.instance}' listen to '{topic}': write '{one.name}: {topic}' below its 'connect', or remove that"

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from rbxcompose.check_runner import check
 from rbxcompose.checks.mux_source import Wrong
-from rbxcompose.findings import Finding, correction, suggest
+from rbxcompose.findings import DID_YOU_MEAN, Finding, correction, suggest
 from rbxcompose.model.robot import Robot
 from rbxcompose.rules import NAMES
 from rbxcompose.sdk.ports import Out
@@ -43,6 +43,9 @@ def _missing(robot: Robot, name: str, source: str) -> Wrong | None:
         if component in robot.written:
             return None  # it exists, but has mistakes, which are reported at their own place
         message = f"comes from a component that the robot does not have: '{component}'"
+        having = [end.instance for end in robot.ends if port and end.name == port and isinstance(end.port, Out)]
+        if len(having) == 1:  # the only one with such an output
+            return Wrong(message, f"{DID_YOU_MEAN} '{having[0]}.{port}'?", component, having)
         return Wrong(
             message, suggest(component, robot.components, "components of this robot"), component, robot.components
         )

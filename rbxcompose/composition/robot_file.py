@@ -12,7 +12,7 @@ from rbxcompose.composition.overlay import NOTHING_TO_CHANGE
 from rbxcompose.composition.robot_manifest import RobotManifest
 from rbxcompose.composition.scopes import fill_scopes
 from rbxcompose.composition.section_reader import read_sections
-from rbxcompose.findings import Finding, Report
+from rbxcompose.findings import Finding, Report, Span
 from rbxcompose.manifest.documents import Documents
 from rbxcompose.manifest.file_models import file_model
 from rbxcompose.manifest.files import find, project_of, shown_name
@@ -131,10 +131,14 @@ def read_mission(
     sources: dict[str, str],
     sim: bool = True,
     environment: Mapping[str, str] | None = None,
+    span: Span | None = None,
 ) -> MappingNode | None:
-    """Read a mission's file, check its header and fill in `${...}`; its body stays as nodes."""
+    """Read a mission's file, check its header and fill in `${...}`; its body stays as nodes.
+
+    `span` is the place that names the file.
+    """
     documents = Documents(report, sources)
-    root = documents.read(path, MISSION)
+    root = documents.read(path, MISSION, span)
     if root is None:
         return None
     header = {name: entry for name, entry in root.entries.items() if name in ManifestHeader.model_fields}

@@ -9,7 +9,7 @@ from typing import Any
 
 from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import DID_YOU_MEAN, Finding, Related, Report, Span, kind, replacement
-from rbxcompose.manifest.files import shown_name
+from rbxcompose.manifest.files import ROBOT_FILE, shown_name
 from rbxcompose.manifest.foreign_words import FOREIGN
 from rbxcompose.manifest.header import ManifestHeader
 from rbxcompose.manifest.meant_keys import meant_keys, with_keys
@@ -59,8 +59,13 @@ class Documents:
         if root is None:
             return None
         if finding := _trouble(root, wanted):
-            related = (Related(span, f"this needs a {wanted}"),) if span else ()
-            self.report.add(changed(finding, related=(*finding.related, *related)))
+            if span and finding.span and file.name == ROBOT_FILE:  # another file was meant
+                told = (Related(finding.span, f"what kind '{plain(shown)}' is"), *finding.related)
+                message = f"this must name a file of kind {wanted}"
+                self.report.add(changed(finding, span=span, message=message, help="", related=told))
+            else:
+                related = (Related(span, f"this needs a {wanted}"),) if span else ()
+                self.report.add(changed(finding, related=(*finding.related, *related)))
             return None
         return root if isinstance(root, MappingNode) else None
 

@@ -126,6 +126,10 @@ def _missing(written: str, path: Path, span: Span | None, writer: Path | None = 
     if (neighbours := _names_in(path.parent)) is None:
         return UNREADABLE.at(span, f"'{plain(written)}' does not exist", help=_nearest_folder(path))
     message, there = f"'{plain(written)}' does not exist", f"in '{plain(shown_name(path.parent))}'"
+    if len(whole := [one for one in neighbours if Path(one).stem == path.name and one.endswith(_ENDINGS)]) == 1:
+        meant = f"{written.removesuffix(path.name)}{whole[0]}"
+        fix = replacement(span, written, meant) if span else None
+        return UNREADABLE.at(span, message, help=f"did you mean '{plain(meant)}'?", fix=fix)
     return UNREADABLE.misspelt(span, message, path.name, neighbours, there, within=written)
 
 

@@ -19,7 +19,7 @@ from rbxcompose.manifest import tree
 from rbxcompose.manifest.arguments import show
 from rbxcompose.manifest.fill_names import Names, NameTypes, NameValues
 from rbxcompose.manifest.given_values import given_span
-from rbxcompose.manifest.launch_syntax import PATTERN, cure_of
+from rbxcompose.manifest.launch_syntax import PATTERN, Cure, cure_of, cure_of_variable
 from rbxcompose.manifest.limits import ALL_BYTES
 from rbxcompose.manifest.scalar_parts import part_span
 from rbxcompose.manifest.scalars import describe
@@ -149,6 +149,7 @@ _PIECE = re.compile(
     r"\$\$|\$\{(?P<body>[^}]*)(?P<end>\}?)|\$(?P<name>[A-Za-z][A-Za-z0-9_.]*)"
     rf"|{PATTERN}"
 )
+_ARGUMENT = re.compile(r"\bargs\.\w+")
 _SECRET = re.compile(r"\s*secret\.(?P<name>[a-z][a-z0-9_]{0,59})\s*")
 _ENVIRONMENT = re.compile(r"\s*env\.(?P<name>[A-Za-z_][A-Za-z0-9_]*)(:(?P<mode>[-?])(?P<rest>.*))?\s*", re.DOTALL)
 
@@ -221,11 +222,12 @@ class _Filler:
         return replace(scalar, text="".join(parts))
 
     def where_given(self, filled: TreeNode, piece: re.Match[str]) -> TreeNode:
-        """Return what was filled in for one `${...}`, with the place of its value if that was given to an argument."""
-        named = self.known.get((piece["body"] or "").strip())
-        if named is None or named.given is None or not isinstance(filled, ScalarNode):
+        """Return what was filled in for one `${...}`, with the place of its value if one given argument decides it."""
+        names = {*_ARGUMENT.findall(piece["body"] or "")}
+        given = [self.known[name].given for name in names if name in self.known]
+        if len(given) != 1 or given[0] is None or not isinstance(filled, ScalarNode):
             return filled  # lists and maps keep the places where they were written
-        return replace(filled, span=given_span(named.given, filled.span))
+        return replace(filled, span=given_span(given[0], filled.span))
 
     def within(self, scalar: ScalarNode, filled: TreeNode) -> TreeNode:
         """Return what was filled in, or `BROKEN` after a finding if everything filled in is too large together."""
@@ -244,7 +246,9 @@ class _Filler:
     def piece(self, scalar: ScalarNode, piece: re.Match[str]) -> object:
         """Return the value of one `${...}`, None if it stays as it is, `BROKEN` after a finding."""
         if piece["verb"]:
-            return self.launch(scalar, piece)
+            message = f"'{plain(piece.group(), 60)}' is a substitution of ROS launch files"
+            cure = cure_of(piece["verb"], piece["of"], self.known, runs=self.runs)
+            return self.foreign(scalar, piece, message, cure)
         body, name = piece["body"], piece["name"]
         if body is None and name:
             return None if self.runs else self.running_name(scalar, piece)
@@ -261,17 +265,17 @@ class _Filler:
         try:
             expression = parse_fill(body)
         except ExpressionError as error:
+            if other := cure_of_variable(body):
+                return self.foreign(scalar, piece, "this is the syntax of a shell", other)
             span = part_span(scalar, piece.start("body") + error.start, piece.start("body") + error.end)
             self.report.add(SYNTAX.at(span, error.message, help=error.help))
             return BROKEN
         return self.expression(scalar, piece.start("body"), expression)
 
-    def launch(self, scalar: ScalarNode, piece: re.Match[str]) -> object:
-        """Report a substitution of ROS launch files."""
+    def foreign(self, scalar: ScalarNode, piece: re.Match[str], message: str, cure: Cure) -> object:
+        """Report what has the syntax of another tool."""
         span = part_span(scalar, piece.start(), piece.end())
-        cure = cure_of(piece["verb"], piece["of"], self.known, runs=self.runs)
         fix = replacement(span, piece.group(), cure.meant) if cure.meant else None
-        message = f"'{plain(piece.group(), 60)}' is a substitution of ROS launch files"
         self.report.add(SYNTAX.at(span, message, help=cure.help, fix=fix))
         return BROKEN
 
@@ -352,7 +356,12 @@ class _Filler:
             return "an environment variable must stand alone: '${" + name + "}'"
         if name.startswith("secret."):
             return "a secret must stand alone: '${" + name.lower() + "}'"
+        if name.isupper():
+            return f"an environment variable is written '${{env.{name}}}'"
         fix = suggest(name, self.known, "names that can be filled in")
+        if name.startswith("args.") and not fix.startswith(DID_YOU_MEAN):
+            given = ", and give it a value by 'with' where this file is included" if self.scope else ""
+            return f"declare '{name.removeprefix('args.')}' below 'args' of this file{given}"
         if self.runs and not fix.startswith(DID_YOU_MEAN):
             return f"what is known while the robot runs is written '${name}'"
         return fix

@@ -1,4 +1,4 @@
-"""Keys of other tools for which ours are known: of Docker Compose, of ROS launch files."""
+"""Keys of other tools: those for which ours are known, and those that need something else here."""
 
 from __future__ import annotations
 
@@ -19,3 +19,29 @@ _OURS = {
 }
 FOREIGN: Mapping[str, str] = {name: ours for ours, names in _OURS.items() for name in names.split()}
 """Our key for each of theirs."""
+
+_CURES = {
+    "settings of a component are keys of its own; '${env.NAME}' fills in a variable, and the domain is 'domain' below "
+    "'bus'": "environment env env_file",
+    "components run as processes of this machine, without containers: remove it": "image build volumes networks "
+    "container_name privileged",
+    "components find each other by topics: remove it": "expose links network_mode",
+    "'profiles' is a section of the file: 'profiles: {NAME: {components: {...}}}'": "profiles",
+    "the clock belongs to the bus: write 'clock: external' below 'bus'": "use_sim_time",
+    "joints are driven by the sections 'buses', 'actuators', 'joints' and 'controllers'": "ros2_control "
+    "controller_manager hardware_interface transmission transmissions",
+    "a component has a 'type' instead": "package pkg executable exec node_type",
+}
+CURES: Mapping[str, str] = {name: cure for cure, names in _CURES.items() for name in names.split()}
+"""What to do instead of a key that has no counterpart."""
+BELOW: Mapping[tuple[str, str], str] = {
+    ("locks", "topic"): "a lock listens on the topic of its mux and its own name: 'MUX/NAME'; remove 'topic'",
+}
+"""What to do instead of a key below an entry of such a map."""
+MESSAGES: Mapping[str, str] = {
+    "Bool": "flag",
+    "String": "text",
+    **dict.fromkeys(("Float32", "Float64"), "number"),
+    **{f"{sign}Int{size}": "number" for sign in ("", "U") for size in (8, 16, 32, 64)},
+}
+"""The type of a value for each message of `std_msgs` with one field."""

@@ -1,11 +1,15 @@
-"""Substitutions of ROS launch files in a manifest: `$(arg speed)`, `$(env HOME)`."""
+"""Substitutions of other tools in a manifest: `$(arg speed)` of ROS launch files, `${HOME:-/root}` of shells."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Container
 from typing import NamedTuple
 
+from rbxcompose.printable import plain
+
 PATTERN = r"\$\((?P<verb>arg|var|env|optenv|find|find-pkg-share|eval|anon) (?P<of>[^)$]*)\)"
+_VARIABLE = re.compile(r"\s*(?P<name>(?:args\.)?[A-Za-z_]\w*)(?P<rest>:?[-?].*)", re.DOTALL)
 _ARGUMENTS = ("arg", "var")
 _PATHS = ("find", "find-pkg-share")
 
@@ -15,6 +19,17 @@ class Cure(NamedTuple):
 
     help: str
     meant: str = ""
+
+
+def cure_of_variable(body: str) -> Cure | None:
+    """Return the cure of a variable with a default as a shell and Docker Compose have it; None for anything else."""
+    found = _VARIABLE.fullmatch(body)
+    if found is None:
+        return None
+    name, rest = found["name"], plain(found["rest"], 60)
+    if name.startswith("args."):
+        return Cure(f"write '${{{name}}}', and its 'default' where it is declared below 'args'")
+    return Cure(f"write '${{env.{name}{rest}}}'", f"${{env.{name}{found['rest']}}}")
 
 
 def cure_of(verb: str, of: str, known: Container[str], *, runs: bool) -> Cure:

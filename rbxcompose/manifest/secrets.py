@@ -62,7 +62,8 @@ class Secrets:
             reason = "does not exist" if is_missing else f"cannot be read: {os.strerror(error.errno or 0)}"
             message = f"the secret '{name}' is not available: the file '{shown}' {reason}"
             near = next(iter(nearest(name, self._names())), "") if is_missing else ""
-            there = f"put it into '{shown}' with mode 0600, or into the variable {VARIABLE}{name.upper()}"
+            there = f"put it into '{shown}' with mode 0600, or into the variable {VARIABLE}{name.upper()}; a value "
+            there += "that is no secret is written here, or filled in by '${args.NAME}'"
             raise NoSecretError(message, f"{DID_YOU_MEAN} '{near}'?" if near else there, near) from None
         if len(data) > SECRET:
             raise NoSecretError(f"'{shown}' is larger than {SECRET:,} bytes", "a secret is one short text")

@@ -21,6 +21,7 @@ from rbxcompose.manifest.documents import Documents
 from rbxcompose.manifest.header import ManifestHeader
 from rbxcompose.manifest.misplaced import is_misplaced, misplaced
 from rbxcompose.manifest.named_items import help_with_names
+from rbxcompose.manifest.namesakes import with_namesake
 from rbxcompose.manifest.renamer import Renames
 from rbxcompose.manifest.salvage import salvaged
 from rbxcompose.manifest.shapes import keys_at, with_references
@@ -342,8 +343,12 @@ class Reading(Generic[M]):
 
     def valid(self, model: type[T], name: str, node: TreeNode) -> T | None:
         """Return an entry as an instance of `model`, None after its findings."""
-        path = (self.section.name, *self.section.at, name)
-        return validate(model, node, path, self.report, self.contents.known)
+        path, before = (self.section.name, *self.section.at, name), len(self.report.findings)
+        read = validate(model, node, path, self.report, self.contents.known)
+        if read is None:
+            named = self.section.names_in(self.contents.root)
+            self.report.findings[before:] = with_namesake(self.report.findings[before:], name, named)
+        return read
 
     def entries(self) -> dict[str, M]:
         """Return the entries without mistakes, by name."""

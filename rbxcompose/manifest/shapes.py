@@ -30,6 +30,11 @@ def keys_at(model: Any, path: KeyPath) -> list[str]:
     return list(dict.fromkeys(name for shape in shapes for name in field_types(shape)))
 
 
+def models_at(model: Any, path: KeyPath) -> list[type[BaseModel]]:
+    """Return the models that the map at `path` below `model` may have."""
+    return [shape for one in _types_at(model, path) for shape in _models(one)]
+
+
 def dimension_at(model: Any, path: KeyPath) -> Dimension | None:
     """Return the dimension of the quantity at `path` below `model`, None if it is not a quantity."""
     marks = (mark for one in _types_at(model, path) for mark in alternatives(one))

@@ -15,6 +15,7 @@ from pydantic_core import ErrorDetails
 
 from rbxcompose.findings import DID_YOU_MEAN, SIMILAR, Finding, Report, Span, correction, kind
 from rbxcompose.manifest.conversions import changed, repaired
+from rbxcompose.manifest.forms import help_of_form
 from rbxcompose.manifest.requirements import BOUNDS, EXPECTED
 from rbxcompose.manifest.scalars import describe, number_trouble, plain_value
 from rbxcompose.manifest.shapes import dimension_at, keys_at
@@ -234,7 +235,8 @@ def _findings(
         if loc not in said and not is_broken(at(node, loc)):
             said.add(loc)
             finding = _finding(model, node, path, loc, error)
-            yield _slip(model, node, path, loc, error, finding) or finding
+            keys = keys_at(model, loc) if error["type"].startswith("model") else ()
+            yield _slip(model, node, path, loc, error, finding, keys) or finding
 
 
 def _locate(node: TreeNode, error: ErrorDetails) -> KeyPath:
@@ -307,7 +309,11 @@ def _finding(model: Any, node: TreeNode, path: KeyPath, loc: KeyPath, error: Err
             bound = format_quantity(context[key], dimension) if dimension else context[key]
             return OUT_OF_RANGE.at(span, f"'{name}' must be {words} {bound}")
         case kind_of_error if kind_of_error in EXPECTED:
-            return WRONG_TYPE.at(span, f"'{name}' must be {EXPECTED[kind_of_error]}", label=label_of(value))
+            message, help_text = (
+                f"'{name}' must be {EXPECTED[kind_of_error]}",
+                help_of_form(model, loc, value, error["type"]),
+            )
+            return WRONG_TYPE.at(span, message, label=label_of(value), help=help_text)
     if "valid" in context:  # a validator of ours that supplies the valid names
         message = error["msg"] if is_key else f"'{name}': {error['msg']}"
         return NOT_A_CHOICE.misspelt(place, message, context["name"], context["valid"], context["what"])

@@ -46,6 +46,7 @@ def read_missions(
             sources=sources,
             sim=manifest.is_simulated,
             environment=environment,
+            span=entry.span,
         )
         program = read_program(root, report, skills, budget) if root else None
         if program is not None:

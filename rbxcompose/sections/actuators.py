@@ -13,7 +13,7 @@ from rbxcompose.config import Config, Name, Ratio
 from rbxcompose.findings import Finding, Related, Span, kind
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading
-from rbxcompose.manifest.tree import ScalarNode, at, key_span, value_span
+from rbxcompose.manifest.tree import ScalarNode, at, value_span
 from rbxcompose.references import ACTUATOR, SERVO_BUS, Refers
 
 NO_MODEL = kind(
@@ -153,8 +153,11 @@ def _models(reading: Reading[ActuatorModel], found: Mapping[str, ActuatorModel])
 def _ids(reading: Reading[ActuatorModel], found: Mapping[str, ActuatorModel]) -> Iterator[Finding]:
     first: dict[tuple[str, int], Span] = {}
     for name, one in found.items():
-        span = key_span(reading.contents.root, ("actuators", name))
+        span = value_span(reading.contents.root, ("actuators", name, "id"))
         other = first.setdefault((one.bus, one.id), span)
         if other is not span:
             message = f"two servos of the bus '{one.bus}' have the id {one.id}"
-            yield ONE_ID.at(span, message, related=[Related(other, "the other one")])
+            taken = {each.id for each in found.values() if each.bus == one.bus}
+            free = next((number for number in range(1, 253) if number not in taken), None)
+            help_text = f"{free} is free" if free is not None else ""
+            yield ONE_ID.at(span, message, help=help_text, related=[Related(other, "the other one")])

@@ -13,13 +13,14 @@ from rbxcompose.body.attachment import PieceAttachment
 from rbxcompose.body.description import BodyPart, Description, describe
 from rbxcompose.body.files import BodyFile
 from rbxcompose.config import Config, Name
-from rbxcompose.findings import Finding, Span
+from rbxcompose.findings import Finding, Span, replacement
 from rbxcompose.manifest.fields import FileName
 from rbxcompose.manifest.files import project_of, resolve
 from rbxcompose.manifest.reader import UNREADABLE
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading
 from rbxcompose.manifest.tree import BROKEN, Entry, KeyPath, MappingNode, ScalarNode, TreeNode, at, key_span, value_span
+from rbxcompose.manifest.validate import WRONG_TYPE
 from rbxcompose.manifest.wanted_components import WantedComponent, Wiring
 from rbxcompose.printable import plain
 from rbxcompose.references import JOINT, LINK
@@ -127,6 +128,9 @@ def body(reading: Reading[BodyModel]) -> Description | None:
         body:
           urdf: robot.urdf                # beside this file, or a path from here
     """
+    if (wrong := _xacro_as_urdf(reading.node)) is not None:
+        reading.report.add(wrong)
+        return None
     read, report = reading.whole(), reading.report
     if read is None or reading.node is None:
         return None
@@ -135,8 +139,8 @@ def body(reading: Reading[BodyModel]) -> Description | None:
     parts = [_part(reading, reading.node, (), "", read, None)] if read.urdf or read.xacro else []
     for name, piece in read.pieces.items():
         parts.append(_part(reading, reading.node, (PIECES, name), name, piece, piece.attach))
-    if wrong := [one for one in parts if isinstance(one, Finding)]:
-        report.extend(wrong)
+    if refused := [one for one in parts if isinstance(one, Finding)]:
+        report.extend(refused)
         return None
     robot = reading.contents.root.get("name")
     named = robot.text if isinstance(robot, ScalarNode) else ""
@@ -144,6 +148,18 @@ def body(reading: Reading[BodyModel]) -> Description | None:
     found, findings = describe(named, reading.contents.file.parent, usable, reading.contents.documents.sources)
     report.extend(findings)
     return found
+
+
+def _xacro_as_urdf(node: TreeNode | None) -> Finding | None:
+    """Return the finding about a xacro file with arguments that is given as a URDF."""
+    if not isinstance(node, MappingNode) or "with" not in node or "xacro" in node:
+        return None
+    entry = node.entries.get("urdf")
+    if entry is None or not isinstance(entry.value, ScalarNode) or not entry.value.text.endswith(".xacro"):
+        return None
+    fix = replacement(entry.key.span, "urdf", "xacro")
+    help_text = f"write 'xacro: {plain(entry.value.text)}'"
+    return WRONG_TYPE.at(entry.key.span, "a URDF has no arguments, but this is a xacro file", help=help_text, fix=fix)
 
 
 def _part(

@@ -119,7 +119,9 @@ def safety(reading: Reading[SafetyModel]) -> SafetyModel:
     root, heat = reading.contents.root, read.thermal
     if not (heat.resume < heat.limit and heat.warn <= heat.limit):
         message = f"resume {heat.resume:g} degC, warn {heat.warn:g} degC, limit {heat.limit:g} degC"
-        reading.report.add(THERMAL_ORDER.at(key_span(root, ("safety", "thermal")), message))
+        key, order = ("warn", "not above") if heat.resume < heat.limit else ("resume", "below")
+        help_text = f"'{key}' must be {order} 'limit', {heat.limit:g} degC: write it, or raise 'limit'"
+        reading.report.add(THERMAL_ORDER.at(key_span(root, ("safety", "thermal")), message, help=help_text))
     if read.on_shutdown == "park" and not read.park:
         span = key_span(root, ("safety", "on_shutdown"))
         reading.report.add(NOTHING_TO_PARK.at(span, "joints are to be parked, but 'park' names none"))

@@ -11,6 +11,7 @@ from pydantic_core import PydanticCustomError
 from rbxcompose.config import Config
 from rbxcompose.expressions.types import TYPES
 from rbxcompose.manifest.fields import DottedName, PortName, TopicName
+from rbxcompose.manifest.foreign_words import MESSAGES
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Reading
 from rbxcompose.manifest.short_forms import Short
@@ -22,6 +23,9 @@ _PLAIN = ("number", "count", "text", "flag")  # the first to be proposed
 
 def _known(what: str, valid: tuple[str, ...], name: str) -> str:
     if name not in valid:
+        if (meant := MESSAGES.get(name.rpartition("/")[-1])) in valid:
+            help_text = {"name": name, "help": f"write '{meant}': it is what the field of the message holds"}
+            raise PydanticCustomError(what, f"there is no {what} '{{name}}'", help_text)
         context = {"name": name, "valid": valid, "what": f"{what}s"}
         raise PydanticCustomError(what, f"there is no {what} '{{name}}'", context)
     return name

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from dataclasses import field, replace
 
 from rbxcompose.dataclass import dataclass
@@ -29,6 +29,7 @@ class NodeScope:
     places: Iterable[str]
     removed: Mapping[str, Span] = field(default_factory=dict)  # removed places, each with what removed it
     may_have: Callable[[str], bool] = lambda name: False  # whether a name may exist that could not be read
+    items: Container[str] = ()  # items of loops anywhere in the mission
 
     def variable(self, name: str) -> Type | None:
         """Return the type of `$name`, if there is one."""
@@ -94,7 +95,7 @@ def base_scope(program: Program, robot: RobotNames) -> NodeScope:
     def may_have(name: str) -> bool:
         return program.is_open or robot.may_have(VALUE, name)
 
-    return NodeScope(base_names(program, robot), robot.places, robot.removed, may_have)
+    return NodeScope(base_names(program, robot), robot.places, robot.removed, may_have, program.items)
 
 
 def views(program: Program, robot: RobotNames) -> Iterator[View]:
@@ -136,7 +137,9 @@ def findings_of(
         elif (name := _at(problem, ((name.name, name.start) for name in expression.names))) and not scope.variable(
             name
         ):
-            yield codes.UNKNOWN_NAME.at(span, problem.message, help=problem.help, fix=fix)
+            kept = f"'${name}' is known in its loop only: keep it there by 'set' in a datum, and read that"
+            help_text, fix = (kept, None) if name in scope.items else (problem.help, fix)
+            yield codes.UNKNOWN_NAME.at(span, problem.message, help=help_text, fix=fix)
         else:
             help_text = problem.help or (minutes_help(written) if wanted.dimension == TIME else "")
             yield kind.at(span, problem.message, help=help_text, fix=fix)
