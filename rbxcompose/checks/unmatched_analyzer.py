@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
 from rbxcompose.check_runner import check
@@ -35,7 +36,9 @@ def unmatched_analyzer(robot: Robot) -> Iterator[Finding]:
           match: [battery]
     ```
     """
-    known = {*robot.components, *robot.written, *robot.brought}
+    there = {*robot.components, *robot.written, *robot.brought}
+    known = {name for name in there if name.isidentifier()}
+    meant = {re.sub(r"\W", "", name) for name in there - known}  # names that are told where they stand
     compared = 0
     for name, analyzer in robot.manifest.diagnostics.analyzers.items():
         for index, pattern in enumerate(analyzer.match):
@@ -46,7 +49,7 @@ def unmatched_analyzer(robot: Robot) -> Iterator[Finding]:
                 return
             tried = () if pattern in known or not is_glob(pattern) else known
             compared += len(tried)
-            if pattern not in known and not any(Analyzer((pattern,)).matches(component) for component in tried):
+            if pattern not in known | meant and not any(Analyzer((pattern,)).matches(component) for component in tried):
                 yield unmatched_analyzer.misspelt(
                     place,
                     f"analyzer '{name}' matches no component with '{pattern}'",

@@ -16,6 +16,7 @@ _OURS = {
     "turn_rate": "angular_velocity rotation_speed",
     "heading": "yaw theta",
     "colour": "color",
+    "match": "contains startswith",
 }
 FOREIGN: Mapping[str, str] = {name: ours for ours, names in _OURS.items() for name in names.split()}
 """Our key for each of theirs."""

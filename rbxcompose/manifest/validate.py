@@ -15,6 +15,7 @@ from pydantic_core import ErrorDetails
 
 from rbxcompose.findings import DID_YOU_MEAN, SIMILAR, Finding, Report, Span, correction, kind
 from rbxcompose.manifest.conversions import changed, repaired
+from rbxcompose.manifest.foreign_words import FOREIGN
 from rbxcompose.manifest.forms import help_of_form
 from rbxcompose.manifest.requirements import BOUNDS, EXPECTED
 from rbxcompose.manifest.scalars import describe, number_trouble, plain_value
@@ -268,7 +269,8 @@ def _unknown_key(
     """Return the finding for an unknown key, and the missing key that it misspells, if any."""
     key = str(loc[-1])
     missing = [str(place[-1]) for place in lacking if place[:-1] == loc[:-1]]
-    meant = get_close_matches(key, missing, n=1, cutoff=SIMILAR)
+    is_foreign = FOREIGN.get(key) in missing
+    meant = [FOREIGN[key]] if is_foreign else get_close_matches(key, missing, n=1, cutoff=SIMILAR)
     message = f"unknown key '{plain(key, 60)}' in {where((*path, *loc[:-1]))}"
     above = at(node, loc[:-1])
     taken = above.entries if isinstance(above, MappingNode) else ()
@@ -286,6 +288,8 @@ def _finding(model: Any, node: TreeNode, path: KeyPath, loc: KeyPath, error: Err
     if "valid" not in context and (is_key or error["type"] == "string_pattern_mismatch"):
         text = value.text if isinstance(value, ScalarNode) and place is span else name
         help_text = "lower-case letters, digits and underscores, starting with a letter"
+        near = re.sub(r"\W+", "_", text.strip("/ ")).lower()  # ROS 1 began names of topics with a slash
+        help_text += f", such as '{near}'" if re.fullmatch(r"[a-z][a-z0-9_]{0,59}", near) else ""
         return BAD_NAME.at(place, f"'{text}' is not a valid name", help=help_text)
     match error["type"]:
         case "missing":
