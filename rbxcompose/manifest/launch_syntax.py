@@ -9,7 +9,7 @@ from typing import NamedTuple
 from rbxcompose.printable import plain
 
 PATTERN = r"\$\((?P<verb>arg|var|env|optenv|find|find-pkg-share|eval|anon) (?P<of>[^)$]*)\)"
-_VARIABLE = re.compile(r"\s*(?P<name>(?:args\.)?[A-Za-z_]\w*)(?P<rest>:?[-?].*)", re.DOTALL)
+_WITH_DEFAULT = re.compile(r"(?P<name>(?:args\.)?+[A-Za-z_]\w*+)(?P<rest>:?+[-?].*+)", re.DOTALL)
 _ARGUMENTS = ("arg", "var")
 _PATHS = ("find", "find-pkg-share")
 
@@ -23,7 +23,7 @@ class Cure(NamedTuple):
 
 def cure_of_variable(body: str) -> Cure | None:
     """Return the cure of a variable with a default as a shell and Docker Compose have it; None for anything else."""
-    found = _VARIABLE.fullmatch(body)
+    found = _WITH_DEFAULT.fullmatch(body.strip())
     if found is None:
         return None
     name, rest = found["name"], plain(found["rest"], 60)

@@ -37,7 +37,7 @@ NOT_SHOWN = {
     "RBX7003": "the example would be too large to read",
     "RBX4115": "the example is cut short: nobody wants to read 40 levels",
     "RBX4146": "the mistake is in two files",
-    **dict.fromkeys(("RBX4180", "RBX4181"), "the mistake is in two files"),
+    **dict.fromkeys(("RBX4163", "RBX4180", "RBX4181"), "the mistake is in two files"),
     "RBX4147": "the example would be too large to read",
     "RBX3120": "no component that ships reads a topic in another QoS class",
     "RBX4116": "no component that ships has an action that cannot be restarted",

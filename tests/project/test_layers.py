@@ -26,8 +26,8 @@ GROUND = {
     "formats": "findings plugins",
     "geometry": "dataclass",
     "levels": "",
-    "manifest": "config dataclass expressions findings per_compile plugins printable references regular_files "
-    "restarts slips units",
+    "manifest": "config dataclass expressions field_docs findings per_compile plugins printable references "
+    "regular_files restarts slips units",
     "msgs": "dataclass findings units",
     "per_compile": "dataclass",
     "plugins": "findings printable",

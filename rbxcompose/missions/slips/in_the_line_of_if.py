@@ -14,8 +14,8 @@ from rbxcompose.missions.slips.unknown_settings import unknown_settings
 from rbxcompose.printable import plain
 from rbxcompose.slips import Repair
 
-_THEN = re.compile(r"(?P<condition>[^'\"]*?)\s*\bthen\b:?\s*(?P<then>[^'\"]*?)(?:\s*\belse\b:?\s*(?P<other>[^'\"]*))?")
-_LOOP = re.compile(r"(?P<word>while|until)\b:?\s*(?P<condition>.+)", re.DOTALL)
+_THEN, _ELSE = re.compile(r"\bthen\b:?+"), re.compile(r"\belse\b:?+")
+_LOOP = re.compile(r"(?P<word>while|until)\b:?+\s*+(?P<condition>.++)", re.DOTALL)
 _LONGEST = 60  # characters of what was written, in the help
 
 
@@ -26,7 +26,7 @@ def in_the_line_of_if(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] |
         return None
     entry = node.entries.get("if")
     if entry and "then" not in node and isinstance(value := entry.value, ScalarNode):
-        found = _THEN.fullmatch(value.text) if value.plain else None
+        found = _THEN.search(value.text) if value.plain and not {*value.text} & {*"'\""} else None
         return _then(node, value, found) if found else None
     entry = node.entries.get("repeat")
     if entry and isinstance(value := entry.value, ScalarNode):
@@ -37,12 +37,14 @@ def in_the_line_of_if(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] |
 
 def _then(node: MappingNode, value: ScalarNode, found: re.Match[str]) -> Repair[TreeNode]:
     """Return the step with `then`, whose own text needs no further finding."""
-    word = inner_span(value, found.end("condition"), len(value.text))
-    step = plain(found["then"] or "STEP", _LONGEST)
-    other = f", and 'else: {plain(found['other'], _LONGEST)}' below that" if found["other"] else ""
+    written = value.text[: found.start()].rstrip()
+    word = inner_span(value, found.start(), len(value.text))
+    first, *others = _ELSE.split(value.text[found.end() :], maxsplit=1)
+    step = plain(first.strip() or "STEP", _LONGEST)
+    other = f", and 'else: {plain(others[0].strip(), _LONGEST)}' below that" if others else ""
     message = "'then' needs a line of its own"
     finding = codes.WRONG_SHAPE.at(value.span, message, help=f"write 'then: {_as_step(step)}' below 'if'{other}")
-    condition = replace(value, text=found["condition"], span=inner_span(value, 0, found.end("condition")))
+    condition = replace(value, text=written, span=inner_span(value, 0, len(written)))
     added = {"then": Entry(ScalarNode("then", word), MappingNode({"": Entry(told(word), told(word))}, word))}
     return Repair(_with(node, "if", condition, added), (finding,))
 
