@@ -226,7 +226,8 @@ def suggest(name: str, valid: Iterable[str], what: str = VALID) -> str:
 
 def _completed(name: str, names: list[str]) -> list[str]:
     """Return the only name that begins with the words of a shorter one: `XL430` is that of `XL430-W250`."""
-    longer = [one for one in names if len(name) > LEAST_WORD and one.startswith(name) and not one[len(name)].isalnum()]
+    begun = [one for one in names if len(name) > LEAST_WORD and one != name and one.startswith(name)]
+    longer = [one for one in begun if not one[len(name)].isalnum()]
     return longer if len(longer) == 1 and name not in names else []
 
 
