@@ -152,7 +152,7 @@ def test_a_state_a_loop_and_an_input_are_renamed_where_they_are_meant(shipped: N
         ("robots/turtlebot/robot.yaml", "  |dock: {", "9", "names start with a lower-case letter"),
         ("robots/turtlebot/robot.yaml", "  |dock: {", "corner_1", "'corner_1' is taken"),
         ("missions/patrol.yaml", "$|low", "battery", "then `check` would say"),
-        ("missions/patrol_machine.yaml", "    |count:\n", "finished", "'finished' has another meaning already, as at"),
+        ("missions/patrol_machine.yaml", "    |count:\n", "finished", "a state cannot be named 'finished'"),
         ("robots/box_robot/robot.yaml", "  |base: rbx", "chassis", "then `check` would say"),
     ],
 )
