@@ -60,7 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     unlock = actions.add_parser(
         "unlock",
         help="end what was locked by hand",
-        description="What still commands motion must come to rest once, as after a stop.",
+        description="What still commands goes on at once.",
     )
     unlock.set_defaults(do=_unlock)
     for one in (why, watch):

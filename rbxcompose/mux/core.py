@@ -196,9 +196,9 @@ class MuxCore(Generic[M]):
         self._settle(now)
 
     def unlock(self, names: Iterable[str], now: float) -> None:
-        """End what was locked by hand. As after a stop, an input that still commands motion must come to rest once."""
-        ended = [name for name in names if self.locks.by_hand.pop(name, None) is not None]
-        self._must_rest(ended, now)
+        """End what was locked by hand: as with other locks, an input goes on at once. One whose time is over does not."""
+        for name in names:
+            self.locks.by_hand.pop(name, None)
         self._settle(now)
 
     def add(self, name: str, source: MuxSource, now: float) -> None:

@@ -112,7 +112,15 @@ def test_a_lock_by_hand_stops_at_once_and_ends_by_hand_or_at_its_time() -> None:
         assert mux.send(mux.now, "low", 1.0)  # it was silent for its timeout
 
 
-def test_what_went_on_during_a_lock_by_hand_must_come_to_rest_once() -> None:
+def test_who_unlocks_by_hand_lets_an_input_go_on_at_once() -> None:
+    mux = Driven(BOTH)
+    mux.core.lock(["low"], math.inf, 0.0)
+    assert not mux.send(0.1, "low", 1.0)
+    mux.core.unlock(["low"], 0.2)
+    assert mux.send(0.3, "low", 1.0)
+
+
+def test_what_went_on_until_the_time_of_a_lock_by_hand_is_over_must_come_to_rest_once() -> None:
     mux = Driven(BOTH)
     mux.core.lock(["low"], 0.5, 0.0)
     for step in range(1, 20):
