@@ -5,12 +5,13 @@ from __future__ import annotations
 from pydantic import Field
 
 from rbxcompose.diagnostics.core import DEFAULT_TIMEOUT, Aggregator, Analyzer
+from rbxcompose.diagnostics.requests import DiagnosticsTree, ShowDiagnostics, TreeLine
 from rbxcompose.diagnostics.status import Status
 from rbxcompose.levels import Level, level_of
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray, DiagnosticStatus, KeyValue
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header
-from rbxcompose.sdk import Component, Config, In, Out, Time, component
+from rbxcompose.sdk import Component, Config, In, Out, Time, answers, component
 
 PERIOD = 1.0  # [s] between two reports when nothing changes
 
@@ -101,6 +102,23 @@ class Diagnostics(Component[DiagnosticsConfig]):
             if group.level is not told:
                 self.context.log(group.level, f"{group.name} is {group.level.name}: {group.message}")
             self.told[group.name] = group.level
+
+    @answers(ShowDiagnostics)
+    def show(self, request: ShowDiagnostics) -> DiagnosticsTree:
+        """Return the tree as it is now."""
+        level = self.core.top_level(self.now)
+        lines = tuple(_line(status) for status in self.core.report(self.now))
+        worst = next((one for one in lines if one.is_group and one.level is level), None)
+        cause = "" if worst is None or level is Level.OK else f"{worst.path}: {worst.message}"
+        return DiagnosticsTree(self.now, level, cause, lines, self.core.dropped)
+
+
+def _line(status: Status) -> TreeLine:
+    depth = status.name.count("/") - 1
+    name = status.name.rpartition("/")[2]
+    return TreeLine(
+        status.name, name, depth, depth == 0, status.level, status.message, status.hardware_id, status.values
+    )
 
 
 def status_of(message: DiagnosticStatus) -> Status:

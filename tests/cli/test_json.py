@@ -23,6 +23,7 @@ MISTAKES = {
     "body check": "nowhere.yaml",
     "controller ls": "",
     "controller switch": "head",
+    "diag tree": "",
     "doctor": "nobody",
     "down": "nobody",
     "expand": "nowhere.yaml",
