@@ -52,7 +52,7 @@ ABOVE = {
     "bus": "sdk.bound",
     "bus_types": "actuation",
     "check_runner": "missions.analysis model.doubts model.robot",
-    "checks": "actuation body.model check_runner composition diagnostics.core missions model sdk sections",
+    "checks": "actuation body.model check_runner composition diagnostics missions model sdk sections",
     "cli": "actuation body bus compiler composition controller_requests diagnostics.requests doctor "
     "executive.requests finding_pages importing inspection lsp.server mission_tests missions model params plan "
     "recording rendering replay runtime scaffold schema.documents sdk sections",
@@ -93,7 +93,8 @@ ABOVE = {
     "schema": "controller_interface missions sdk sections",
     "sdk": "diagnostics.updater",
     "sections": "actuation.bus_types actuation.control_tables actuation.serial_ports actuation.servo_models "
-    "actuation.torques body control.calibration control.limits controller_interface sdk twins.servo_faults",
+    "actuation.torques body control.calibration control.limits controller_interface diagnostics.settings sdk "
+    "twins.servo_faults",
     "servo_bus_config": "actuation control controller_interface sdk.ports twins.fault_script",
     "servo_bus_line": "actuation servo_bus_config twins",
     "sim": "",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from rbxcompose.diagnostics.requests import DiagnosticsTree, TreeLine
+from rbxcompose.diagnostics.requests import DiagnosticsTree, LevelChange, TreeLine
 from rbxcompose.levels import Level
 from rbxcompose.printable import fitted, plain
 from rbxcompose.typed_json import to_data
@@ -30,7 +30,8 @@ def tree_lines(
         if values and not line.is_group:
             yield from _values(line, colour, width)
     if tree.dropped:
-        yield fitted(f"{tree.dropped:,} statuses were refused", width) if width else f"{tree.dropped:,} were refused"
+        text = f"{tree.dropped:,} statuses were refused; the log says why"
+        yield fitted(text, width) if width else text
 
 
 def _row(name: str, level: Level, message: str, column: int, colour: bool, width: int) -> str:
@@ -50,6 +51,18 @@ def _values(line: TreeLine, colour: bool, width: int) -> Iterator[str]:
         text = f"{_STEP * (line.depth + 2)}{plain(key):<{keys}}  {plain(value, _LONGEST)}"
         text = fitted(text, width) if width else text
         yield f"{_FAINT}{text}{_RESET}" if colour else text
+
+
+def change_line(change: LevelChange, colour: bool) -> str:
+    """Return a change as a line: `   12.30  /power  OK -> WARN  battery: Medium battery`."""
+    old, new = (f"{_COLOURS[one]}{one.name}{_RESET}" if colour else one.name for one in (change.old, change.new))
+    cause = "" if change.cause == change.new.name else plain(change.cause, _LONGEST)
+    return f"{change.time:8.2f}  {plain(change.path)}  {old} -> {new}  {cause}".rstrip()
+
+
+def told_change(change: LevelChange) -> dict[str, Any]:
+    """Return a change as data for JSON; levels are words."""
+    return {**to_data(change), "old": change.old.name.lower(), "new": change.new.name.lower()}
 
 
 def told_tree(tree: DiagnosticsTree) -> dict[str, Any]:
