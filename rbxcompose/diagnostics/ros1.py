@@ -44,6 +44,15 @@ def _missing(name: str, now: float, message: str = "Missing") -> HeardItem:
     return HeardItem(DiagnosticStatus(int(STALE), name, message), now)
 
 
+def _combined(levels: Sequence[int], *, empty: Level, is_classic: bool) -> Level:
+    """Return the worst level; some STALE ones are an ERROR, or with the policy `stale` no more than STALE."""
+    if not levels:
+        return empty
+    if is_classic:
+        return ERROR if STALE in levels and min(levels) < STALE else Level(max(levels))
+    return ERROR if ERROR in levels else Level(max(levels))
+
+
 def _depth(path: str) -> int:
     return 0 if path in ("", "/") else path.count("/")
 
@@ -62,8 +71,8 @@ def without_prefix(path: str, prefix: str) -> str:
 class Generic:
     """GenericAnalyzer: the items that match, below a header."""
 
-    def __init__(self, analyzer: AnalyzerModel, path: str, name: str, now: float) -> None:
-        self.analyzer, self.path, self.name = analyzer, path, name
+    def __init__(self, analyzer: AnalyzerModel, path: str, name: str, now: float, *, is_classic: bool) -> None:
+        self.analyzer, self.path, self.name, self._is_classic = analyzer, path, name, is_classic
         self.items = {expected: _missing(expected, now) for expected in analyzer.expected}
         self._discards = analyzer.discard_stale and analyzer.timeout > 0
         self._prefixes = [prefix.replace("/", " ") for prefix in analyzer.strip_prefix]
@@ -115,9 +124,7 @@ class Generic:
             rows.append(item.shown(self.path, is_stale=is_stale))
             levels.append(rows[-1].status.level)
             values.append(KeyValue(name, item.status.message))
-        level = Level(max(levels, default=STALE))
-        if level is STALE and not all(one == STALE for one in levels):
-            level = ERROR
+        level = _combined(levels, empty=STALE, is_classic=self._is_classic)
         level, message = self._counted(level)
         was_stale = timeout > 0 and self._told is STALE and now - self._told_at > timeout
         if level is not self._told:
@@ -144,8 +151,9 @@ class Generic:
 class Other(Generic):
     """OtherAnalyzer: what nothing matches; it forgets what is silent for 5 s."""
 
-    def __init__(self, base: str, now: float, *, as_errors: bool) -> None:
-        super().__init__(AnalyzerModel(timeout=DEFAULT_TIMEOUT, discard_stale=True), f"{base}/{OTHER}", OTHER, now)
+    def __init__(self, base: str, now: float, *, as_errors: bool, is_classic: bool) -> None:
+        analyzer = AnalyzerModel(timeout=DEFAULT_TIMEOUT, discard_stale=True)
+        super().__init__(analyzer, f"{base}/{OTHER}", OTHER, now, is_classic=is_classic)
         self._as_errors = as_errors
 
     def report(self, now: float) -> list[TreeRow]:
@@ -184,7 +192,10 @@ _KINDS = {"generic": Generic, "discard": Discard, "ignore": Ignore}
 class AnalyzerGroup:
     """AnalyzerGroup: analyzers by name, and a header above them if it has a path."""
 
-    def __init__(self, base: str, name: str, analyzers: Mapping[str, AnalyzerModel], now: float) -> None:
+    def __init__(
+        self, base: str, name: str, analyzers: Mapping[str, AnalyzerModel], now: float, *, is_classic: bool
+    ) -> None:
+        self._is_classic = is_classic
         self.name, self.path = name, f"/{'/'.join(step for step in (base.strip('/'), name) if step)}"
         self.analyzers: list[Generic | AnalyzerGroup] = []
         self._broken: list[HeardItem] = []
@@ -203,9 +214,9 @@ class AnalyzerGroup:
     def _made(self, key: str, one: AnalyzerModel, now: float) -> Generic | AnalyzerGroup:
         name = key if one.path is None else one.path
         if one.kind == "group":
-            return AnalyzerGroup(self.path, name, one.analyzers, now)
+            return AnalyzerGroup(self.path, name, one.analyzers, now, is_classic=self._is_classic)
         path = f"/{'/'.join(step for step in (self.path.strip('/'), name) if step)}"
-        return _KINDS.get(one.kind, Ignore)(one, path, name, now)
+        return _KINDS.get(one.kind, Ignore)(one, path, name, now, is_classic=self._is_classic)
 
     def match(self, name: str) -> bool:
         """Return whether an item belongs to one of the analyzers."""
@@ -229,9 +240,7 @@ class AnalyzerGroup:
             for header in (row.status for row in told if row.status.name == one.path):
                 levels.append(header.level)
                 values.append(KeyValue(one.name, header.message))
-        level = Level(max(levels, default=OK))
-        if level is STALE and not all(one == STALE for one in levels):
-            level = ERROR
+        level = _combined(levels, empty=OK, is_classic=self._is_classic)
         if self.path != "/":
             status = DiagnosticStatus(int(level), self.path, _WORDS[level], values=tuple(values))
             rows.append(TreeRow(self.name, _depth(self.path) - 1, is_group=True, status=status))
@@ -244,8 +253,9 @@ class Ros1Aggregator:
     def __init__(self, settings: DiagnosticsModel, expected: Sequence[str] = (), *, started: float = 0.0) -> None:
         self._settings = settings
         base = f"/{settings.base.strip('/')}" if settings.base else ""
-        self._root = AnalyzerGroup("", settings.base, settings.analyzers, started)
-        self._other = Other(base, started, as_errors=settings.other == "error")
+        classic = settings.is_classic
+        self._root = AnalyzerGroup("", settings.base, settings.analyzers, started, is_classic=classic)
+        self._other = Other(base, started, as_errors=settings.other == "error", is_classic=classic)
         self.items: dict[str, HeardItem] = {}
         self._places: dict[str, tuple[Generic | AnalyzerGroup, ...]] = {}
         self._levels: dict[str, Level] = {}
@@ -295,9 +305,7 @@ class Ros1Aggregator:
         """Return the tree: the header of an analyzer before its items, that of a group behind all that is in it."""
         rows = [*self._root.report(now), *(self._other.report(now) if self._settings.other != "hide" else ())]
         levels = [row.status.level for row in rows]
-        self._level = Level(max(levels, default=OK))
-        if self._level is STALE and min(levels) < STALE:
-            self._level = ERROR
+        self._level = _combined(levels, empty=OK, is_classic=self._settings.is_classic)
         worst = max(rows, key=lambda row: row.status.level, default=None)
         self._cause = f"{worst.status.name}: {worst.status.message}" if worst and self._level is not OK else ""
         self._remember(rows, now)
