@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 
 from rbxcompose.check_runner import check
-from rbxcompose.diagnostics.conditions import fits, is_glob
+from rbxcompose.diagnostics.conditions import component_of, fits, is_glob
 from rbxcompose.diagnostics.settings import each_analyzer
 from rbxcompose.findings import Finding
 from rbxcompose.manifest.yaml_nodes import TOO_LARGE
@@ -49,9 +49,10 @@ def unmatched_analyzer(robot: Robot) -> Iterator[Finding]:
                 message = f"the patterns up to this one take more than {_MOST_COMPARED:,} comparisons with components"
                 yield TOO_LARGE.at(place, message, help="use fewer patterns")
                 return
-            tried = () if pattern in known or not is_glob(pattern) else known
+            wanted = component_of(pattern)  # which details it has shows only while it runs
+            tried = () if wanted in known or not is_glob(wanted) else known
             compared += len(tried)
-            if pattern not in known | meant and not any(fits(pattern, component) for component in tried):
+            if wanted not in known | meant and not any(fits(wanted, component) for component in tried):
                 yield unmatched_analyzer.misspelt(
                     place,
                     f"analyzer '{path[-1]}' matches no component with '{pattern}'",
