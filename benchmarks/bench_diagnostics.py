@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 from benchmarks.measuring import Row, in_turns
 from rbxcompose.msgs.cdr import decode, encode
@@ -61,7 +61,7 @@ def _second(items: int, *, flaps: bool = False) -> Callable[[], object]:
     return second
 
 
-def _statuses(items: int, level: int) -> Sequence[DiagnosticStatus]:
+def _statuses(items: int, level: int) -> tuple[DiagnosticStatus, ...]:
     return tuple(
         DiagnosticStatus(
             level,

@@ -7,10 +7,10 @@ from typing import TypeVar
 import pytest
 
 from rbxcompose.components.battery_sim import BatterySimConfig
+from rbxcompose.diagnostics.settings import AnalyzerModel
 from rbxcompose.manifest.options import ComponentOptions
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.salvage import salvaged
-from rbxcompose.sections.diagnostics import AnalyzerModel
 from rbxcompose.sections.muxes import MuxModel
 
 M = TypeVar("M")

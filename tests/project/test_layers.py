@@ -65,7 +65,7 @@ ABOVE = {
     "executive missions monitors mux.core navigation sdk servo_bus_config servo_bus_line servo_report sim "
     "twins.fault_script",
     "servo_report": "actuation control",
-    "composition": "body.description sections",
+    "composition": "body.description diagnostics.settings sections",
     "control": "",
     "diagnostics": "",
     "doctor": "actuation.port_errors actuation.serial_ports bus.graph composition model.flow model.robot "
