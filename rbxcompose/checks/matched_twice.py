@@ -37,7 +37,7 @@ def matched_twice(robot: Robot) -> Iterator[Finding]:
     """
     first: dict[str, tuple[tuple[str, ...], int]] = {}
     for path, analyzer in each_analyzer(robot.manifest.diagnostics.analyzers):
-        shown = analyzer.match if analyzer.kind in SHOWN else ()
+        shown = analyzer.conditions if analyzer.kind in SHOWN else ()
         for index, pattern in ((index, one) for index, one in enumerate(shown) if isinstance(one, str)):
             other = first.setdefault(pattern, (path, index))
             if other != (path, index):

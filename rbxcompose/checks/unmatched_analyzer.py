@@ -42,7 +42,7 @@ def unmatched_analyzer(robot: Robot) -> Iterator[Finding]:
     meant = {re.sub(r"\W", "", name) for name in there - known}  # names that are told where they stand
     compared = 0
     for path, analyzer in each_analyzer(robot.manifest.diagnostics.analyzers):
-        patterns = [(index, one) for index, one in enumerate(analyzer.match) if isinstance(one, str)]
+        patterns = [(index, one) for index, one in enumerate(analyzer.conditions) if isinstance(one, str)]
         for index, pattern in patterns:
             place = robot.value("diagnostics", "analyzers", *path, "match", index)
             if compared > _MOST_COMPARED:

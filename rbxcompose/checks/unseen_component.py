@@ -46,7 +46,7 @@ def unseen_component(robot: Robot) -> Iterator[Finding]:
     """
     settings = robot.manifest.diagnostics
     groups = [one for _, one in each_analyzer(settings.analyzers)]
-    told = [one for group in groups for one in (*group.match, *group.expected)]
+    told = [one for group in groups for one in (*group.conditions, *group.expected)]
     named = {*dropped(robot), *(one for one in told if isinstance(one, str))}
     for name in robot.written - named if groups else ():
         is_left = not any(fits(one, name) for one in settings.ignore) and not any(matches(g, name) for g in groups)

@@ -32,8 +32,8 @@ def fits(condition: Condition, name: str) -> bool:
         condition.name is None or name == condition.name,
         condition.startswith is None or name.startswith(condition.startswith),
         condition.contains is None or condition.contains in name,
-        not condition.any or any(fits(one, name) for one in condition.any),
-        all(fits(one, name) for one in condition.all),
+        condition.any is None or any(fits(one, name) for one in condition.any),
+        all(fits(one, name) for one in condition.all or ()),
         condition.unless is None or not fits(condition.unless, name),
     )
     return all(tests) and (condition.regex is None or fits_regex(condition.regex, name))
@@ -42,7 +42,7 @@ def fits(condition: Condition, name: str) -> bool:
 def matches(analyzer: AnalyzerModel, name: str) -> bool:
     """Return whether the status called `name` belongs to the group of an analyzer itself, not to one below it."""
     return (
-        any(fits(one, name) for one in analyzer.match)
+        any(fits(one, name) for one in analyzer.conditions)
         or any(_is_like(one, name) for one in analyzer.expected)
         or name.startswith(analyzer.strip_prefix)
     )

@@ -103,13 +103,14 @@ class Aggregator:
 
     def take_over(self, old: Aggregator, now: float) -> None:
         """Go on with what another aggregator knew: its items, and the levels of groups that are the same."""
-        self.history, self.admission = old.history, old.admission
+        self.admission = old.admission
         for name, before in old._items.items():
             if before.status is None and not before.cause:
                 continue
             item = self._items.get(name) or self._entered(name, before.heard)
             item.status, item.heard, item.level, item.cause = before.status, before.heard, before.level, before.cause
             self._follow(item, now)
+        self.history = old.history  # in which what is known already is no change
         there = {group.key: group for group in old._layout.groups}
         for group in self._layout.groups:
             if group.key in there:

@@ -60,7 +60,8 @@ class GroupLayout:
         return Group((OTHER,), analyzer, None, f"{base}/{OTHER}", self._born)
 
     def _add(self, parent: Group, analyzers: Mapping[str, AnalyzerModel], found: list[Group]) -> None:
-        for name, one in analyzers.items():
+        for name in sorted(analyzers):  # as plans come from other processes
+            one = analyzers[name]
             if one.kind not in SHOWN:
                 self.silent.append(one)
                 continue

@@ -86,7 +86,11 @@ class Generic:
     def match(self, name: str) -> bool:
         """Return whether an item belongs here."""
         one = self.analyzer
-        return any(fits(each, name) for each in one.match) or name in one.expected or name.startswith(one.strip_prefix)
+        return (
+            any(fits(each, name) for each in one.conditions)
+            or name in one.expected
+            or name.startswith(one.strip_prefix)
+        )
 
     def take(self, item: HeardItem) -> None:
         """Keep an item."""

@@ -50,9 +50,9 @@ class Matcher(Config):
     """What is somewhere in the name."""
     regex: Annotated[str, AfterValidator(_regex)] | None = None
     """A regular expression of Python for the whole name."""
-    any: tuple[Condition, ...] = Field((), min_length=1)
+    any: tuple[Condition, ...] | None = Field(None, min_length=1)
     """At least one of these."""
-    all: tuple[Condition, ...] = Field((), min_length=1)
+    all: tuple[Condition, ...] | None = Field(None, min_length=1)
     """Each of these."""
     unless: Condition | None = Field(None, alias="not")
     """Not this."""
@@ -92,7 +92,7 @@ class AnalyzerModel(Config):
 
     type: Literal["generic", "group", "ignore", "discard", "other"] | None = None
     """`group` has groups below it, `ignore` and `discard` show nowhere what they match, `other` takes what is left."""
-    match: tuple[Condition, ...] = Field((), min_length=1)
+    match: tuple[Condition, ...] | None = Field(None, min_length=1)
     """Names of components, patterns with `*`, or maps that say more about names; one must fit."""
     expected: tuple[Pattern, ...] = ()
     """Names that must report, whatever matches."""
@@ -125,6 +125,11 @@ class AnalyzerModel(Config):
     def kind(self) -> str:
         """Return the type, also where it is not written."""
         return self.type or ("group" if self.analyzers else "generic")
+
+    @property
+    def conditions(self) -> tuple[Condition, ...]:
+        """Return what `match` lists."""
+        return self.match or ()
 
     @property
     def holds(self) -> tuple[float, float]:
