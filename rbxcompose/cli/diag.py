@@ -13,14 +13,14 @@ import select
 import shutil
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 from rbxcompose.cli.output.console import has_colour, refuse, tell
 from rbxcompose.cli.output.terminal import full_screen, raw, show
 from rbxcompose.cli.robots.commands import add_asking_options, pass_on
 from rbxcompose.cli.robots.health import change_line, told_change, told_tree, tree_lines
 from rbxcompose.cli.robots.lookup import NotDoneError, answer_of, find_robot
-from rbxcompose.diagnostics.requests import Acknowledge, DiagnosticsTree, ListChanges, ShowDiagnostics
+from rbxcompose.diagnostics.requests import Acknowledge, DiagnosticsTree, LevelChange, ListChanges, ShowDiagnostics
 from rbxcompose.runtime.folder import RobotFolder
 
 _PERIOD = 0.2  # [s] between two requests to a robot that is followed
@@ -109,11 +109,11 @@ def _show_live(folder: RobotFolder, *, values: bool) -> int:
 
 def _echo(arguments: argparse.Namespace) -> int:
     folder = find_robot(arguments.robot)
-    known = answer_of(folder, ListChanges())
+    known = list(_changes(folder))
     number = known[-1].number if known else 0
     try:
         while True:
-            for change in answer_of(folder, ListChanges(number)):
+            for change in _changes(folder, number):
                 tell(json.dumps(told_change(change)) if arguments.json else change_line(change, has_colour(sys.stdout)))
                 number = change.number
             time.sleep(_PERIOD)
@@ -121,9 +121,16 @@ def _echo(arguments: argparse.Namespace) -> int:
         return 0
 
 
+def _changes(folder: RobotFolder, number: int = 0) -> Iterator[LevelChange]:
+    """Yield all known changes after one, as many at a time as an answer holds."""
+    while some := answer_of(folder, ListChanges(number)):
+        yield from some
+        number = some[-1].number
+
+
 def _history(arguments: argparse.Namespace) -> int:
     above = f"/{arguments.path.strip('/')}".rstrip("/")
-    known = answer_of(find_robot(arguments.robot), ListChanges())
+    known = _changes(find_robot(arguments.robot))
     changes = [one for one in known if f"{one.path}/".startswith(f"{above}/")]
     if arguments.json:
         tell(json.dumps([told_change(one) for one in changes]))

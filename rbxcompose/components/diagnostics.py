@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Iterator, Sequence
 
 from rbxcompose.diagnostics.core import Aggregator
 from rbxcompose.diagnostics.requests import (
@@ -24,6 +25,8 @@ from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.sdk import Component, In, Out, Refused, answers, component
 
 PAUSE = 0.05  # [s] between two reports at least, so that flapping levels cost little
+MOST_ARRAYS, LARGEST_ARRAY = 30.0, 200_000  # [Hz], [B] of one publisher: to read more takes too much of a core
+MOST_TOLD = 100_000  # characters of an answer to people
 ROUNDING = 1e-9  # [s]
 PAUSE_PER_ROW = 0.0001  # [s]; a row is about 20 us of work, so reports never take more than a fifth of a core
 
@@ -45,7 +48,7 @@ class Diagnostics(Component[DiagnosticsConfig]):
 
     made_by = "Every robot runs one; its groups are those of the section `diagnostics`."
     rate = 5.0
-    diagnostics = In(DiagnosticArray, "/diagnostics", is_open=True, max_rate=100.0)
+    diagnostics = In(DiagnosticArray, "/diagnostics", is_open=True, max_rate=MOST_ARRAYS, max_size=LARGEST_ARRAY)
     diagnostics_agg = Out(DiagnosticArray, "/diagnostics_agg")
     diagnostics_toplevel_state = Out(DiagnosticStatus, "/diagnostics_toplevel_state")
     diagnostics_changes = Out(DiagnosticArray, "/diagnostics_changes", qos="event")
@@ -141,18 +144,25 @@ class Diagnostics(Component[DiagnosticsConfig]):
 
     @answers(ShowDiagnostics)
     def show(self, request: ShowDiagnostics) -> DiagnosticsTree:
-        """Return the tree as it is now."""
+        """Return the tree as it is now; of too many lines, groups and the worst."""
         self.core.advance(self.now)
         rows = self.core.report(self.now)
         if self.config.profile == "ros1":
             rows = tuple(sorted(rows, key=lambda row: row.status.name.split("/")))
         level, cause = self.core.level()
-        return DiagnosticsTree(self.now, level, cause, tuple(map(_line, rows)), self.core.admission.refused)
+        lines = [_line(row) for row in rows]
+        worst_first = sorted(range(len(lines)), key=lambda index: (not lines[index].is_group, -lines[index].level))
+        kept = sorted(_within(worst_first, [_size(line) for line in lines]))
+        told = tuple(lines[index] for index in kept)
+        refused = self.core.admission.refused
+        return DiagnosticsTree(self.now, level, cause, told, len(lines) - len(told), refused)
 
     @answers(ListChanges)
     def changes(self, request: ListChanges) -> tuple[LevelChange, ...]:
-        """Return the last changes of levels."""
-        return tuple(self.core.history.after(request.after))
+        """Return the first of the changes that are still known."""
+        known = list(self.core.history.after(request.after))
+        kept = _within(range(len(known)), [len(one.path) + len(one.cause) + 100 for one in known])
+        return tuple(known[index] for index in kept)
 
     @answers(Acknowledge)
     def acknowledge(self, request: Acknowledge) -> str:
@@ -170,9 +180,24 @@ class Diagnostics(Component[DiagnosticsConfig]):
 
 def _line(row: TreeRow) -> TreeLine:
     status = row.status
-    values = tuple((pair.key, pair.value) for pair in status.values)
+    values = () if row.is_group else tuple((pair.key, pair.value) for pair in status.values)  # those of a group repeat
     level = Level(status.level)
     return TreeLine(status.name, row.name, row.depth, row.is_group, level, status.message, status.hardware_id, values)
+
+
+def _size(line: TreeLine) -> int:
+    texts = (line.path, line.name, line.message, line.hardware_id, *(text for pair in line.values for text in pair))
+    return 150 + sum(map(len, texts))
+
+
+def _within(order: Iterable[int], sizes: Sequence[int]) -> Iterator[int]:
+    """Yield the first of `order` whose sizes an answer can hold."""
+    left = MOST_TOLD
+    for index in order:
+        left -= sizes[index]
+        if left < 0:
+            return
+        yield index
 
 
 def _as_status(change: LevelChange) -> DiagnosticStatus:

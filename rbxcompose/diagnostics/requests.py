@@ -27,15 +27,16 @@ class TreeLine:
 
 @dataclass(frozen=True, slots=True)
 class DiagnosticsTree:
-    """The whole tree at robot time `time` [s], with the level of the robot and its cause.
+    """The tree at robot time `time` [s], with the level of the robot and its cause.
 
-    `dropped` counts the statuses that were refused since the start.
+    `left_out` counts the lines for which there was no room, `dropped` the statuses refused since the start.
     """
 
     time: float
     level: Level
     cause: str
     lines: tuple[TreeLine, ...]
+    left_out: int = 0
     dropped: int = 0
 
 
@@ -60,7 +61,10 @@ class LevelChange:
 
 @dataclass(frozen=True, slots=True)
 class ListChanges(Query[tuple[LevelChange, ...]]):
-    """Return the changes after number `after` that are still known, oldest first."""
+    """Return the changes after number `after` that are still known, oldest first; of many, only the first.
+
+    Whoever wants all asks again, after the last one, until there are none.
+    """
 
     about = TYPE
     after: int = 0

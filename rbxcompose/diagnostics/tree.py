@@ -11,7 +11,7 @@ from rbxcompose.levels import Level
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticStatus
 
 MOST_CHANGES = 1000
-_LONGEST = 500  # characters of a cause
+_LONGEST = 200  # characters of a cause
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,6 +25,7 @@ TREE = DiagnosticsTree(
         TreeLine("/power/charger", "charger", 1, False, STALE, "silent since 2.0 s"),
         TreeLine("/motion", "motion", 0, True, OK, "OK"),
     ),
+    left_out=3,
     dropped=1200,
 )
 
@@ -38,6 +39,7 @@ def test_a_tree_is_aligned_with_the_cause_beside_each_group_and_values_on_reques
         "      level        9 %",
         "    charger  STALE  silent since 2.0 s",
         "  motion     OK",
+        "3 more are on /diagnostics_agg",
         "1,200 statuses were refused; the log says why",
     ]
 
@@ -45,7 +47,7 @@ def test_a_tree_is_aligned_with_the_cause_beside_each_group_and_values_on_reques
 def test_colours_change_nothing_else_and_a_width_cuts() -> None:
     plain = list(tree_lines("turtlebot", TREE))
     coloured = list(tree_lines("turtlebot", TREE, colour=True))
-    assert coloured[6] == "  motion     \x1b[32mOK   \x1b[0m"
+    assert coloured[4] == "  motion     \x1b[32mOK\x1b[0m"
     assert len(coloured) == len(plain)
     assert all(len(line) <= 20 for line in tree_lines("turtlebot", TREE, width=20))
 

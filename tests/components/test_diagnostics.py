@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import pytest
@@ -9,6 +10,7 @@ from rbxcompose.levels import Level
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray, DiagnosticStatus
 from rbxcompose.requests import Refused
 from rbxcompose.testing import Bench, instance
+from rbxcompose.typed_json import to_data
 
 
 def bench() -> Bench:
@@ -153,4 +155,6 @@ def test_a_flood_of_names_is_cut_off_with_one_line_in_the_log() -> None:
         robot.advance(0.1)
     told = [text for text in robot.texts() if "left out" in text]
     assert told == ["diagnostics: there are 10,000 statuses: further names are left out; `diag tree` counts them"]
-    assert robot.host.ask("diagnostics", ShowDiagnostics()).dropped == 2_001
+    tree = robot.host.ask("diagnostics", ShowDiagnostics())
+    assert (tree.dropped, len(tree.lines) + tree.left_out) == (2_001, 10_001)
+    assert len(json.dumps(to_data(tree))) < 200_000  # what a control socket takes at once

@@ -29,8 +29,9 @@ def tree_lines(
         yield _row(name, line.level, message, column, colour, width)
         if values and not line.is_group:
             yield from _values(line, colour, width)
-    if tree.dropped:
-        text = f"{tree.dropped:,} statuses were refused; the log says why"
+    notes = [f"{tree.left_out:,} more are on /diagnostics_agg"] if tree.left_out else []
+    notes += [f"{tree.dropped:,} statuses were refused; the log says why"] if tree.dropped else []
+    for text in notes:
         yield fitted(text, width) if width else text
 
 

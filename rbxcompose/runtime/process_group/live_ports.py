@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import partial
 from typing import Any, Protocol, cast
@@ -91,8 +92,17 @@ def _end(
             topic, handler = instance.topic(name), _on_message(component, name, port, handling)
             waits = isinstance(port, ServesTopic)  # like goals: a sender that waits for a listener relies on it
             is_light = handling.worker is None
+            most = math.inf if port.max_size is None else port.max_size
             return bus.subscribe(
-                owner, topic, interface, port.qos, handler, max_rate=port.max_rate, waits=waits, is_light=is_light
+                owner,
+                topic,
+                interface,
+                port.qos,
+                handler,
+                max_rate=port.max_rate,
+                max_size=most,
+                waits=waits,
+                is_light=is_light,
             )
         case Serves():
             serve = _on_request(component, name, port, handling)
