@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 
 from rbxcompose.expressions.types import TYPES, UNKNOWN, Type, TypeKind, choice_of, quantity_of
 from rbxcompose.levels import Level
