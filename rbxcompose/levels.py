@@ -1,8 +1,7 @@
-"""Diagnostic levels, and how several of them are combined."""
+"""Diagnostic levels, and their words."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from enum import IntEnum
 
 
@@ -27,11 +26,3 @@ def log_word(level: Level) -> str:
 def level_of(number: int) -> Level:
     """Return the level for a number on the wire; an unknown number is an ERROR."""
     return Level(number) if Level.OK <= number <= Level.STALE else Level.ERROR
-
-
-def combined(levels: Iterable[Level]) -> Level:
-    """Return the level of a group: the worst one, but ERROR if only some are STALE; OK for an empty group."""
-    found = set(levels)
-    if Level.STALE in found and len(found) > 1:
-        return Level.ERROR
-    return max(found, default=Level.OK)

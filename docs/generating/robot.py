@@ -55,12 +55,17 @@ def tables(hint: object, whose: str) -> Iterator[str]:
         yield (f"{of}: {lowered(about(model))}\n\n" if of else "") + keys_table(model)
 
 
-def models_below(hint: object, whose: str) -> Iterator[tuple[str, type[Config]]]:
-    """Give every model in an annotation and in the fields of those, with what has it."""
+def models_below(
+    hint: object, whose: str, above: frozenset[type[Config]] = frozenset()
+) -> Iterator[tuple[str, type[Config]]]:
+    """Give every model in an annotation and in the fields of those, with what has it; not again what contains it."""
     for model in models_in(hint):
+        if model in above:
+            continue
         yield whose, model
         for key, inner in get_type_hints(model, include_extras=True).items():
-            yield from models_below(inner, f"In {code(key)}") if key in model.model_fields else ()
+            if key in model.model_fields:
+                yield from models_below(inner, f"In {code(key)}", above | {model})
 
 
 def models_in(hint: object) -> Iterator[type[Config]]:

@@ -72,10 +72,12 @@ def takes_of(hint: object) -> str:
     for known, words in _NAMED:
         if hint == known:
             return words
-    if dimension := dimension_of(hint):
-        return dimension.name.replace("_", " ")
-    inner = [takes_of(one) for one in get_args(hint) if not isinstance(one, str) and one not in (type(None), ...)]
     origin = get_origin(hint)
+    if origin is not Union and origin is not UnionType and (dimension := _own_dimension(hint)):
+        return dimension.name.replace("_", " ")
+    if origin is Annotated:
+        return takes_of(get_args(hint)[0])
+    inner = [takes_of(one) for one in get_args(hint) if not isinstance(one, str) and one not in (type(None), ...)]
     if origin in (Union, UnionType):
         return " or ".join(inner)
     if origin is Literal:
@@ -94,8 +96,16 @@ def _referring(kind: str) -> str:
 
 def plural(words: str) -> str:
     """Return words for several of what the words are for one: 'names', 'any values', 'maps'."""
+    if " or " in words and "`" not in words:
+        return " or ".join(map(plural, words.split(" or ")))
     head, space, rest = words.partition(" of ")
     return words if head.endswith("`") else f"{head}s{space}{rest}"
+
+
+def _own_dimension(hint: object) -> Dimension | None:
+    """Return what a quantity measures; None for a choice of several types, of which one may be a quantity."""
+    is_choice = any(get_origin(one) in (Union, UnionType) for one in get_args(hint)[:1])
+    return None if is_choice else dimension_of(hint)
 
 
 def dimension_of(hint: object) -> Dimension | None:

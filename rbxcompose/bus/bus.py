@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Sequence
 from typing import Any, TypeVar
 
@@ -81,6 +82,7 @@ class Bus:
         handler: Callable[[M], None],
         *,
         max_rate: float | None = None,
+        max_size: float = math.inf,
         waits: bool = False,
         is_patient: bool = False,
         is_light: bool = True,
@@ -88,12 +90,13 @@ class Bus:
         """Call `handler` with each message of a topic; with `waits`, not before `open`.
 
         Takes at most `max_rate` [Hz] from each publisher of another process (all messages if infinite); None means the
-        limit of the QoS class. A patient subscription is for topics that are published often and read rarely. A light
-        handler may run in the thread that brings a message.
+        limit of the QoS class. Refuses their messages of more than `max_size` [B]. A patient subscription is for topics
+        that are published often and read rarely. A light handler may run in the thread that brings a message.
         """
         node = self._node(owner)
         kinds = {"waits": waits, "is_patient": is_patient, "is_light": is_light}
-        return _kept(node, Subscription(self._topics, node, topic, message, qos, handler, max_rate, **kinds))
+        made = Subscription(self._topics, node, topic, message, qos, handler, max_rate, max_size=max_size, **kinds)
+        return _kept(node, made)
 
     def serve(self, owner: str, name: str, service: type[Service[Q, R]], handler: Callable[[Q], R]) -> None:
         """Answer requests with what `handler` returns; if it raises, the caller gets the error instead.

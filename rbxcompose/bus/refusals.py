@@ -10,6 +10,7 @@ class RefusalReason(StrEnum):
     """Why a message is refused; the words complete the sentence `12 messages were refused: ...`."""
 
     TOO_MANY = "too many at once"
+    TOO_LARGE = "too large"
     ATTACHMENT = "no ROS attachment"
     LENGTH = "wrong length"
     CONTENT = "unreadable content"

@@ -102,6 +102,7 @@ class Subscription(Generic[M]):
     """Passes the messages of a topic to `handler` and remembers the newest.
 
     It takes at most `max_rate` [Hz] from each publisher in another process; None means the limit of the QoS class.
+    Messages of more than `max_size` [B] from there are refused before they cost anything.
     """
 
     def __init__(
@@ -114,6 +115,7 @@ class Subscription(Generic[M]):
         handler: Callable[[M], None],
         max_rate: float | None = None,
         *,
+        max_size: float = math.inf,
         waits: bool = False,
         listens: bool = True,
         is_patient: bool = False,
@@ -131,7 +133,7 @@ class Subscription(Generic[M]):
         self.refusals = Refusals()
         self.is_wanted: Callable[[], bool] = lambda: True  # if false, arrivals from other processes are ignored
         self._topics, self._process, self._qos = topics, node.process, qos
-        self._message, self._handler = message, handler
+        self._message, self._handler, self._max_size = message, handler, max_size
         rate = max_rate or most_per_second(qos)
         self._allowances = None if rate is None or math.isinf(rate) else Allowances(rate)
         self._arrived = -math.inf  # [s] of robot time
@@ -211,6 +213,9 @@ class Subscription(Generic[M]):
     def _arrive(self, arrival: Arrival) -> None:
         # In a thread of the transport: age is measured from here, however busy the scheduler is.
         if not self.is_wanted():
+            return
+        if len(arrival.payload) > self._max_size:
+            self.refusals.add(RefusalReason.TOO_LARGE)
             return
         now, source = self._process.clock.now(), None
         if self._allowances is None or (source := self._allowed(self._allowances, arrival, now)) is not None:

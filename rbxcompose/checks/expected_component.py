@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from rbxcompose.check_runner import check
+from rbxcompose.diagnostics.settings import each_analyzer
 from rbxcompose.findings import Finding
 from rbxcompose.model.robot import Robot
 from rbxcompose.rules import NAMES
@@ -35,12 +36,12 @@ def expected_component(robot: Robot) -> Iterator[Finding]:
     ```
     """
     known = {*robot.components, *robot.written, *robot.brought}
-    for name, analyzer in robot.manifest.diagnostics.analyzers.items():
+    for path, analyzer in each_analyzer(robot.manifest.diagnostics.analyzers):
         for index, expected in enumerate(analyzer.expected):
             if expected.partition(": ")[0] not in known:
                 yield expected_component.misspelt(
-                    robot.value("diagnostics", "analyzers", name, "expected", index),
-                    f"analyzer '{name}' expects '{expected}', which the robot does not have",
+                    robot.value("diagnostics", "analyzers", *path, "expected", index),
+                    f"analyzer '{path[-1]}' expects '{expected}', which the robot does not have",
                     expected,
                     known,
                     "components of this robot",

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 from rbxcompose.check_runner import check
 from rbxcompose.checks.shortened_list import dropped
-from rbxcompose.diagnostics.core import Analyzer
+from rbxcompose.diagnostics.conditions import fits, matches
+from rbxcompose.diagnostics.settings import each_analyzer
 from rbxcompose.findings import Finding, Severity
 from rbxcompose.model.robot import Robot
 
@@ -43,13 +44,15 @@ def unseen_component(robot: Robot) -> Iterator[Finding]:
           match: [base, go_to, spare, cmd_vel]
     ```
     """
-    analyzers = robot.manifest.diagnostics.analyzers
-    groups = [Analyzer(one.match, one.expected) for one in analyzers.values()]
-    seen = {*dropped(robot), *(name for group in groups for name in (*group.match, *group.expected))}
-    for name in robot.written - seen if groups else ():
-        if name in robot.components and not any(group.matches(name) for group in groups):
+    settings = robot.manifest.diagnostics
+    groups = [one for _, one in each_analyzer(settings.analyzers)]
+    told = [one for group in groups for one in (*group.conditions, *group.expected)]
+    named = {*dropped(robot), *(one for one in told if isinstance(one, str))}
+    for name in robot.written - named if groups else ():
+        is_left = not any(fits(one, name) for one in settings.ignore) and not any(matches(g, name) for g in groups)
+        if name in robot.components and is_left and not any(group.kind == "other" for group in groups):
             yield unseen_component.at(
                 robot.component_span(name),
                 f"no analyzer matches '{name}'",
-                help=f"put it into the 'match' of one of them: {', '.join(analyzers)}",
+                help=f"put it into the 'match' of one of them: {', '.join(settings.analyzers)}",
             )

@@ -13,13 +13,14 @@ from rbxcompose.composition.history import History
 from rbxcompose.composition.inclusions import Inclusions
 from rbxcompose.config import Bound, Place
 from rbxcompose.dataclass import dataclass
+from rbxcompose.diagnostics.settings import DiagnosticsModel
 from rbxcompose.findings import Span
 from rbxcompose.manifest.section import Contents
 from rbxcompose.manifest.tree import KeyPath, MappingNode
 from rbxcompose.sections.body import body
 from rbxcompose.sections.bus import BusModel, bus
 from rbxcompose.sections.components import ComponentEntry, components
-from rbxcompose.sections.diagnostics import DiagnosticsModel, diagnostics
+from rbxcompose.sections.diagnostics import diagnostics
 from rbxcompose.sections.missions import MissionEntry, missions
 from rbxcompose.sections.muxes import MuxModel, muxes
 from rbxcompose.sections.places import places

@@ -1,171 +1,240 @@
 """The aggregator: from the statuses of all parts to one tree with a level for each group.
 
-Statuses are named `component` or `component: detail`; a pattern that matches the component matches its details too.
-All times are robot time [s] at which a status reached the aggregator.
+All times are robot time [s] at which a status reached the aggregator. A status costs the same however many there are:
+levels are counted in each group, and only groups in which a count has changed are looked at.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import replace
-from fnmatch import fnmatchcase
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from heapq import heappop, heappush
 
-from rbxcompose.dataclass import dataclass
-from rbxcompose.diagnostics.status import Status
-from rbxcompose.levels import Level, combined
-
-DEFAULT_TIMEOUT = 5.0  # [s]
-OTHER = "Other"  # the group of statuses that no analyzer matches
-_GLOB = frozenset("*?[")
-MOST_ITEMS = 10_000  # names come from outside; the tree must not grow without bound
-
-
-@dataclass(frozen=True, slots=True)
-class Analyzer:
-    """A group of the tree: names or globs in `match`, names that must report in `expected`.
-
-    An item that is silent for more than `timeout` [s] is STALE.
-    """
-
-    match: tuple[str, ...] = ()
-    expected: tuple[str, ...] = ()
-    timeout: float = DEFAULT_TIMEOUT
-
-    def matches(self, name: str) -> bool:
-        """Return whether the status called `name` belongs to this group."""
-        parts = (name, _component(name))
-        return any(_matches(parts, pattern) for pattern in (*self.match, *self.expected))
-
-
-@dataclass(frozen=True, slots=True)
-class _Item:
-    """The latest status under a name; `status` is None until one has been received."""
-
-    status: Status | None
-    heard: float
-    cause: str = ""  # why the part is lost; empty if it is not
-
-    def seen(self, name: str, timeout: float, now: float) -> Status:
-        """Return the status of the item in the tree at `now`."""
-        status = self.status or Status(name, Level.OK, "has not reported yet")
-        if self.cause:
-            return replace(status, level=Level.STALE, message=self.cause)
-        if now - self.heard <= timeout:
-            return status
-        last = f", last: {status.message}" if status.message else ""
-        silent = f"silent since {self.heard:.1f} s{last}" if self.status else "never reported"
-        return replace(status, level=Level.STALE, message=silent)
+from rbxcompose.diagnostics.admission import Admission
+from rbxcompose.diagnostics.conditions import component_of, fits, matches
+from rbxcompose.diagnostics.group import Group, GroupItem, Item
+from rbxcompose.diagnostics.layout import GroupLayout
+from rbxcompose.diagnostics.settings import DiagnosticsModel
+from rbxcompose.diagnostics.tree import LevelHistory, TreeRow
+from rbxcompose.levels import Level
+from rbxcompose.msgs.diagnostic_msgs import DiagnosticStatus
 
 
 class Aggregator:
-    """Keeps the latest status of every name and sorts them into the groups of `analyzers`.
+    """Keeps the latest status of every name and sorts them into groups.
 
-    `started` is the robot time [s] from which on a part that was expected counts as late.
+    `expected` are the robot's own components, which must all report; `started` is the robot time [s] from which on
+    they count as late.
     """
 
-    def __init__(self, analyzers: Mapping[str, Analyzer], *, started: float = 0.0) -> None:
-        self._analyzers = dict(analyzers)
-        self._started = started
-        self._items = {
-            name: _Item(None, started) for analyzer in self._analyzers.values() for name in analyzer.expected
-        }
-        self._groups_of: dict[str, tuple[str, ...]] = {}
-        self._reported: dict[str, Level] | None = None
-        self.dropped = 0  # statuses of new names for which there was no room
+    def __init__(self, settings: DiagnosticsModel, expected: Sequence[str] = (), *, started: float = 0.0) -> None:
+        self._settings, self._own = settings, frozenset(expected)
+        self._layout = GroupLayout(settings, started)
+        self._items: dict[str, Item] = {}
+        self._dirty: list[int] = []
+        self._is_dirty: set[int] = set()
+        self._check_at = math.inf  # [s], the first time at which a group may change by itself
+        self.history, self.admission = LevelHistory(), Admission()
+        names = {*expected, *(name for one in self._layout.groups for name in one.analyzer.expected)}
+        for name in sorted(names):
+            self._place(Item(name, started, is_own=self._is_own(name)))
+        for group in self._layout.groups:
+            self._touch(group)
+        self._settle(started)
+        self.has_news = False  # the level of a group has changed; whoever reports it resets this
 
-    def feed(self, now: float, statuses: Iterable[Status]) -> None:
+    def feed(self, now: float, statuses: Iterable[DiagnosticStatus]) -> None:
         """Receive statuses that arrived at `now`; a name that was lost is back."""
+        items = self._items
         for status in statuses:
-            if status.name not in self._items and len(self._items) >= MOST_ITEMS:
-                self.dropped += 1
+            item = items.get(status.name)
+            if item is None and (item := self._new(status, now)) is None:
                 continue
-            component = _component(status.name)
-            if component in self._items and self._items[component].status is None:
-                del self._items[component]  # a placeholder for a part that had not reported
-            self._items[status.name] = _Item(status, now)
+            item.status, item.heard = self.admission.fitted(status), now
+            if status.level != item.level or not item.is_plain:
+                item.level, item.cause = status.level, ""
+                self._follow(item, now)
+        self._settle(now)
 
     def lost(self, now: float, names: Iterable[str], cause: str) -> None:
         """Mark the components `names` as STALE immediately, with the `cause`, until they report again."""
         for name in names:
-            known = [item for item in self._items if name in (item, _component(item))]
-            for item in known or [name]:
-                before = self._items.get(item, _Item(None, now))
-                self._items[item] = replace(before, cause=cause)
+            known = [one for one in self._items.values() if name in (one.name, component_of(one.name))]
+            for item in known or [self._place(Item(name, now, is_own=self._is_own(name)))]:
+                item.cause = cause
+                for member in item.members:
+                    member.group.is_urgent = True
+                self._follow(item, now)
+        self._settle(now)
 
-    def report(self, now: float) -> tuple[Status, ...]:
-        """Return the tree: for each group its header `/group`, followed by its items `/group/name` by name."""
-        tree: list[Status] = []
-        self._reported = {}
-        for group, items in self._groups(now).items():
-            header = self._header(group, items, now)
-            self._reported[group] = header.level
-            tree.append(header)
-            tree.extend(replace(item, name=f"/{group}/{_flat(item.name)}") for item in items)
-        return tuple(tree)
+    def advance(self, now: float) -> None:
+        """Let time pass: what is silent for too long becomes STALE, and levels that had to last count."""
+        if now > self._check_at:
+            for group in self._layout.groups:
+                if now > group.check_at:
+                    self._sweep(group, now)
+            self._settle(now)
+            self._check_at = min(group.check_at for group in self._layout.groups)
 
-    def changed(self, now: float) -> bool:
-        """Return whether the level of any group differs from the last report; before the first one it does."""
-        return self._levels(now) != self._reported
+    def acknowledge(self, now: float, path: str = "") -> list[str]:
+        """Let the latched levels of a group and those below it follow the present; return the paths of these groups."""
+        done: list[str] = []
+        for group in self._layout.groups:
+            if (not path or f"{group.path}/".startswith(f"{path}/")) and group.acknowledge():
+                group.is_urgent = True
+                self._touch(group)
+                done.append(group.path)
+        self._settle(now)
+        return done
 
-    def top_level(self, now: float) -> Level:
-        """Return the level of the whole robot."""
-        return combined(self._levels(now).values())
+    def level(self) -> tuple[Level, str]:
+        """Return the level of the whole robot, and the group that gives it with its cause."""
+        return self._layout.level()
 
-    def _levels(self, now: float) -> dict[str, Level]:
-        return {group: self._level(group, items, now) for group, items in self._groups(now).items()}
+    def paths(self) -> list[str]:
+        """Return the paths of all groups."""
+        return [one.path for one in self._layout.groups if one.has_header]
 
-    def _groups(self, now: float) -> dict[str, list[Status]]:
-        """Return the items of every group with their status at `now`, sorted by name; Other only if it has any."""
-        groups: dict[str, list[Status]] = {group: [] for group in (*self._analyzers, OTHER)}
-        for name in sorted(self._items):
-            for group in self._groups_with(name):
-                timeout = self._analyzers[group].timeout if group in self._analyzers else DEFAULT_TIMEOUT
-                groups[group].append(self._items[name].seen(name, timeout, now))
-        if not groups[OTHER] and OTHER not in self._analyzers:
-            del groups[OTHER]
-        return groups
+    def report(self, now: float) -> tuple[TreeRow, ...]:
+        """Return the tree: the header of each group, followed by its items by name and the groups below it."""
+        for group in self._layout.groups:
+            group.tell(now)
+        return tuple(row for top in self._layout.tops() for row in _rows(top, 0))
 
-    def _groups_with(self, name: str) -> tuple[str, ...]:
-        if name not in self._groups_of:
-            matching = tuple(group for group, analyzer in self._analyzers.items() if analyzer.matches(name))
-            self._groups_of[name] = matching or (OTHER,)
-        return self._groups_of[name]
+    def take_over(self, old: Aggregator, now: float) -> None:
+        """Go on with what another aggregator knew: its items, and the levels of groups that are the same."""
+        self.admission = old.admission
+        for name, before in old._items.items():
+            if before.status is None and not before.cause:
+                continue
+            item = self._items.get(name) or self._entered(name, before.heard)
+            item.status, item.heard, item.level, item.cause = before.status, before.heard, before.level, before.cause
+            self._follow(item, now)
+        self.history = old.history  # in which what is known already is no change
+        there = {group.key: group for group in old._layout.groups}
+        for group in self._layout.groups:
+            if group.key in there:
+                group.take_over(there[group.key])
+            self._touch(group)
+        self._settle(now)
 
-    def _level(self, group: str, items: list[Status], now: float) -> Level:
-        if items:
-            return combined(item.level for item in items)
-        is_late = now - self._started > self._analyzers[group].timeout
-        return Level.STALE if is_late else Level.OK
+    # Items
 
-    def _header(self, group: str, items: list[Status], now: float) -> Status:
-        level = self._level(group, items, now)
-        if not items:
-            return Status(f"/{group}", level, "nothing reported" if level is Level.STALE else "nothing reported yet")
-        worst = max(items, key=lambda item: item.level)  # the first one if several are equal
-        return Status(
-            f"/{group}",
-            level,
-            "OK" if worst.level is Level.OK else f"{worst.name}: {worst.message}",
-            values=tuple((item.name, item.message) for item in items),
-        )
+    def _is_own(self, name: str) -> bool:
+        return component_of(name) in self._own
+
+    def _new(self, status: DiagnosticStatus, now: float) -> Item | None:
+        return self._entered(status.name, now) if self.admission.takes(status, len(self._items)) else None
+
+    def _entered(self, name: str, now: float) -> Item:
+        """Return the item of a new name; it replaces a placeholder for its component."""
+        component = component_of(name)
+        if component != name and component in self._items and self._items[component].status is None:
+            self._forget(self._items[component], now)
+        return self._place(Item(name, now, is_own=self._is_own(name)))
+
+    def _place(self, item: Item) -> Item:
+        """Put an item into all groups that match it, else into `Other`; one that is ignored into none."""
+        self._items[item.name], name = item, item.name
+        wanted: list[Group] = []
+        if not any(fits(one, name) for one in self._settings.ignore):
+            wanted = [group for group in self._layout.matching if matches(group.analyzer, name)]
+            silent = any(matches(one, name) for one in self._layout.silent)
+            wanted = wanted or ([] if silent else [self._layout.other])
+        for group in wanted:
+            group.add(item)
+            self._touch(group)
+        return item
+
+    def _follow(self, item: Item, now: float) -> None:
+        """Give an item the level that it has now, in all of its groups."""
+        item.is_plain = item.status is not None and not item.cause
+        for member in item.members:
+            level = member.level_at(now)
+            if level is not member.level:
+                self._move(member, level, now)
+            item.is_plain = item.is_plain and level == item.level
+            if (timeout := member.group.analyzer.timeout) and not item.cause:
+                member.group.check_at = min(member.group.check_at, item.heard + timeout)
+                self._check_at = min(self._check_at, member.group.check_at)
+            if member.group.is_urgent:
+                self._touch(member.group)
+
+    def _move(self, member: GroupItem, level: Level, now: float) -> None:
+        old = member.level
+        member.group.move(member, level)
+        self.history.add(now, member.path, old, level, member.message())
+        self._touch(member.group)
+
+    def _forget(self, item: Item, now: float) -> None:
+        for member in list(item.members):
+            self._leave(member, now)
+
+    def _leave(self, member: GroupItem, now: float) -> None:
+        member.group.drop(member, now)
+        self._touch(member.group)
+        if not member.item.members:
+            del self._items[member.item.name]
+
+    # Groups
+
+    def _touch(self, group: Group) -> None:
+        if group.index not in self._is_dirty:
+            self._is_dirty.add(group.index)
+            heappush(self._dirty, group.index)
+
+    def _sweep(self, group: Group, now: float) -> None:
+        """Find what has become STALE by silence; let it disappear if it shall."""
+        timeout, group.check_at = group.analyzer.timeout or math.inf, math.inf
+        shall_go = group.analyzer.discard_stale or group is self._layout.other
+        for member in list(group.members.values()):
+            level, item = member.level_at(now), member.item
+            if level is not member.level:
+                self._move(member, level, now)
+                item.is_plain = False
+            if now - item.heard <= timeout:
+                group.check_at = min(group.check_at, item.heard + timeout)
+            elif shall_go and not (item.is_own or item.name in group.analyzer.expected):
+                self._leave(member, now)
+        self._touch(group)
+
+    def _settle(self, now: float) -> None:
+        """Bring the levels of all groups in which something has changed up to date, in the order of dependence."""
+        while self._dirty:
+            index = heappop(self._dirty)
+            self._is_dirty.discard(index)
+            group = self._layout.groups[index]
+            before, is_urgent, had_failed = group.level, group.is_urgent, group.is_failed
+            if group.update(now):
+                self.has_news = True
+                if group.has_header:
+                    self.history.add(now, group.path, before, group.level, group.message)
+            for one in group.dependents if group.is_failed is not had_failed else ():
+                self._touch(one)
+            self._check_at = min(self._check_at, group.check_at)
+            self._tell_parent(group, is_urgent)
+
+    def _tell_parent(self, group: Group, is_urgent: bool) -> None:
+        parent, counted = group.parent, group.level if group.is_visible else None
+        if parent is None or counted is group.counted:
+            return
+        if group.counted is not None:
+            parent.counts[group.counted] -= 1
+        if counted is not None:
+            parent.counts[counted] += 1
+        group.counted, self.has_news = counted, True
+        parent.is_urgent = parent.is_urgent or is_urgent
+        self._touch(parent)
 
 
-def _component(name: str) -> str:
-    return name.partition(": ")[0]
-
-
-def is_glob(pattern: str) -> bool:
-    """Return whether a pattern can match other names than itself."""
-    return not _GLOB.isdisjoint(pattern)
-
-
-def _matches(parts: tuple[str, str], pattern: str) -> bool:
-    # Equality first: a name may contain brackets, which have a meaning in globs.
-    if pattern in parts:
-        return True
-    return is_glob(pattern) and any(fnmatchcase(part, pattern) for part in parts)
-
-
-def _flat(name: str) -> str:
-    """Return `name` as one step of a path: a slash would add a level."""
-    return name.strip("/").replace("/", " ")
+def _rows(group: Group, depth: int) -> Iterator[TreeRow]:
+    """Yield the header of a group and what is below it."""
+    if not group.is_visible:
+        return
+    if group.has_header:
+        yield TreeRow(group.name, depth, is_group=True, status=group.shown())
+    below = depth + group.has_header
+    for member in group.sorted_members:
+        yield TreeRow(member.name, below, is_group=False, status=member.shown())
+    for child in group.children:
+        yield from _rows(child, below)

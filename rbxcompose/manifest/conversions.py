@@ -11,14 +11,25 @@ from rbxcompose.manifest.tree import KeyPath, ScalarNode, TreeNode, at
 from rbxcompose.units import Quantity, format_quantity
 
 
+def place_of(node: TreeNode, error: ErrorDetails) -> KeyPath:
+    """Return the place of an error in the tree, without pydantic's own steps, such as members of a union."""
+    found: KeyPath = ()
+    for step in error["loc"]:
+        if at(node, (*found, step)) is not None:
+            found = (*found, step)
+    if error["type"] == "missing":
+        found = (*found, error["loc"][-1])
+    return found
+
+
 def repaired(data: Any, error: ErrorDetails, node: TreeNode) -> Any:
     """Return `data` with one value converted to what a strict field requires: a number to text, a list to a tuple."""
-    convert = _REPAIRS.get(error["type"])
+    path, convert = place_of(node, error), _REPAIRS.get(error["type"])
     if convert is None:
         return data
     try:
-        return changed(data, error["loc"], lambda value: convert(value, at(node, error["loc"])))
-    except (KeyError, IndexError, TypeError):  # the place is not in the data, for example a member of a union
+        return changed(data, path, lambda value: convert(value, at(node, path)))
+    except (KeyError, IndexError, TypeError):  # the place is not in the data, such as a missing key
         return data
 
 

@@ -14,7 +14,7 @@ from pydantic import TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
 from rbxcompose.findings import DID_YOU_MEAN, SIMILAR, Finding, Report, Span, correction, kind
-from rbxcompose.manifest.conversions import changed, repaired
+from rbxcompose.manifest.conversions import changed, place_of, repaired
 from rbxcompose.manifest.foreign_words import FOREIGN
 from rbxcompose.manifest.forms import help_of_form
 from rbxcompose.manifest.requirements import BOUNDS, EXPECTED
@@ -223,7 +223,7 @@ def _findings(
     model: Any, node: TreeNode, path: KeyPath, errors: list[ErrorDetails], also: tuple[str, ...]
 ) -> Iterator[Finding]:
     """Turn pydantic's errors into findings: one for each place, none for what was reported before."""
-    located = [(_locate(node, error), error) for error in errors]
+    located = [(place_of(node, error), error) for error in errors]
     lacking = {loc for loc, error in located if error["type"] == "missing"}
     said: set[KeyPath] = set()
     for loc, error in located:
@@ -238,17 +238,6 @@ def _findings(
             finding = _finding(model, node, path, loc, error)
             keys = keys_at(model, loc) if error["type"].startswith("model") else ()
             yield _slip(model, node, path, loc, error, finding, keys) or finding
-
-
-def _locate(node: TreeNode, error: ErrorDetails) -> KeyPath:
-    """Return the place of an error in the tree, without pydantic's own steps, such as members of a union."""
-    found: KeyPath = ()
-    for step in error["loc"]:
-        if at(node, (*found, step)) is not None:
-            found = (*found, step)
-    if error["type"] == "missing":
-        found = (*found, error["loc"][-1])
-    return found
 
 
 def where(path: KeyPath) -> str:

@@ -119,10 +119,11 @@ class _Wires:
 def own_components(manifest: RobotManifest, written: Mapping[str, RobotComponent]) -> dict[str, RobotComponent]:
     """Return the components that every robot runs, except the one that runs missions."""
     names = [*written, *ALWAYS, *([MISSION] if manifest.missions else [])]
-    analyzers = {name: one.model_dump(exclude_none=True) for name, one in manifest.diagnostics.analyzers.items()}
+    groups = manifest.diagnostics
+    settings = {name: getattr(groups, name) for name in groups.model_fields_set}
     return {
         "transforms": _own(manifest, "transforms", {"urdf": manifest.body.text if manifest.body else ""}),
-        "diagnostics": _own(manifest, "diagnostics", {"analyzers": analyzers, "expected": names}),
+        "diagnostics": _own(manifest, "diagnostics", {**settings, "expected": names}),
     }
 
 
@@ -183,6 +184,6 @@ def values_of(manifest: RobotManifest, components: Mapping[str, RobotComponent])
     types: dict[str, str] = {}  # by topic
     for end in (end for component in components.values() for end in component.ends if end.type_name):
         types.setdefault(end.topic, end.type_name)
-    namespace, groups = manifest.bus.namespace or "", tuple(manifest.diagnostics.analyzers)
+    namespace, groups = manifest.bus.namespace or "", manifest.diagnostics.headers
     found = {name: value_of(entry, components, types, namespace, groups) for name, entry in manifest.values.items()}
     return {name: value for name, value in found.items() if value is not None}

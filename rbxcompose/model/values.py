@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 
 from rbxcompose.expressions.types import TYPES, UNKNOWN, Type, TypeKind, choice_of, quantity_of
 from rbxcompose.levels import Level
@@ -30,16 +30,17 @@ def value_of(
     components: Mapping[str, RobotComponent],
     types: Mapping[str, str],
     namespace: str,
-    groups: Collection[str] = (),
+    groups: Mapping[str, str],
 ) -> ValueSource | None:
     """Return what a value refers to, None if its source does not exist (a check reports that).
 
-    `types` are the ROS types of the robot's topics; `groups` are the diagnostics groups, whose levels are values, too.
+    `types` are the ROS types of the robot's topics; `groups` are the paths of the diagnostics groups, whose levels
+    are values, too.
     """
     if entry.port is not None:
         component, _, port = entry.port.partition(".")
         if component == DIAGNOSTICS and port in groups:
-            return ValueSource(LEVELS_TOPIC, LEVELS_TYPE, "level", type=choice_of(*LEVEL_WORDS), group=port)
+            return ValueSource(LEVELS_TOPIC, LEVELS_TYPE, "level", type=choice_of(*LEVEL_WORDS), group=groups[port])
         end = components[component].end(port) if component in components else None
         return _of_port(end, entry) if end else None
     if entry.topic is None:

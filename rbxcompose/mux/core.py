@@ -196,7 +196,7 @@ class MuxCore(Generic[M]):
         self._settle(now)
 
     def unlock(self, names: Iterable[str], now: float) -> None:
-        """End what was locked by hand: as with other locks, an input goes on at once. One whose time is over does not."""
+        """End what was locked by hand: an input goes on at once, as with other locks."""
         for name in names:
             self.locks.by_hand.pop(name, None)
         self._settle(now)

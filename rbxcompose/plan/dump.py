@@ -98,7 +98,8 @@ def _encode(value: Any, hint: Any, order: EntryOrder) -> Any:
             return [_encode(each, _item(hint, index), order) for index, each in enumerate(value)]
         case _ if isinstance(value, Config) or is_dataclass(value):
             cls: Any = type(value)
-            return {name: _encode(getattr(value, name), each, order) for name, each in _hints(cls).items()}
+            hints = _hints(cls)
+            return {key: _encode(getattr(value, name), hints[key], order) for key, name in _names(cls).items()}
         case _:
             return to_jsonable_python(value)
 
@@ -215,10 +216,17 @@ def _members(data: Any, cls: Any) -> dict[str, Any]:
 
 @cache
 def _hints(cls: Any) -> dict[str, Any]:
-    """Return the types of the fields of a dataclass or a configuration, with their annotations."""
+    """Return the types of the fields of a dataclass or a configuration by key, with their annotations."""
     hints = get_type_hints(cls, include_extras=True)
-    names = cls.model_fields if issubclass(cls, BaseModel) else [field.name for field in fields(cls)]
-    return {name: hints[name] for name in names}
+    return {key: hints[name] for key, name in _names(cls).items()}
+
+
+@cache
+def _names(cls: Any) -> dict[str, str]:
+    """Return the names of the fields by key: the alias of a field that has one."""
+    if issubclass(cls, BaseModel):
+        return {field.alias or name: name for name, field in cls.model_fields.items()}
+    return {field.name: field.name for field in fields(cls)}
 
 
 def _metadata(hint: Any) -> tuple[Any, ...]:

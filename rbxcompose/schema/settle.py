@@ -37,7 +37,7 @@ def referred(schema: Schema, document: Schema) -> Schema:
 
 def settled(raw: Schema) -> Schema:
     """Return the manifest form of one of pydantic's schemas."""
-    raw = {key: value for key, value in raw.items() if key != "title"}
+    raw = {"anyOf" if key == "oneOf" else key: value for key, value in raw.items() if key != "title"}
     if raw.get("default", 0) in _NOTHING:
         del raw["default"]
     if DIMENSION in raw:

@@ -90,14 +90,16 @@ class In(Port[Latest[M]]):
         unit: str = "",
         is_open: bool = False,
         max_rate: float | None = None,
+        max_size: int | None = None,
     ) -> None:
         """Take `is_open` for an input that may also be fed from outside the robot.
 
         At most `max_rate` messages per second are taken from each publisher of another process [Hz]; commands are
-        always limited.
+        always limited. Messages of other processes with more than `max_size` [B] are refused unread.
         """
         super().__init__(topic)
         self.interface, self.qos, self.unit, self.is_open, self.max_rate = message, Qos(qos), unit, is_open, max_rate
+        self.max_size = max_size
 
 
 class ServesTopic(In[M]):

@@ -4,59 +4,53 @@ from __future__ import annotations
 
 from dataclasses import replace
 from fnmatch import fnmatchcase
-from typing import Annotated
 
-from pydantic import Field
-
-from rbxcompose.config import Config, Name, Time
+from rbxcompose.diagnostics.settings import AnalyzerModel, DiagnosticsModel
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.renamer import Renames
 from rbxcompose.manifest.section import Reading
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.manifest.validate import validate
-from rbxcompose.references import ANALYZER, RUNNING, Refers
+from rbxcompose.references import ANALYZER
 
-Pattern = Annotated[str, Refers(RUNNING, is_told=True)]
-
-
-class AnalyzerModel(Config):
-    """One group of statuses."""
-
-    match: tuple[Pattern, ...] = Field(min_length=1)
-    """Names of components, or patterns with `*`."""
-    timeout: Time | None = Field(None, gt=0)
-    """A status that is older is stale."""
-    expected: tuple[Pattern, ...] = ()
-    """Names that must report, whatever matches."""
-
-
-class DiagnosticsModel(Config):
-    """How the states of components are grouped."""
-
-    analyzers: dict[Name, AnalyzerModel] = {}
-    """Groups by name."""
+_CONDITIONS = ("match", "expected", "name", "any", "all", "not")  # keys of analyzers and matchers that name components
 
 
 def _rename(renames: Renames, name: str, node: TreeNode) -> TreeNode:
     """Return an analyzer whose patterns match the outside names of the part's components and muxes."""
     if not isinstance(node, MappingNode):
         return node
-    changed = {
-        key: Entry(one.key, _patterns(renames, one.value)) if key in ("match", "expected") else one
-        for key, one in node.entries.items()
-    }
+    changed = {key: Entry(one.key, _below(renames, key, one.value)) for key, one in node.entries.items()}
     return replace(node, entries=changed)
+
+
+def _below(renames: Renames, key: str, node: TreeNode) -> TreeNode:
+    """Return what an analyzer or a matcher has below one of its keys."""
+    if key in _CONDITIONS:
+        return _patterns(renames, node)
+    if key == "analyzers" and isinstance(node, MappingNode):
+        groups = {name: Entry(one.key, _rename(renames, name, one.value)) for name, one in node.entries.items()}
+        return replace(node, entries=groups)
+    return node
 
 
 def _patterns(renames: Renames, node: TreeNode) -> TreeNode:
     """Return a list of names and patterns; a pattern that also matches muxes of the part is followed by their names."""
-    if not isinstance(node, SequenceNode):
-        return node
-    items: list[TreeNode] = []
-    for item in node.items:
-        changed = _pattern(renames, item.text) if isinstance(item, ScalarNode) and "${" not in item.text else []
-        items += [replace(item, text=text) for text in changed] if isinstance(item, ScalarNode) and changed else [item]
-    return replace(node, items=tuple(items))
+    match node:
+        case MappingNode():
+            return _rename(renames, "", node)
+        case ScalarNode():
+            return _changed(renames, node)[0]
+        case SequenceNode(items=items):
+            changed = (
+                _changed(renames, one) if isinstance(one, ScalarNode) else [_patterns(renames, one)] for one in items
+            )
+            return replace(node, items=tuple(one for several in changed for one in several))
+
+
+def _changed(renames: Renames, item: ScalarNode) -> list[ScalarNode]:
+    texts = [] if "${" in item.text else _pattern(renames, item.text)
+    return [replace(item, text=text) for text in texts] or [item]
 
 
 def _pattern(renames: Renames, pattern: str) -> list[str]:
@@ -90,6 +84,7 @@ def diagnostics(reading: Reading[DiagnosticsModel]) -> DiagnosticsModel:
     if not isinstance(node, MappingNode):
         return reading.whole() or DiagnosticsModel()
     others = {name: entry for name, entry in node.entries.items() if name != "analyzers"}
-    validate(DiagnosticsModel, replace(node, entries=others), ("diagnostics",), reading.report)
+    whole = validate(DiagnosticsModel, replace(node, entries=others), ("diagnostics",), reading.report)
     found = ((name, reading.valid(AnalyzerModel, name, entry.value)) for name, entry in reading.named())
-    return DiagnosticsModel(analyzers={name: read for name, read in found if read is not None})
+    analyzers = {name: read for name, read in found if read is not None}
+    return (whole or DiagnosticsModel()).model_copy(update={"analyzers": analyzers})

@@ -183,6 +183,16 @@ def test_a_flood_of_commands_is_capped_before_anything_is_decoded_and_other_topi
     assert set(heard.refusals.news()) == {RefusalReason.TOO_MANY}
 
 
+def test_a_message_that_is_too_large_is_refused_unread(network: Network, one: Connected, other: Connected) -> None:
+    got = list[Twist]()
+    heard = other.bus.subscribe("base", "moved", Twist, Qos.STATE, got.append, max_size=52)  # that of a Twist
+    moved = one.bus.publisher("base", "moved", Twist, Qos.STATE)
+    network.until(lambda: moved._remote.has_match)
+    moved._remote.put(bytes(53), Attachment(1, 0, bytes(16)).encode())
+    moved(Twist())
+    network.until(lambda: got and heard.refusals.news() == {RefusalReason.TOO_LARGE: 1})
+
+
 def test_another_type_on_the_same_topic_is_never_delivered(network: Network, one: Connected, other: Connected) -> None:
     got: list[object] = []
     other.bus.subscribe("there", "t", String, Qos.EVENT, got.append)

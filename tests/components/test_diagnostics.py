@@ -1,8 +1,16 @@
 from __future__ import annotations
 
+import json
+from typing import Any
+
+import pytest
+
+from rbxcompose.diagnostics.requests import Acknowledge, ListChanges, ShowDiagnostics
 from rbxcompose.levels import Level
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray, DiagnosticStatus
+from rbxcompose.requests import Refused
 from rbxcompose.testing import Bench, instance
+from rbxcompose.typed_json import to_data
 
 
 def bench() -> Bench:
@@ -61,3 +69,92 @@ def test_going_down_nothing_is_told_to_have_become_better() -> None:
     ]
     robot.advance(3.0)
     assert robot.texts()[-1] == "diagnostics: /power is ERROR: battery: Low battery"
+
+
+def strangers(config: dict[str, Any], *levels: int) -> Bench:
+    """Return a bench with nothing but diagnostics, after statuses of `arm`, one every 0.3 s."""
+    robot = Bench(instance("diagnostics", "diagnostics", {"expected": ["diagnostics"], **config}))
+    robot.advance(0.1)
+    for level in levels:
+        robot.publish("/diagnostics", DiagnosticArray(status=(DiagnosticStatus(level, "arm", "hm"),)))
+        robot.advance(0.3)
+    return robot
+
+
+def test_the_level_of_the_robot_has_a_topic_with_its_cause() -> None:
+    robot = strangers({"analyzers": {"arm": {"match": ["arm"]}}})
+    states = robot.collect("/diagnostics_toplevel_state", DiagnosticStatus)
+    robot.publish("/diagnostics", DiagnosticArray(status=(DiagnosticStatus(2, "arm", "hot"),)))
+    robot.advance(0.0)
+    assert states[-1] == DiagnosticStatus(2, "toplevel_state", "/arm: arm: hot")
+
+
+def test_each_change_of_a_level_is_published_once_with_its_cause() -> None:
+    robot = strangers({"analyzers": {"arm": {"match": ["arm"]}}})
+    told = robot.collect("/diagnostics_changes", DiagnosticArray)
+    robot.publish("/diagnostics", DiagnosticArray(status=(DiagnosticStatus(1, "arm", "warm"),)))
+    robot.advance(3.0)
+    assert [(one.name, one.level, one.message) for array in told for one in array.status] == [
+        ("/arm/arm", 1, "warm"),
+        ("/arm", 1, "arm: warm"),
+    ]
+
+
+def test_levels_that_flap_are_reported_at_intervals_and_remembered_each() -> None:
+    robot = strangers({"analyzers": {"arm": {"match": ["arm"]}}})
+    reports = robot.collect("/diagnostics_agg", DiagnosticArray)
+    for index in range(100):
+        robot.publish("/diagnostics", DiagnosticArray(status=(DiagnosticStatus(index % 2, "arm", "hm"),)))
+        robot.advance(0.01)
+    assert len(reports) <= 22
+    assert len(robot.host.ask("diagnostics", ListChanges())) == 2 * 99
+
+
+def test_people_see_the_tree_and_acknowledge_what_is_latched() -> None:
+    robot = strangers({"analyzers": {"arm": {"match": ["arm"], "latch": True}}}, 2, 0)
+    tree = robot.host.ask("diagnostics", ShowDiagnostics())
+    assert (tree.level, tree.cause) == (Level.ERROR, "/arm: arm: hm (latched since 0.1 s, OK now)")
+    assert [(line.depth, line.path, line.is_group) for line in tree.lines[:2]] == [
+        (0, "/arm", True),
+        (1, "/arm/arm", False),
+    ]
+    with pytest.raises(Refused, match="there is no group '/amr'"):
+        robot.host.ask("diagnostics", Acknowledge("amr"))
+    assert robot.host.ask("diagnostics", Acknowledge("/arm")) == "acknowledged: /arm"
+    with pytest.raises(Refused, match="no level is latched"):
+        robot.host.ask("diagnostics", Acknowledge())
+    assert robot.host.ask("diagnostics", ShowDiagnostics()).level is Level.OK
+
+
+def test_other_groups_take_effect_while_the_robot_runs_and_keep_what_is_known() -> None:
+    robot = strangers({"analyzers": {"arm": {"match": ["arm"], "latch": True}}}, 2, 0)
+    changed = {"analyzers": {"arm": {"match": ["arm"], "latch": True}, "rest": {"match": ["diagnostics"]}}}
+    robot.host.prepare([instance("diagnostics", "diagnostics", {"expected": ["diagnostics"], **changed})])
+    robot.host.activate(["diagnostics"])
+    robot.advance(0.0)
+    tree = robot.host.ask("diagnostics", ShowDiagnostics())
+    assert [line.path for line in tree.lines] == ["/arm", "/arm/arm", "/rest", "/rest/diagnostics"]
+    assert (tree.level, len(robot.host.ask("diagnostics", ListChanges()))) == (Level.ERROR, 3)
+
+
+def test_the_profile_of_ros_1_reports_at_its_rate_only() -> None:
+    robot = strangers({"profile": "ros1", "analyzers": {"arm": {"match": ["arm"]}}}, 0)
+    reports = robot.collect("/diagnostics_agg", DiagnosticArray)
+    robot.publish("/diagnostics", DiagnosticArray(status=(DiagnosticStatus(2, "arm", "hot"),)))
+    robot.advance(0.0)
+    assert reports == []
+    robot.advance(1.0)
+    assert levels(reports[-1])["/arm"] == Level.ERROR
+
+
+def test_a_flood_of_names_is_cut_off_with_one_line_in_the_log() -> None:
+    robot = strangers({})
+    for start in range(0, 12_000, 4_000):
+        names = (f"name {index}" for index in range(start, start + 4_000))
+        robot.publish("/diagnostics", DiagnosticArray(status=tuple(DiagnosticStatus(0, name) for name in names)))
+        robot.advance(0.1)
+    told = [text for text in robot.texts() if "left out" in text]
+    assert told == ["diagnostics: there are 10,000 statuses: further names are left out; `diag tree` counts them"]
+    tree = robot.host.ask("diagnostics", ShowDiagnostics())
+    assert (tree.dropped, len(tree.lines) + tree.left_out) == (2_001, 10_001)
+    assert len(json.dumps(to_data(tree))) < 200_000  # what a control socket takes at once

@@ -7,10 +7,10 @@ from typing import TypeVar
 import pytest
 
 from rbxcompose.components.battery_sim import BatterySimConfig
+from rbxcompose.diagnostics.settings import AnalyzerModel
 from rbxcompose.manifest.options import ComponentOptions
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.salvage import salvaged
-from rbxcompose.sections.diagnostics import AnalyzerModel
 from rbxcompose.sections.muxes import MuxModel
 
 M = TypeVar("M")
@@ -44,7 +44,7 @@ def test_an_input_of_a_mux_keeps_its_name_and_its_source() -> None:
 def test_the_items_of_a_list_keep_their_places() -> None:
     read = left(AnalyzerModel, "match: [base, [go_to], charger]")
     assert read is not None
-    assert (read.match[0], read.match[2]) == ("base", "charger")
+    assert (read.conditions[0], read.conditions[2]) == ("base", "charger")
 
 
 def test_one_wrong_topic_leaves_the_others_connected() -> None:

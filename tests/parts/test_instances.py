@@ -33,6 +33,10 @@ def test_all_that_a_part_says_of_its_own_names_follows(project: Project) -> None
           analyzers:
             all: {match: ["*"], expected: [battery]}
             some: {match: [batt*, base]}
+            deep:
+              suppressed_by: some
+              analyzers:
+                inner: {match: [{any: [battery, base], not: {name: charger}}], suppressed_by: some}
         missions:
           tour: {file: ../missions/tour.yaml, with: {home: home, text: elsewhere}}
         """
@@ -50,6 +54,11 @@ def test_all_that_a_part_says_of_its_own_names_follows(project: Project) -> None
     assert project.value("diagnostics", "analyzers", "left_all", "match") == ["left_*", "cmd_vel"]
     assert project.value("diagnostics", "analyzers", "left_all", "expected") == ["left_battery"]
     assert project.value("diagnostics", "analyzers", "left_some", "match") == ["left_batt*", "base"]
+    deep = {"match": [{"any": ["left_battery", "base"], "not": {"name": "left_charger"}}], "suppressed_by": "left_some"}
+    assert project.value("diagnostics", "analyzers", "left_deep") == {
+        "suppressed_by": "left_some",
+        "analyzers": {"inner": deep},
+    }
     assert project.value("missions", "left_tour", "with") == {"home": "left_home", "text": "elsewhere"}
     assert project.manifest.missions["left_tour"].path == project.folder / "missions/tour.yaml"
 

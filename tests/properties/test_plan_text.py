@@ -79,6 +79,10 @@ muxes:
 diagnostics:
   analyzers:
     all: {{match: ["*"]}}
+    deep:
+      analyzers:
+        one: {{match: [{{any: [base, {{regex: "b.*"}}], not: {{name: x}}}}], debounce: {number} s, count: {rounds}}}
+        two: {{match: ["bat*"], debounce: {{up: {number} s}}, count: {{max: {rounds}}}, suppressed_by: one, path: T}}
 missions:
   visit: visit.yaml
 start: visit

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import partial
 from typing import Any, Protocol, cast
@@ -75,7 +76,15 @@ def subscribe(component: Component[Any], owner: str, topic: str, port: In[Any], 
     waits = isinstance(port, ServesTopic)  # like goals: a sender that waits for a listener relies on it
     is_light, interface = handling.worker is None, cast(Any, port.interface)
     return bus.subscribe(
-        owner, topic, interface, port.qos, handler, max_rate=port.max_rate, waits=waits, is_light=is_light
+        owner,
+        topic,
+        interface,
+        port.qos,
+        handler,
+        max_rate=port.max_rate,
+        max_size=math.inf if port.max_size is None else port.max_size,
+        waits=waits,
+        is_light=is_light,
     )
 
 
