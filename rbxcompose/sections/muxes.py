@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Annotated
 
 from pydantic import Field
 
 from rbxcompose.config import Config, Frequency, Name, Time
-from rbxcompose.manifest.fields import PortName
+from rbxcompose.manifest.fields import PortName, TopicName
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.renamer import Renames
 from rbxcompose.manifest.section import ANY, Contents, Reading, SetScope
 from rbxcompose.manifest.tree import Entry, MappingNode, TreeNode, at
 from rbxcompose.manifest.wanted_components import WantedComponent, Wiring
+from rbxcompose.mux.words import Ending, Handover, MuxMode, MuxProfile, mode_of
 from rbxcompose.sdk.ports import Out
 from rbxcompose.sdk.registry import component_type
 from rbxcompose.sections.components import ComponentEntry, components
@@ -25,32 +27,78 @@ _TWIST = "geometry_msgs/msg/Twist"  # the type that a mux forwards if nothing de
 class MuxInput(Config):
     """One source of a mux."""
 
-    priority: int
-    """The input with the highest priority wins."""
-    timeout: Time = Field(gt=0)
-    """The input counts as silent after this long without a message."""
+    priority: int | None = None
+    """The input with the highest priority wins. Only in the mode `priority`, which needs it."""
+    timeout: Time | None = Field(None, ge=0)
+    """The input counts as silent after this long without a message. Only the mode `select` can do without it."""
     source: PortName | None = Field(None, alias="from")
     """The component, or `component.port`, whose output this is; without it the input is open to the outside."""
+    topic: TopicName | None = None
+    """Its topic, if that is not `MUX/INPUT`."""
+    zero_releases: bool = False
+    """Whether its zero lets go of the output at once, as when somebody lets go of a joystick."""
     max_rate: Frequency | None = Field(None, gt=0)
     """Most messages from one publisher in another process; the rest is dropped and reported. Default: 1000 Hz."""
 
 
 class MuxLock(Config):
-    """A heartbeat that locks while it is silent."""
+    """A heartbeat that locks while it is silent, or a flag that locks while it is true."""
 
-    priority: int
-    """Inputs with a lower priority are locked."""
-    timeout: Time = Field(gt=0)
-    """The lock engages after this long without a message."""
+    priority: int | None = None
+    """Inputs with a lower priority are locked. In the other modes, all are, and there are no priorities."""
+    timeout: Time | None = Field(None, ge=0)
+    """The lock engages after this long without a message. Only a flag can do without it."""
+    topic: TopicName | None = None
+    """The topic of a flag, `std_msgs/Bool`. Without it, the lock is a heartbeat, `std_msgs/Empty` at `MUX/LOCK`."""
 
 
 class MuxModel(Config):
     """Lets one of several sources command an output."""
 
+    mode: MuxMode | None = None
+    """Who gets through: the live input with the highest `priority`, the one that was selected, or who sent last."""
+    profile: MuxProfile = "default"
+    """Whose rules are followed to the letter: ours, or those of a program of ROS."""
     inputs: dict[Name, MuxInput] = Field(min_length=1)
     """Sources by name."""
     locks: dict[Name, MuxLock] = {}
     """Locks by name."""
+    initial: Annotated[str, Field(pattern=r"^([a-z][a-z0-9_]*|__none)$")] | None = None
+    """In the mode `select`: the input that is selected at the start, or `__none`. Default: the first one."""
+    lazy: bool = False
+    """In the mode `select`: whether it subscribes to the selected input alone."""
+    on_idle: Ending | None = None
+    """What follows the last command when no input is live any more: a `stop`, `none`, or a stop after a `hold`."""
+    on_lock: Ending | None = None
+    """What follows the last command of an input that gets locked."""
+    handover: Handover | None = None
+    """How fast velocities may grow after another input took over. Smaller ones, and stops, are never delayed."""
+    zero_stops: bool | None = None
+    """Whether a message of zeros is rest. Default: for velocities, and for what a base follows."""
+
+    @property
+    def works_by(self) -> MuxMode:
+        """Return the mode, which may be left out."""
+        return mode_of(self.mode, self.profile)
+
+    @property
+    def has_priorities(self) -> bool:
+        """Return whether priorities count."""
+        return self.works_by == "priority"
+
+    @property
+    def ranks(self) -> dict[str, int]:
+        """Return the priorities of inputs, as far as they are known and count."""
+        return _ranks(self.inputs) if self.has_priorities else {}
+
+    @property
+    def lock_ranks(self) -> dict[str, int]:
+        """Return the priorities of locks, as far as they are known and count."""
+        return _ranks(self.locks) if self.has_priorities else {}
+
+
+def _ranks(entries: Mapping[str, MuxInput | MuxLock]) -> dict[str, int]:
+    return {name: one.priority for name, one in entries.items() if one.priority is not None}
 
 
 def _rename(renames: Renames, name: str, node: TreeNode) -> TreeNode:
@@ -84,12 +132,20 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
         config: dict[str, object] = {
             "output": name,
             "message": wiring.message_of(name) or _TWIST,
-            "inputs": {
-                key: each.model_dump(exclude={"source"}, exclude_unset=True) for key, each in one.inputs.items()
-            },
-            "locks": {key: {"priority": each.priority, "timeout": each.timeout} for key, each in one.locks.items()},
+            "mode": one.works_by,
+            "profile": one.profile,
+            "inputs": {key: _set(each, "source") for key, each in one.inputs.items()},
+            "locks": {key: _set(each) for key, each in one.locks.items()},
+            **_set(one, "inputs", "locks", "mode", "profile"),
         }
+        if one.zero_stops is None and wiring.drives(name):
+            config["zero_stops"] = True
         yield WantedComponent(name, MUX, config, ("muxes", name))
+
+
+def _set(entry: Config, *left_out: str) -> dict[str, object]:
+    """Return the fields of an entry that have a value, as data."""
+    return entry.model_dump(exclude=set(left_out), exclude_none=True, exclude_unset=True)
 
 
 def _connects(contents: Contents) -> dict[str, dict[str, str]]:
@@ -100,7 +156,7 @@ def _connects(contents: Contents) -> dict[str, dict[str, str]]:
             component, _, port = (source.source or "").partition(".")
             if (written := contents.of(components).get(component)) is not None:
                 for output in _outputs(written, mux, port):
-                    found.setdefault(component, {})[output] = f"{mux}/{name}"
+                    found.setdefault(component, {})[output] = source.topic or f"{mux}/{name}"
     return found
 
 
@@ -139,7 +195,7 @@ def _details(read: Iterable[str]) -> Mapping[str, str]:
     details=_details,
 )
 def muxes(reading: Reading[MuxModel]) -> dict[str, MuxModel]:
-    """Which source may command, by topic: the live input with the highest priority gets through.
+    """Which source may command, by topic: the live one with the highest priority, the selected one, or the latest.
 
     Example:
         muxes:

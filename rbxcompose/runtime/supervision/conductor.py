@@ -13,7 +13,7 @@ from typing import Any
 
 from rbxcompose.levels import Level
 from rbxcompose.plan.model import Plan
-from rbxcompose.robot_events import MissionOver, RobotHeld
+from rbxcompose.robot_events import ComponentNoted, MissionOver, RobotHeld
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.options import RunOptions
 from rbxcompose.runtime.supervision.changes import WORLD, Changes
@@ -48,6 +48,7 @@ class Conductor:
         self.plan, self.layers = plan, options.layers
         self.generation = 0  # of the plan: how often it was changed
         self._changing: Changing | None = None
+        self.notes: dict[str, str] = {}  # what people should see of components
         self._repeated: dict[str, list[dict[str, Any]]] = {}  # requests that components get again after a restart
         self._options, self._router = options, router
         self._scheduler, self._effects = scheduler, effects
@@ -144,6 +145,9 @@ class Conductor:
                 self._failed(instance, text)
             case say.Repeated(instance, requests):
                 self._repeated[instance] = requests
+            case ComponentNoted(instance, text):
+                self.notes[instance] = text
+                self._effects.states_changed()
             case MissionOver():
                 self._mission_over(message)
             case say.TimeIsUp():
