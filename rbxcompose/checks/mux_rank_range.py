@@ -23,7 +23,8 @@ def mux_rank_range(robot: Robot) -> Iterator[Finding]:
       cmd_vel:
         profile: twist_mux
         inputs:
-          teleop:
+          navigation:
+            from: go_to
             priority: 0
             timeout: 0.5 s
     ```
@@ -33,7 +34,8 @@ def mux_rank_range(robot: Robot) -> Iterator[Finding]:
       cmd_vel:
         profile: twist_mux
         inputs:
-          teleop:
+          navigation:
+            from: go_to
             priority: 1
             timeout: 0.5 s
     ```

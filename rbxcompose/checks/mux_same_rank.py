@@ -26,6 +26,7 @@ def mux_same_rank(robot: Robot) -> Iterator[Finding]:
             priority: 10
             timeout: 0.5 s
           navigation:
+            from: go_to
             priority: 10
             timeout: 0.5 s
     ```
@@ -39,6 +40,7 @@ def mux_same_rank(robot: Robot) -> Iterator[Finding]:
             priority: 100
             timeout: 0.5 s
           navigation:
+            from: go_to
             priority: 10
             timeout: 0.5 s
     ```

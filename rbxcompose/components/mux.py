@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Any
 
 from rbxcompose.findings import suggest
@@ -14,6 +14,7 @@ from rbxcompose.msgs.topic_tools_interfaces import MuxAdd, MuxDelete, MuxList, M
 from rbxcompose.msgs.types import Message
 from rbxcompose.mux.account import lock_states, states_of, why
 from rbxcompose.mux.config import NOBODY, MuxConfig, MuxInputConfig, core_of, source_of
+from rbxcompose.mux.orders import MuxOrders, input_at, noted
 from rbxcompose.mux.requests import (
     NONE,
     AddMuxInput,
@@ -27,7 +28,7 @@ from rbxcompose.mux.requests import (
     UnlockMuxInputs,
 )
 from rbxcompose.mux.sources import NEVER
-from rbxcompose.requests import Command, Refused, answers
+from rbxcompose.requests import Refused, answers
 from rbxcompose.sdk import (
     Capability,
     Component,
@@ -93,7 +94,7 @@ class Mux(Component[MuxConfig]):
         self.refused: list[str] = []
         self.heard_at: dict[str, float] = {}  # when an input last sent
         self.changes: deque[MuxChange] = deque(maxlen=KEPT)
-        self.orders: dict[str, Command] = {}  # of people, which hold after a restart, too
+        self.orders = MuxOrders()
         self.listening = set(self.config.inputs)
         self.listen()
 
@@ -106,18 +107,14 @@ class Mux(Component[MuxConfig]):
 
     def take_over(self, old: Mux) -> None:
         """Take over who was sending, what was selected, and what people have locked and added."""
-        for name, order in old.orders.items():
-            if isinstance(order, AddMuxInput) and order.input not in self.core.inputs:
+        for order in old.orders.added.values():
+            if order.input not in self.core.inputs:
                 self.add_input(order)
-                self.orders[name] = order
+                self.orders.keep(order)
         self.core.take_over(old.core)
         self.heard_at = old.heard_at
-        self.orders |= {
-            name: order for name, order in old.orders.items() if not isinstance(order, AddMuxInput | DeleteMuxInput)
-        }
-        self.context.repeat(tuple(self.orders.values()))
-        self.listen()
-        self.settle()
+        self.orders.take_over(old.orders, self.core.inputs)
+        self.changed()
 
     # Messages
 
@@ -203,24 +200,22 @@ class Mux(Component[MuxConfig]):
             raise Refused(f"the inputs of '{self.name}' are not selected: its mode is '{self.config.mode}'")
         name = None if request.input == NONE else self.known(request.input)
         self.core.select(name, self.now)
-        self.keep("select", SelectMuxInput(self.name, name or NONE))
-        self.listen()
-        self.settle()
+        self.orders.keep(SelectMuxInput(self.name, name or NONE))
+        self.changed()
         return self.tell(f"'{name}' is selected" if name else "no input is selected")
 
     @answers(AddMuxInput)
     def add(self, request: AddMuxInput) -> str:
         """Add an input."""
-        if self.found(request.input) is not None or (request.topic and self.found(request.topic) is not None):
+        if any(one and input_at(one, self.topics) is not None for one in (request.input, request.topic)):
             raise Refused(f"'{self.name}' already has the input '{request.input}'")
         if request.input == NONE or request.input in self.bound or LOCK + request.input in self.bound:
             raise Refused(f"'{request.input}' cannot be the name of an input")
         if self.config.has_priorities and (request.priority is None or request.timeout is None):
             raise Refused("an input needs a priority and a timeout")
         self.add_input(request)
-        self.keep(f"add {request.input}", request)
-        self.listen()
-        self.settle()
+        self.orders.keep(request)
+        self.changed()
         return self.tell(f"input '{request.input}' takes '{self.topics[request.input]}'")
 
     @answers(DeleteMuxInput)
@@ -231,11 +226,8 @@ class Mux(Component[MuxConfig]):
             raise Refused(f"'{name}' is selected: select another one first")
         self.core.delete(name, self.now)
         del self.topics[name]
-        if self.orders.pop(f"add {name}", None) is None:
-            self.orders[f"delete {name}"] = DeleteMuxInput(self.name, name)
-        self.context.repeat(tuple(self.orders.values()))
-        self.listen()
-        self.settle()
+        self.orders.keep(DeleteMuxInput(self.name, name))
+        self.changed()
         return self.tell(f"input '{name}' is gone")
 
     @answers(LockMuxInputs)
@@ -243,11 +235,9 @@ class Mux(Component[MuxConfig]):
         """Lock inputs by hand; what they had commanded ends as with any lock."""
         names = [self.known(name) for name in request.inputs] or list(self.core.inputs)
         self.core.lock(names, NEVER if request.seconds is None else self.now + request.seconds, self.now)
-        for name in names:
-            self.orders[f"lock {name}"] = LockMuxInputs(self.name, (name,), request.seconds)
-        self.context.repeat(tuple(self.orders.values()))
+        self.orders.keep(LockMuxInputs(self.name, tuple(names), request.seconds))
         self.send(self.core.tick(self.now))
-        self.settle()
+        self.changed()
         limit = "until they are unlocked" if request.seconds is None else f"for {request.seconds:g} s"
         return self.tell(f"locked by hand {limit}: {', '.join(names)}")
 
@@ -295,18 +285,9 @@ class Mux(Component[MuxConfig]):
 
     def add_input(self, request: AddMuxInput) -> None:
         """Add an input to the core."""
-        one = MuxInputConfig(topic=request.topic, priority=request.priority or 0, timeout=request.timeout)
+        one = MuxInputConfig(topic=request.topic or None, priority=request.priority or 0, timeout=request.timeout)
         self.core.add(request.input, source_of(one, self.config), self.now)
         self.topics[request.input] = request.topic or f"{self.config.output}/{request.input}"
-
-    def found(self, text: str) -> str | None:
-        """Return the input of this name or topic."""
-        bare = text.strip("/")
-        for name, topic in self.topics.items():
-            own = topic.strip("/")
-            if text == name or bare == own or (text.startswith("/") and bare.endswith(f"/{own}")):
-                return name
-        return None
 
     def known(self, text: str) -> str:
         """Return the input of this name or topic.
@@ -314,26 +295,28 @@ class Mux(Component[MuxConfig]):
         Raises:
             Refused: if there is none.
         """
-        if (name := self.found(text)) is None:
+        if (name := input_at(text, self.topics)) is None:
             raise Refused(f"'{self.name}' has no input '{text}'; {suggest(text, self.topics, 'inputs')}")
         return name
 
     def listen(self) -> None:
         """Subscribe to what counts: a lazy mux listens to the selected input alone."""
-        wanted = {self.core.arbiter.selected} if self.config.lazy else set(self.topics)
+        chosen = self.core.arbiter.selected
+        wanted = {name for name in self.topics if name == chosen or not self.config.lazy}
         for name in self.listening - wanted:
             self.context.mute(name)
-        for name in (wanted & self.topics.keys()) - self.listening:
+        for name in wanted - self.listening:
             one = self.config.inputs.get(name)
             self.context.listen(_input(name, self.topics[name], self.config, one.max_rate if one else None))
-        self.listening = wanted & self.topics.keys()
+        self.listening = wanted
 
     # What it tells
 
-    def keep(self, name: str, order: Command) -> None:
-        """Have an order repeated after a restart."""
-        self.orders[name] = order
-        self.context.repeat(tuple(self.orders.values()))
+    def changed(self) -> None:
+        """Follow an order of a person, now and after a restart."""
+        self.context.repeat(self.orders.all)
+        self.listen()
+        self.settle()
 
     def tell(self, text: str) -> str:
         """Log what somebody ordered, and return it as the answer."""
@@ -365,7 +348,9 @@ class Mux(Component[MuxConfig]):
         """Publish who holds the output, if that has changed; in the profile of `topic_tools`, what is selected."""
         is_selection = self.config.profile == "topic_tools"
         name = self.core.arbiter.selected if is_selection else self.core.active
-        text = NOBODY.get(self.config.profile, NONE) if name is None else self.topics[name] if is_selection else name
+        text = NOBODY.get(self.config.profile, NONE)
+        if name is not None:
+            text = self.topics[name] if is_selection else name
         if text != self.announced:
             self.announced = text
             self.bound[ANNOUNCED](String(data=text))
@@ -373,12 +358,9 @@ class Mux(Component[MuxConfig]):
     def note(self) -> None:
         """Tell the supervisor what is locked by hand, and forget the orders of locks that have ended."""
         by_hand = self.core.locks.by_hand
-        ended = [name for name in self.orders if name.startswith("lock ") and name[5:] not in by_hand]
-        for name in ended:
-            del self.orders[name]
-        if ended:
-            self.context.repeat(tuple(self.orders.values()))
-        text = _hand_note(by_hand.items())
+        if self.orders.forget_locks(by_hand):
+            self.context.repeat(self.orders.all)
+        text = noted(by_hand.items())
         if text != self.noted:
             self.noted = text
             self.context.notify(ComponentNoted(self.name, text))
@@ -398,8 +380,3 @@ def _services(output: str) -> dict[str, Port[Any]]:
         "list": Serves(MuxList, f"{output}/list", skill=None),
     }
     return {name: port.named(name) for name, port in found.items()}
-
-
-def _hand_note(locked: Iterable[tuple[str, float]]) -> str:
-    told = [name if until == math.inf else f"{name} until {until:.1f} s" for name, until in locked]
-    return f"locked by hand: {', '.join(told)}" if told else ""

@@ -16,8 +16,8 @@ from rbxcompose.mux.core import MuxCore
 from rbxcompose.mux.handover import RAMPS
 from rbxcompose.mux.requests import NONE
 from rbxcompose.mux.rest import VELOCITIES, is_zeroed, rest_of
-from rbxcompose.mux.sources import NEVER, Endings, MuxLock, MuxSource, Ramp
-from rbxcompose.mux.words import HIGHEST, Ending, Handover, Hold, MuxMode, MuxProfile
+from rbxcompose.mux.sources import NEVER, LockSource, MuxEndings, MuxSource, Ramp
+from rbxcompose.mux.words import HIGHEST, HandoverLimits, HoldFirst, MuxEnding, MuxMode, MuxProfile
 
 ANNOUNCED: Mapping[MuxProfile, str] = {"topic_tools": "selected"}
 ACTIVE = "active"  # the topic below the mux on which it announces who holds the output
@@ -27,7 +27,7 @@ NOBODY: Mapping[MuxProfile, str] = {"yocs": "idle"}
 class MuxInputConfig(Config):
     """An input."""
 
-    topic: str = ""
+    topic: str | None = None
     """Its topic, if that is not `<output>/<name>`."""
     priority: int = 0
     """The input with the highest priority wins, where priorities count."""
@@ -42,7 +42,7 @@ class MuxInputConfig(Config):
 class MuxLockConfig(Config):
     """A lock."""
 
-    topic: str = ""
+    topic: str | None = None
     """The topic of a flag; without it, it is a heartbeat at `<output>/<name>`."""
     priority: int | None = None
     """Inputs with a lower priority are locked; all, where priorities do not count."""
@@ -69,11 +69,11 @@ class MuxConfig(Config):
     """The input that is selected first, `__none` for none; by default the first one."""
     lazy: bool = False
     """Whether only the selected input is subscribed to."""
-    on_idle: Ending | None = None
+    on_idle: MuxEnding | None = None
     """What follows the last command if no input is live any more; by default a stop, where zero is rest."""
-    on_lock: Ending | None = None
+    on_lock: MuxEnding | None = None
     """What follows the last command if its input was locked."""
-    handover: Handover | None = None
+    handover: HandoverLimits | None = None
     """How fast the output may grow after another input took over."""
     zero_stops: bool | None = None
     """Whether a message of zeros commands rest; by default for velocities."""
@@ -96,7 +96,7 @@ class MuxConfig(Config):
     def topic_of(self, name: str) -> str:
         """Return the topic of an input or a lock as it is written."""
         one = self.inputs.get(name) or self.locks.get(name)
-        return (one.topic if one else "") or f"{self.output}/{name}"
+        return (one.topic if one else None) or f"{self.output}/{name}"
 
 
 def core_of(config: MuxConfig, *, is_stopped: bool = False) -> MuxCore[Message]:
@@ -107,7 +107,7 @@ def core_of(config: MuxConfig, *, is_stopped: bool = False) -> MuxCore[Message]:
         {name: source_of(one, config) for name, one in config.inputs.items()},
         arbiter=arbiter_of(config),
         locks={name: _lock(one, config) for name, one in config.locks.items()},
-        endings=Endings(_wait(config.on_idle, config.profile), _wait(config.on_lock, config.profile)),
+        endings=MuxEndings(_wait(config.on_idle, config.profile), _wait(config.on_lock, config.profile)),
         handover=_ramp(config),
         stopped=is_stopped,
         **rest,
@@ -141,9 +141,9 @@ def source_of(one: MuxInputConfig, config: MuxConfig) -> MuxSource:
     )
 
 
-def _lock(one: MuxLockConfig, config: MuxConfig) -> MuxLock:
+def _lock(one: MuxLockConfig, config: MuxConfig) -> LockSource:
     counts = config.has_priorities and one.priority is not None
-    return MuxLock(
+    return LockSource(
         _priority(one.priority or 0, config) if counts else NEVER,
         one.timeout or NEVER,
         is_flag=bool(one.topic),
@@ -154,10 +154,10 @@ def _priority(written: int, config: MuxConfig) -> int:
     return max(0, min(written, HIGHEST)) if config.profile == "twist_mux" else written
 
 
-def _wait(ending: Ending | None, profile: MuxProfile) -> float:
+def _wait(ending: MuxEnding | None, profile: MuxProfile) -> float:
     """Return how long after the last command the stop follows [s]."""
     match ending:
-        case Hold(hold=time):
+        case HoldFirst(hold=time):
             return time
         case None:
             return 0.0 if profile == "default" else NEVER

@@ -12,7 +12,7 @@ from typing import Generic, TypeVar
 
 from rbxcompose.mux.arbiters import Arbiter, ByPriority
 from rbxcompose.mux.locks import MuxLocks
-from rbxcompose.mux.sources import Endings, MuxLock, MuxSource, Ramp
+from rbxcompose.mux.sources import LockSource, MuxEndings, MuxSource, Ramp
 
 M = TypeVar("M")
 
@@ -36,8 +36,8 @@ class MuxCore(Generic[M]):
         zero: Callable[[M | None], M] | None,
         is_zero: Callable[[M], bool] = _never,
         arbiter: Arbiter | None = None,
-        locks: Mapping[str, MuxLock] | None = None,
-        endings: Endings | None = None,
+        locks: Mapping[str, LockSource] | None = None,
+        endings: MuxEndings | None = None,
         handover: Ramp[M] | None = None,
         stopped: bool = False,
     ) -> None:
@@ -47,7 +47,7 @@ class MuxCore(Generic[M]):
         self.is_stopped, self.is_closed, self.is_held = stopped, False, False
         self.waiting: set[str] = set()  # inputs that must come to rest once before they count again
         self.sending_until: dict[str, float] = {}  # when an input is sure to be quiet
-        self._zero, self._is_zero, self._endings, self._handover = zero, is_zero, endings or Endings(), handover
+        self._zero, self._is_zero, self._endings, self._handover = zero, is_zero, endings or MuxEndings(), handover
         self._shape: M | None = None  # the last message that came out
         self._live_until: dict[str, float] = {}  # last moment at which an input is live
         self._neutral: set[str] = set()  # inputs whose last message was zero

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 
-from rbxcompose.mux.sources import MuxLock, MuxSource
+from rbxcompose.mux.sources import LockSource, MuxSource
 
 
 class MuxLocks:
     """Which inputs are held back, and by what. All times are robot time [s]."""
 
-    def __init__(self, locks: Mapping[str, MuxLock]) -> None:
+    def __init__(self, locks: Mapping[str, LockSource]) -> None:
         self.declared = dict(locks)
         self.by_hand: dict[str, float] = {}  # until when, by input
         self._until: dict[str, float] = {}  # when a lock engages because it is silent

@@ -35,7 +35,8 @@ def rest_of(message: type[Message]) -> Callable[[Message | None], Message]:
 
 
 def _numbers(message: Message) -> Iterator[tuple[str, Any]]:
-    for name in _names(type(message)):
+    kind: Any = type(message)  # mypy considers classes of a generic not hashable
+    for name in _names(kind):
         yield name, getattr(message, name)
 
 

@@ -31,7 +31,7 @@ class MuxSource:
 
 
 @dataclass(frozen=True, slots=True)
-class MuxLock:
+class LockSource:
     """A lock that holds back every input with a lower priority.
 
     It carries a heartbeat, and is engaged while it is silent; or a flag, and is engaged while that is true, or silent
@@ -60,7 +60,7 @@ class Ramp(Protocol[M]):
 
 
 @dataclass(frozen=True, slots=True)
-class Endings:
+class MuxEndings:
     """How long after the last command a stop follows [s]; `NEVER` for none."""
 
     on_idle: float = 0.0

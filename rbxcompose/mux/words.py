@@ -25,17 +25,17 @@ OWN_NAMES = frozenset({"output", "announced", "active", "selected", "select", "a
 """Names that a mux needs itself, below its topic or among its ports; so are those that begin with `lock_`."""
 
 
-class Hold(Config):
+class HoldFirst(Config):
     """The last command stays in force for a while, then a stop follows."""
 
     hold: Time = Field(gt=0)
     """How long until the stop. Nothing is repeated, so a receiver that brakes by itself may do so earlier."""
 
 
-Ending = Literal["none", "stop"] | Hold
+MuxEnding = Literal["none", "stop"] | HoldFirst
 
 
-class Handover(Config):
+class HandoverLimits(Config):
     """How fast the output may grow from what one source commanded to what the next one commands."""
 
     linear: Acceleration | None = Field(None, gt=0)

@@ -12,9 +12,9 @@ from rbxcompose.manifest.fields import PortName, TopicName
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.renamer import Renames
 from rbxcompose.manifest.section import ANY, Contents, Reading, SetScope
-from rbxcompose.manifest.tree import Entry, MappingNode, TreeNode, at
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode, at
 from rbxcompose.manifest.wanted_components import WantedComponent, Wiring
-from rbxcompose.mux.words import Ending, Handover, MuxMode, MuxProfile, mode_of
+from rbxcompose.mux.words import MODE_OF, HandoverLimits, MuxEnding, MuxMode, MuxProfile, mode_of
 from rbxcompose.sdk.ports import Out
 from rbxcompose.sdk.registry import component_type
 from rbxcompose.sections.components import ComponentEntry, components
@@ -67,11 +67,11 @@ class MuxModel(Config):
     """In the mode `select`: the input that is selected at the start, or `__none`. Default: the first one."""
     lazy: bool = False
     """In the mode `select`: whether it subscribes to the selected input alone."""
-    on_idle: Ending | None = None
+    on_idle: MuxEnding | None = None
     """What follows the last command when no input is live any more: a `stop`, `none`, or a stop after a `hold`."""
-    on_lock: Ending | None = None
+    on_lock: MuxEnding | None = None
     """What follows the last command of an input that gets locked."""
-    handover: Handover | None = None
+    handover: HandoverLimits | None = None
     """How fast velocities may grow after another input took over. Smaller ones, and stops, are never delayed."""
     zero_stops: bool | None = None
     """Whether a message of zeros is rest. Default: for velocities, and for what a base follows."""
@@ -95,6 +95,52 @@ class MuxModel(Config):
     def lock_ranks(self) -> dict[str, int]:
         """Return the priorities of locks, as far as they are known and count."""
         return _ranks(self.locks) if self.has_priorities else {}
+
+
+class RankedInput(MuxInput):
+    """An input where priorities count."""
+
+    priority: int
+    timeout: Time = Field(ge=0)
+
+
+class TimedInput(MuxInput):
+    """An input that lets go by itself."""
+
+    timeout: Time = Field(ge=0)
+
+
+class RankedLock(MuxLock):
+    """A lock where priorities count."""
+
+    priority: int
+
+
+class PriorityMux(MuxModel):
+    """The live input with the highest priority gets through."""
+
+    inputs: dict[Name, RankedInput] = Field(min_length=1)  # type: ignore[assignment]
+    locks: dict[Name, RankedLock] = {}  # type: ignore[assignment]
+
+
+class LatestMux(MuxModel):
+    """Who sent last gets through."""
+
+    inputs: dict[Name, TimedInput] = Field(min_length=1)  # type: ignore[assignment]
+
+
+_MODELS: dict[str, type[MuxModel]] = {"priority": PriorityMux, "latest": LatestMux}
+
+
+def _model_of(node: TreeNode) -> type[MuxModel]:
+    """Return what a mux must have in its mode; without a mode that exists, what all have."""
+    mode = _word(node, "mode") or next((MODE_OF[one] for one in MODE_OF if one == _word(node, "profile")), "priority")
+    return _MODELS.get(mode, MuxModel)
+
+
+def _word(node: TreeNode, key: str) -> str:
+    value = at(node, (key,))
+    return value.text if isinstance(value, ScalarNode) else ""
 
 
 def _ranks(entries: Mapping[str, MuxInput | MuxLock]) -> dict[str, int]:
@@ -187,6 +233,7 @@ def _details(read: Iterable[str]) -> Mapping[str, str]:
     scope=SetScope.KEYS,
     has_topics=True,
     shared=((), (ANY,), *((ANY, key) for key in _BELOW_TOPIC)),
+    models=lambda node: (_model_of(node),),
     clash=_clash,
     rename=_rename,
     topics=_topics,
@@ -213,4 +260,5 @@ def muxes(reading: Reading[MuxModel]) -> dict[str, MuxModel]:
                 priority: 200
                 timeout: 0.3 s
     """
-    return reading.readable_entries()
+    found = ((name, reading.readable(_model_of(one.value), name, one.value)) for name, one in reading.named())
+    return {name: read for name, read in found if read is not None}

@@ -30,6 +30,7 @@ from rbxcompose.requests import Command, Query
 from rbxcompose.robot_events import MissionOver, RobotEvent
 from rbxcompose.sdk import Activity, Ended, Outcome, Place, skill
 from rbxcompose.sdk.bound import Reply
+from rbxcompose.sdk.ports import In
 
 
 @skill("toy_count", outcomes={"nobody": "failure"})

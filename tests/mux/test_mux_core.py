@@ -11,10 +11,10 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 
 from rbxcompose.mux.account import why
 from rbxcompose.mux.core import MuxCore
-from rbxcompose.mux.sources import MuxLock, MuxSource
+from rbxcompose.mux.sources import LockSource, MuxSource
 
 INPUTS = {"safety": MuxSource(200, 0.2), "teleop": MuxSource(100, 0.5), "navigation": MuxSource(10, 0.5)}
-LOCKS = {"door": MuxLock(150, 0.3)}
+LOCKS = {"door": LockSource(150, 0.3)}
 
 
 def still(message: float) -> bool:
@@ -25,7 +25,7 @@ def rest(last: float | None) -> float:
     return 0.0
 
 
-def mux(*, locks: dict[str, MuxLock] | None = None, stopped: bool = False) -> MuxCore[float]:
+def mux(*, locks: dict[str, LockSource] | None = None, stopped: bool = False) -> MuxCore[float]:
     return MuxCore(INPUTS, zero=rest, is_zero=still, locks=locks, stopped=stopped)
 
 
@@ -178,7 +178,7 @@ def test_a_silent_lock_holds_back_what_has_a_smaller_priority_and_nothing_else()
 
 
 def test_a_lock_of_the_same_priority_holds_nothing_back() -> None:
-    core = mux(locks={"door": MuxLock(100, 0.3)})
+    core = mux(locks={"door": LockSource(100, 0.3)})
     assert core.receive("teleop", 2.0, 0.0) == 2.0
 
 

@@ -99,8 +99,8 @@ ABOVE = {
     "sim": "",
     "skills": "sdk",
     "twins": "actuation",
-    "testing": "twins bus compiler components missions model.wires params plan.model recording.message rendering.text "
-    "runtime.process_group runtime.records sdk",
+    "testing": "twins bus compiler components missions model.wires mux.config params plan.model recording.message "
+    "rendering.text runtime.process_group runtime.records sdk",
 }
 # Pure: no bus, thread or clock.
 CORES = {"body", "control", "diagnostics", "missions", "mux", "navigation", "params", "sim"}
