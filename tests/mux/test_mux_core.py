@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import pytest
 from hypothesis import settings
@@ -253,6 +254,8 @@ def test_an_input_that_is_not_configured_is_a_mistake_of_the_caller(name: str) -
 
 
 MESSAGES = st.sampled_from([0.0, 1.0, 2.0])
+LETTING_GO = {**INPUTS, "teleop": MuxSource(100, 0.5, zero_releases=True)}
+EVERY_LOCK = {**LOCKS, "pause": LockSource(50, is_flag=True)}
 
 
 class AnyHistory(RuleBasedStateMachine):
@@ -260,41 +263,60 @@ class AnyHistory(RuleBasedStateMachine):
 
     def __init__(self) -> None:
         super().__init__()
-        self.core = MuxCore(INPUTS, zero=rest, is_zero=still, locks=LOCKS)
+        self.core = MuxCore(LETTING_GO, zero=rest, is_zero=still, locks=EVERY_LOCK)
         self.now = 0.0
         self.heard: dict[str, tuple[float, float]] = {}  # input -> when, what
-        self.door = -math.inf
-        self.waiting: set[str] = set()  # went on during the stop, have not come to rest since
+        self.door, self.is_paused = -math.inf, False
+        self.by_hand: dict[str, float] = {}  # input -> until when
+        self.waiting: set[str] = set()  # went on during a stop or a lock by hand, have not come to rest since
         self.stopped = self.closed = False
         self.passed = self.zeros_of_ticks = 0
         self.moving = False  # the last thing that came out was not zero
 
-    def live(self, name: str) -> bool:
+    def sends(self, name: str) -> bool:
         return name in self.heard and self.now <= self.heard[name][0] + INPUTS[name].timeout
 
+    def live(self, name: str) -> bool:
+        has_let_go = LETTING_GO[name].zero_releases and name in self.heard and still(self.heard[name][1])
+        return self.sends(name) and not has_let_go
+
+    def floor(self) -> float:
+        door = EVERY_LOCK["door"].priority if self.now > self.door + LOCKS["door"].timeout else -math.inf
+        return max(door, EVERY_LOCK["pause"].priority if self.is_paused else -math.inf)
+
     def winner(self) -> str | None:
-        door_open = self.now <= self.door + LOCKS["door"].timeout
         free = [
             name
             for name, source in INPUTS.items()
-            if self.live(name) and name not in self.waiting and (door_open or source.priority >= LOCKS["door"].priority)
+            if self.live(name)
+            and name not in self.waiting
+            and name not in self.by_hand
+            and source.priority >= self.floor()
         ]
         held = self.stopped or self.closed or not free
         return None if held else max(free, key=lambda name: INPUTS[name].priority)
 
+    def must_rest(self, names: Iterable[str]) -> None:
+        self.waiting |= {name for name in names if self.sends(name) and not still(self.heard[name][1])}
+
+    def end_locks(self) -> None:
+        """End the locks by hand whose time is over."""
+        ended = [name for name, until in self.by_hand.items() if until <= self.now]
+        for name in ended:
+            del self.by_hand[name]
+        self.must_rest(ended)
+
     @rule(duration=st.sampled_from([0.0, 0.05, 0.1, 0.25, 0.6]))
     def time_passes(self, duration: float) -> None:
-        self.now += duration
-
-    @rule()
-    def it_is_woken_in_time(self) -> None:
-        deadline = self.core.next_deadline()
-        if deadline is not None:
+        end = self.now + duration
+        while (deadline := self.core.next_deadline()) is not None and deadline <= end:
             self.now = max(self.now, deadline)
             self.tick()
+        self.now = end
 
     @rule()
     def tick(self) -> None:
+        self.end_locks()
         zero = self.core.tick(self.now)
         if zero is not None:
             assert zero == 0.0
@@ -307,11 +329,13 @@ class AnyHistory(RuleBasedStateMachine):
 
     @rule(name=st.sampled_from(sorted(INPUTS)), message=MESSAGES)
     def receive(self, name: str, message: float) -> None:
-        if still(message) or not self.live(name):
+        before = self.winner()
+        if still(message) or not self.sends(name):
             self.waiting.discard(name)
         self.heard[name] = self.now, message
         out = self.core.receive(name, message, self.now)
-        assert out == (message if name == self.winner() else None)
+        lets_go = still(message) and LETTING_GO[name].zero_releases
+        assert out == (message if name == (before if lets_go else self.winner()) else None)
         if out is not None:
             self.passed += 1
             self.moving = not still(out)
@@ -320,6 +344,22 @@ class AnyHistory(RuleBasedStateMachine):
     def heartbeat(self) -> None:
         self.door = self.now
         self.core.heartbeat("door", self.now)
+
+    @rule(is_on=st.booleans())
+    def pause(self, is_on: bool) -> None:
+        self.is_paused = is_on
+        self.core.flag("pause", is_on, self.now)
+
+    @rule(name=st.sampled_from(sorted(INPUTS)), seconds=st.sampled_from([0.2, math.inf]))
+    def lock(self, name: str, seconds: float) -> None:
+        self.by_hand[name] = self.now + seconds
+        self.core.lock([name], self.now + seconds, self.now)
+
+    @rule(name=st.sampled_from(sorted(INPUTS)))
+    def unlock(self, name: str) -> None:
+        if self.by_hand.pop(name, None) is not None:
+            self.must_rest([name])
+        self.core.unlock([name], self.now)
 
     @rule()
     def stop(self) -> None:
@@ -331,7 +371,7 @@ class AnyHistory(RuleBasedStateMachine):
     def release(self) -> None:
         self.core.release(self.now)
         if self.stopped:
-            self.waiting |= {name for name in self.heard if self.live(name) and not still(self.heard[name][1])}
+            self.must_rest(self.heard)
         self.stopped = False
 
     @precondition(lambda self: self.now > 2.0 and not self.closed)
@@ -351,4 +391,4 @@ class AnyHistory(RuleBasedStateMachine):
 
 
 TestAnyHistory = AnyHistory.TestCase
-TestAnyHistory.settings = settings(max_examples=80, stateful_step_count=40, deadline=None)
+TestAnyHistory.settings = settings(max_examples=150, stateful_step_count=50, deadline=None)
