@@ -9,6 +9,7 @@ from typing import Any
 
 from rbxcompose.findings import suggest
 from rbxcompose.msgs import registry
+from rbxcompose.msgs.finite import is_finite
 from rbxcompose.msgs.std_msgs import Bool, Empty, String
 from rbxcompose.msgs.topic_tools_interfaces import MuxAdd, MuxDelete, MuxList, MuxSelect
 from rbxcompose.msgs.types import Message
@@ -92,6 +93,7 @@ class Mux(Component[MuxConfig]):
         self.noted = ""
         self.wakes_at = math.inf  # [s], the first of the wakes to come
         self.refused: list[str] = []
+        self.broken: set[str] = set()  # inputs whose last message had a number that is none
         self.heard_at: dict[str, float] = {}  # when an input last sent
         self.changes: deque[MuxChange] = deque(maxlen=KEPT)
         self.orders = MuxOrders()
@@ -121,14 +123,24 @@ class Mux(Component[MuxConfig]):
     def received(self, port: str, message: Any) -> None:
         """Forward a message of who holds the output, or take the message of a lock."""
         if port in self.topics:
-            self.heard_at[port] = self.now
-            self.send(self.core.receive(port, message, self.now))
+            self.take(port, message)
         elif (lock := port.removeprefix(LOCK)) in self.config.locks:
             if self.config.locks[lock].topic:
                 self.core.flag(lock, message.data, self.now)
             else:
                 self.core.heartbeat(lock, self.now)
         self.settle()
+
+    def take(self, name: str, message: Message) -> None:
+        """Forward a message if its input holds the output; drop one with a number that is none, as if never sent."""
+        if not is_finite(message):
+            if name not in self.broken:
+                self.broken.add(name)
+                self.warn(f"input '{name}' sends numbers that are not finite: they are dropped")
+            return
+        self.broken.discard(name)
+        self.heard_at[name] = self.now
+        self.send(self.core.receive(name, message, self.now))
 
     def wake(self) -> None:
         """Send the single zero after the last source has ended."""

@@ -129,7 +129,7 @@ class MuxCore(Generic[M]):
     # Time
 
     def tick(self, now: float) -> M | None:
-        """Return a zero, once, when the source that was let through has ended, no other is live, and it is due."""
+        """Return a zero, once, when the source that was let through has ended, nobody follows it, and it is due."""
         self._settle(now)
         if self._stop_at is None or now < self._stop_at:
             return None
@@ -242,10 +242,14 @@ class MuxCore(Generic[M]):
         self._now = now
         self._must_rest(self.locks.expire(now), now)
         self._active = None if self._is_shut else self.arbiter.holder(self._free(now), self.inputs)
-        if self._active is not None or self._last is None:
+        if self._last is None or self._is_followed(self._last[0], now):
             self._stop_at = None
         elif self._stop_at is None:
             self._ended(now)
+
+    def _is_followed(self, last: str, now: float) -> bool:
+        """Return whether somebody commands still: who sent last, or a holder that sends, too."""
+        return self._active is not None and (self._active == last or now <= self.sending_until[self._active])
 
     def _ended(self, now: float) -> None:
         """Note when the stop is due, now that the last source has ended."""
