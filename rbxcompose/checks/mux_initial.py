@@ -38,7 +38,7 @@ def mux_initial(robot: Robot) -> Iterator[Finding]:
     ```
     """
     for mux, entry in robot.manifest.muxes.items():
-        if entry.initial is not None and entry.initial not in (NONE, *entry.inputs):
+        if entry.works_by == "select" and entry.initial is not None and entry.initial not in (NONE, *entry.inputs):
             span = robot.value("muxes", mux, "initial")
             yield mux_initial.at(
                 span,

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Discriminator, Field, Tag
 
 from rbxcompose.config import Acceleration, AngularAcceleration, Config, Time
 
@@ -32,7 +32,13 @@ class HoldFirst(Config):
     """How long until the stop. Nothing is repeated, so a receiver that brakes by itself may do so earlier."""
 
 
-MuxEnding = Literal["none", "stop"] | HoldFirst
+def _form(value: object) -> str:
+    return "word" if isinstance(value, str) else "hold"
+
+
+MuxEnding = Annotated[
+    Annotated[Literal["none", "stop"], Tag("word")] | Annotated[HoldFirst, Tag("hold")], Discriminator(_form)
+]
 
 
 class HandoverLimits(Config):
