@@ -67,7 +67,9 @@ def _who_holds(core: Core, now: float) -> str:
 
 
 def _who_locks(core: Core, now: float) -> list[str]:
-    told = []
+    told: list[str] = []
+    if not core.locks:
+        return told
     if hand := [name for name in core.locked_out(now) if name in core.locks.by_hand]:
         told.append(f"{_listed(hand)} {_are(hand)} locked by hand")
     if out := [name for name in core.locked_out(now) if core.locks.above(core.inputs[name], now)]:

@@ -286,7 +286,7 @@ class MuxCore(Generic[M]):
     def _free(self, now: float) -> list[str]:
         if self._is_shut:
             return []
-        locked = self._locked(now) if self.locks else ()
+        locked = self._locked(now)
         return [name for name in self.inputs if name not in locked and self._would_count(name, now)]
 
     def _would_count(self, name: str, now: float) -> bool:

@@ -57,6 +57,8 @@ class MuxLocks:
 
     def locked(self, inputs: Mapping[str, MuxSource], now: float) -> list[str]:
         """Return the inputs that are held back."""
+        if not self:  # as in most muxes, at each message
+            return []
         floor = max((self.declared[name].priority for name in self.engaged(now)), default=-math.inf)
         return [name for name, one in inputs.items() if one.priority < floor or name in self.by_hand]
 
