@@ -66,6 +66,6 @@ def _stop() -> Row:
         name="timeout of the last source to the stop at the base",
         unit="ms",
         how="robot time; topic_tools, twist_mux and yocs_cmd_vel_mux send none",
-        ours=1e3 * (stopped - began - TIMEOUT),
+        ours=round(1e3 * (stopped - began - TIMEOUT), 6),
         most=20,
     )

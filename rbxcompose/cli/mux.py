@@ -1,4 +1,4 @@
-"""Show who may command, and why; select, add, delete, lock and unlock inputs of muxes while the robot runs.
+"""Show who may command and why; select, add, delete or lock the inputs of muxes of a running robot.
 
 Without a MUX, the only one of the robot is meant. What is added, deleted, selected or locked here lasts until the robot
 goes down; write it in the manifest to keep it.

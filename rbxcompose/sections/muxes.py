@@ -148,13 +148,19 @@ def _ranks(entries: Mapping[str, MuxInput | MuxLock]) -> dict[str, int]:
 
 
 def _rename(renames: Renames, name: str, node: TreeNode) -> TreeNode:
-    """Return a mux whose inputs and locks follow its renamed topics."""
+    """Return a mux whose inputs and locks follow its renamed topics, and what it selects first with them."""
     if not isinstance(node, MappingNode):
         return node
-    changed = {
-        key: Entry(one.key, renames.topics(one.value, f"{name}/")) if key in _BELOW_TOPIC else one
-        for key, one in node.entries.items()
-    }
+
+    def renamed(text: str) -> str:
+        return renames.topic(f"{name}/{text}").rpartition("/")[-1]
+
+    changed = dict(node.entries)
+    for key, one in node.entries.items():
+        if key in _BELOW_TOPIC:
+            changed[key] = Entry(one.key, renames.topics(one.value, f"{name}/"))
+        elif key == "initial":
+            changed[key] = Entry(one.key, renames.texts(one.value, renamed))
     return MappingNode(changed, node.span, node.tag)
 
 
