@@ -33,4 +33,12 @@ class RobotHeld:
     reason: str
 
 
-RobotEvent = MissionOver | MissionWaits | RobotHeld
+@dataclass(frozen=True, slots=True)
+class ComponentNoted:
+    """A component tells what people should see of it in `ps`; an empty text ends it."""
+
+    component: str
+    text: str
+
+
+RobotEvent = MissionOver | MissionWaits | RobotHeld | ComponentNoted

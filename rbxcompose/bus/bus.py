@@ -171,6 +171,10 @@ class Bus:
         """Deliver to a component the requests and goals that have waited for it."""
         self._node(owner).open()
 
+    def withdraw(self, owner: str, end: Closable) -> None:
+        """Close one end that a component declared, before the others."""
+        self._node(owner).withdraw(end)
+
     def close_owner(self, owner: str) -> None:
         """Withdraw all that a component declared: its goals end as aborted, and their clients learn that it is lost."""
         node = self._nodes.pop(owner, None)

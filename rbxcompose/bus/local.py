@@ -116,6 +116,11 @@ class Participant:
         """Close `end` together with the node."""
         self._declared.append(end)
 
+    def withdraw(self, end: Closable) -> None:
+        """Close `end` now."""
+        self._declared.remove(end)
+        end.close()
+
     def when_open(self, callback: Callable[[], None]) -> None:
         """Let `open` call `callback`."""
         self._closed_doors.append(callback)

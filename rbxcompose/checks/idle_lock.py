@@ -46,13 +46,13 @@ def idle_lock(robot: Robot) -> Iterator[Finding]:
     ```
     """
     for mux, entry in robot.manifest.muxes.items():
-        lowest = min(entry.inputs, key=lambda name: entry.inputs[name].priority)
-        least = entry.inputs[lowest].priority
-        for name, lock in entry.locks.items():
-            if lock.priority <= least:
+        ranks = entry.ranks
+        lowest = min(ranks, key=lambda name: ranks[name], default="")
+        for name, priority in entry.lock_ranks.items():
+            if lowest and priority <= ranks[lowest]:
                 yield idle_lock.at(
                     robot.value("muxes", mux, "locks", name, "priority"),
-                    f"lock '{name}' of mux '{mux}' holds back no input: none has a priority below {lock.priority}",
+                    f"lock '{name}' of mux '{mux}' holds back no input: none has a priority below {priority}",
                     help="give it a higher priority than the inputs that it should hold back",
                     related=[Related(robot.value("muxes", mux, "inputs", lowest, "priority"), "the lowest input")],
                 )

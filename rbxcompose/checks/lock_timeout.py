@@ -22,11 +22,11 @@ def lock_timeout(robot: Robot) -> Iterator[Finding]:
     Good: `locks: {door: {priority: 200, timeout: 1 s}}`
     """
     for mux, entry in robot.manifest.muxes.items():
-        output = robot.components[mux].end("output") if mux in robot.components else None
         for name, lock in entry.locks.items():
-            for writer in robot.writers.get(f"{output.topic}/{name}", ()) if output else ():
+            end = robot.components[mux].end(f"lock_{name}") if mux in robot.components else None
+            for writer in robot.writers.get(end.topic, ()) if end else ():
                 period = period_of(robot.components[writer.instance])
-                if period is not None and lock.timeout < 2 * period - 1e-9:
+                if period is not None and lock.timeout and lock.timeout < 2 * period - 1e-9:
                     when = "before" if lock.timeout <= period else "if one is late, before"
                     yield lock_timeout.at(
                         robot.value("muxes", mux, "locks", name, "timeout"),

@@ -47,10 +47,11 @@ def long_timeout(robot: Robot) -> Iterator[Finding]:
     for mux, entry in robot.manifest.muxes.items():
         for name, one in entry.inputs.items():
             end = robot.components[mux].end(name)
-            if end and isinstance(end.port, In) and end.port.qos is Qos.COMMAND and one.timeout > LONGEST:
+            timeout = one.timeout or 0.0
+            if end and isinstance(end.port, In) and end.port.qos is Qos.COMMAND and timeout > LONGEST:
                 yield long_timeout.at(
                     robot.value("muxes", mux, "inputs", name, "timeout"),
-                    f"input '{name}' of mux '{mux}' stays live for {format_quantity(one.timeout, TIME)} after its last "
+                    f"input '{name}' of mux '{mux}' stays live for {format_quantity(timeout, TIME)} after its last "
                     "command",
                     help="a few times the time between two commands is enough, such as '0.5 s'",
                 )

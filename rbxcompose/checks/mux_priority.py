@@ -44,12 +44,12 @@ def mux_priority(robot: Robot) -> Iterator[Finding]:
     """
     for mux, entry in robot.manifest.muxes.items():
         first: dict[int, str] = {}
-        for name, source in entry.inputs.items():
-            other = first.setdefault(source.priority, name)
+        for name, priority in entry.ranks.items() if entry.profile == "default" else ():
+            other = first.setdefault(priority, name)
             if other != name:
                 yield mux_priority.at(
                     robot.value("muxes", mux, "inputs", name, "priority"),
-                    f"two inputs of mux '{mux}' have the same priority {source.priority}",
+                    f"two inputs of mux '{mux}' have the same priority {priority}",
                     label=f"input '{name}'",
                     help="the higher priority wins: give each input its own",
                     related=[Related(robot.value("muxes", mux, "inputs", other, "priority"), f"input '{other}'")],

@@ -44,7 +44,7 @@ def mux_timeout(robot: Robot) -> Iterator[Finding]:
         for name, source in entry.inputs.items():
             component = robot.components.get((source.source or "").partition(".")[0])
             period = period_of(component) if component else None
-            if component and period is not None and source.timeout < 2 * period - 1e-9:
+            if component and period is not None and source.timeout and source.timeout < 2 * period - 1e-9:
                 when = "before" if source.timeout <= period else "if one message is late, before"
                 yield mux_timeout.at(
                     robot.value("muxes", mux, "inputs", name, "timeout"),

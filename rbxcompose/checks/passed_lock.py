@@ -52,14 +52,14 @@ def passed_lock(robot: Robot) -> Iterator[Finding]:
     ```
     """
     for mux, entry in robot.manifest.muxes.items():
-        least = min(one.priority for one in entry.inputs.values())
-        for name, lock in entry.locks.items():
-            above = [key for key, one in entry.inputs.items() if one.source and one.priority >= lock.priority]
-            if least < lock.priority and above:  # otherwise it holds back nothing at all
+        ranks = entry.ranks
+        for name, priority in entry.lock_ranks.items():
+            above = [key for key, rank in ranks.items() if entry.inputs[key].source and rank >= priority]
+            if above and min(ranks.values()) < priority:  # otherwise it holds back nothing at all
                 yield passed_lock.at(
                     robot.value("muxes", mux, "locks", name, "priority"),
                     f"lock '{name}' of mux '{mux}' does not hold back '{above[0]}', which drives by itself",
-                    help=f"give it a priority above {max(entry.inputs[one].priority for one in above)}",
+                    help=f"give it a priority above {max(ranks[one] for one in above)}",
                     related=[
                         Related(robot.value("muxes", mux, "inputs", one, "priority"), f"input '{one}'") for one in above
                     ],

@@ -82,6 +82,7 @@ def _data(state: RobotState, supervisor: int | None) -> dict[str, Any]:
 def _component(one: ComponentState) -> dict[str, object]:
     """Return one component; a blocked one with what blocks it."""
     fields = {"name": one.name, "type": one.type, "process": one.process, "pid": one.pid, "restarts": one.restarts}
+    fields |= {"note": one.note} if one.note else {}
     if one.waits_for is None:
         return {**fields, "state": one.state}
     return {**fields, "state": _BLOCKED if one.state == "active" else one.state, "waits_for": one.waits_for}
@@ -110,8 +111,9 @@ def _table(shown: Mapping[str, Any]) -> str:
     lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
     blocked = [one for one in shown["components"] if "waits_for" in one]
     waiting = [f"{one['name']} waits for {one['waits_for']}, which failed" for one in blocked]
+    notes = [f"{one['name']}: {one['note']}" for one in shown["components"] if "note" in one]
     left = [] if pid else [_NO_SUPERVISOR.format(shown["robot"])]
-    return "\n".join([head, *_stop_lines(shown["stop"]), *lines, *waiting, *left])
+    return "\n".join([head, *_stop_lines(shown["stop"]), *lines, *waiting, *notes, *left])
 
 
 def _stop_lines(stop: Mapping[str, Any] | None) -> Iterator[str]:

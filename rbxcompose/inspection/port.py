@@ -53,7 +53,7 @@ def _reason(robot: Robot, component: RobotComponent, end: PortEnd) -> str:
     for mux, entry in robot.manifest.muxes.items():
         for name, source in entry.inputs.items():
             is_taken = (source.source or "").partition(".")[0] == component.name and isinstance(end.port, Out)
-            if is_taken and end.topic == resolve(f"{mux}/{name}", namespace):
+            if is_taken and end.topic == resolve(source.topic or f"{mux}/{name}", namespace):
                 place = robot.value("muxes", mux, "inputs", name, "from")
                 return f"mux '{mux}' takes it as its input '{name}' ({place})"
     connected = (*component.path, "connect", end.name)

@@ -35,3 +35,7 @@ class Wiring(Protocol):
     def message_of(self, topic: str) -> str:
         """Return the type of a subscriber of a topic, else of a publisher below it; empty if there is none."""
         ...
+
+    def drives(self, topic: str) -> bool:
+        """Return whether a base follows the commands on a topic."""
+        ...

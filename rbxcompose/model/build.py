@@ -24,7 +24,7 @@ from rbxcompose.model.robot import Robot, RobotComponent
 from rbxcompose.model.skills import names_of_skills, services_of, skills_of, topics_of
 from rbxcompose.model.values import value_of
 from rbxcompose.model.wires import ends_of, resolve
-from rbxcompose.sdk.capabilities import require_declared
+from rbxcompose.sdk.capabilities import Drives, require_declared
 from rbxcompose.sdk.ports import In, Out
 from rbxcompose.sdk.registry import component_type
 
@@ -105,6 +105,15 @@ class _Wires:
         last = bisect_left(self._written, (f"{name}0",))  # "0" follows "/"
         _, message = min((one[1:] for one in self._written[first:last]), default=(0, ""))
         return message
+
+    def drives(self, topic: str) -> bool:
+        """Return whether a base follows the commands on a topic."""
+        name = resolve(topic, self.namespace)
+        return any(
+            end is not None and end.topic == name
+            for component in self.components.values()
+            for end in (component.end(one.commands) for one in component.declared(Drives))
+        )
 
 
 def own_components(manifest: RobotManifest, written: Mapping[str, RobotComponent]) -> dict[str, RobotComponent]:

@@ -1,4 +1,4 @@
-"""Selects which of several command sources is let through: the live, unlocked one with the highest priority.
+"""Selects which of several command sources is let through, below latches and locks that no source can pass.
 
 The mux forwards, it never repeats: each subscriber keeps a deadline of its own, and a repeated command would add a
 second one to it. All times are robot time [s] at which something reached the mux; stamps inside messages do not count.
@@ -7,223 +7,294 @@ second one to it. All times are robot time [s] at which something reached the mu
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Generic, TypeVar
 
-from rbxcompose.dataclass import dataclass
+from rbxcompose.mux.arbiters import Arbiter, ByPriority
+from rbxcompose.mux.locks import MuxLocks
+from rbxcompose.mux.sources import LockSource, MuxEndings, MuxSource, Ramp
 
 M = TypeVar("M")
 
 
-@dataclass(frozen=True, slots=True)
-class MuxSource:
-    """A source that is expected to send repeatedly: after more than `timeout` [s] of silence it counts as gone."""
-
-    priority: int
-    timeout: float
+def _never(message: object) -> bool:
+    return False
 
 
 class MuxCore(Generic[M]):
     """Lets one input through, with the latched lock `stop` above all of them.
 
-    `inputs` carry messages. `locks` carry heartbeats: a silent one locks every input with a priority below its own.
-    `zero` is the message that commands rest. `stopped=True` is for a mux that was stopped when its process died.
+    `zero` makes the message that commands rest from the last one that came out, or from None. It is None itself for
+    messages that have no rest: then the mux sends none of its own. `stopped` is for a mux that was stopped when its
+    process died.
     """
 
     def __init__(
         self,
         inputs: Mapping[str, MuxSource],
         *,
-        zero: M,
-        is_zero: Callable[[M], bool],
-        locks: Mapping[str, MuxSource] | None = None,
+        zero: Callable[[M | None], M] | None,
+        is_zero: Callable[[M], bool] = _never,
+        arbiter: Arbiter | None = None,
+        locks: Mapping[str, LockSource] | None = None,
+        endings: MuxEndings | None = None,
+        handover: Ramp[M] | None = None,
         stopped: bool = False,
     ) -> None:
-        self._inputs = dict(inputs)
-        self._locks = dict(locks or {})
-        self._zero = zero
-        self._is_zero = is_zero
-        self._stopped = stopped
-        self._closed = False
-        self._held = False
-        # Last moment at which a source is live. Who was sending before a restart is unknown, so all count as live then.
-        self._input_until = dict.fromkeys(self._inputs, math.inf if stopped else -math.inf)
-        self._lock_until = dict.fromkeys(self._locks, -math.inf)
+        self.inputs: dict[str, MuxSource] = {}
+        self.locks = MuxLocks(locks or {})
+        self.arbiter = arbiter or ByPriority()
+        self.is_stopped, self.is_closed, self.is_held = stopped, False, False
+        self.waiting: set[str] = set()  # inputs that must come to rest once before they count again
+        self.sending_until: dict[str, float] = {}  # when an input is sure to be quiet
+        self._zero, self._is_zero, self._endings, self._handover = zero, is_zero, endings or MuxEndings(), handover
+        self._shape: M | None = None  # the last message that came out
+        self._live_until: dict[str, float] = {}  # last moment at which an input is live
         self._neutral: set[str] = set()  # inputs whose last message was zero
-        self._waiting: set[str] = set()  # inputs that must come to rest once before they count again
         self._active: str | None = None
-        self._owes_zero = False  # something was let through, and has not been followed by a zero of our own
+        self._last: tuple[str, M] | None = None  # whose message came out last; None after a zero of our own
+        self._stop_at: float | None = None  # when the stop follows the end of the last source
         self._now = -math.inf
+        for name, source in inputs.items():
+            self.inputs[name] = source
+            self._forget(name)
+        if stopped:  # who was sending before a restart is unknown, so all count as sending
+            self.sending_until = dict.fromkeys(self.inputs, math.inf)
 
     def take_over(self, old: MuxCore[M]) -> None:
-        """Copy when inputs and locks of the same names were last received, and which must come to rest once."""
-        self._input_until |= {name: until for name, until in old._input_until.items() if name in self._inputs}
-        self._lock_until |= {name: until for name, until in old._lock_until.items() if name in self._locks}
-        self._neutral = old._neutral & self._inputs.keys()
-        self._waiting = old._waiting & self._inputs.keys()
+        """Copy when inputs and locks of the same names were last received, what was chosen, and who must rest once."""
+        for mine, theirs in ((self._live_until, old._live_until), (self.sending_until, old.sending_until)):
+            mine |= {name: until for name, until in theirs.items() if name in self.inputs}
+        self.locks.take_over(old.locks, self.inputs)
+        self.arbiter.take_over(old.arbiter, list(self.inputs))
+        self._neutral = old._neutral & self.inputs.keys()
+        self.waiting = old.waiting & self.inputs.keys()
 
     @property
     def active(self) -> str | None:
         """The input let through as of the last call; None if there is none."""
         return self._active
 
-    @property
-    def stopped(self) -> bool:
-        """Return whether the lock `stop` is latched."""
-        return self._stopped
+    # What arrives
 
     def receive(self, name: str, message: M, now: float) -> M | None:
-        """Receive a message of input `name`; return it if it must be forwarded, else None."""
-        was_silent = now > self._input_until[name]
-        self._neutral.discard(name)
-        if self._is_zero(message):
-            self._neutral.add(name)
-        if was_silent or name in self._neutral:
-            self._waiting.discard(name)
-        self._input_until[name] = now + self._inputs[name].timeout
+        """Receive a message of input `name`; return what must be forwarded, None for nothing.
+
+        Raises:
+            KeyError: if there is no such input.
+        """
+        source = self.inputs[name]
         self._settle(now)
-        if self._active != name:
-            return None
-        self._owes_zero = True
+        is_zero, was_quiet = self._is_zero(message), now > self.sending_until[name]
+        self._neutral.discard(name)
+        if is_zero:
+            self._neutral.add(name)
+        if was_quiet or is_zero:
+            self.waiting.discard(name)
+        self.sending_until[name] = now + source.quiet
+        if is_zero and source.zero_releases:
+            return self._let_go(name, message, now)
+        self._live_until[name] = now + source.timeout
+        self.arbiter.heard(name, self._free(now), self.inputs)
+        self._settle(now)
+        return self._passed(name, message, now) if self._active == name else None
+
+    def _let_go(self, name: str, message: M, now: float) -> M | None:
+        """Return the zero of an input that lets go, if it held the output: it stops by itself what it has begun."""
+        held = self._active == name
+        self._live_until[name] = -math.inf
+        if held:
+            self._rests()
+        self._settle(now)
+        return message if held else None
+
+    def _passed(self, name: str, message: M, now: float) -> M:
+        if self._handover is not None:
+            if self._last is not None and self._last[0] != name:
+                self._handover.begin(self._last[1], now)
+            message = self._handover.through(message, now)
+        self._last, self._shape = (name, message), message
         return message
 
     def heartbeat(self, lock: str, now: float) -> None:
         """Receive a heartbeat of `lock`: it blocks nothing until it has been silent for its timeout."""
-        self._lock_until[lock] = now + self._locks[lock].timeout
+        self.locks.heard(lock, now, is_on=False)
         self._settle(now)
 
-    def tick(self, now: float) -> M | None:
-        """Return a zero, once, when the input that was let through has ended and no other is live."""
+    def flag(self, lock: str, is_on: bool, now: float) -> None:
+        """Receive a flag of `lock`: it blocks while it is true."""
+        self.locks.heard(lock, now, is_on=is_on)
         self._settle(now)
-        if self._active is not None or not self._owes_zero:
+
+    # Time
+
+    def tick(self, now: float) -> M | None:
+        """Return a zero, once, when the source that was let through has ended, nobody follows it, and it is due."""
+        self._settle(now)
+        if self._stop_at is None or now < self._stop_at:
             return None
-        self._owes_zero = False
-        return self._zero
+        return self._rests()
 
     def next_deadline(self) -> float | None:
         """Return when `tick` must be called if nothing is received before [s]; None if never.
 
         It is the first moment after a timeout: exactly at its timeout a source still counts as live.
         """
-        if self._active is None and self._owes_zero:
-            return self._now
-        if self._is_shut:
-            return None
-        ends = (*self._input_until.values(), *self._lock_until.values())
-        return min((math.nextafter(end, math.inf) for end in ends if self._now <= end < math.inf), default=None)
+        ends: list[float] = list(self.locks.ends()) if not self.is_closed else []
+        if not self._is_shut:
+            waits = (self.sending_until[name] for name in self.waiting)
+            ends += [math.nextafter(end, math.inf) for end in (*self._live_until.values(), *waits) if end < math.inf]
+        due = [end for end in ends if self._now < end]
+        return min([*due, self._stop_at] if self._stop_at is not None else due, default=None)
 
-    def stop(self, now: float) -> M:
+    # What people order
+
+    def stop(self, now: float) -> M | None:
         """Latch the lock `stop`; return the zero to send immediately."""
-        self._stopped = True
-        self._settle(now)
-        self._owes_zero = False
-        return self._zero
+        self.is_stopped = True
+        return self._shut(now)
 
     def release(self, now: float) -> None:
         """Open the lock `stop`. This moves nothing: an input that still commands motion must come to rest once.
 
         To do that, its last message must be zero, or it must be silent for its timeout.
         """
-        if self._stopped:
-            self._stopped = False
-            for name, source in self._inputs.items():
-                if self._input_until[name] >= now and name not in self._neutral:
-                    self._waiting.add(name)
-                    self._input_until[name] = min(self._input_until[name], now + source.timeout)
+        if self.is_stopped:
+            self.is_stopped = False
+            self._must_rest(self.inputs, now)
         self._settle(now)
 
-    def hold(self, now: float) -> M:
+    def hold(self, now: float) -> M | None:
         """Let nothing through until `resume`; return the zero to send immediately."""
-        self._held = True
-        self._settle(now)
-        self._owes_zero = False
-        return self._zero
+        self.is_held = True
+        return self._shut(now)
 
     def resume(self, now: float) -> None:
-        """Let new messages through again: inputs and locks received before count as silent.
+        """Let new messages through again: inputs and heartbeats received before count as silent.
 
         An input that had to come to rest once still has to.
         """
-        self._held = False
-        self._input_until.update((name, -math.inf) for name in self._inputs if name not in self._waiting)
-        self._lock_until = dict.fromkeys(self._locks, -math.inf)
+        self.is_held = False
+        for name in self.inputs.keys() - self.waiting:
+            self._forget(name)
+        self.locks.forget()
         self._settle(now)
 
-    def close(self, now: float) -> M:
+    def close(self, now: float) -> M | None:
         """Shut down: return one last zero, after which neither `receive` nor `tick` returns a message."""
-        self._closed = True
+        self.is_closed = True
+        return self._shut(now)
+
+    def select(self, name: str | None, now: float) -> None:
+        """Let this input through, or none, in a mux whose inputs are selected."""
+        self.arbiter.selected = name
         self._settle(now)
-        self._owes_zero = False
-        return self._zero
+
+    def lock(self, names: Iterable[str], until: float, now: float) -> None:
+        """Hold these inputs back by hand until a time [s], which may be `NEVER`."""
+        self.locks.by_hand |= dict.fromkeys(names, until)
+        self._settle(now)
+
+    def unlock(self, names: Iterable[str], now: float) -> None:
+        """End what was locked by hand. As after a stop, an input that still commands motion must come to rest once."""
+        ended = [name for name in names if self.locks.by_hand.pop(name, None) is not None]
+        self._must_rest(ended, now)
+        self._settle(now)
+
+    def add(self, name: str, source: MuxSource, now: float) -> None:
+        """Add an input."""
+        self.inputs[name] = source
+        self._forget(name)
+        self._settle(now)
+
+    def delete(self, name: str, now: float) -> None:
+        """Remove an input; if it held the output, this is its end."""
+        del self.inputs[name], self._live_until[name], self.sending_until[name]
+        self.locks.by_hand.pop(name, None)
+        self.waiting.discard(name)
+        self._settle(now)
+
+    # What is known
+
+    def live_until(self, name: str) -> float:
+        """Return the last moment at which an input is live [s], unless it sends again."""
+        return self._live_until[name]
+
+    def is_live(self, name: str, now: float) -> bool:
+        """Return whether an input counts, or would if it were let."""
+        return now <= self._live_until[name]
 
     def locked_out(self, now: float) -> list[str]:
-        """Return the inputs locked for lack of a heartbeat; none while the mux is stopped or held.
+        """Return the inputs that are locked; none while the mux is stopped or held.
 
         Shutting down does not cure a lock, so a closed mux still reports them.
         """
-        if self._stopped or self._held:
-            return []
-        floor = self._floor(now)
-        return [name for name, one in self._inputs.items() if one.priority < floor]
+        return [] if self.is_stopped or self.is_held else self._locked(now)
 
     def refused(self, now: float) -> list[str]:
         """Return the inputs that are locked but still sending."""
-        locked = [] if self._closed else self.locked_out(now)
-        return [name for name in locked if self._is_live(name, now) and name not in self._waiting]
+        locked = [] if self.is_closed else self.locked_out(now)
+        return [name for name in locked if self._would_count(name, now)]
 
-    def why(self, now: float) -> str:
-        """Return a sentence for people on what controls the output at `now`.
-
-        It has no times: each message of a source would make them wrong, and no status is worth sending that often.
-        """
-        if self._closed:
-            return "closed: the robot is going down"
-        if self._stopped:
-            return "stopped"
-        if self._held:
-            return "held: robot time stands still"
-        told = [self._who_holds(now), *([self._who_locks(now)] if self.locked_out(now) else [])]
-        return "; ".join(filter(None, told)) or "no input"
-
-    def _who_holds(self, now: float) -> str:
-        winner = self._winner(now)
-        if winner is not None:
-            return f"{winner} holds"
-        resting = [name for name in self._inputs if self._is_live(name, now) and name in self._waiting]
-        return f"{' and '.join(resting)} must come to rest once after the stop" if resting else ""
-
-    def _who_locks(self, now: float) -> str:
-        silent, out = self._silent_locks(now), self.locked_out(now)
-        locks = f"{' and '.join(silent)} give{'s' if len(silent) == 1 else ''} no heartbeat"
-        return f"{locks}: {' and '.join(out)} {'is' if len(out) == 1 else 'are'} locked out"
+    # How it decides
 
     def _settle(self, now: float) -> None:
         self._now = now
-        self._active = self._winner(now)
+        self._must_rest(self.locks.expire(now), now)
+        self._active = None if self._is_shut else self.arbiter.holder(self._free(now), self.inputs)
+        if self._last is None or self._is_followed(self._last[0], now):
+            self._stop_at = None
+        elif self._stop_at is None:
+            self._ended(now)
 
-    def _winner(self, now: float) -> str | None:
+    def _is_followed(self, last: str, now: float) -> bool:
+        """Return whether somebody commands still: who sent last, or a holder that sends, too."""
+        return self._active is not None and (self._active == last or now <= self.sending_until[self._active])
+
+    def _ended(self, now: float) -> None:
+        """Note when the stop is due, now that the last source has ended."""
+        is_locked = any(self._would_count(name, now) for name in self._locked(now))
+        wait = self._endings.on_lock if is_locked else self._endings.on_idle
+        if self._zero is None or wait == math.inf:
+            self._rests()
+        else:
+            self._stop_at = now + wait
+
+    def _rests(self) -> M | None:
+        """Note that nothing is left in force of what came out; return the message of rest."""
+        self._last = self._stop_at = None
+        if self._handover is not None:
+            self._handover.end()
+        return self._zero(self._shape) if self._zero is not None else None
+
+    def _shut(self, now: float) -> M | None:
+        rest = self._rests()
+        self._settle(now)
+        return rest
+
+    def _must_rest(self, names: Iterable[str], now: float) -> None:
+        """Have inputs that still command motion come to rest once before they count again."""
+        for name in names:
+            if self.sending_until[name] >= now and name not in self._neutral:
+                self.waiting.add(name)
+                self.sending_until[name] = min(self.sending_until[name], now + self.inputs[name].quiet)
+
+    def _forget(self, name: str) -> None:
+        self._live_until[name] = math.inf if self.inputs[name].starts_live else -math.inf
+        self.sending_until[name] = -math.inf
+
+    def _free(self, now: float) -> list[str]:
         if self._is_shut:
-            return None
-        floor = self._floor(now)
-        candidates = [
-            name
-            for name, source in self._inputs.items()
-            if source.priority >= floor and name not in self._waiting and self._is_live(name, now)
-        ]
-        return max(candidates, key=lambda name: self._inputs[name].priority, default=None)
+            return []
+        locked = self._locked(now)
+        return [name for name in self.inputs if name not in locked and self._would_count(name, now)]
+
+    def _would_count(self, name: str, now: float) -> bool:
+        return name not in self.waiting and now <= self._live_until[name]
+
+    def _locked(self, now: float) -> list[str]:
+        return self.locks.locked(self.inputs, now)
 
     @property
     def _is_shut(self) -> bool:
-        return self._stopped or self._closed or self._held
-
-    def _floor(self, now: float) -> float:
-        """Return the lowest priority that passes."""
-        if not self._locks:
-            return -math.inf
-        return max((self._locks[name].priority for name in self._silent_locks(now)), default=-math.inf)
-
-    def _is_live(self, name: str, now: float) -> bool:
-        return now <= self._input_until[name]
-
-    def _silent_locks(self, now: float) -> list[str]:
-        return [name for name, until in self._lock_until.items() if now > until]
+        return self.is_stopped or self.is_closed or self.is_held

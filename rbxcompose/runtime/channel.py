@@ -8,7 +8,7 @@ from dataclasses import field
 from typing import Any, get_args
 
 from rbxcompose.dataclass import dataclass
-from rbxcompose.robot_events import MissionOver, RobotHeld
+from rbxcompose.robot_events import ComponentNoted, MissionOver, RobotHeld
 from rbxcompose.typed_json import Family
 
 _CHUNK = 65536
@@ -224,6 +224,7 @@ ChannelWord = (
     | Failed
     | MissionOver
     | RobotHeld
+    | ComponentNoted
     | Repeated
     | TimeIsUp
     | Answered

@@ -54,6 +54,7 @@ class ComponentState:
     pid: int | None
     restarts: int
     waits_for: str | None = None  # the failed component that it depends on
+    note: str = ""  # what people should see of it
 
 
 @dataclass(frozen=True, slots=True)

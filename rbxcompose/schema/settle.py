@@ -42,6 +42,8 @@ def settled(raw: Schema) -> Schema:
         del raw["default"]
     if DIMENSION in raw:
         return _quantity(raw)
+    if "oneOf" in raw:  # of members that are told apart by a function, which a schema cannot call
+        raw = {"anyOf" if key == "oneOf" else key: value for key, value in raw.items()}
     if "anyOf" in raw:
         return _any_of(raw)
     if "$ref" in raw:  # editors see what is beside it, validators need not

@@ -25,7 +25,7 @@ from rbxcompose.levels import Level
 from rbxcompose.msgs.entries import ArrayEntries
 from rbxcompose.qos import Qos
 from rbxcompose.requests import Command, Query, Refused, answers
-from rbxcompose.robot_events import MissionOver, MissionWaits, RobotHeld
+from rbxcompose.robot_events import ComponentNoted, MissionOver, MissionWaits, RobotHeld
 from rbxcompose.sdk.bound import Ended, Later, Outcome, Reply, SentGoal, ServedGoal
 from rbxcompose.sdk.capabilities import (
     Capability,
@@ -63,6 +63,7 @@ __all__ = [
     "Command",
     "CommandsMotion",
     "Component",
+    "ComponentNoted",
     "CompositeTask",
     "Config",
     "Drains",

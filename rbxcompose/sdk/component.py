@@ -15,7 +15,7 @@ from rbxcompose.requests import Command, Query, Refused, Request, Requests, answ
 from rbxcompose.robot_events import RobotEvent
 from rbxcompose.sdk.bound import Window
 from rbxcompose.sdk.capabilities import Capability
-from rbxcompose.sdk.ports import Port
+from rbxcompose.sdk.ports import In, Port
 
 A = TypeVar("A")
 C = TypeVar("C", bound=Config)
@@ -57,6 +57,17 @@ class Context(Protocol):
 
     def window(self, path: str, question: Query[Any]) -> Window:
         """Open a window for tools outside at `path`; queries there get the component's answer to `question`."""
+        ...
+
+    def listen(self, port: In[Any]) -> None:
+        """Subscribe to the topic of an input, named like one of `ports` or anew, instead of what its name had before.
+
+        Its messages go where those of the component's own ports go.
+        """
+        ...
+
+    def mute(self, name: str) -> None:
+        """End the subscription of an input; do nothing if there is none."""
         ...
 
 

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 
 from rbxcompose.bus.goals import GoalState
 from rbxcompose.bus.names import ActionNames
 from rbxcompose.clock import NANOSECONDS
-from rbxcompose.components.mux import MuxConfig
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.action_msgs import GoalStatusArray
 from rbxcompose.msgs.cdr import decode
 from rbxcompose.msgs.geometry_msgs import Twist
 from rbxcompose.msgs.nav_msgs import Odometry
+from rbxcompose.mux.config import MuxConfig
 from rbxcompose.plan.model import Instance, Plan
 from rbxcompose.recording.message import Recorded
 from rbxcompose.sdk.capabilities import Drives
@@ -33,7 +34,7 @@ from rbxcompose.testing.invariants import (
 
 def laws_of(plan: Plan, *, slack: float = 0.0, is_lossless: bool = False, longest_goal: float = 60.0) -> Laws:
     """Return the laws of a robot: its bases, its velocity muxes, and the claims of its actions."""
-    switches = (_switch(one) for one in plan.instances if isinstance(one.config, MuxConfig) and _is_twist(one.config))
+    switches = (_switch(one) for one in plan.instances if isinstance(one.config, MuxConfig) and _is_judged(one.config))
     return Laws(
         bases=list(_bases(plan)),
         switches=list(switches),
@@ -79,14 +80,19 @@ def _bases(plan: Plan) -> Iterator[Base]:
                 yield Base(command, motion, one.process, timeout.value, cycle, (straight.value, turning.value))
 
 
-def _is_twist(config: MuxConfig) -> bool:
-    return registry.message(config.message) is Twist
+def _is_judged(config: MuxConfig) -> bool:
+    """Return whether the laws are those of this mux; one with a hand-over sends what no input has sent."""
+    is_plain = config.profile == "default" and config.handover is None
+    return is_plain and registry.message(config.message) is Twist
 
 
 def _switch(instance: Instance) -> Switch:
     config = instance.config
     assert isinstance(config, MuxConfig)  # noqa: S101
-    inputs = {instance.topic(name): SwitchInput(one.priority, one.timeout) for name, one in config.inputs.items()}
+    inputs = {
+        instance.topic(name): SwitchInput(one.priority, math.inf if one.timeout is None else one.timeout)
+        for name, one in config.inputs.items()
+    }
     return Switch(instance.topic("output"), instance.process, inputs)
 
 

@@ -159,6 +159,6 @@ def test_its_status_tells_when_a_source_need_no_longer_come_to_rest() -> None:
     for _ in range(12):
         robot.publish("/cmd_vel/teleop", FAST)
         robot.advance(0.1)
-    assert told[-1].message == "teleop must come to rest once after the stop"
+    assert told[-1].message == "teleop must come to rest once"
     robot.advance(3.0)
     assert told[-1].message == "no input"

@@ -30,6 +30,7 @@ from rbxcompose.requests import Command, Query
 from rbxcompose.robot_events import MissionOver, RobotEvent
 from rbxcompose.sdk import Activity, Ended, Outcome, Place, skill
 from rbxcompose.sdk.bound import Reply
+from rbxcompose.sdk.ports import In
 
 
 @skill("toy_count", outcomes={"nobody": "failure"})
@@ -248,6 +249,12 @@ class Robot:
 
     def window(self, path: str, question: Query[Any]) -> FakeWindow:
         return self.windows.setdefault(path, FakeWindow(question))
+
+    def listen(self, port: In[Any]) -> None:
+        raise AssertionError("missions subscribe to nothing else")
+
+    def mute(self, name: str) -> None:
+        raise AssertionError("missions keep their subscriptions")
 
     def level(self, percent: float) -> None:
         self.mission.received("value_battery", Float32(data=percent))

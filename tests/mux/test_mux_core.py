@@ -3,24 +3,31 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from rbxcompose.mux.core import MuxCore, MuxSource
+from rbxcompose.mux.account import why
+from rbxcompose.mux.core import MuxCore
+from rbxcompose.mux.sources import LockSource, MuxSource
 
 INPUTS = {"safety": MuxSource(200, 0.2), "teleop": MuxSource(100, 0.5), "navigation": MuxSource(10, 0.5)}
-LOCKS = {"door": MuxSource(150, 0.3)}
+LOCKS = {"door": LockSource(150, 0.3)}
 
 
 def still(message: float) -> bool:
     return message == 0.0
 
 
-def mux(*, locks: dict[str, MuxSource] | None = None, stopped: bool = False) -> MuxCore[float]:
-    return MuxCore(INPUTS, zero=0.0, is_zero=still, locks=locks, stopped=stopped)
+def rest(last: float | None) -> float:
+    return 0.0
+
+
+def mux(*, locks: dict[str, LockSource] | None = None, stopped: bool = False) -> MuxCore[float]:
+    return MuxCore(INPUTS, zero=rest, is_zero=still, locks=locks, stopped=stopped)
 
 
 def test_the_only_live_input_passes() -> None:
@@ -96,7 +103,7 @@ def test_stop_sends_zero_at_once_and_lets_nothing_through() -> None:
     core = mux()
     core.receive("safety", 3.0, 0.0)
     assert core.stop(0.1) == 0.0
-    assert core.stopped
+    assert core.is_stopped
     assert core.active is None
     assert core.receive("safety", 3.0, 0.2) is None
     assert core.tick(10.0) is None
@@ -147,7 +154,7 @@ def test_an_input_that_waits_does_not_hold_back_a_lower_one() -> None:
 
 def test_a_mux_that_was_stopped_when_it_died_comes_back_stopped() -> None:
     core = mux(stopped=True)
-    assert core.stopped
+    assert core.is_stopped
     assert core.receive("teleop", 2.0, 5.0) is None
 
 
@@ -172,7 +179,7 @@ def test_a_silent_lock_holds_back_what_has_a_smaller_priority_and_nothing_else()
 
 
 def test_a_lock_of_the_same_priority_holds_nothing_back() -> None:
-    core = mux(locks={"door": MuxSource(100, 0.3)})
+    core = mux(locks={"door": LockSource(100, 0.3)})
     assert core.receive("teleop", 2.0, 0.0) == 2.0
 
 
@@ -205,30 +212,30 @@ def test_closing_sends_one_zero_and_nothing_more() -> None:
 def test_it_says_who_holds_the_output() -> None:
     core = mux()
     core.receive("navigation", 1.0, 2.81)
-    assert core.why(3.0) == "navigation holds"
+    assert why(core, 3.0) == "navigation holds"
 
 
 def test_it_says_why_nothing_passes() -> None:
     core = mux(locks=LOCKS)
-    assert mux().why(0.0) == "no input"
+    assert why(mux(), 0.0) == "no input"
     silent = "door gives no heartbeat: teleop and navigation are locked out"
-    assert (core.why(0.0), core.refused(0.0)) == (silent, [])
+    assert (why(core, 0.0), core.refused(0.0)) == (silent, [])
     core.receive("teleop", 2.0, 0.0)
-    assert (core.why(0.1), core.refused(0.1)) == (silent, ["teleop"])
+    assert (why(core, 0.1), core.refused(0.1)) == (silent, ["teleop"])
     core.stop(0.2)
-    assert core.why(0.2) == "stopped"
+    assert why(core, 0.2) == "stopped"
     core.release(0.3)
-    assert core.why(0.3) == f"teleop must come to rest once after the stop; {silent}"
+    assert why(core, 0.3) == f"teleop must come to rest once; {silent}"
     core.close(0.4)
-    assert core.why(0.4) == "closed: the robot is going down"
+    assert why(core, 0.4) == "closed: the robot is going down"
 
 
 def test_an_input_above_a_silent_lock_holds_while_the_others_are_locked_out() -> None:
     core = mux(locks=LOCKS)
     core.receive("safety", 3.0, 0.1)
-    assert core.why(0.1).startswith("safety holds; door gives no heartbeat: ")
+    assert why(core, 0.1).startswith("safety holds; door gives no heartbeat: ")
     core.heartbeat("door", 0.2)
-    assert (core.why(0.2), core.locked_out(0.2)) == ("safety holds", [])
+    assert (why(core, 0.2), core.locked_out(0.2)) == ("safety holds", [])
 
 
 def test_a_lock_that_falls_silent_is_told_in_time_though_nothing_moves() -> None:
@@ -247,6 +254,8 @@ def test_an_input_that_is_not_configured_is_a_mistake_of_the_caller(name: str) -
 
 
 MESSAGES = st.sampled_from([0.0, 1.0, 2.0])
+LETTING_GO = {**INPUTS, "teleop": MuxSource(100, 0.5, zero_releases=True)}
+EVERY_LOCK = {**LOCKS, "pause": LockSource(50, is_flag=True)}
 
 
 class AnyHistory(RuleBasedStateMachine):
@@ -254,41 +263,60 @@ class AnyHistory(RuleBasedStateMachine):
 
     def __init__(self) -> None:
         super().__init__()
-        self.core = MuxCore(INPUTS, zero=0.0, is_zero=still, locks=LOCKS)
+        self.core = MuxCore(LETTING_GO, zero=rest, is_zero=still, locks=EVERY_LOCK)
         self.now = 0.0
         self.heard: dict[str, tuple[float, float]] = {}  # input -> when, what
-        self.door = -math.inf
-        self.waiting: set[str] = set()  # went on during the stop, have not come to rest since
+        self.door, self.is_paused = -math.inf, False
+        self.by_hand: dict[str, float] = {}  # input -> until when
+        self.waiting: set[str] = set()  # went on during a stop or a lock by hand, have not come to rest since
         self.stopped = self.closed = False
         self.passed = self.zeros_of_ticks = 0
         self.moving = False  # the last thing that came out was not zero
 
-    def live(self, name: str) -> bool:
+    def sends(self, name: str) -> bool:
         return name in self.heard and self.now <= self.heard[name][0] + INPUTS[name].timeout
 
+    def live(self, name: str) -> bool:
+        has_let_go = LETTING_GO[name].zero_releases and name in self.heard and still(self.heard[name][1])
+        return self.sends(name) and not has_let_go
+
+    def floor(self) -> float:
+        door = EVERY_LOCK["door"].priority if self.now > self.door + LOCKS["door"].timeout else -math.inf
+        return max(door, EVERY_LOCK["pause"].priority if self.is_paused else -math.inf)
+
     def winner(self) -> str | None:
-        door_open = self.now <= self.door + LOCKS["door"].timeout
         free = [
             name
             for name, source in INPUTS.items()
-            if self.live(name) and name not in self.waiting and (door_open or source.priority >= LOCKS["door"].priority)
+            if self.live(name)
+            and name not in self.waiting
+            and name not in self.by_hand
+            and source.priority >= self.floor()
         ]
         held = self.stopped or self.closed or not free
         return None if held else max(free, key=lambda name: INPUTS[name].priority)
 
+    def must_rest(self, names: Iterable[str]) -> None:
+        self.waiting |= {name for name in names if self.sends(name) and not still(self.heard[name][1])}
+
+    def end_locks(self) -> None:
+        """End the locks by hand whose time is over."""
+        ended = [name for name, until in self.by_hand.items() if until <= self.now]
+        for name in ended:
+            del self.by_hand[name]
+        self.must_rest(ended)
+
     @rule(duration=st.sampled_from([0.0, 0.05, 0.1, 0.25, 0.6]))
     def time_passes(self, duration: float) -> None:
-        self.now += duration
-
-    @rule()
-    def it_is_woken_in_time(self) -> None:
-        deadline = self.core.next_deadline()
-        if deadline is not None:
+        end = self.now + duration
+        while (deadline := self.core.next_deadline()) is not None and deadline <= end:
             self.now = max(self.now, deadline)
             self.tick()
+        self.now = end
 
     @rule()
     def tick(self) -> None:
+        self.end_locks()
         zero = self.core.tick(self.now)
         if zero is not None:
             assert zero == 0.0
@@ -301,11 +329,13 @@ class AnyHistory(RuleBasedStateMachine):
 
     @rule(name=st.sampled_from(sorted(INPUTS)), message=MESSAGES)
     def receive(self, name: str, message: float) -> None:
-        if still(message) or not self.live(name):
+        before = self.winner()
+        if still(message) or not self.sends(name):
             self.waiting.discard(name)
         self.heard[name] = self.now, message
         out = self.core.receive(name, message, self.now)
-        assert out == (message if name == self.winner() else None)
+        lets_go = still(message) and LETTING_GO[name].zero_releases
+        assert out == (message if name == (before if lets_go else self.winner()) else None)
         if out is not None:
             self.passed += 1
             self.moving = not still(out)
@@ -314,6 +344,22 @@ class AnyHistory(RuleBasedStateMachine):
     def heartbeat(self) -> None:
         self.door = self.now
         self.core.heartbeat("door", self.now)
+
+    @rule(is_on=st.booleans())
+    def pause(self, is_on: bool) -> None:
+        self.is_paused = is_on
+        self.core.flag("pause", is_on, self.now)
+
+    @rule(name=st.sampled_from(sorted(INPUTS)), seconds=st.sampled_from([0.2, math.inf]))
+    def lock(self, name: str, seconds: float) -> None:
+        self.by_hand[name] = self.now + seconds
+        self.core.lock([name], self.now + seconds, self.now)
+
+    @rule(name=st.sampled_from(sorted(INPUTS)))
+    def unlock(self, name: str) -> None:
+        if self.by_hand.pop(name, None) is not None:
+            self.must_rest([name])
+        self.core.unlock([name], self.now)
 
     @rule()
     def stop(self) -> None:
@@ -325,7 +371,7 @@ class AnyHistory(RuleBasedStateMachine):
     def release(self) -> None:
         self.core.release(self.now)
         if self.stopped:
-            self.waiting |= {name for name in self.heard if self.live(name) and not still(self.heard[name][1])}
+            self.must_rest(self.heard)
         self.stopped = False
 
     @precondition(lambda self: self.now > 2.0 and not self.closed)
@@ -345,4 +391,4 @@ class AnyHistory(RuleBasedStateMachine):
 
 
 TestAnyHistory = AnyHistory.TestCase
-TestAnyHistory.settings = settings(max_examples=80, stateful_step_count=40, deadline=None)
+TestAnyHistory.settings = settings(max_examples=150, stateful_step_count=50, deadline=None)

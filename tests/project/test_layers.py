@@ -52,17 +52,17 @@ ABOVE = {
     "bus": "sdk.bound",
     "bus_types": "actuation",
     "check_runner": "missions.analysis model.doubts model.robot",
-    "checks": "actuation body.model check_runner composition diagnostics.core missions model sdk sections",
+    "checks": "actuation body.model check_runner composition diagnostics.core missions model mux sdk sections",
     "cli": "actuation body bus compiler composition controller_requests doctor executive.requests finding_pages "
-    "importing inspection lsp.server mission_tests missions model params plan recording rendering replay runtime "
-    "scaffold schema.documents sdk sections",
+    "importing inspection lsp.server mission_tests missions model mux.requests params plan recording rendering replay "
+    "runtime scaffold schema.documents sdk sections",
     "controller_interface": "control sdk",
     "controller_manager": "controller_interface sdk",
     "controller_requests": "",
     "controllers": "control controller_interface sdk",
     "compiler": "check_runner composition model plan",
     "components": "actuation body control controller_interface controller_manager controller_requests diagnostics "
-    "executive missions monitors mux.core navigation sdk servo_bus_config servo_bus_line servo_report sim "
+    "executive missions monitors mux navigation sdk servo_bus_config servo_bus_line servo_report sim "
     "twins.fault_script",
     "servo_report": "actuation control",
     "composition": "body.description sections",
@@ -93,14 +93,14 @@ ABOVE = {
     "schema": "controller_interface missions sdk sections",
     "sdk": "diagnostics.updater",
     "sections": "actuation.bus_types actuation.control_tables actuation.serial_ports actuation.servo_models "
-    "actuation.torques body control.calibration control.limits controller_interface sdk twins.servo_faults",
+    "actuation.torques body control.calibration control.limits controller_interface mux.words sdk twins.servo_faults",
     "servo_bus_config": "actuation control controller_interface sdk.ports twins.fault_script",
     "servo_bus_line": "actuation servo_bus_config twins",
     "sim": "",
     "skills": "sdk",
     "twins": "actuation",
-    "testing": "twins bus compiler components missions model.wires params plan.model recording.message rendering.text "
-    "runtime.process_group runtime.records sdk",
+    "testing": "twins bus compiler components missions model.wires mux.config params plan.model recording.message "
+    "rendering.text runtime.process_group runtime.records sdk",
 }
 # Pure: no bus, thread or clock.
 CORES = {"body", "control", "diagnostics", "missions", "mux", "navigation", "params", "sim"}

@@ -12,7 +12,9 @@ from threading import Thread
 from rbxcompose.bus.graph import Graph
 from rbxcompose.cli.bus.place import BusPlace, place_of
 from rbxcompose.cli.completions.candidates import candidates, for_shell
-from rbxcompose.cli.robots.lookup import NotDoneError, find_robot, known_state, robots_up
+from rbxcompose.cli.robots.lookup import NotDoneError, answer_of, find_robot, known_state, robots_up
+from rbxcompose.mux.requests import MUX, LookAtMux
+from rbxcompose.runtime.folder import ComponentState
 
 PATIENCE = 0.3  # [s] in which the bus must answer; a person at the keyboard does not wait longer
 _MANIFESTS = (".yaml", ".yml")
@@ -45,6 +47,10 @@ class KnownValues:
                 return files(current)
             case "COMPONENT":
                 return self._components(given)
+            case "MUX":
+                return [one.name for one in self._states(given) if one.type == MUX]
+            case "INPUT":
+                return self._inputs(given)
             case "TYPE":
                 return _types()
         return ()
@@ -58,11 +64,24 @@ class KnownValues:
         return names if current[:1] in ("/", "") else [name.removeprefix("/") for name in names]
 
     def _components(self, given: Mapping[str, str]) -> list[str]:
+        return [one.name for one in self._states(given)]
+
+    def _states(self, given: Mapping[str, str]) -> Sequence[ComponentState]:
         try:
             state = known_state(find_robot(given.get("robot")))
         except NotDoneError:
             return []
-        return [one.name for one in state.components] if state else []
+        return state.components if state else []
+
+    def _inputs(self, given: Mapping[str, str]) -> list[str]:
+        """Return the inputs of all muxes of a robot."""
+        names = [one.name for one in self._states(given) if one.type == MUX]
+        try:
+            folder = find_robot(given.get("robot"))
+            states = [answer_of(folder, LookAtMux(name), timeout=PATIENCE) for name in names]
+        except NotDoneError:
+            return []
+        return [each.name for one in states for each in one.inputs]
 
 
 def _place(given: Mapping[str, str]) -> BusPlace:

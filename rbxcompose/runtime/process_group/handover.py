@@ -18,7 +18,7 @@ from rbxcompose.robot_events import RobotEvent
 from rbxcompose.runtime.process_group.worker import Worker
 from rbxcompose.sdk.bound import Window
 from rbxcompose.sdk.component import Context
-from rbxcompose.sdk.ports import Calls, CallsAction, Out, Port, ServesAction
+from rbxcompose.sdk.ports import Calls, CallsAction, In, Out, Port, ServesAction
 
 
 def handed_over(end: Any, port: Port[Any], worker: Worker) -> Any:
@@ -190,6 +190,14 @@ class HandedOver:
     def window(self, path: str, question: Query[Any]) -> Window:
         """Open a window for tools outside at `path`."""
         return _Window(self._context, self._worker, path, question)
+
+    def listen(self, port: In[Any]) -> None:
+        """Subscribe to the topic of an input."""
+        self._worker.send(lambda: self._context.listen(port))
+
+    def mute(self, name: str) -> None:
+        """End the subscription of an input."""
+        self._worker.send(lambda: self._context.mute(name))
 
 
 class _Window:

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 
 from rbxcompose.bus.action_server import ActionServer
 from rbxcompose.bus.bus import Bus
-from rbxcompose.bus.names import admin_key
+from rbxcompose.bus.names import admin_key, resolve
 from rbxcompose.clock import Clock
 from rbxcompose.config import Config
 from rbxcompose.diagnostics.updater import DiagnosticTask
@@ -21,14 +21,14 @@ from rbxcompose.robot_events import RobotEvent, RobotHeld
 from rbxcompose.runtime.channel import Repeated
 from rbxcompose.runtime.process_group.frames import Frames
 from rbxcompose.runtime.process_group.handover import HandedOver, handed_over
-from rbxcompose.runtime.process_group.live_ports import bind
+from rbxcompose.runtime.process_group.live_ports import bind, subscribe
 from rbxcompose.runtime.process_group.statuses import Statuses
 from rbxcompose.runtime.process_group.steps import GoalSteps
 from rbxcompose.runtime.process_group.worker import Worker
 from rbxcompose.scheduler import Scheduler
 from rbxcompose.sdk.bound import Window
 from rbxcompose.sdk.component import Component
-from rbxcompose.sdk.ports import Port, ServesAction, ServesTopic
+from rbxcompose.sdk.ports import In, Port, ServesAction, ServesTopic
 from rbxcompose.sdk.registry import component_type
 from rbxcompose.typed_json import to_data
 
@@ -336,6 +336,22 @@ class Hosted:
         name = self.instance.name
         key = admin_key(self.host.plan.robot, path)
         return self.host.bus.window(name, key, lambda: to_data(self.host.ask(name, question)))
+
+    def listen(self, port: In[Any]) -> None:
+        """Subscribe to the topic of an input, instead of what its name had before."""
+        self.mute(port.name)
+        topic = resolve(port.topic, self.host.plan.bus.namespace)
+        component, name = self._made(), self.instance.name
+        self._ends[port.name] = component.bound[port.name] = subscribe(
+            component, name, topic, port, self.host.bus, self
+        )
+
+    def mute(self, name: str) -> None:
+        """End the subscription of an input."""
+        end = self._ends.pop(name, None)
+        self._made().bound.pop(name, None)
+        if end is not None:
+            self.host.bus.withdraw(self.instance.name, end)
 
     def _repeat(self, component: Component[Any], request: Command) -> None:
         try:

@@ -69,6 +69,16 @@ def bind(component: Component[Any], instance: Instance, bus: Bus, frames: Frames
         component.bound[name] = _end(component, instance, name, port, bus, frames, handling)
 
 
+def subscribe(component: Component[Any], owner: str, topic: str, port: In[Any], bus: Bus, handling: Handling) -> Any:
+    """Subscribe to a topic; its messages go to the handler of the port."""
+    handler = _on_message(component, port.name, port, handling)
+    waits = isinstance(port, ServesTopic)  # like goals: a sender that waits for a listener relies on it
+    is_light, interface = handling.worker is None, cast(Any, port.interface)
+    return bus.subscribe(
+        owner, topic, interface, port.qos, handler, max_rate=port.max_rate, waits=waits, is_light=is_light
+    )
+
+
 def _end(
     component: Component[Any],
     instance: Instance,
@@ -88,12 +98,7 @@ def _end(
             publisher = bus.publisher(owner, instance.topic(name), interface, port.qos)
             return paced(publisher, port, handling.clock, handling.watch)
         case In():
-            topic, handler = instance.topic(name), _on_message(component, name, port, handling)
-            waits = isinstance(port, ServesTopic)  # like goals: a sender that waits for a listener relies on it
-            is_light = handling.worker is None
-            return bus.subscribe(
-                owner, topic, interface, port.qos, handler, max_rate=port.max_rate, waits=waits, is_light=is_light
-            )
+            return subscribe(component, owner, instance.topic(name), port, bus, handling)
         case Serves():
             serve = _on_request(component, name, port, handling)
             bus.serve_later(owner, instance.topic(name), interface, serve, waits=True)

@@ -9,15 +9,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from itertools import takewhile
-from typing import Any
 
 from rbxcompose.levels import Level
 from rbxcompose.plan.model import Plan
-from rbxcompose.robot_events import MissionOver, RobotHeld
+from rbxcompose.robot_events import ComponentNoted, MissionOver, RobotHeld
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.options import RunOptions
 from rbxcompose.runtime.supervision.changes import WORLD, Changes
 from rbxcompose.runtime.supervision.dependents import blocked_by, blocked_text, is_commanding
+from rbxcompose.runtime.supervision.kept_words import KeptWords
 from rbxcompose.runtime.supervision.members import ConductorEffects, Member, Phase
 from rbxcompose.runtime.supervision.plan_change import LONGEST, Changing, WhenDone, text_of
 from rbxcompose.runtime.supervision.shutdown import END_BOUND, Closing, rest_time
@@ -48,7 +48,7 @@ class Conductor:
         self.plan, self.layers = plan, options.layers
         self.generation = 0  # of the plan: how often it was changed
         self._changing: Changing | None = None
-        self._repeated: dict[str, list[dict[str, Any]]] = {}  # requests that components get again after a restart
+        self.kept = KeptWords()
         self._options, self._router = options, router
         self._scheduler, self._effects = scheduler, effects
         names = [*([router] if router else []), *plan.groups]
@@ -124,8 +124,7 @@ class Conductor:
         if not member.is_started and not member.is_given_up:
             member.is_started = True
             self._effects.send(member.name, say.Start())
-            again = [one.name for one in self.plan.of_group(member.name) if member.restarts]
-            for one, request in ((name, request) for name in again for request in self._repeated.get(name, ())):
+            for one, request in self.kept.repeated(self.plan.of_group(member.name) if member.restarts else ()):
                 self._effects.send(member.name, say.Ask(0, one, request))  # nobody waits for the answer
 
     # What processes say
@@ -142,8 +141,9 @@ class Conductor:
                 self._proceed()
             case say.Failed(instance, text):
                 self._failed(instance, text)
-            case say.Repeated(instance, requests):
-                self._repeated[instance] = requests
+            case say.Repeated() | ComponentNoted():
+                self.kept.heard(message)
+                self._effects.states_changed()
             case MissionOver():
                 self._mission_over(message)
             case say.TimeIsUp():

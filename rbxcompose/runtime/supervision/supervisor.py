@@ -354,7 +354,8 @@ class Supervisor:
             state = SUSPENDED
         elif child is not None and self.conductor.members[process].is_told_lost:
             state = SILENT
-        return ComponentState(name, type_name, state, process, pid, restarts, waits_for)
+        note = self.conductor.kept.notes.get(name, "")
+        return ComponentState(name, type_name, state, process, pid, restarts, waits_for, note)
 
     def _write_state(self) -> None:
         self._is_state_old = False

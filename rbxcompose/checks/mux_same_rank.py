@@ -1,0 +1,59 @@
+"""Equal priorities in a profile that knows what to do with them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.check_runner import check
+from rbxcompose.findings import Finding, Related, Severity
+from rbxcompose.model.robot import Robot
+
+
+@check("RBX3137", Severity.WARNING)
+def mux_same_rank(robot: Robot) -> Iterator[Finding]:
+    """Two inputs of a mux have the same priority, and their order decides
+
+    In the profile `twist_mux` the first one in the list wins, always. In the profile `yocs` the one that holds the
+    output keeps it until its timeout. Neither can be seen from the priorities.
+
+    Bad:
+    ```yaml
+    muxes:
+      cmd_vel:
+        profile: twist_mux
+        inputs:
+          teleop:
+            priority: 10
+            timeout: 0.5 s
+          navigation:
+            from: go_to
+            priority: 10
+            timeout: 0.5 s
+    ```
+    Good:
+    ```yaml
+    muxes:
+      cmd_vel:
+        profile: twist_mux
+        inputs:
+          teleop:
+            priority: 100
+            timeout: 0.5 s
+          navigation:
+            from: go_to
+            priority: 10
+            timeout: 0.5 s
+    ```
+    """
+    for mux, entry in robot.manifest.muxes.items():
+        first: dict[int, str] = {}
+        for name, rank in entry.ranks.items() if entry.profile != "default" else ():
+            other = first.setdefault(rank, name)
+            if other != name:
+                who = f"'{other}' always wins" if entry.profile == "twist_mux" else "the one that holds keeps it"
+                yield mux_same_rank.at(
+                    robot.value("muxes", mux, "inputs", name, "priority"),
+                    f"inputs '{other}' and '{name}' of mux '{mux}' have the same priority {rank}: {who}",
+                    help="give each input its own priority",
+                    related=[Related(robot.value("muxes", mux, "inputs", other, "priority"), f"input '{other}'")],
+                )

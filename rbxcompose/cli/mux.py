@@ -1,0 +1,199 @@
+"""Show who may command and why; select, add, delete or lock the inputs of muxes of a running robot.
+
+Without a MUX, the only one of the robot is meant. What is added, deleted, selected or locked here lasts until the robot
+goes down; write it in the manifest to keep it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections.abc import Callable, Iterator
+
+from rbxcompose.cli.bus.entities import count, seconds, table
+from rbxcompose.cli.output.console import refuse, tell
+from rbxcompose.cli.robots.commands import add_asking_options, show_answer
+from rbxcompose.cli.robots.lookup import REFUSED, NotDoneError, answer_of, find_robot, known_state
+from rbxcompose.findings import suggest
+from rbxcompose.mux.requests import (
+    MUX,
+    AddMuxInput,
+    DeleteMuxInput,
+    LockMuxInputs,
+    LookAtMux,
+    MuxInputState,
+    MuxState,
+    ReadMuxChanges,
+    SelectMuxInput,
+    UnlockMuxInputs,
+)
+from rbxcompose.requests import Command
+from rbxcompose.runtime.folder import RobotFolder
+from rbxcompose.typed_json import to_data
+
+_LOOK = 0.2  # [s] between two looks of `watch`; no change is missed between them
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    actions = parser.add_subparsers(dest="action", metavar="ls|why|select|lock|...", required=True)
+    ls = actions.add_parser("ls", help="list muxes, their modes, and who holds each output")
+    ls.set_defaults(do=_ls)
+    why = actions.add_parser("why", help="show who holds an output until when, and what keeps the others from it")
+    why.set_defaults(do=_why)
+    watch = actions.add_parser("watch", help="print each change of who holds an output, until interrupted")
+    watch.add_argument("-n", "--count", type=count, metavar="N", help="end after N changes")
+    watch.set_defaults(do=_watch)
+    select = actions.add_parser("select", help="let an input through, in the mode `select`; '__none' for none")
+    select.set_defaults(do=_select)
+    add = actions.add_parser("add", help="add an input")
+    add.add_argument("--topic", metavar="TOPIC", default="", help="its topic, if that is not MUX/INPUT")
+    add.add_argument("--priority", type=int, metavar="N", help="its priority; only where priorities count")
+    add.add_argument("--timeout", type=seconds, metavar="T", help="it counts as silent after this time")
+    add.set_defaults(do=_add)
+    delete = actions.add_parser("delete", help="remove an input")
+    delete.set_defaults(do=_delete)
+    lock = actions.add_parser("lock", help="hold inputs back by hand, all if none is named")
+    lock.add_argument("--for", dest="seconds", type=seconds, metavar="T", help="unlock them after this time")
+    lock.set_defaults(do=_lock)
+    unlock = actions.add_parser(
+        "unlock",
+        help="end what was locked by hand",
+        description="What still commands motion must come to rest once, as after a stop.",
+    )
+    unlock.set_defaults(do=_unlock)
+    for one in (why, watch):
+        one.add_argument("names", metavar="MUX", nargs="*", help="the mux, if the robot has several")
+    for one in (select, add, delete):
+        one.add_argument("names", metavar="MUX|INPUT", nargs="+", help="the mux, if there are several, and the input")
+    for one in (lock, unlock):
+        one.add_argument("names", metavar="MUX|INPUT", nargs="*", help="the mux, if there are several, and inputs")
+    for one in (ls, why, watch, select, add, delete, lock, unlock):
+        add_asking_options(one)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the chosen subcommand."""
+    do: Callable[[argparse.Namespace], int] = arguments.do
+    try:
+        return do(arguments)
+    except NotDoneError as error:
+        return refuse(error.finding)
+
+
+def _names(folder: RobotFolder) -> list[str]:
+    """Return the muxes of a robot."""
+    state = known_state(folder)
+    return [one.name for one in state.components if one.type == MUX] if state else []
+
+
+def _chosen(arguments: argparse.Namespace, folder: RobotFolder) -> tuple[str, list[str]]:
+    """Return the mux that is meant, and the inputs; the first of the names may be that of the mux."""
+    known, given = _names(folder), list(arguments.names)
+    if given and given[0] in known:
+        return given[0], given[1:]
+    if len(known) == 1:
+        return known[0], given
+    if not known:
+        raise NotDoneError(REFUSED.at(None, "this robot has no mux"))
+    first = f"there is no mux '{given[0]}'; " if given else "this robot has several muxes, so name one; "
+    raise NotDoneError(REFUSED.at(None, f"{first}{suggest(given[0] if given else '', known, 'muxes')}"))
+
+
+def _only_mux(arguments: argparse.Namespace, folder: RobotFolder) -> str:
+    mux, others = _chosen(arguments, folder)
+    if others:
+        message = f"there is no mux '{others[0]}'; {suggest(others[0], [mux], 'muxes')}"
+        raise NotDoneError(REFUSED.at(None, message))
+    return mux
+
+
+def _ls(arguments: argparse.Namespace) -> int:
+    folder = find_robot(arguments.robot)
+    found = [answer_of(folder, LookAtMux(name)) for name in _names(folder)]
+    if arguments.json:
+        tell(json.dumps([to_data(one) for one in found]))
+    elif not found:
+        tell("this robot has no muxes")
+    else:
+        rows = [
+            (one.name, one.mode, one.profile, ", ".join(each.name for each in one.inputs), one.why) for one in found
+        ]
+        tell(table([("mux", "mode", "profile", "inputs", ""), *rows]))
+    return 0
+
+
+def _why(arguments: argparse.Namespace) -> int:
+    folder = find_robot(arguments.robot)
+    state = answer_of(folder, LookAtMux(_only_mux(arguments, folder)))
+    tell(json.dumps(to_data(state)) if arguments.json else "\n".join(_account(state)))
+    return 0
+
+
+def _account(state: MuxState) -> Iterator[str]:
+    """Yield the lines that tell who holds an output, who waits for what, and which locks are engaged."""
+    until = f", for another {state.until - state.time:.2f} s unless it sends again" if state.until else ""
+    yield f"{state.name}: {state.why}{until}"
+    rows = [("input", "priority", "state", "last heard", "why")]
+    for one in sorted(state.inputs, key=lambda each: -(each.priority or 0)):
+        priority = "" if one.priority is None else str(one.priority)
+        rows.append((one.name, priority, one.state, _heard(one), one.why))
+    yield table(rows)
+    for lock in state.locks:
+        below = "all inputs" if lock.priority is None else f"inputs below {lock.priority}"
+        yield f"lock {lock.name}: {f'{lock.why}, {below} are locked out' if lock.why else 'open'}"
+
+
+def _heard(one: MuxInputState) -> str:
+    return "never" if one.silent_for is None else f"{one.silent_for:.2f} s ago"
+
+
+def _watch(arguments: argparse.Namespace) -> int:
+    folder = find_robot(arguments.robot)
+    mux, after, shown = _only_mux(arguments, folder), 0, 0
+    while True:
+        changes = answer_of(folder, ReadMuxChanges(mux, after))
+        for one in changes if after else changes[-1:]:
+            tell(json.dumps({"mux": mux, **to_data(one)}) if arguments.json else f"{one.time:9.2f} s  {one.text}")
+            shown += 1
+            if arguments.count is not None and shown >= arguments.count:
+                return 0
+        after = changes[-1].number if changes else after
+        time.sleep(_LOOK)
+
+
+def _order(arguments: argparse.Namespace, make: Callable[[str, list[str]], Command]) -> int:
+    folder = find_robot(arguments.robot)
+    show_answer(arguments, folder, answer_of(folder, make(*_chosen(arguments, folder))))
+    return 0
+
+
+def _one(mux: str, inputs: list[str]) -> str:
+    """Return the only input that was named."""
+    if len(inputs) != 1:
+        raise NotDoneError(REFUSED.at(None, f"name one input of '{mux}'"))
+    return inputs[0]
+
+
+def _select(arguments: argparse.Namespace) -> int:
+    return _order(arguments, lambda mux, inputs: SelectMuxInput(mux, _one(mux, inputs)))
+
+
+def _add(arguments: argparse.Namespace) -> int:
+    def made(mux: str, inputs: list[str]) -> Command:
+        return AddMuxInput(mux, _one(mux, inputs), arguments.topic, arguments.priority, arguments.timeout)
+
+    return _order(arguments, made)
+
+
+def _delete(arguments: argparse.Namespace) -> int:
+    return _order(arguments, lambda mux, inputs: DeleteMuxInput(mux, _one(mux, inputs)))
+
+
+def _lock(arguments: argparse.Namespace) -> int:
+    return _order(arguments, lambda mux, inputs: LockMuxInputs(mux, tuple(inputs), arguments.seconds))
+
+
+def _unlock(arguments: argparse.Namespace) -> int:
+    return _order(arguments, lambda mux, inputs: UnlockMuxInputs(mux, tuple(inputs)))
