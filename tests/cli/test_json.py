@@ -81,6 +81,10 @@ MISTAKES = {
     "topic ls": "",
     "topic pub": "/chatter std_msgs/String",
     "topic show": "/odom",
+    "udev check": "nowhere.yaml",
+    "udev generate": "nowhere.yaml",
+    "udev install": "nowhere.yaml --yes",
+    "udev scan": "nowhere.yaml",
     "why": "components.base robots/turtlebot/robt.yaml",
 }
 

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.actuation.serial_ports import SerialPort, UsbDevice
+from rbxcompose.devices.serial_ports import SerialPort
+from rbxcompose.devices.usb import UsbDevice
 from rbxcompose.doctor.serial_ports import PortFile, look_at, port_findings
 from rbxcompose.testing import check_text
 from tests.checks import strangers
