@@ -1,0 +1,102 @@
+"""Files of ROS parameters: those of ROS 2 by nodes, those of ROS 1, and dumps of `dynamic_reconfigure`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import PurePath
+
+from rbxcompose.dataclass import dataclass
+from rbxcompose.findings import Span
+from rbxcompose.importing.foreign_files import ForeignFile
+from rbxcompose.manifest.tree import Entry, MappingNode
+
+ROS_2 = "ros__parameters"
+_DUMPED = "dictitems"  # what Python's classes of maps are written as
+_GROUPS = "groups"
+_OF_A_GROUP = frozenset({"id", "name", "parameters", "parent", "state", "type"})
+ALL_NODES = "/**"
+
+
+@dataclass(frozen=True, slots=True)
+class NodeParameters:
+    """The parameters of one node: its name with the namespaces above it, the place of the name, and the map."""
+
+    node: str
+    span: Span
+    root: MappingNode
+
+
+def parameters_of(file: ForeignFile) -> list[NodeParameters]:
+    """Return the parameters of each node that a file names; without such names, all are of one node.
+
+    That one has the name of the file. Keys with dots become maps, and dumps of `dynamic_reconfigure` lose what Python
+    and its groups add.
+    """
+    if not isinstance(file.root, MappingNode):
+        return []
+    root = plain_dump(file.root)
+    found = list(_nodes(root, ""))
+    return found or [NodeParameters(PurePath(file.name).stem, root.span, without_dots(root))]
+
+
+def _nodes(root: MappingNode, above: str) -> Iterator[NodeParameters]:
+    for name, entry in root.entries.items():
+        if not isinstance(entry.value, MappingNode):
+            continue
+        path = name if name.startswith("/") or not above else f"{above}/{name}"
+        own = entry.value.get(ROS_2)
+        if isinstance(own, MappingNode):
+            yield NodeParameters(path, entry.key.span, without_dots(own))
+        if own is None:
+            yield from _nodes(entry.value, path)
+
+
+def without_dots(node: MappingNode) -> MappingNode:
+    """Return a map in which `a.b: 1` is `a: {b: 1}`, as ROS 2 takes it; of two equal keys the last one counts."""
+    entries: dict[str, Entry] = {}
+    for name, entry in node.entries.items():
+        first, dot, rest = name.partition(".")
+        value = without_dots(entry.value) if isinstance(entry.value, MappingNode) else entry.value
+        if dot and first and rest:
+            value = without_dots(MappingNode({rest: Entry(entry.key, value)}, entry.value.span))
+        known = entries.get(first if dot and first and rest else name)
+        if known is not None and isinstance(known.value, MappingNode) and isinstance(value, MappingNode):
+            value = _joined(known.value, value)
+        entries[first if dot and first and rest else name] = Entry(entry.key, value)
+    return MappingNode(entries, node.span, node.tag)
+
+
+def _joined(one: MappingNode, other: MappingNode) -> MappingNode:
+    entries = dict(one.entries)
+    for name, entry in other.entries.items():
+        known = entries.get(name)
+        value = entry.value
+        if known is not None and isinstance(known.value, MappingNode) and isinstance(value, MappingNode):
+            value = _joined(known.value, value)
+        entries[name] = Entry(entry.key, value)
+    return MappingNode(entries, one.span, one.tag)
+
+
+def plain_dump(node: MappingNode) -> MappingNode:
+    """Return what a dump of `dynamic_reconfigure` says, without the classes of Python and the groups for display."""
+    inner = _undressed(node)
+    groups = inner.get(_GROUPS)
+    if isinstance(groups, MappingNode) and _undressed(groups).entries.keys() >= _OF_A_GROUP:
+        inner = MappingNode({name: one for name, one in inner.entries.items() if name != _GROUPS}, inner.span)
+    return inner
+
+
+def _undressed(node: MappingNode) -> MappingNode:
+    inner = node.get(_DUMPED)
+    if isinstance(inner, MappingNode) and node.entries.keys() <= {_DUMPED, "state"}:
+        return MappingNode(inner.entries, node.span)
+    return node
+
+
+def scalars_of(node: MappingNode, above: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Entry]]:
+    """Yield all values that are no maps, with their names from the root."""
+    for name, entry in node.entries.items():
+        if isinstance(entry.value, MappingNode) and entry.value.entries:
+            yield from scalars_of(entry.value, (*above, name))
+        else:
+            yield (*above, name), entry
