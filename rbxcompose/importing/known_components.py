@@ -12,7 +12,7 @@ from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Report, Severity, Span, kind
 from rbxcompose.importing.foreign_files import Given
 from rbxcompose.importing.manifest_text import quantity
-from rbxcompose.importing.parameter_values import Plain, written
+from rbxcompose.importing.parameter_values import ParameterData, written
 from rbxcompose.importing.ros_parameters import NodeParameters
 from rbxcompose.manifest.shapes import alternatives, field_types
 from rbxcompose.printable import plain
@@ -45,7 +45,7 @@ class KnownComponent:
 
 
 def known_component(
-    node: NodeParameters, parameters: Mapping[tuple[str, ...], Given[Plain]], report: Report
+    node: NodeParameters, parameters: Mapping[tuple[str, ...], Given[ParameterData]], report: Report
 ) -> KnownComponent | None:
     """Return the component that a node is; None unless its parameters are those of just one type.
 
@@ -66,7 +66,7 @@ def known_component(
     return KnownComponent(own, node.node, node.span, fitting[0], settings)
 
 
-def _fits(type_: str, node: str, given: Mapping[str, Given[Plain]]) -> bool:
+def _fits(type_: str, node: str, given: Mapping[str, Given[ParameterData]]) -> bool:
     cls = component_type(type_)
     config = cls.config_type()
     fields = config.model_fields
@@ -92,11 +92,11 @@ def _dimensions(config: type[Config]) -> dict[str, Dimension]:
     }
 
 
-def _data(value: Plain, dimension: Dimension | None) -> object:
+def _data(value: ParameterData, dimension: Dimension | None) -> object:
     return value if dimension is None or isinstance(value, str) else _written(value, dimension)
 
 
-def _written(value: Plain, dimension: Dimension | None) -> str:
+def _written(value: ParameterData, dimension: Dimension | None) -> str:
     """Return a value as a manifest has it; numbers of files are in SI."""
     if dimension is None or isinstance(value, bool | str | list):
         return written(value)

@@ -8,11 +8,11 @@ from rbxcompose.manifest.scalars import number_trouble, plain_value
 from rbxcompose.manifest.tree import ScalarNode, SequenceNode, TreeNode
 from rbxcompose.units import MOST
 
-Plain = bool | int | float | str | list[bool | int | float | str]
+ParameterData = bool | int | float | str | list[bool | int | float | str]
 _LONGEST = 10_000  # items of a list, as a manifest has them
 
 
-def value_of(node: TreeNode) -> Given[Plain] | None:
+def value_of(node: TreeNode) -> Given[ParameterData] | None:
     """Return the value of a parameter: a word, a number, or a list of such; None if it is none of these."""
     match node:
         case ScalarNode():
@@ -34,7 +34,7 @@ def _scalar(node: TreeNode) -> bool | int | float | str | None:
     return value
 
 
-def argument_type(value: Plain) -> str:
+def argument_type(value: ParameterData) -> str:
     """Return the type of an argument that takes a value and others like it."""
     match value:
         case bool():
@@ -48,7 +48,7 @@ def argument_type(value: Plain) -> str:
     return "list"
 
 
-def written(value: Plain) -> str:
+def written(value: ParameterData) -> str:
     """Return a value as a manifest has it."""
     match value:
         case bool():
