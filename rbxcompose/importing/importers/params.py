@@ -17,7 +17,7 @@ from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode
 from rbxcompose.printable import plain
 
 Path = tuple[str, ...]
-KnownValues = dict[Path, Given[ParameterData]]
+GivenValues = dict[Path, Given[ParameterData]]
 
 # What programs of ROS have by themselves, and what decides here.
 _OF_ROS = {
@@ -31,7 +31,7 @@ _OF_ROS = {
 def params(files: Sequence[ForeignFile], name: str, report: Report) -> str:
     """Return a robot with a component for each node that is one of ours, and an argument for each other parameter."""
     found = [file for file in files if _is_one(file, report)]
-    nodes: dict[str, tuple[NodeParameters, KnownValues]] = {}
+    nodes: dict[str, tuple[NodeParameters, GivenValues]] = {}
     for file in found:
         for node in parameters_of(file):
             _, known = nodes.setdefault(node.node, (node, {}))
@@ -59,7 +59,7 @@ def _is_one(file: ForeignFile, report: Report) -> bool:
     return not words
 
 
-def _add(known: KnownValues, node: NodeParameters, report: Report) -> None:
+def _add(known: GivenValues, node: NodeParameters, report: Report) -> None:
     """Add the parameters of a node; tell those that cannot be carried over, and those that disagree."""
     for path, entry in scalars_of(node.root):
         shown = f"'{plain(shown_name(path), 60)}' of '{plain(node.node, 60)}'"
@@ -81,7 +81,7 @@ def _is_false(node: TreeNode) -> bool:
     return isinstance(node, ScalarNode) and plain_value(node) is False
 
 
-def _argument_rows(nodes: dict[str, tuple[NodeParameters, KnownValues]]) -> Iterator[Row]:
+def _argument_rows(nodes: dict[str, tuple[NodeParameters, GivenValues]]) -> Iterator[Row]:
     """Yield an argument for each parameter, below the name of its node."""
     names = FreeNames()
     if nodes:
