@@ -170,14 +170,7 @@ class ForeignMap:
         """Yield the maps in a map by their names; `what` is what each of them is."""
         node = self._ask(key)
         if isinstance(node, MappingNode):
-            for name, entry in node.entries.items():
-                if not name or _is_refused(name):
-                    continue
-                if isinstance(entry.value, MappingNode):
-                    yield name, ForeignMap(entry.value, f"{what} '{plain(name, 60)}'", entry.key.span, self.report)
-                else:
-                    message = f"{what} '{plain(name, 60)}' must be a map of keys and values"
-                    self.tell(WRONG_TYPE.at(entry.value.span, message, label=label_of(entry.value)))
+            yield from maps_in(node, what, self.report)
         elif node is not None:
             self._wrong(key, node, "a map of keys and values")
 
@@ -221,6 +214,18 @@ class ForeignMap:
             return
         label = "YAML takes this for an octal number" if _is_octal(node) else label_of(node)
         self.tell(WRONG_TYPE.at(node.span, f"'{key}' of {self.what} must be {what}", label=label))
+
+
+def maps_in(node: MappingNode, what: str, report: Report) -> Iterator[tuple[str, ForeignMap]]:
+    """Yield the maps in a map by their names; `what` is what each of them is."""
+    for name, entry in node.entries.items():
+        if not name or _is_refused(name):
+            continue
+        if isinstance(entry.value, MappingNode):
+            yield name, ForeignMap(entry.value, f"{what} '{plain(name, 60)}'", entry.key.span, report)
+        else:
+            message = f"{what} '{plain(name, 60)}' must be a map of keys and values"
+            report.add(WRONG_TYPE.at(entry.value.span, message, label=label_of(entry.value)))
 
 
 def _is_refused(text: str) -> bool:

@@ -28,6 +28,7 @@ MISTAKES = {
     "expand": "nowhere.yaml",
     "explain": "RBX1099",
     "import arbotix": "nowhere.yaml",
+    "import diagnostics": "nowhere.yaml",
     "import mux": "nowhere.yaml",
     "import params": "nowhere.yaml",
     "logs": "--robot nobody",

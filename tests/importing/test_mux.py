@@ -46,7 +46,8 @@ class TwistMux:
         self.flags: dict[str, bool] = {}
 
     def is_over(self, one: Mapping[str, Any], now: float) -> bool:
-        return one["timeout"] > 0 and now - self.heard.get(one["topic"], -math.inf) > one["timeout"]
+        timeout = float(one["timeout"])
+        return timeout > 0 and now - self.heard.get(one["topic"], -math.inf) > timeout
 
     def passes(self, topic: str, now: float) -> bool:
         locked = [
