@@ -10,8 +10,10 @@ from rbxcompose.devices.usb import UsbDevice
 
 
 def names_of(port: SerialPort, named: Iterable[UsbDevice]) -> list[str]:
-    """Return the names that mean a port."""
-    return [one.name for one in named if port.device is not None and port.device.is_meant_by(one)]
+    """Return the names that mean a port: by its device, or by a link if the kernel tells no device."""
+    if port.device is None:
+        return [one.name for one in named if port.is_linked(one.name)]
+    return [one.name for one in named if port.device.is_meant_by(one)]
 
 
 def proposed(port: SerialPort, ports: Sequence[SerialPort]) -> Mapping[str, str]:

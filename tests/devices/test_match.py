@@ -41,3 +41,8 @@ def test_adapters_with_one_serial_number_are_found_and_several_ports_of_one_are_
         )
     ]
     assert [[one.path for one in group] for group in same_serials(ports)] == [["/dev/ttyUSB0", "/dev/ttyUSB1"]]
+
+
+def test_a_port_without_a_device_is_meant_by_its_link() -> None:
+    port = SerialPort("/dev/pts/0", ("/dev/arm", "/dev/serial/by-id/leg"))
+    assert names_of(port, [UsbDevice("0403", "6014", name="arm"), UsbDevice("0403", "6014", name="leg")]) == ["arm"]
