@@ -10,7 +10,7 @@ from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Report, Severity, Span, kind
 from rbxcompose.importing.foreign_files import ForeignFile, ForeignMap, Given, maps_in
 from rbxcompose.importing.importer import NOT_CARRIED_OVER, OTHER_PROGRAM
-from rbxcompose.importing.ros_parameters import NodeParameters, parameters_of
+from rbxcompose.importing.ros_parameters import NodeParameters, parameters_with
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode
 from rbxcompose.printable import plain
 
@@ -83,27 +83,15 @@ class ForeignAggregator:
 
 def read_aggregators(file: ForeignFile, report: Report) -> list[ForeignAggregator]:
     """Return the aggregators of a file; other nodes in it are told, and so is a file without any."""
-    nodes = [(node, _root(node.root)) for node in parameters_of(file)]
-    if not any(root for _, root in nodes):
+    found, others = parameters_with(file, lambda root: bool(_analyzers(root)))
+    if not found:
         words = f"'{plain(file.name)}' is no file of diagnostic_aggregator: nothing in it has the type of an analyzer"
         report.add(OTHER_PROGRAM.at(file.root.span, words))
         return []
-    found = []
-    for node, root in nodes:
-        if root is None:
-            words = f"'{plain(node.node, 60)}' is not carried over: it has no analyzers"
-            report.add(NOT_CARRIED_OVER.at(node.span, words))
-        else:
-            found.append(_aggregator(node, root, report))
-    return found
-
-
-def _root(root: MappingNode) -> MappingNode | None:
-    """Return the map that has the analyzers: this one, or one below, as ROS 1 puts it below the name of the node."""
-    if _analyzers(root):
-        return root
-    below = (one.value for one in root.entries.values() if isinstance(one.value, MappingNode))
-    return next((one for one in below if _analyzers(one)), None)
+    for node in others:
+        words = f"'{plain(node.node, 60)}' is not carried over: it has no analyzers"
+        report.add(NOT_CARRIED_OVER.at(node.span, words))
+    return [_aggregator(node, report) for node in found]
 
 
 def _analyzers(node: MappingNode) -> dict[str, Entry]:
@@ -120,7 +108,8 @@ def _has_type(one: Entry) -> bool:
     return isinstance(type_, ScalarNode) and "Analyzer" in type_.text
 
 
-def _aggregator(node: NodeParameters, root: MappingNode, report: Report) -> ForeignAggregator:
+def _aggregator(node: NodeParameters, report: Report) -> ForeignAggregator:
+    root = node.root
     analyzers = _analyzers(root)
     others = {name: one for name, one in root.entries.items() if name not in (*_BELOW, *analyzers)}
     told = ForeignMap(MappingNode(others, root.span), f"'{plain(node.node, 60)}'", node.span, report)

@@ -9,7 +9,7 @@ from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Related, Report, Span
 from rbxcompose.importing.foreign_files import ForeignFile, ForeignMap, Given
 from rbxcompose.importing.importer import DISAGREES, NOT_CARRIED_OVER, OTHER_PROGRAM
-from rbxcompose.importing.ros_parameters import NodeParameters, parameters_of
+from rbxcompose.importing.ros_parameters import NodeParameters, parameters_with
 from rbxcompose.manifest.tree import MappingNode, SequenceNode, TreeNode
 from rbxcompose.manifest.validate import OUT_OF_RANGE, WRONG_TYPE, label_of
 from rbxcompose.printable import plain
@@ -46,17 +46,15 @@ class ForeignMux:
 
 def read_muxes(file: ForeignFile, report: Report) -> list[ForeignMux]:
     """Return the muxes of a file; other nodes in it are told, and so is a file without any."""
-    nodes = parameters_of(file)
-    found = [(node, _program(node.root)) for node in nodes]
-    if not any(program for _, program in found):
+    found, others = parameters_with(file, lambda root: bool(_program(root)))
+    if not found:
         words = f"'{plain(file.name)}' is no file of a mux: it has neither 'topics' nor 'locks' nor 'subscribers'"
         report.add(OTHER_PROGRAM.at(file.root.span, words))
         return []
-    for node, program in found:
-        if not program:
-            report.add(NOT_CARRIED_OVER.at(node.span, f"'{plain(node.node, 60)}' is not carried over: it is no mux"))
-    is_named = found[0][0].root.span != file.root.span
-    return [_mux(node if is_named else replace(node, node=""), program, report) for node, program in found if program]
+    for node in others:
+        report.add(NOT_CARRIED_OVER.at(node.span, f"'{plain(node.node, 60)}' is not carried over: it is no mux"))
+    named = (replace(node, node="") if node.root.span == file.root.span else node for node in found)
+    return [_mux(node, _program(node.root), report) for node in named]
 
 
 def _program(root: MappingNode) -> str:

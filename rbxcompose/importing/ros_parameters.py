@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import PurePath
 
 from rbxcompose.dataclass import dataclass
@@ -49,6 +49,31 @@ def _nodes(root: MappingNode, above: str) -> Iterator[NodeParameters]:
             yield NodeParameters(path, entry.key.span, without_dots(own))
         if own is None:
             yield from _nodes(entry.value, path)
+
+
+def parameters_with(
+    file: ForeignFile, is_wanted: Callable[[MappingNode], bool]
+) -> tuple[list[NodeParameters], list[NodeParameters]]:
+    """Return the parameters of the nodes that are wanted, and those of the other nodes.
+
+    ROS 1 has no word for the nodes in a file, so those that are wanted may be anywhere below the names of others.
+    """
+    wanted: list[NodeParameters] = []
+    others: list[NodeParameters] = []
+    for node in parameters_of(file):
+        found = list(_wanted(node, is_wanted))
+        wanted += found
+        others += [] if found else [node]
+    return wanted, others
+
+
+def _wanted(node: NodeParameters, is_wanted: Callable[[MappingNode], bool]) -> Iterator[NodeParameters]:
+    if is_wanted(node.root):
+        yield node
+        return
+    for name, entry in node.root.entries.items():
+        if isinstance(entry.value, MappingNode):
+            yield from _wanted(NodeParameters(name, entry.key.span, entry.value), is_wanted)
 
 
 def without_dots(node: MappingNode) -> MappingNode:

@@ -120,6 +120,24 @@ def test_topics_and_locks_in_two_files_are_one_mux_and_two_nodes_are_two(tmp_pat
     assert list(found.data["muxes"]) == ["cmd_vel", "cmd_vel_2"]
 
 
+@pytest.mark.parametrize(
+    ("text", "profile"),
+    [
+        ("twist_mux:\n  topics: [{name: a, topic: b, timeout: 1, priority: 2}]\n", "twist_mux"),
+        ("lab: {mux: {topics: [{name: a, topic: b, timeout: 1, priority: 2}]}}\n", "twist_mux"),
+        ("/lab/mux: {ros__parameters: {topics: {a: {topic: b, timeout: 1, priority: 2}}}}\n", "twist_mux"),
+        ("m: {ros__parameters: {topics.a.topic: b, topics.a.timeout: 1, topics.a.priority: 2}}\n", "twist_mux"),
+        ("cmd_vel_mux: {subscribers: [{name: a, topic: b, timeout: 1, priority: 2}]}\n", "yocs"),
+        ("m: {ros__parameters: {subscribers: {a: {topic: b, timeout: 1, priority: 2}}}}\n", "yocs"),
+    ],
+)
+def test_muxes_are_found_wherever_ros_keeps_them(text: str, profile: str, tmp_path: Path) -> None:
+    found = mux(tmp_path, text)
+    [made] = found.data["muxes"].values()
+    assert made == {"profile": profile, "inputs": {"a": {"topic": "b", "timeout": "1 s", "priority": 2}}}
+    assert [code for code, _ in found.told] == ["RBX2295"]
+
+
 ENTRY = "topics:\n- {name: b, topic: b, timeout: 1, priority: 1}\n"
 WRONG = {
     "a list": ("[1, 2]\n", "RBX2231", 1),
