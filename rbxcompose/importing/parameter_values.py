@@ -6,6 +6,7 @@ from rbxcompose.importing.foreign_files import Given
 from rbxcompose.importing.manifest_text import flag, flow_list, key, number, word
 from rbxcompose.manifest.scalars import number_trouble, plain_value
 from rbxcompose.manifest.tree import ScalarNode, SequenceNode, TreeNode
+from rbxcompose.printable import FORBIDDEN
 from rbxcompose.units import MOST
 
 ParameterData = bool | int | float | str | list[bool | int | float | str]
@@ -26,12 +27,17 @@ def value_of(node: TreeNode) -> Given[ParameterData] | None:
 
 
 def _scalar(node: TreeNode) -> bool | int | float | str | None:
-    if not isinstance(node, ScalarNode) or number_trouble(node):
+    if not isinstance(node, ScalarNode) or is_told(node):
         return None
     value = plain_value(node)
     if isinstance(value, int | float) and not isinstance(value, bool) and not abs(value) < MOST:
         return None
     return value
+
+
+def is_told(node: TreeNode) -> bool:
+    """Return whether a value was refused when the file was read."""
+    return isinstance(node, ScalarNode) and bool(number_trouble(node) or FORBIDDEN.search(node.text))
 
 
 def argument_type(value: ParameterData) -> str:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import PurePath
 
 from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Span
 from rbxcompose.importing.foreign_files import ForeignFile
-from rbxcompose.manifest.tree import Entry, MappingNode
+from rbxcompose.manifest.tree import Entry, MappingNode, TreeNode
 
 ROS_2 = "ros__parameters"
 _DUMPED = "dictitems"  # what Python's classes of maps are written as
@@ -77,29 +77,44 @@ def _wanted(node: NodeParameters, is_wanted: Callable[[MappingNode], bool]) -> I
 
 
 def without_dots(node: MappingNode) -> MappingNode:
-    """Return a map in which `a.b: 1` is `a: {b: 1}`, as ROS 2 takes it; of two equal keys the last one counts."""
-    entries: dict[str, Entry] = {}
+    """Return a map in which `a.b: 1` is `a: {b: 1}`, as ROS 2 takes it.
+
+    A key with dots stays as it is where that place is taken, so that nothing is lost.
+    """
+    whole = MappingNode({}, node.span, node.tag)
+    dotted: list[tuple[str, Entry]] = []
     for name, entry in node.entries.items():
-        first, dot, rest = name.partition(".")
         value = without_dots(entry.value) if isinstance(entry.value, MappingNode) else entry.value
-        if dot and first and rest:
-            value = without_dots(MappingNode({rest: Entry(entry.key, value)}, entry.value.span))
-        known = entries.get(first if dot and first and rest else name)
-        if known is not None and isinstance(known.value, MappingNode) and isinstance(value, MappingNode):
-            value = _joined(known.value, value)
-        entries[first if dot and first and rest else name] = Entry(entry.key, value)
-    return MappingNode(entries, node.span, node.tag)
+        if "." in name and all(name.split(".")):
+            dotted.append((name, Entry(entry.key, value)))
+        else:
+            whole.entries[name] = Entry(entry.key, value)
+    for name, entry in dotted:
+        changed = _put(whole, name.split("."), entry)
+        whole = changed or MappingNode({**whole.entries, name: entry}, whole.span, whole.tag)
+    return whole
 
 
-def _joined(one: MappingNode, other: MappingNode) -> MappingNode:
-    entries = dict(one.entries)
-    for name, entry in other.entries.items():
-        known = entries.get(name)
-        value = entry.value
-        if known is not None and isinstance(known.value, MappingNode) and isinstance(value, MappingNode):
-            value = _joined(known.value, value)
-        entries[name] = Entry(entry.key, value)
-    return MappingNode(entries, one.span, one.tag)
+def _put(node: MappingNode, steps: Sequence[str], entry: Entry) -> MappingNode | None:
+    """Return a map with one more entry some levels below; None if its place is taken."""
+    first, rest = steps[0], steps[1:]
+    known = node.get(first)
+    below: TreeNode | None = known
+    if rest and (known is None or isinstance(known, MappingNode)):
+        below = _put(known or MappingNode({}, entry.value.span), rest, entry)
+    elif known is None:
+        below = entry.value
+    elif isinstance(known, MappingNode) and isinstance(entry.value, MappingNode):
+        whole: MappingNode | None = known
+        for name, one in entry.value.entries.items():
+            whole = None if whole is None else _put(whole, [name], one)
+        below = whole
+    else:
+        below = None
+    if below is None:
+        return None
+    key = node.entries[first].key if first in node.entries else entry.key
+    return MappingNode({**node.entries, first: Entry(key, below)}, node.span, node.tag)
 
 
 def plain_dump(node: MappingNode) -> MappingNode:

@@ -61,6 +61,21 @@ def test_nodes_in_namespaces_and_dots_in_names_are_read_as_ros_does(tmp_path: Pa
     assert "'lab/arm'" in found.text
 
 
+@given(st.permutations(["a: 1", "a.b: 2", "a.b.c: 3", "a.d: {e: 4}"]))
+def test_a_name_that_is_also_the_beginning_of_another_loses_nothing(
+    tmp_path_factory: pytest.TempPathFactory, lines: list[str]
+) -> None:
+    found = params(tmp_path_factory.mktemp("dots"), "".join(f"{line}\n" for line in lines))
+    assert defaults(found) == {"a": 1, "a_b": 2, "a_b_c": 3, "a_d_e": 4}
+    assert found.told == []
+
+
+def test_a_name_that_is_written_in_two_ways_disagrees(tmp_path: Path) -> None:
+    found = params(tmp_path, "a.b: 2\na: {b: 3}\nc: {d: {e: 1}}\nc.d: {f: 2}\n")
+    assert defaults(found) == {"a_b": 3, "c_d_e": 1, "c_d_f": 2}
+    assert found.told == [("RBX2232", 1)]
+
+
 def test_a_node_is_a_component_only_if_all_fits(tmp_path: Path) -> None:
     whole = {
         "max_speed": 0.4,
@@ -89,6 +104,7 @@ WRONG = {
     "lists of maps": ("a: 1\nb: [{c: 1}]\n", "RBX2230", 2),
     "infinite": ("a: 1\nb: .inf\n", "RBX1109", 2),
     "simulated time": ("a: 1\nuse_sim_time: true\n", "RBX2230", 2),
+    "a sign that nobody sees": ('a: 1\nb: "\\e[31m"\n', "RBX1106", 2),
     "empty": ("a: 1\nb:\n", "RBX2230", 2),
 }
 

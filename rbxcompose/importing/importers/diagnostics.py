@@ -50,10 +50,15 @@ def _settings(aggregators: Sequence[ForeignAggregator], report: Report) -> Itera
     other = _agreed([one.other_is_error for one in aggregators if one.other_is_error], "other_as_errors", report)
     if rate:
         yield row(1, f"rate: {quantity(rate.value, 'Hz')}", f"{place(rate.span)}: pub_rate")
-    if base and base.value.strip("/"):
-        yield row(1, f"base: {word(base.value.strip('/'))}", place(base.span))
+    if base and _path(base.value):
+        yield row(1, f"base: {word(_path(base.value))}", place(base.span))
     if other and other.value:
         yield row(1, "other: error", f"{place(other.span)}: other_as_errors")
+
+
+def _path(written: str) -> str:
+    """Return a path with single slashes between its steps and none around them."""
+    return "/".join(step for step in written.split("/") if step.strip())
 
 
 def _agreed(given: Sequence[Given[T]], what: str, report: Report) -> Given[T] | None:
@@ -76,7 +81,7 @@ def _analyzers(analyzers: Sequence[ForeignAnalyzer], depth: int) -> Iterator[Row
 
 def _analyzer(one: ForeignAnalyzer, name: str, depth: int) -> Iterator[Row]:
     yield row(depth, f"type: {one.type}")
-    path = one.path.value.strip("/") if one.path else ""
+    path = _path(one.path.value) if one.path else ""
     if one.path and path != name and one.type in ("generic", "group"):
         yield row(depth, f"path: {word(path)}", place(one.path.span))
     conditions = [_condition(key, each) for key, ones in one.matched.items() for each in ones]

@@ -10,7 +10,7 @@ from rbxcompose.importing.importer import DISAGREES, NOT_CARRIED_OVER, OTHER_PRO
 from rbxcompose.importing.known_components import KnownComponent, known_component
 from rbxcompose.importing.manifest_text import Row, header, place, row, section
 from rbxcompose.importing.names import FreeNames
-from rbxcompose.importing.parameter_values import ParameterData, argument_type, shown_name, value_of, written
+from rbxcompose.importing.parameter_values import ParameterData, argument_type, is_told, shown_name, value_of, written
 from rbxcompose.importing.ros_parameters import NodeParameters, parameters_of, scalars_of
 from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode
@@ -69,10 +69,12 @@ def _add(known: GivenValues, node: NodeParameters, report: Report) -> None:
         if path[0] in _OF_ROS:
             continue
         value = value_of(entry.value)
+        if value is None and is_told(entry.value):
+            continue
         if value is None:
             words = f"{shown} is not carried over: it is neither a value nor a list of values"
             report.add(NOT_CARRIED_OVER.at(entry.value.span, words))
-        elif (other := known.setdefault(path, value)) != value:
+        elif (other := known.setdefault(tuple(".".join(path).split(".")), value)) != value:
             words = f"{shown} was something else before; the first one counts"
             report.add(DISAGREES.at(value.span, words, related=[Related(other.span, "the first one")]))
 
