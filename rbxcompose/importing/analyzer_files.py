@@ -148,6 +148,12 @@ def _analyzer(name: str, told: ForeignMap) -> ForeignAnalyzer | None:
     told.places(*_BELOW, *below)
     told.tell_others()
     one.below = list(_read(below, told.report))
+    if type_ == "ignore":
+        words = (
+            f"{told.what} is not carried over: it matches nothing in ROS either, so its items are in Other"
+        )
+        told.tell(NOT_CARRIED_OVER.at(told.span, words))
+        return None
     why = _why_refused(one)
     if why:
         told.tell(REFUSED.at(told.span, f"{told.what} is left out: {why}"))
@@ -170,8 +176,8 @@ def _type(told: ForeignMap) -> str | None:
 
 def _why_refused(one: ForeignAnalyzer) -> str:
     """Return why the aggregator refuses an analyzer; empty if it does not."""
-    if one.type in ("ignore", "discard"):
-        return "" if one.type == "ignore" or _matches(one) else "it matches nothing"
+    if one.type == "discard":
+        return "" if _matches(one) else "it matches nothing"
     if one.path is None:
         return "it has no path"
     if one.type == "generic" and not _matches(one):

@@ -44,9 +44,15 @@ Good: `level: 3`
 )
 
 _PYTHON = "!!python/"
-_PLAIN_TAGS = re.compile(
-    r"!!(?:python/object(?:/new)?:dynamic_reconfigure\.encoding\.Config"
-    r"|(?:python/)?(?:unicode|str|bytes|int|long|float|bool|none|null|tuple|list|seq|dict|map))"
+_OF_YAML = ("str", "int", "float", "bool", "null", "seq", "map")
+_OF_PYTHON = ("unicode", "str", "bytes", "int", "long", "float", "bool", "none", "tuple", "list", "dict")
+_PLAIN_TAGS = frozenset(
+    {
+        "!!python/object/new:dynamic_reconfigure.encoding.Config",
+        "!!python/object:dynamic_reconfigure.encoding.Config",
+        *(f"!!{one}" for one in _OF_YAML),
+        *(f"{_PYTHON}{one}" for one in _OF_PYTHON),
+    }
 )
 _OCTAL = re.compile(r"[-+]?0[0-9]+")
 _FLAGS = {

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
-import re
-from collections.abc import Iterator, Mapping, MutableMapping
+from collections.abc import Collection, Iterator, Mapping, MutableMapping
 from pathlib import Path
 
 from rbxcompose.findings import Edit, Finding, Fix, Span, kind
@@ -147,7 +146,7 @@ def _decode(data: bytes, file: str) -> tuple[str, list[Finding]]:
         return text, [NOT_UTF8.at(span, message, label=f"byte 0x{data[error.start]:02x}", help="save it as UTF-8")]
 
 
-def read_text(text: str | bytes, file: str, known_tags: re.Pattern[str] | None = None) -> ParsedText:
+def read_text(text: str | bytes, file: str, known_tags: Collection[str] = ()) -> ParsedText:
     """Read the text of one manifest into a located tree; columns count characters from 1.
 
     The tree is None if the text cannot be read to its end; with other findings it holds what could be read.

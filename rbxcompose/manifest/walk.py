@@ -6,7 +6,7 @@ The tree is at most `DEPTH` levels deep, aliases included, so that all later cod
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from itertools import pairwise
 from typing import Any
 
@@ -159,7 +159,7 @@ class Walk:
     `known_tags` are those of files of other programs, which say nothing that the tree does not.
     """
 
-    def __init__(self, text: str, file: str, known_tags: re.Pattern[str] | None = None) -> None:
+    def __init__(self, text: str, file: str, known_tags: Collection[str] = ()) -> None:
         self.text = text
         self.file = file
         lines = enumerate(text.split("\n"), 1) if "#" in text else ()
@@ -248,7 +248,7 @@ class Walk:
         if not written or written == REPLACE or (written == REMOVE and is_alone):
             return written
         short = written.replace("tag:yaml.org,2002:", "!!")
-        if self.known_tags and self.known_tags.fullmatch(short):
+        if short in self.known_tags:
             return ""
         if short == REMOVE:
             message, help_text = "'!remove' takes no value", "remove the value after it"
