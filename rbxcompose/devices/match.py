@@ -23,9 +23,9 @@ def proposed(port: SerialPort, ports: Sequence[SerialPort]) -> Mapping[str, str]
         return {}
     others = [one.device for one in ports if one.device is not None and one != port]
     keys = {"vendor": own.vendor, "product": own.product}
-    if own.serial:
+    if own.serial and own.serial.isprintable():
         keys["serial"] = own.serial
-    if not own.serial or any(one.usb_port != own.usb_port for one in _alike(keys, others)):
+    if "serial" not in keys or any(one.usb_port != own.usb_port for one in _alike(keys, others)):
         keys["usb_port"] = own.usb_port  # without a serial number, the next one of its kind would be meant, too
     if _alike(keys, others) and own.interface is not None:
         keys["interface"] = str(own.interface)

@@ -67,6 +67,22 @@ def test_a_machine_is_scanned_without_any_robot(
     assert found[2]["entry"] == {"vendor": "1a86", "product": "7523", "usb_port": "1-1.2"}
 
 
+def test_the_entries_that_are_written_make_a_robot_that_knows_all(
+    machine: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    MachineTree(machine).plug("ttyUSB9", serial="\x1b[31m", usb_port="1-9")
+    Path("robot.yaml").write_text(ROBOT.partition("devices")[0], encoding="utf-8")
+    run(machine, "scan", 0)
+    entries = capsys.readouterr().out.partition("devices:\n")[2].splitlines()
+    named = "\n".join(one.replace("NAME", f"it_{number}") for number, one in enumerate(entries))
+    Path("robot.yaml").write_text(f"{ROBOT.partition('devices')[0]}devices:\n{named}\n", encoding="utf-8")
+    assert command.main(["check"]) == 0
+    capsys.readouterr()
+    run(machine, "scan --json", 0)
+    found = json.loads(capsys.readouterr().out)
+    assert sorted(name for one in found for name in one["devices"]) == [f"it_{number}" for number in range(8)]
+
+
 def test_rules_are_written_when_they_differ_and_only_then(machine: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run(machine, "install", 2)
     assert not (machine / RULES).exists()

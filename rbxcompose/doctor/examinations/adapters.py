@@ -8,6 +8,7 @@ from rbxcompose.devices.match import names_of
 from rbxcompose.doctor.facts import HostFacts
 from rbxcompose.doctor.registry import examination
 from rbxcompose.findings import Finding, Severity, kind
+from rbxcompose.printable import plain
 from rbxcompose.sections.devices import devices
 
 UNKNOWN = kind(
@@ -32,7 +33,7 @@ def adapters(facts: HostFacts) -> Iterator[str | Finding]:
     for port in facts.ports:
         if port.device is None:
             continue
-        shown = f"{port.path} ({port.device.shown}{f', {port.about}' if port.about else ''})"
+        shown = f"{port.path} ({port.device.shown}{f', {plain(port.about)}' if port.about else ''})"
         if names := names_of(port, named):
             yield f"{shown} is {' and '.join(repr(name) for name in names)}"
         elif named:
