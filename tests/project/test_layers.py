@@ -53,7 +53,7 @@ ABOVE = {
     "bus_types": "actuation",
     "check_runner": "missions.analysis model.doubts model.robot",
     "checks": "actuation body.model check_runner composition diagnostics missions model mux sdk sections",
-    "cli": "actuation body bus compiler composition controller_requests devices diagnostics.requests doctor "
+    "cli": "actuation body bus compiler composition controller_requests devices doctor "
     "executive.requests finding_pages importing inspection lsp.server mission_tests missions model mux.requests params "
     "plan recording rendering replay runtime scaffold schema.documents sdk sections",
     "controller_interface": "control sdk",
@@ -93,7 +93,7 @@ ABOVE = {
     "schema": "controller_interface missions sdk sections",
     "sdk": "diagnostics.updater",
     "sections": "actuation.bus_types actuation.control_tables actuation.servo_models actuation.torques body "
-    "control.calibration control.limits controller_interface devices.usb diagnostics.settings mux.words sdk "
+    "control.calibration control.limits controller_interface devices.usb mux.words sdk "
     "twins.servo_faults",
     "servo_bus_config": "actuation control controller_interface sdk.ports twins.fault_script",
     "servo_bus_line": "actuation servo_bus_config twins",
