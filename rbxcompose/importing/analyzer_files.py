@@ -149,9 +149,7 @@ def _analyzer(name: str, told: ForeignMap) -> ForeignAnalyzer | None:
     told.tell_others()
     one.below = list(_read(below, told.report))
     if type_ == "ignore":
-        words = (
-            f"{told.what} is not carried over: it matches nothing in ROS either, so its items are in Other"
-        )
+        words = f"{told.what} is not carried over: it matches nothing in ROS either, so its items are in Other"
         told.tell(NOT_CARRIED_OVER.at(told.span, words))
         return None
     why = _why_refused(one)
