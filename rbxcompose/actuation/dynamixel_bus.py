@@ -16,10 +16,10 @@ from rbxcompose.actuation.dynamixel_packets import Answer, NoAnswer, packets_by_
 from rbxcompose.actuation.dynamixel_port import BlockingPort
 from rbxcompose.actuation.dynamixel_reads import GroupRead, ServoReader, in_other_order
 from rbxcompose.actuation.groups import FACTORY_DELAY, in_chunks
-from rbxcompose.actuation.port_errors import LostPortError
-from rbxcompose.actuation.serial_ports import latency_of, port_path
 from rbxcompose.actuation.servo_models import ServoModel
 from rbxcompose.actuation.transfers import ReadPlan, Stretch, WritePlan, read_plan, write_plans
+from rbxcompose.devices.port_errors import LostPortError
+from rbxcompose.devices.serial_ports import latency_of, port_path
 
 IDS = range(253)
 _SLACK = 0.001  # [s] beyond the latency timer of an adapter

@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 import serial
 from dynamixel_sdk import PortHandler
 
-from rbxcompose.actuation.port_errors import (
+from rbxcompose.devices.port_errors import (
     BusyPortError,
     ForbiddenPortError,
     LostPortError,

@@ -12,7 +12,6 @@ import platform
 import sys
 import time
 
-from rbxcompose.actuation.serial_ports import latency_timers
 from rbxcompose.cli.bus.entities import add_json_option
 from rbxcompose.cli.bus.guest import Guest, HeardMessage
 from rbxcompose.cli.bus.messages import to_json
@@ -20,6 +19,7 @@ from rbxcompose.cli.bus.place import place_of
 from rbxcompose.cli.output.console import FINDINGS, has_colour, refuse, tell, tell_report
 from rbxcompose.cli.robots.lookup import NotDoneError, add_robot_option, find_robot, robots_up
 from rbxcompose.compiler import compile_robot
+from rbxcompose.devices.serial_ports import latency_timers, serial_ports
 from rbxcompose.doctor import machine
 from rbxcompose.doctor.facts import BusFacts, HostFacts, RunningRobot
 from rbxcompose.doctor.registry import ExaminationResult, examine_all, has_errors
@@ -62,6 +62,7 @@ def run(arguments: argparse.Namespace) -> int:
         processes=machine.processes(),
         base=base_folder(),
         latencies=latency_timers(),
+        ports=serial_ports(),
     )
     answers = examine_all(facts)
     tell(to_json([one.to_data() for one in answers]) if arguments.json else _text(answers))

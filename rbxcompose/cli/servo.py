@@ -9,10 +9,10 @@ import argparse
 from importlib.util import find_spec
 from pathlib import Path
 
-from rbxcompose.actuation.port_errors import PortError
 from rbxcompose.actuation.servo_findings import NOT_INSTALLED
 from rbxcompose.cli.bus.entities import add_json_option, add_timeout_option, count
 from rbxcompose.cli.output.console import refuse
+from rbxcompose.devices.port_errors import PortError
 
 LAST_ID = 252
 USUAL = (57_600, 1_000_000)  # [bit/s], at which servos are sold

@@ -12,7 +12,6 @@ from typing import Any, Literal
 from rbxcompose.actuation.bus_types import bus_type
 from rbxcompose.actuation.joint_drive import JointDrive
 from rbxcompose.actuation.periods import Periods
-from rbxcompose.actuation.port_errors import PortError
 from rbxcompose.actuation.position_drive import PositionDrive
 from rbxcompose.actuation.preparation import prepare, with_torque
 from rbxcompose.actuation.priority import be_prompt
@@ -24,6 +23,7 @@ from rbxcompose.control.joint_states import Enable, Hold, JointMode, MoveTo
 from rbxcompose.controller_interface import controller_type
 from rbxcompose.controller_manager import ControllerManager, ControllerSeat
 from rbxcompose.controller_requests import ControllerState, ListControllers, SwitchControllers
+from rbxcompose.devices.port_errors import PortError
 from rbxcompose.msgs.rbxcompose_msgs import SetSpeed
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.std_srvs import SetBool, Trigger

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from rbxcompose.bus.graph import Graph
 from rbxcompose.dataclass import dataclass
+from rbxcompose.devices.serial_ports import SerialPort
 from rbxcompose.model.robot import Robot
 from rbxcompose.runtime.folder import RobotFolder, RobotState
 from rbxcompose.runtime.processes import Process
@@ -86,7 +87,7 @@ class Version:
 class HostFacts:
     """All facts. `file` is the named robot, which need not be up; `processes` are this user's titled processes.
 
-    `latencies` are the latency timers of USB adapters [s], by the paths of their ports.
+    `latencies` are the latency timers of USB adapters [s], by the paths of their ports; `ports` are plugged in.
     """
 
     running: Sequence[RunningRobot]
@@ -99,6 +100,7 @@ class HostFacts:
     processes: Mapping[Process, str]
     base: Path
     latencies: Mapping[str, float] = field(default_factory=dict)
+    ports: Sequence[SerialPort] = ()
 
     @property
     def robots(self) -> list[Robot]:

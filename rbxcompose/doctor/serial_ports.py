@@ -7,9 +7,10 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from rbxcompose.actuation.port_errors import FORBIDDEN, NO_PORT, UNFIT, PortError, slow_adapter
-from rbxcompose.actuation.serial_ports import SerialPort, UsbDevice, connected, latency_of, port_of
 from rbxcompose.dataclass import dataclass
+from rbxcompose.devices.port_errors import FORBIDDEN, NO_PORT, UNFIT, PortError, slow_adapter
+from rbxcompose.devices.serial_ports import SerialPort, connected, latency_of, port_of
+from rbxcompose.devices.usb import UsbDevice
 from rbxcompose.findings import Finding, Span
 from rbxcompose.model.flow import setting_span
 from rbxcompose.model.robot import Robot

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Generic, TypeVar
 
 from rbxcompose.dataclass import dataclass
-from rbxcompose.findings import Finding, Report, Span
+from rbxcompose.findings import Finding, Report, Severity, Span, kind
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.manifest.limits import KEY
 from rbxcompose.manifest.reader import read_source, read_text
@@ -24,11 +24,36 @@ from rbxcompose.manifest.validate import (
     label_of,
     not_a_choice,
 )
+from rbxcompose.manifest.walk import TAG
 from rbxcompose.printable import FORBIDDEN, plain
 from rbxcompose.units import MOST
 
 T = TypeVar("T")
 
+PYTHON_OBJECT = kind(
+    "RBX2292",
+    """An imported file asks for an object of Python
+
+Tags such as `!!python/object/apply` make a reader of YAML call functions of Python. Nothing is called here: what is
+below the tag is read as plain data. The tags that `dynparam dump` writes around its values are known, and not told.
+
+Bad: `level: !!python/object/apply:eval ["3"]`
+Good: `level: 3`
+""",
+    Severity.WARNING,
+)
+
+_PYTHON = "!!python/"
+_OF_YAML = ("str", "int", "float", "bool", "null", "seq", "map")
+_OF_PYTHON = ("unicode", "str", "bytes", "int", "long", "float", "bool", "none", "tuple", "list", "dict")
+_PLAIN_TAGS = frozenset(
+    {
+        "!!python/object/new:dynamic_reconfigure.encoding.Config",
+        "!!python/object:dynamic_reconfigure.encoding.Config",
+        *(f"!!{one}" for one in _OF_YAML),
+        *(f"{_PYTHON}{one}" for one in _OF_PYTHON),
+    }
+)
 _OCTAL = re.compile(r"[-+]?0[0-9]+")
 _FLAGS = {
     **dict.fromkeys(("yes", "on", "true", "y"), True),
@@ -62,9 +87,17 @@ def _read(path: Path, report: Report, sources: MutableMapping[str, str]) -> Fore
     text, findings = read_source(path, shown, sources, what="an imported file")
     root = None
     if text is not None:
-        root, findings = read_text(text, shown)
-    report.extend(findings)
+        root, findings = read_text(text, shown, _PLAIN_TAGS)
+    report.extend(_without_objects(one, shown) for one in findings)
     return None if root is None else ForeignFile(shown, root)
+
+
+def _without_objects(finding: Finding, shown: str) -> Finding:
+    """Return what to tell of a tag of Python: the object is not made, its parts are read as plain data."""
+    if finding.code != TAG.code or _PYTHON not in finding.message:
+        return finding
+    words = f"'{plain(shown)}' asks for an object of Python here, which is not made"
+    return PYTHON_OBJECT.at(finding.span, words, help="its parts are read as plain data")
 
 
 class ForeignMap:
@@ -143,14 +176,7 @@ class ForeignMap:
         """Yield the maps in a map by their names; `what` is what each of them is."""
         node = self._ask(key)
         if isinstance(node, MappingNode):
-            for name, entry in node.entries.items():
-                if not name or _is_refused(name):
-                    continue
-                if isinstance(entry.value, MappingNode):
-                    yield name, ForeignMap(entry.value, f"{what} '{plain(name, 60)}'", entry.key.span, self.report)
-                else:
-                    message = f"{what} '{plain(name, 60)}' must be a map of keys and values"
-                    self.tell(WRONG_TYPE.at(entry.value.span, message, label=label_of(entry.value)))
+            yield from maps_in(node, what, self.report)
         elif node is not None:
             self._wrong(key, node, "a map of keys and values")
 
@@ -194,6 +220,18 @@ class ForeignMap:
             return
         label = "YAML takes this for an octal number" if _is_octal(node) else label_of(node)
         self.tell(WRONG_TYPE.at(node.span, f"'{key}' of {self.what} must be {what}", label=label))
+
+
+def maps_in(node: MappingNode, what: str, report: Report) -> Iterator[tuple[str, ForeignMap]]:
+    """Yield the maps in a map by their names; `what` is what each of them is."""
+    for name, entry in node.entries.items():
+        if not name or _is_refused(name):
+            continue
+        if isinstance(entry.value, MappingNode):
+            yield name, ForeignMap(entry.value, f"{what} '{plain(name, 60)}'", entry.key.span, report)
+        else:
+            message = f"{what} '{plain(name, 60)}' must be a map of keys and values"
+            report.add(WRONG_TYPE.at(entry.value.span, message, label=label_of(entry.value)))
 
 
 def _is_refused(text: str) -> bool:

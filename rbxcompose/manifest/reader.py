@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
-from collections.abc import Iterator, Mapping, MutableMapping
+from collections.abc import Collection, Iterator, Mapping, MutableMapping
 from pathlib import Path
 
 from rbxcompose.findings import Edit, Finding, Fix, Span, kind
@@ -146,10 +146,11 @@ def _decode(data: bytes, file: str) -> tuple[str, list[Finding]]:
         return text, [NOT_UTF8.at(span, message, label=f"byte 0x{data[error.start]:02x}", help="save it as UTF-8")]
 
 
-def read_text(text: str | bytes, file: str) -> ParsedText:
+def read_text(text: str | bytes, file: str, known_tags: Collection[str] = ()) -> ParsedText:
     """Read the text of one manifest into a located tree; columns count characters from 1.
 
     The tree is None if the text cannot be read to its end; with other findings it holds what could be read.
+    `known_tags` are tags that may be left out; others are findings.
     """
     if isinstance(text, bytes):
         text, findings = _decode(text, file)
@@ -168,7 +169,7 @@ def read_text(text: str | bytes, file: str) -> ParsedText:
         return None, [failure]
     if root is None:
         return None, [NOT_YAML.at(Span(file, 1, 1, 1, 2), "this file is empty")]
-    walk = Walk(text, file)
+    walk = Walk(text, file, known_tags)
     node = walk.node(root)
     return node, [*walk.findings, *passwords(text, node)]
 

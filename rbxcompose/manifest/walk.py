@@ -6,7 +6,7 @@ The tree is at most `DEPTH` levels deep, aliases included, so that all later cod
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from itertools import pairwise
 from typing import Any
 
@@ -154,15 +154,19 @@ def span_of(node: yaml.Node, file: str) -> Span:
 
 
 class Walk:
-    """One walk over a composed document; the findings are in `findings`."""
+    """One walk over a composed document; the findings are in `findings`.
 
-    def __init__(self, text: str, file: str) -> None:
+    `known_tags` are those of files of other programs, which say nothing that the tree does not.
+    """
+
+    def __init__(self, text: str, file: str, known_tags: Collection[str] = ()) -> None:
         self.text = text
         self.file = file
         lines = enumerate(text.split("\n"), 1) if "#" in text else ()
         self.commented = {number: line for number, line in lines if " #" in line}
         self.may_repeat = "&" in text  # without an anchor there are no aliases, so nothing has to be remembered
         self.may_tag = "!" in text
+        self.known_tags = known_tags
         self.findings: list[Finding] = []
         self._done: dict[int, tuple[TreeNode, int, int]] = {}  # by id: the node, how many nodes it has, how deep it is
         self._open: set[int] = set()  # ids of the nodes being walked, from the root to the current one
@@ -244,6 +248,8 @@ class Walk:
         if not written or written == REPLACE or (written == REMOVE and is_alone):
             return written
         short = written.replace("tag:yaml.org,2002:", "!!")
+        if short in self.known_tags:
+            return ""
         if short == REMOVE:
             message, help_text = "'!remove' takes no value", "remove the value after it"
         else:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 from rbxcompose.actuation.bus import FoundServo, ServoReading, ServoStatistics
-from rbxcompose.actuation.port_errors import LostPortError
+from rbxcompose.devices.port_errors import LostPortError
 from rbxcompose.twins.servo_fake import FakeServo
 from rbxcompose.twins.servo_line import FakeLine
 

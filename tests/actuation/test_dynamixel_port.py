@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbxcompose.actuation.dynamixel_port import BlockingPort
-from rbxcompose.actuation.port_errors import (
+from rbxcompose.devices.port_errors import (
     BusyPortError,
     ForbiddenPortError,
     LostPortError,
@@ -22,7 +22,7 @@ from rbxcompose.actuation.port_errors import (
     UnfitPortError,
     slow_adapter,
 )
-from rbxcompose.actuation.serial_ports import latency_of
+from rbxcompose.devices.serial_ports import latency_of
 
 
 class Line:

@@ -8,15 +8,15 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.actuation.dynamixel_bus import DynamixelBus
-from rbxcompose.actuation.port_errors import LostPortError, NoDeviceError, NoPortError
-from rbxcompose.actuation.serial_ports import port_path
 from rbxcompose.actuation.servo_models import servo_models
 from rbxcompose.clock import SteppedClock
+from rbxcompose.devices.port_errors import LostPortError, NoDeviceError, NoPortError
+from rbxcompose.devices.serial_ports import port_path
 from rbxcompose.twins.servo_fake import FakeServo
 from rbxcompose.twins.servo_line import FakeLine
 from rbxcompose.twins.servo_port import FakePort
 from tests.actuation.conftest import Plugged
-from tests.actuation.machine_tree import MachineTree
+from tests.devices.machine_tree import MachineTree
 
 MODELS = {1: servo_models()["AX-12"], 2: servo_models()["XL430-W250"], 3: servo_models()["XL430-W250"]}
 
@@ -51,7 +51,7 @@ def test_a_bus_that_is_named_by_its_device_is_found_under_another_number(
     line = FakeLine([FakeServo("XL430-W250", 2)], clock.now)
     with ExitStack() as stack:
         port = stack.enter_context(FakePort(line, paths[0]))
-        bus = stack.enter_context(DynamixelBus("usb:0403:6014:FT4", {2: MODELS[2]}, timeout=0.2))
+        bus = stack.enter_context(DynamixelBus("dev:arm=usb:0403:6014:FT4", {2: MODELS[2]}, timeout=0.2))
         port.unplug()
         for name in ("sys", "dev"):
             (tmp_path / name).unlink()

@@ -24,7 +24,7 @@ MAY_OPEN = {
     "recording/files.py",
     "regular_files.py",
     "actuation/dynamixel_port.py",
-    "actuation/serial_ports.py",
+    "devices/serial_ports.py",
     "atomic_files.py",
     "runtime/process_group/capture.py",
     "runtime/folder.py",

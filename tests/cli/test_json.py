@@ -33,6 +33,9 @@ MISTAKES = {
     "expand": "nowhere.yaml",
     "explain": "RBX1099",
     "import arbotix": "nowhere.yaml",
+    "import diagnostics": "nowhere.yaml",
+    "import mux": "nowhere.yaml",
+    "import params": "nowhere.yaml",
     "logs": "--robot nobody",
     "mission cancel": "",
     "mission explore": "patrl robots/turtlebot",
@@ -86,6 +89,10 @@ MISTAKES = {
     "topic ls": "",
     "topic pub": "/chatter std_msgs/String",
     "topic show": "/odom",
+    "udev check": "nowhere.yaml",
+    "udev generate": "nowhere.yaml",
+    "udev install": "nowhere.yaml --yes",
+    "udev scan": "nowhere.yaml",
     "why": "components.base robots/turtlebot/robt.yaml",
 }
 

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.actuation.serial_ports import SerialPort
 from rbxcompose.cli.main import main
 from rbxcompose.clock import SteppedClock
+from rbxcompose.devices.serial_ports import SerialPort
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.std_msgs import Float64
 from rbxcompose.qos import Qos

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rbxcompose.actuation.port_errors import LostPortError
+from rbxcompose.devices.port_errors import LostPortError
 from rbxcompose.msgs.builtin_interfaces import Duration
 from rbxcompose.msgs.control_msgs import FollowJointTrajectory
 from rbxcompose.msgs.rbxcompose_msgs import MoveJoints

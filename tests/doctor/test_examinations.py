@@ -13,6 +13,8 @@ import pytest
 from rbxcompose.bus.graph import Graph, GraphEnd, GraphName, WireType
 from rbxcompose.bus.wire import RosQos
 from rbxcompose.compiler import compile_robot
+from rbxcompose.devices.serial_ports import SerialPort
+from rbxcompose.devices.usb import UsbDevice
 from rbxcompose.doctor import machine
 from rbxcompose.doctor.facts import BusFacts, Clocks, HostFacts, Listener, ResourceLimits, RunningRobot, Version
 from rbxcompose.doctor.registry import EXAMINATIONS, PLUGINS, ExaminationResult, examination, examine_all, has_errors
@@ -85,6 +87,23 @@ def test_on_a_machine_that_is_well_nothing_is_wrong() -> None:
     assert not has_errors(answers)
 
 
+def test_adapters_are_told_with_the_devices_that_they_are(tmp_path: Path) -> None:
+    ports = (
+        SerialPort("/dev/ttyS0"),
+        SerialPort("/dev/ttyUSB0", (), UsbDevice("0403", "6014", "FT4"), about="FTDI UM232H"),
+        SerialPort("/dev/ttyUSB1", (), UsbDevice("1a86", "7523", "", "1-1.2")),
+    )
+    shown = [("ok", "/dev/ttyUSB0 (0403:6014 FT4, FTDI UM232H)"), ("ok", "/dev/ttyUSB1 (1a86:7523 at USB port 1-1.2)")]
+    new = "is plugged in; 'rbxcompose udev scan' gives it a name"
+    assert told("adapters", replace(FINE, ports=ports)) == [(level, f"{words} {new}") for level, words in shown]
+    robot = robot_of(tmp_path, "devices: {arm: {vendor: 0403, product: 6014}}\n")
+    assert told("adapters", replace(FINE, file=robot, ports=ports)) == [
+        ("ok", f"{shown[0][1]} is 'arm'"),
+        ("RBX9412", f"{shown[1][1]} is none of the devices: arm"),
+    ]
+    assert told("adapters", FINE) == [("ok", "no USB adapter with a serial port is plugged in")]
+
+
 def test_a_device_that_a_bus_names_is_looked_for(tmp_path: Path) -> None:
     lines = (
         "devices: {adapter: {vendor: 0000, product: 0000, serial: none}}",
@@ -100,7 +119,7 @@ def test_a_device_that_a_bus_names_is_looked_for(tmp_path: Path) -> None:
     )
     robot = robot_of(tmp_path, "\n".join(lines))
     assert told("devices", replace(FINE, file=robot)) == [
-        ("RBX9411", "'servos': the USB device 0000:0000 none is not connected")
+        ("RBX9411", "'servos': the device 'adapter' (0000:0000 none) is not connected")
     ]
 
 

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.actuation.serial_ports import SerialPort, UsbDevice
+from rbxcompose.devices.serial_ports import SerialPort
+from rbxcompose.devices.usb import UsbDevice
 from rbxcompose.doctor.serial_ports import PortFile, look_at, port_findings
 from rbxcompose.testing import check_text
 from tests.checks import strangers
@@ -61,6 +62,8 @@ def test_a_device_that_is_missing_or_there_twice_is_told(tmp_path: Path) -> None
     assert told(tmp_path, "usb:1a86:7523", PortFile()) == [
         ("RBX2252", "the USB device 1a86:7523 has 2 ports", twice),
     ]
+    [(code, words, _)] = told(tmp_path, "dev:lidar=usb:0403:6014:A7", PortFile())
+    assert (code, words) == ("RBX2251", "the device 'lidar' (0403:6014 A7) is not connected")
 
 
 def test_an_adapter_that_holds_replies_back_is_warned_of(tmp_path: Path) -> None:

@@ -15,7 +15,8 @@ from rbxcompose.importing.importer import imported
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.rendering.text import render_text
 
-FILES = Path(__file__).parent / "arbotix"
+EXAMPLES = Path(__file__).parent
+FILES = EXAMPLES / "arbotix"
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,13 +46,13 @@ class Imported:
         return found
 
 
-def import_files(paths: Sequence[Path], name: str = "tried") -> Imported:
+def import_files(paths: Sequence[Path], name: str = "tried", program: str = "arbotix") -> Imported:
     report, sources = Report(), dict[str, str]()
-    return Imported(imported("arbotix", read_files(paths, report, sources), name, report), report, sources)
+    return Imported(imported(program, read_files(paths, report, sources), name, report), report, sources)
 
 
-def import_texts(folder: Path, *texts: str) -> Imported:
+def import_texts(folder: Path, *texts: str, program: str = "arbotix") -> Imported:
     paths = [folder / f"file_{number}.yaml" for number, _ in enumerate(texts, 1)]
     for path, text in zip(paths, texts, strict=True):
         path.write_text(text, encoding="utf-8")
-    return import_files(paths)
+    return import_files(paths, program=program)

@@ -47,13 +47,13 @@ GROUND = {
 # What the others import beside the ground and themselves. A row may be that of a package, a module or what lies deeper.
 ABOVE = {
     "__main__": "cli.main",
-    "actuation": "control",
+    "actuation": "control devices",
     "body": "",
     "bus": "sdk.bound",
     "bus_types": "actuation",
     "check_runner": "missions.analysis model.doubts model.robot",
     "checks": "actuation body.model check_runner composition diagnostics missions model mux sdk sections",
-    "cli": "actuation body bus compiler composition controller_requests diagnostics.requests doctor "
+    "cli": "actuation body bus compiler composition controller_requests devices diagnostics.requests doctor "
     "executive.requests finding_pages importing inspection lsp.server mission_tests missions model mux.requests params "
     "plan recording rendering replay runtime scaffold schema.documents sdk sections",
     "controller_interface": "control sdk",
@@ -61,18 +61,18 @@ ABOVE = {
     "controller_requests": "",
     "controllers": "control controller_interface sdk",
     "compiler": "check_runner composition model plan",
-    "components": "actuation body control controller_interface controller_manager controller_requests diagnostics "
-    "executive missions monitors mux navigation sdk servo_bus_config servo_bus_line servo_report sim "
+    "components": "actuation body control controller_interface controller_manager controller_requests devices "
+    "diagnostics executive missions monitors mux navigation sdk servo_bus_config servo_bus_line servo_report sim "
     "twins.fault_script",
     "servo_report": "actuation control",
     "composition": "body.description diagnostics.settings sections",
     "control": "",
+    "devices": "",
     "diagnostics": "",
-    "doctor": "actuation.port_errors actuation.serial_ports bus.graph composition model.flow model.robot "
-    "runtime.folder runtime.processes sdk sections",
+    "doctor": "devices bus.graph composition model.flow model.robot runtime.folder runtime.processes sdk sections",
     "executive": "missions sdk",
     "finding_pages": "check_runner missions.analysis",
-    "importing": "actuation.servo_models composition.dump scaffold.answers sections",
+    "importing": "actuation.servo_models composition.dump mux.words scaffold.answers sdk.registry sections",
     "inspection": "body.model bus.names bus.wire composition missions model plan schema sdk sections",
     "lsp": "compiler composition missions model.robot schema sections",
     "mission_tests": "compiler components.mission composition executive missions model plan.model sdk sections.faults "
@@ -92,19 +92,19 @@ ABOVE = {
     "scaffold": "actuation.bus_load actuation.servo_models actuation.torques composition missions sdk",
     "schema": "controller_interface missions sdk sections",
     "sdk": "diagnostics.updater",
-    "sections": "actuation.bus_types actuation.control_tables actuation.serial_ports actuation.servo_models "
-    "actuation.torques body control.calibration control.limits controller_interface diagnostics.settings mux.words sdk "
+    "sections": "actuation.bus_types actuation.control_tables actuation.servo_models actuation.torques body "
+    "control.calibration control.limits controller_interface devices.usb diagnostics.settings mux.words sdk "
     "twins.servo_faults",
     "servo_bus_config": "actuation control controller_interface sdk.ports twins.fault_script",
     "servo_bus_line": "actuation servo_bus_config twins",
     "sim": "",
     "skills": "sdk",
-    "twins": "actuation",
+    "twins": "actuation devices.port_errors",
     "testing": "twins bus compiler components missions model.wires mux.config params plan.model recording.message "
     "rendering.text runtime.process_group runtime.records sdk",
 }
 # Pure: no bus, thread or clock.
-CORES = {"body", "control", "diagnostics", "missions", "mux", "navigation", "params", "sim"}
+CORES = {"body", "control", "devices", "diagnostics", "missions", "mux", "navigation", "params", "sim"}
 TABLE = {
     **{name: frozenset(row.split()) for name, row in GROUND.items()},
     **{name: frozenset(row.split()) | GROUND.keys() for name, row in ABOVE.items()},

@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.actuation.dynamixel_bus import DynamixelBus
-from rbxcompose.actuation.port_errors import LostPortError
 from rbxcompose.clock import SteppedClock
+from rbxcompose.devices.port_errors import LostPortError
 from rbxcompose.requests import Refused
 from rbxcompose.twins.fault_script import FaultScript, InjectFault, TwinFault
 from rbxcompose.twins.servo_fake import FakeServo

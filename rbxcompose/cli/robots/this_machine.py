@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from importlib.util import find_spec
 
-from rbxcompose.actuation.serial_ports import serial_ports
 from rbxcompose.cli.output.console import tell_report
 from rbxcompose.compiler import Compilation
+from rbxcompose.devices.serial_ports import serial_ports
 from rbxcompose.doctor.serial_ports import look_at, port_findings
 from rbxcompose.findings import Finding, Report, kind
 from rbxcompose.model.robot import Robot

@@ -8,10 +8,10 @@ import os
 from collections.abc import Sequence
 
 from rbxcompose.actuation.bus import FoundServo
-from rbxcompose.actuation.serial_ports import port_path, serial_ports
 from rbxcompose.cli.output.console import FINDINGS, refuse, tell, tell_report
 from rbxcompose.cli.servos.reach import bus_at, nobody, protocols
 from rbxcompose.cli.servos.survey import Survey, choose, survey
+from rbxcompose.devices.serial_ports import port_path, serial_ports
 from rbxcompose.findings import Report
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.printable import plain

@@ -9,10 +9,10 @@ from contextlib import contextmanager
 
 from rbxcompose.actuation.bus import FoundServo
 from rbxcompose.actuation.dynamixel_bus import DynamixelBus
-from rbxcompose.actuation.port_errors import slow_adapter
 from rbxcompose.actuation.servo_findings import REFUSED, SILENT, UNKNOWN_MODEL
 from rbxcompose.cli.output.console import FINDINGS, refuse, tell, tell_report
 from rbxcompose.cli.robots.lookup import NotDoneError
+from rbxcompose.devices.port_errors import slow_adapter
 from rbxcompose.findings import Report
 from rbxcompose.printable import plain
 

@@ -8,15 +8,16 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from rbxcompose.actuation.port_errors import PortError
-from rbxcompose.actuation.serial_ports import port_path
+from rbxcompose.devices.port_errors import PortError
+from rbxcompose.devices.serial_ports import port_path
 from rbxcompose.doctor.facts import HostFacts
 from rbxcompose.doctor.registry import examination
-from rbxcompose.findings import Finding, kind
+from rbxcompose.findings import Finding, Span, kind
+from rbxcompose.model.flow import setting_span
 from rbxcompose.model.robot import Robot
 from rbxcompose.printable import plain
 
-_PREFIXES = "/dev/", "usb:"
+_PREFIXES = "/dev/", "usb:", "usb@", "dev:"
 
 NO_DEVICE = kind(
     "RBX9411",
@@ -34,9 +35,8 @@ Good: `port: /dev/serial/by-id/...`, and `sudo usermod -aG dialout $USER`
 @examination
 def devices(facts: HostFacts) -> Iterator[str | Finding]:
     """Check that each device exists and may be opened."""
-    named = {device: (robot, component) for robot in facts.robots for component, device in _named(robot)}
-    for device, (robot, component) in sorted(named.items()):
-        place = robot.component_span(component)
+    named = {device: (component, place) for robot in facts.robots for component, device, place in _named(robot)}
+    for device, (component, place) in sorted(named.items()):
         try:
             path, shown = Path(port_path(device)), plain(device)
         except PortError as error:
@@ -57,12 +57,13 @@ def devices(facts: HostFacts) -> Iterator[str | Finding]:
         yield "no component names a device"
 
 
-def _named(robot: Robot) -> Iterator[tuple[str, str]]:
+def _named(robot: Robot) -> Iterator[tuple[str, str, Span]]:
+    """Yield the component, the name of the device and its place."""
     for component in robot.components.values():
         for name in type(component.config).model_fields:
-            yield from (
-                (component.name, text) for text in _texts(getattr(component.config, name)) if text.startswith(_PREFIXES)
-            )
+            for text in _texts(getattr(component.config, name)):
+                if text.startswith(_PREFIXES):
+                    yield component.name, text, setting_span(robot, (component, name))
 
 
 def _texts(value: Any) -> Iterator[str]:

@@ -77,8 +77,9 @@ TWO_USB_DEVICES = kind(
     "RBX2252",
     """More than one USB device is meant
 
-Two adapters of one kind differ only by their serial numbers. Those that have none, and adapters with several ports,
-can be told apart by the socket: `/dev/serial/by-path/...`.
+Two adapters of one kind differ only by their serial numbers. Those that have none, or all the same, are told apart by
+the USB port where they are plugged in (`usb_port`), the ports of one adapter by `interface`. `rbxcompose udev scan`
+shows all of this, and writes the entries.
 
 Bad: `devices: {adapter: {vendor: 0403, product: 6014}}`, with two such adapters connected.
 Good: `devices: {adapter: {vendor: 0403, product: 6014, serial: FT4THV5C}}`

@@ -1,0 +1,1 @@
+"""The subcommands of `udev`, one file each, and what they share."""

@@ -1,0 +1,45 @@
+"""USB adapters that are plugged in."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.devices.match import names_of
+from rbxcompose.doctor.facts import HostFacts
+from rbxcompose.doctor.registry import examination
+from rbxcompose.findings import Finding, Severity, kind
+from rbxcompose.printable import plain
+from rbxcompose.sections.devices import devices
+
+UNKNOWN = kind(
+    "RBX9412",
+    """An adapter is plugged in that the robot does not know
+
+The robot names its devices, but none of them is this adapter. It may be a replacement with another serial number, or
+nothing of the robot's.
+
+Bad: `devices: {arm: {vendor: 0403, product: 6014, serial: FT4THV5C}}`, after the adapter was replaced.
+Good: the serial number of the new one, as `rbxcompose udev scan` shows it.
+""",
+    Severity.WARNING,
+)
+
+
+@examination
+def adapters(facts: HostFacts) -> Iterator[str | Finding]:
+    """Tell which device each adapter is; one that is none is only wrong for a robot that names its devices."""
+    contents = [robot.manifest.contents for robot in facts.robots]
+    named = [device.wanted(name) for one in contents for name, device in one.of(devices).items()]
+    for port in facts.ports:
+        if port.device is None:
+            continue
+        shown = f"{port.path} ({port.device.shown}{f', {plain(port.about)}' if port.about else ''})"
+        if names := names_of(port, named):
+            yield f"{shown} is {' and '.join(repr(name) for name in names)}"
+        elif named:
+            words = f"{shown} is none of the devices: {', '.join(sorted({one.name for one in named}))}"
+            yield UNKNOWN.at(None, words, help="'rbxcompose udev scan' writes an entry for it")
+        else:
+            yield f"{shown} is plugged in; 'rbxcompose udev scan' gives it a name"
+    if not any(port.device for port in facts.ports):
+        yield "no USB adapter with a serial port is plugged in"
