@@ -16,7 +16,7 @@ def expected_component(robot: Robot) -> Iterator[Finding]:
     """An analyzer expects a component that the robot does not have
 
     A component that is expected but never reports is STALE for ever, and so is its group. `expected` takes names, not
-    patterns.
+    patterns. With `profile: ros1` it may also have names that programs of ROS report, which nobody knows here.
 
     Bad:
     ```yaml
@@ -35,6 +35,8 @@ def expected_component(robot: Robot) -> Iterator[Finding]:
           expected: [charger]
     ```
     """
+    if robot.manifest.diagnostics.profile == "ros1":
+        return
     known = {*robot.components, *robot.written, *robot.brought}
     for path, analyzer in each_analyzer(robot.manifest.diagnostics.analyzers):
         for index, expected in enumerate(analyzer.expected):
