@@ -2,7 +2,7 @@
 
 A value is written as in a manifest (`param set battery runtime "30 s"`); a bare number is SI, and so is JSON. `set`
 refuses what `check` would refuse, with the values that all components have now. A change lasts until the process ends;
-write it in the manifest to keep it.
+`save` writes it into the manifest, at its place.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ _KEYS = ("node", "name", "value", "read_only", "about")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    actions = parser.add_subparsers(dest="action", metavar="ls|get|set", required=True)
+    actions = parser.add_subparsers(dest="action", metavar="ls|get|set|save", required=True)
     ls = actions.add_parser("ls", help="list parameters with their values")
     ls.add_argument("component", metavar="COMPONENT", nargs="?", help="only those of this component or node")
     ls.set_defaults(do=_ls)
@@ -51,7 +51,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         one.add_argument("component", metavar="COMPONENT", help="a component or node, such as battery")
         one.add_argument("name", metavar="NAME", help="the parameter, such as runtime")
     set_.add_argument("value", metavar="VALUE", help="as in a manifest: '30 s', 0.5, true, [1, 2]")
-    for one in (ls, get, set_):
+    save = actions.add_parser("save", help="write changed values into the manifest, each at its place")
+    save.add_argument("names", metavar="NAME", nargs="*", help="only these: battery, or battery.runtime")
+    save.add_argument("--dry-run", action="store_true", help="only show what would be written")
+    save.set_defaults(do=_save)
+    for one in (ls, get, set_, save):
         add_timeout_option(one, "5s")
         add_json_option(one)
         add_bus_options(one)
@@ -134,7 +138,13 @@ def _set(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
 def _broken_rules(nodes: ParameterNodes, node: str, parameter: rcl.Parameter, state: RobotState) -> Finding | None:
     from rbxcompose.cli.robots.live_rules import why_not  # it imports the compiler, which only `set` needs
 
-    return why_not(nodes, node, parameter, state)
+    return why_not(nodes, {node: [parameter]}, state)
+
+
+def _save(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
+    from rbxcompose.cli.parameters.manifest_verbs import save  # it imports the compiler
+
+    return save(nodes, arguments)
 
 
 def _value(text: str) -> rcl.ParameterValue:

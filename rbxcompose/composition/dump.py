@@ -18,6 +18,7 @@ from rbxcompose.manifest.registry import sections
 from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.section import ROBOT
 from rbxcompose.manifest.tree import BROKEN, Entry, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode
+from rbxcompose.manifest.unit_choice import rounder_unit
 from rbxcompose.manifest.validate import to_plain
 from rbxcompose.printable import FORBIDDEN, escaped
 from rbxcompose.references import FILE
@@ -116,11 +117,11 @@ def _text(text: str, plain: bool) -> str:
     return escaped(json.dumps(text, ensure_ascii=False))
 
 
-def exact(value: float, dimension: Dimension) -> str:
-    """Return a quantity in its usual unit, with as many digits as its value needs."""
-    usual = format_quantity(value, dimension)
-    units = [unit for unit in UNITS.values() if unit.dimension == dimension]
-    units.sort(key=lambda unit: (not usual.endswith(f" {unit.name}"), unit.name))
+def exact(value: float, dimension: Dimension, unit: str | None = None) -> str:
+    """Return a quantity in a `unit`, else its usual or rounder one, with as many digits as its value needs."""
+    first = rounder_unit(value, dimension, unit)
+    units = [one for one in UNITS.values() if one.dimension == dimension]
+    units.sort(key=lambda one: (one.name != first, one.name))
     texts = [f"{digits} {unit.name}" for unit in units for digits in _digits(unit.from_si(value))] or [repr(value)]
     found = next((text for text in texts if _read(text, dimension) == value), None)
     # Some ratios have no text in percent that is exact to the last bit; a product is.

@@ -19,6 +19,7 @@ from rbxcompose.config import Bound, Config, Dimensioned, is_live
 from rbxcompose.dataclass import dataclass
 from rbxcompose.field_docs import field_docs
 from rbxcompose.findings import suggest
+from rbxcompose.manifest.unit_choice import rounder_unit
 from rbxcompose.msgs.rcl_interfaces import (
     FloatingPointRange,
     IntegerRange,
@@ -126,12 +127,12 @@ def told_dimension(description: str) -> Dimension | None:
 
 
 def shown(value: object, dimension: Dimension | None, unit: str | None = None) -> str:
-    """Return the value of a parameter as a person writes it: with its `unit`, else the usual one of the dimension."""
+    """Return the value of a parameter as a person writes it: in its `unit`, else a usual or rounder one."""
     match value:
         case bool():
             return "true" if value else "false"
         case float() if dimension is not None:
-            return format_quantity(value, dimension, unit)
+            return format_quantity(value, dimension, rounder_unit(value, dimension, unit))
         case int() | float():
             return format_number(value)
         case tuple():

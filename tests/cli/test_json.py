@@ -43,6 +43,7 @@ MISTAKES = {
     "msg show": "std_msgs/Strin",
     "param get": "base max_speed",
     "param ls": "",
+    "param save": "baterry",
     "param set": "base max_speed 1",
     "plan": "nowhere.yaml",
     "ps": "nobody",

@@ -204,7 +204,7 @@ def test_a_bound_beside_the_field_holds_and_is_told() -> None:
 def test_values_are_shown_in_the_unit_that_their_description_tells() -> None:
     known = settings(SAMPLE)
     found = {name: shown(one.value, told_dimension(one.descriptor.description)) for name, one in known.items()}
-    assert found["heading"] == "28.6479 deg"
+    assert found["heading"] == "0.5 rad"
     assert (found["speed"], found["low"], found["count"], found["mode"]) == ("0.3 m/s", "20 %", "3", "calm")
     assert (found["inputs.door.timeout"], found["nothing"], found["turns"]) == ("0.5 s", "-", "[]")
 
