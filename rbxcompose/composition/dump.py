@@ -117,11 +117,11 @@ def _text(text: str, plain: bool) -> str:
     return escaped(json.dumps(text, ensure_ascii=False))
 
 
-def exact(value: float, dimension: Dimension, unit: str | None = None) -> str:
-    """Return a quantity in a `unit`, else its usual or rounder one, with as many digits as its value needs."""
-    first = rounder_unit(value, dimension, unit)
-    units = [one for one in UNITS.values() if one.dimension == dimension]
-    units.sort(key=lambda one: (one.name != first, one.name))
+def exact(value: float, dimension: Dimension) -> str:
+    """Return a quantity in its usual or rounder unit, with as many digits as its value needs."""
+    first = rounder_unit(value, dimension)
+    units = [unit for unit in UNITS.values() if unit.dimension == dimension]
+    units.sort(key=lambda unit: (unit.name != first, unit.name))
     texts = [f"{digits} {unit.name}" for unit in units for digits in _digits(unit.from_si(value))] or [repr(value)]
     found = next((text for text in texts if _read(text, dimension) == value), None)
     # Some ratios have no text in percent that is exact to the last bit; a product is.

@@ -7,24 +7,21 @@ an argument is written where that argument gets its value. One that no file writ
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Iterable
 from dataclasses import replace
 from enum import Enum
 
 from rbxcompose.composition.argument_bounds import argument_of
-from rbxcompose.composition.dump import exact
 from rbxcompose.composition.overlay import SET
 from rbxcompose.composition.robot_manifest import RobotManifest
 from rbxcompose.findings import Edit, Fix, Sources, Span
 from rbxcompose.manifest.library import PARTS, library_root
 from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.tree import KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode, at
-from rbxcompose.manifest.unit_choice import rounder_unit
-from rbxcompose.units import UNITS, Dimension, format_number, needs_unit, written_unit
+from rbxcompose.manifest.unit_choice import is_nearly, rounder_unit
+from rbxcompose.units import UNITS, Dimension, example, format_number, needs_unit, to_si, written_unit
 
 _SECTION_AND_NAME = 2
-_LAST_DIGITS = 1e-12
 _FLOW_SIGNS = frozenset(",[]{}")
 
 
@@ -196,11 +193,10 @@ def _quantity_text(value: float, dimension: Dimension, old: str) -> str:
     unit = written_unit(old)
     if unit is None and old and not needs_unit(dimension):
         return value_text(value, None)
-    text = exact(value, dimension, unit)
-    if not text.startswith("$"):
-        return text
-    ours = UNITS[rounder_unit(value, dimension, unit) or ""]  # some ratios have no text that is exact to the last bit
-    return f"{ours.from_si(value):.15g} {ours.name}"
+    ours = UNITS[rounder_unit(value, dimension, unit) or example(dimension).split()[1]]
+    number = ours.from_si(value)
+    texts = (f"{digits} {ours.name}" for digits in (format_number(number), f"{number:.15g}"))
+    return next(text for text in texts if is_nearly(to_si(text, dimension), value))
 
 
 def is_same(one: object, other: object) -> bool:
@@ -208,7 +204,7 @@ def is_same(one: object, other: object) -> bool:
     if isinstance(one, tuple | list) and isinstance(other, tuple | list):
         return len(one) == len(other) and all(map(is_same, one, other))
     if isinstance(one, float) and isinstance(other, float):
-        return math.isclose(one, other, rel_tol=_LAST_DIGITS)
+        return is_nearly(one, other)
     return one == other
 
 

@@ -6,6 +6,7 @@ Numbers are SI. A client may also send text with a unit (`30 s`), as in a manife
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
@@ -19,7 +20,7 @@ from rbxcompose.config import Bound, Config, Dimensioned, is_live
 from rbxcompose.dataclass import dataclass
 from rbxcompose.field_docs import field_docs
 from rbxcompose.findings import suggest
-from rbxcompose.manifest.unit_choice import rounder_unit
+from rbxcompose.manifest.unit_choice import is_nearly, rounder_unit
 from rbxcompose.msgs.rcl_interfaces import (
     FloatingPointRange,
     IntegerRange,
@@ -200,6 +201,7 @@ def changed(config: Config, parameters: Sequence[Parameter], bounds: SettingBoun
         UnsettableError: if one of them is unknown, is read-only or refuses the value, or if they do not fit together.
     """
     known = settings(config)
+    _require_single(parameters)
     wanted = {one.name: _wanted(known, one) for one in parameters}
     fields = type(config).model_fields
     data: dict[str, object] = {}
@@ -212,7 +214,19 @@ def changed(config: Config, parameters: Sequence[Parameter], bounds: SettingBoun
         raise UnsettableError(_reason(error.errors(include_url=False)[0])) from error
     for name in wanted:
         _require_within(name, getattr(new, name), dimension_of(fields[name]), bounds.get(name, ()))
-    return new
+    same = {name: old for name in wanted if _is_same(old := getattr(config, name), getattr(new, name))}
+    return new.model_copy(update=same)
+
+
+def _is_same(old: object, new: object) -> bool:
+    """Return whether a number is what it was, but for the last digits of a conversion: `3 deg`, for example."""
+    return isinstance(old, float) and isinstance(new, float) and is_nearly(old, new)
+
+
+def _require_single(parameters: Sequence[Parameter]) -> None:
+    names = Counter(one.name for one in parameters)
+    if twice := next((name for name, times in names.items() if times > 1), None):
+        raise UnsettableError(f"'{twice}' is set twice")
 
 
 def _require_within(name: str, value: object, dimension: Dimension | None, bounds: Iterable[Bound]) -> None:
@@ -234,6 +248,10 @@ def _wanted(known: Mapping[str, ParameterField], parameter: Parameter) -> object
     value = from_message(parameter.value)
     if value is None:
         raise UnsettableError(f"'{parameter.name}' needs a value")
+    if any(
+        isinstance(one, float) and not math.isfinite(one) for one in (value if isinstance(value, tuple) else [value])
+    ):
+        raise UnsettableError(f"'{parameter.name}' must be a finite number")
     return value
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,6 +15,8 @@ from rbxcompose.dataclass import dataclass
 from rbxcompose.edits import apply
 from rbxcompose.findings import Finding, Fix, Related, kind
 from rbxcompose.manifest.limits import FILE_BYTES
+from rbxcompose.msgs.rbxcompose_parameters import ParameterChange
+from rbxcompose.params.values import from_message
 from rbxcompose.plan.diff import Difference, difference
 from rbxcompose.plan.dump import dump
 from rbxcompose.plan.model import Plan
@@ -98,28 +100,36 @@ def write(texts: NewTexts) -> None:
         done.append(path)
 
 
-def require_unedited(live: LiveSettings, changes: Iterable[LiveChange], folder: RobotFolder) -> None:
-    """Refuse to save values whose places in the files say something else than the robot came up with.
+def require_unedited(
+    live: LiveSettings, changes: Iterable[LiveChange], folder: RobotFolder, history: Sequence[ParameterChange]
+) -> None:
+    """Refuse to save values whose places in the files say something that the robot has never had.
 
     Raises:
         NotDoneError: if there is one.
     """
     edited = _keys_changed(live.plan, folder)
     for change in changes:
-        if change.path in edited:
+        if change.path in edited and not any(is_same(one, change.written) for one in _values(history, change.path)):
             span = live.robot.value(*live.robot.components[change.component].place(change.name))
             was, now = edited[change.path]
             message = f"'{change.path}' is {now} in the file now; the robot came up with {was}"
             raise NotDoneError(CHANGED_SINCE.at(span, message, help="'rbxcompose param reset' takes over the file"))
 
 
-def changed_since_up(live: LiveSettings, folder: RobotFolder) -> list[LiveChange]:
+def changed_since_up(live: LiveSettings, folder: RobotFolder, history: Sequence[ParameterChange]) -> list[LiveChange]:
     """Return what is not as in the files because somebody has set it, not because a file was edited."""
     found = list(live.changes)
     if not found:
         return []
-    kept = _keys_changed(live.plan_with(live.now), folder)
+    kept = _keys_changed(live.plan_with(live.now), folder).keys() | {f"{one.component}.{one.name}" for one in history}
     return [one for one in found if one.path in kept]
+
+
+def _values(history: Iterable[ParameterChange], path: str) -> Iterator[object]:
+    for one in history:
+        if f"{one.component}.{one.name}" == path:
+            yield from (from_message(one.before), from_message(one.after))
 
 
 def _keys_changed(plan: Plan, folder: RobotFolder) -> dict[str, tuple[str, str]]:

@@ -58,6 +58,10 @@ class LiveSettings:
                 if not is_same(old, new):
                     yield LiveChange(name, one, old, new, dimension_of(field))
 
+    def node(self, component: str) -> str:
+        """Return the name of a component on the bus: `/left/battery`."""
+        return resolve(component, self.robot.manifest.bus.namespace or "")
+
     def plan_with(self, configs: Mapping[str, Config]) -> Plan:
         """Return the plan of the manifest, with other configurations of some components."""
         instances = (replace(one, config=configs.get(one.name, one.config)) for one in self.plan.instances)
