@@ -9,6 +9,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from enum import Enum
 from types import MappingProxyType
 from typing import Any, Literal, get_args, get_origin
 
@@ -98,22 +99,40 @@ class ParameterField:
                 if limit is not None:
                     yield key, limit
 
+    @property
+    def _step(self) -> float:
+        return next((step for mark in self._marks if (step := getattr(mark, "multiple_of", None)) is not None), 0)
+
     def _ranges(self) -> tuple[tuple[FloatingPointRange, ...], tuple[IntegerRange, ...]]:
-        low = [bound for key, bound in self._bounds() if key in ("gt", "ge")]
-        high = [bound for key, bound in self._bounds() if key in ("lt", "le")]
-        if not low and not high:
+        """Return the ranges that the wire has; they have no bounds that are not part of them."""
+        low = [(bound, key) for key, bound in self._bounds() if key in ("gt", "ge")]
+        high = [(bound, key) for key, bound in self._bounds() if key in ("lt", "le")]
+        if isinstance(self.value, bool) or not (low or high or self._step):
             return (), ()
         if isinstance(self.value, int):
-            least, most = int(max(low, default=LOWEST)), int(min(high, default=HIGHEST))
-            return (), (IntegerRange(from_value=least, to_value=most),)
-        lowest, highest = max(low, default=-math.inf), min(high, default=math.inf)
-        return (FloatingPointRange(from_value=lowest, to_value=highest),), ()
+            lows = (math.floor(bound) + 1 if key == "gt" else math.ceil(bound) for bound, key in low)
+            highs = (math.ceil(bound) - 1 if key == "lt" else math.floor(bound) for bound, key in high)
+            least, most = max(lows, default=LOWEST), min(highs, default=HIGHEST)
+            return (), (IntegerRange(from_value=least, to_value=most, step=int(self._step)),)
+        up = (math.nextafter(bound, math.inf) if key == "gt" else bound for bound, key in low)
+        down = (math.nextafter(bound, -math.inf) if key == "lt" else bound for bound, key in high)
+        lowest, highest = max(up, default=-math.inf), min(down, default=math.inf)
+        return (FloatingPointRange(from_value=lowest, to_value=highest, step=float(self._step)),), ()
 
     def _constraints(self) -> str:
         words = [f"{_BOUNDS[key]} {self._shown(bound)}" for key, bound in self._bounds()]
-        if self.field is not None and get_origin(self.field.annotation) is Literal:
-            words.append(f"one of {', '.join(map(str, get_args(self.field.annotation)))}")
+        words += [f"in steps of {self._shown(self._step)}"] if self._step else []
+        if choices := self.choices:
+            words.append(f"one of {', '.join(choices)}")
         return ", ".join(words)
+
+    @property
+    def choices(self) -> Sequence[str]:
+        """Return the words that it may be; none if it is not a choice."""
+        hint = self.field.annotation if self.field else None
+        if get_origin(hint) is Literal:
+            return [str(one) for one in get_args(hint)]
+        return [str(one.value) for one in hint] if isinstance(hint, type) and issubclass(hint, Enum) else []
 
     def _shown(self, bound: float) -> str:
         return format_quantity(bound, self.dimension) if self.dimension else f"{bound:g}"
@@ -207,7 +226,7 @@ def changed(config: Config, parameters: Sequence[Parameter], bounds: SettingBoun
     data: dict[str, object] = {}
     for name, field in fields.items():
         value = _with_unit(wanted.get(name, getattr(config, name)), dimension_of(field))
-        data[field.alias or name] = value
+        data[field.alias or name] = _as_choice(value, field)
     try:
         new = type(config).model_validate(data, strict=True)
     except ValidationError as error:
@@ -252,6 +271,14 @@ def _wanted(known: Mapping[str, ParameterField], parameter: Parameter) -> object
         isinstance(one, float) and not math.isfinite(one) for one in (value if isinstance(value, tuple) else [value])
     ):
         raise UnsettableError(f"'{parameter.name}' must be a finite number")
+    return value
+
+
+def _as_choice(value: object, field: FieldInfo) -> object:
+    """Return a word as the member of an enumeration, which a strict field requires; any other value stays."""
+    hint = field.annotation
+    if isinstance(value, str) and isinstance(hint, type) and issubclass(hint, Enum):
+        return next((one for one in hint if one.value == value), value)
     return value
 
 
