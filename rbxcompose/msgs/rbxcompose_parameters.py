@@ -46,7 +46,7 @@ class ChangeParameters(Service["ChangeParameters.Request", "ChangeParameters.Res
     """Set parameters if others still have the values that the caller knows; ask for the changes so far."""
 
     TYPE: ClassVar[str] = "rbxcompose_parameters/srv/ChangeParameters"
-    HASH: ClassVar[str] = "RIHS01_2ad829f6ddd2dab35fc4ccae163938d6bdcec4701fba396690d0d31d0689171c"
+    HASH: ClassVar[str] = "RIHS01_97ee3fe09d52af993ec59f8b00ea74070d1ab2724557670f6e6bab46709dd7cf"
 
     @dataclass(frozen=True, slots=True)
     class Request(Message):
@@ -77,13 +77,13 @@ class ChangeParameters(Service["ChangeParameters.Request", "ChangeParameters.Res
         """Response of `ChangeParameters`."""
 
         TYPE: ClassVar[str] = "rbxcompose_parameters/srv/ChangeParameters_Response"
-        HASH: ClassVar[str] = "RIHS01_9e18438dbbda8b68b235aac0e29f9b07033d6bc0092c4828855a98b22b8a7750"
+        HASH: ClassVar[str] = "RIHS01_621d8752486793ea9b4987ad8acc25e81d577c0495d2e72d99ddcc871093a098"
         FIELDS: ClassVar[Fields] = {
-            "successful": "bool",
-            "reason": "string",
+            "success": "bool",
+            "message": "string",
             "changes": "rbxcompose_parameters/msg/ParameterChange[]",
         }
 
-        successful: bool = False
-        reason: str = ""  # why nothing was changed
+        success: bool = False
+        message: str = ""  # why nothing was changed
         changes: tuple[ParameterChange, ...] = ()  # oldest first

@@ -226,7 +226,7 @@ def changed(config: Config, parameters: Sequence[Parameter], bounds: SettingBoun
     data: dict[str, object] = {}
     for name, field in fields.items():
         value = _with_unit(wanted.get(name, getattr(config, name)), dimension_of(field))
-        data[field.alias or name] = _as_choice(value, field)
+        data[field.alias or name] = _as_choice(name, value, field)
     try:
         new = type(config).model_validate(data, strict=True)
     except ValidationError as error:
@@ -265,6 +265,8 @@ def _wanted(known: Mapping[str, ParameterField], parameter: Parameter) -> object
     if not setting.is_live:
         raise UnsettableError(f"'{parameter.name}' cannot change while the robot runs")
     value = from_message(parameter.value)
+    if type(setting.value) is int and isinstance(value, float) and value.is_integer():
+        value = int(value)  # a client that has only one kind of numbers
     if value is None:
         raise UnsettableError(f"'{parameter.name}' needs a value")
     if any(
@@ -274,12 +276,14 @@ def _wanted(known: Mapping[str, ParameterField], parameter: Parameter) -> object
     return value
 
 
-def _as_choice(value: object, field: FieldInfo) -> object:
+def _as_choice(name: str, value: object, field: FieldInfo) -> object:
     """Return a word as the member of an enumeration, which a strict field requires; any other value stays."""
     hint = field.annotation
-    if isinstance(value, str) and isinstance(hint, type) and issubclass(hint, Enum):
-        return next((one for one in hint if one.value == value), value)
-    return value
+    if isinstance(value, Enum) or not (isinstance(hint, type) and issubclass(hint, Enum)):
+        return value
+    if (member := next((one for one in hint if one.value == value), None)) is None:
+        raise UnsettableError(f"'{name}' must be one of {', '.join(str(one.value) for one in hint)}")
+    return member
 
 
 def _with_unit(value: object, dimension: Dimension | None) -> object:

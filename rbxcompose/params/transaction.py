@@ -65,7 +65,7 @@ class Transaction:
 
     def take(self, node: str, response: ChangeParameters.Response | None, error: str = "") -> None:
         """Take the answer of a node; None if there was an error in its place."""
-        reason = error if response is None else "" if response.successful else response.reason or "it gave no reason"
+        reason = error if response is None else "" if response.success else response.message or "it gave no reason"
         match self._phase:
             case _Phase.CHECKING:
                 self._waiting.remove(node)

@@ -251,7 +251,7 @@ def test_the_wire_has_steps_and_no_bound_that_a_value_may_not_have() -> None:
         ("power", 0.3, "'power' must be a multiple of 0.25"),
         ("power", 1.0, "'power' must be less than 1"),
         ("blinks", 3, "'blinks' must be a multiple of 2"),
-        ("shade", "green", "'shade' must be 'warm' or 'cold'"),
+        ("shade", "green", "'shade' must be one of warm, cold"),
     ],
 )
 def test_steps_and_choices_are_enforced(name: str, value: object, reason: str) -> None:

@@ -23,12 +23,12 @@ class Store:
     def ask(self, node: str, request: ChangeParameters.Request) -> ChangeParameters.Response:
         (wanted,) = request.parameters
         if any(one.value.integer_value != self.values[node] for one in request.expected):
-            return ChangeParameters.Response(reason="it was changed meanwhile")
+            return ChangeParameters.Response(message="it was changed meanwhile")
         if wanted.value.integer_value < 0 or (wanted.value.integer_value == TOO_MUCH and not request.only_check):
-            return ChangeParameters.Response(reason="no")
+            return ChangeParameters.Response(message="no")
         if not request.only_check:
             self.values[node] = wanted.value.integer_value
-        return ChangeParameters.Response(successful=True)
+        return ChangeParameters.Response(success=True)
 
 
 def transaction(store: Store, wanted: dict[str, int], by: str = "x") -> Transaction:

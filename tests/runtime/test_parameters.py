@@ -143,12 +143,12 @@ def change(bench: Bench, expected: float, wanted: float, **fields: Any) -> Chang
 
 
 def test_a_change_knows_what_was_there_and_who_asked(bench: Bench) -> None:
-    assert change(bench, 1.0, 2.0, by="somebody", only_check=True).successful
+    assert change(bench, 1.0, 2.0, by="somebody", only_check=True).success
     assert bench.component("toy").config.size == 1.0
-    assert change(bench, 1.0, 2.0, by="somebody", together="abc").successful
+    assert change(bench, 1.0, 2.0, by="somebody", together="abc").success
     assert set_each(bench, size=3.0) == [(True, "")]
     late = change(bench, 2.0, 4.0, tell_changes=True)
-    assert (late.successful, late.reason) == (False, "'size' was changed meanwhile by a ROS 2 tool (toy:2)")
+    assert (late.success, late.message) == (False, "'size' was changed meanwhile by a ROS 2 tool (toy:2)")
     told = [(one.number, one.before.double_value, one.after.double_value, one.by) for one in late.changes]
     assert told == [(1, 1.0, 2.0, "somebody"), (2, 2.0, 3.0, "a ROS 2 tool")]
     assert "toy: set: size = 2.0, by somebody" in bench.texts()

@@ -125,11 +125,11 @@ def _ask(nodes: ParameterNodes, node: str, request: ChangeParameters.Request) ->
     if nodes.serves(node, CHANGE):
         return nodes.ask([node], CHANGE, ChangeParameters, [request])[0]
     if request.only_check:
-        return ChangeParameters.Response(successful=True)
+        return ChangeParameters.Response(success=True)
     atomically = SetParametersAtomically.Request(parameters=request.parameters)
     (answer,) = nodes.ask([node], "set_parameters_atomically", SetParametersAtomically, [atomically])
     result: SetParametersResult = answer.result
-    return ChangeParameters.Response(successful=result.successful, reason=result.reason)
+    return ChangeParameters.Response(success=result.successful, message=result.reason)
 
 
 def _refusal(transaction: Transaction) -> Finding:

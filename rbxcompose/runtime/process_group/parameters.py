@@ -113,8 +113,8 @@ class _Served:
             if not request.only_check:
                 self.follow(new, ChangeCause(request.by or BY_A_TOOL.by, request.together, request.undoes))
         except (core.UnsettableError, Refused) as refusal:
-            return ChangeParameters.Response(successful=False, reason=str(refusal), changes=changes)
-        return ChangeParameters.Response(successful=True, changes=changes)
+            return ChangeParameters.Response(success=False, message=str(refusal), changes=changes)
+        return ChangeParameters.Response(success=True, changes=changes)
 
     def _require_known(self, expected: Sequence[rcl.Parameter]) -> None:
         now = self._settings
