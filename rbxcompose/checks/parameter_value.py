@@ -26,12 +26,12 @@ def parameter_value(robot: Robot) -> Iterator[Finding]:
     of the argument from which the manifest takes it.
 
     Bad:
-    ```yaml mission
+    ```yaml
     do:
       set_parameter: {component: battery, parameter: warn, value: 120 %}
     ```
     Good:
-    ```yaml mission
+    ```yaml
     do:
       set_parameter: {component: battery, parameter: warn, value: 60 %}
     ```

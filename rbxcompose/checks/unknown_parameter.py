@@ -20,12 +20,12 @@ def unknown_parameter(robot: Robot) -> Iterator[Finding]:
     may change while the robot runs, and so does the reference of components.
 
     Bad:
-    ```yaml mission
+    ```yaml
     do:
       set_parameter: {component: battery, parameter: runtme, value: 30 s}
     ```
     Good:
-    ```yaml mission
+    ```yaml
     do:
       set_parameter: {component: battery, parameter: runtime, value: 30 s}
     ```

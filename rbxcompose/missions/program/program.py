@@ -63,7 +63,7 @@ class RobotNames:
 
     `events` are the values whose messages are events; `settings` are those of components that may change, by component;
     `topics` and `services` have the ROS names of their types; `unread` are missions whose files could not be read;
-    `removed` are places that a layer has removed, each with where it did so. It is not complete if a part of the robot has errors: a missing skill may then belong to that part.
+    `removed` are places that a layer has removed, each with where. It is not complete if a part has errors.
     """
 
     values: Mapping[str, Type] = field(default_factory=dict)
