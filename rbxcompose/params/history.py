@@ -80,7 +80,12 @@ def to_undo(changes: Iterable[ParameterChange], wanted: str = "") -> list[Parame
     """
     known = in_order(changes)
     undone = {(one.component, one.undoes) for one in known if one.undoes}
-    open_ones = [one for one in known if not one.undoes and (one.component, one.number) not in undone]
+    gone = {one.together for one in known if one.together and (one.component, one.number) in undone}
+    open_ones = [
+        one
+        for one in known
+        if not one.undoes and (one.component, one.number) not in undone and one.together not in gone
+    ]
     if wanted:
         chosen = next((one for one in known if identity(one) == wanted), None)
         if chosen is None:

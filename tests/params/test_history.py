@@ -33,9 +33,10 @@ class Robot:
     def undo(self, wanted: str = "") -> list[str]:
         """Take back a change; return what was taken back."""
         found = to_undo([one for each in self.histories.values() for one in each.changes], wanted)
-        for one in found:
-            cause = ChangeCause("me", "", one.number)
-            self.set(cause, **{f"{one.component}_{one.name}": one.before.integer_value})
+        for component in {one.component for one in found}:  # a component is sent one request for all of its changes
+            own = [one for one in found if one.component == component]
+            cause = ChangeCause("me", "", own[0].number)
+            self.set(cause, **{f"{component}_{one.name}": one.before.integer_value for one in own})
         return [identity(one) for one in found]
 
 
@@ -59,6 +60,8 @@ def test_what_was_set_together_is_taken_back_together() -> None:
     robot.set(ChangeCause("me", "abc"), base_speed=1, battery_runtime=2, battery_warn=3)
     assert sorted(robot.undo()) == ["base:1", "battery:1", "battery:2"]
     assert set(robot.values.values()) == {0}
+    with pytest.raises(NothingToUndoError, match="there is no change to take back"):
+        robot.undo()
 
 
 def test_an_earlier_change_is_taken_back_if_nothing_came_after_it() -> None:

@@ -43,6 +43,7 @@ Good: `rbxcompose param diff` shows what is set now; `param set` and `param undo
 """,
 )
 CHANGE = "change_parameters"
+_PATIENCE = 30.0  # [s] in which those before us are done: each of them compiles the robot
 _PAUSE = 0.01  # [s] between two looks whether somebody else is done
 
 Wanted = Mapping[str, Sequence[Parameter]]  # by node
@@ -62,7 +63,7 @@ def change(
     """
     folder = None if arguments.router else find_robot(arguments.robot)
     state = known_state(folder) if folder else None
-    with _turn_at(folder, arguments.timeout):
+    with _turn_at(folder):
         known = known_values(nodes, wanted)
         if state is None:
             sys.stderr.write("the rules of the robot are not checked: its files are not known on this bus\n")
@@ -159,7 +160,7 @@ def _user() -> str:
 
 
 @contextmanager
-def _turn_at(folder: RobotFolder | None, timeout: float) -> Iterator[None]:
+def _turn_at(folder: RobotFolder | None) -> Iterator[None]:
     """Wait until nobody else on this machine changes parameters of the robot, so that rules across components hold.
 
     The kernel ends the turn of a process that is dead.
@@ -169,7 +170,7 @@ def _turn_at(folder: RobotFolder | None, timeout: float) -> Iterator[None]:
         return
     descriptor = os.open(folder.path, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     try:
-        deadline = time.monotonic() + timeout
+        deadline = time.monotonic() + _PATIENCE
         while not _is_locked(descriptor):
             if time.monotonic() > deadline:
                 raise NotDoneError(NOBODY.at(None, f"somebody else is changing parameters of '{folder.path.name}'"))
