@@ -14,6 +14,7 @@ from rbxcompose.field_docs import field_docs
 from rbxcompose.manifest.fields import DottedName, InterfaceName
 from rbxcompose.manifest.options import RestartModel
 from rbxcompose.manifest.registry import naming
+from rbxcompose.manifest.unit_choice import rounder_unit
 from rbxcompose.references import ANYTHING, FILE, PORT, TOPIC, Refers
 from rbxcompose.restarts import Restart
 from rbxcompose.units import Dimension, format_number, format_quantity
@@ -140,5 +141,5 @@ def default_of(field: FieldInfo, dimension: Dimension | None) -> str:
 
 def _shown(value: object, dimension: Dimension | None) -> str:
     if dimension and isinstance(value, int | float):
-        return format_quantity(value, dimension)
+        return format_quantity(value, dimension, rounder_unit(value, dimension))
     return format_number(value) if isinstance(value, int | float) and not isinstance(value, bool) else str(value)

@@ -32,6 +32,7 @@ from rbxcompose.executive.requests import (
 from rbxcompose.executive.shell import ENDS, PUBLISHES, VALUE, port_name
 from rbxcompose.executive.topic_skills import Desks
 from rbxcompose.executive.world import RobotWorld
+from rbxcompose.expressions.types import Type
 from rbxcompose.missions.analysis.uses import Using
 from rbxcompose.missions.engine.condition_watches import POSE
 from rbxcompose.missions.engine.events import MissionEnded, MissionEvent
@@ -59,7 +60,6 @@ from rbxcompose.sdk import (
 LOOK_AGAIN = 0.1  # [s] between two checks for a pose that has not arrived yet
 NO_INPUTS: Mapping[str, str] = {}
 
-
 T = TypeVar("T")
 Made = Annotated[InstanceOf[T], WithJsonSchema({"type": "object"})]  # made by the compiler, never by people
 
@@ -83,6 +83,8 @@ class MissionConfig(Config):
     """The topics on which missions publish."""
     services: dict[str, str] = {}
     """The services that missions call, with their ROS types."""
+    settings: dict[str, dict[str, Made[Type]]] = {}
+    """The types of settings that missions change."""
 
     @property
     def reads(self) -> frozenset[str]:
@@ -106,6 +108,7 @@ class MissionConfig(Config):
             {name: program for name, program in self.programs.items() if name not in broken},
             {name: topic.message for name, topic in self.topics.items()},
             self.services,
+            self.settings,
             events=events_of(self.values),
         )
 
@@ -158,8 +161,7 @@ class Mission(Component[MissionConfig]):
 
     def start(self) -> None:
         """Run the start mission, as soon as every value that it reads has arrived."""
-        name = self.config.start
-        if name is None:
+        if (name := self.config.start) is None:
             self.show(Level.OK, "no mission to start")
             return
         try:
@@ -366,8 +368,8 @@ class Mission(Component[MissionConfig]):
 
     def story(self, mission: str, level: Level, text: str) -> None:
         """Log a line of a mission's story, with its name if several run."""
-        several = len(self.missions.names) > 1
-        self.context.log(level, f"{mission}: {text}" if several and not text.startswith("mission ") else text)
+        is_named = len(self.missions.names) > 1 and not text.startswith("mission ")
+        self.context.log(level, f"{mission}: {text}" if is_named else text)
 
     def publish(self, record: LogRecord) -> None:
         """Publish a record of the log, unless it only records an input."""
@@ -393,8 +395,6 @@ class Mission(Component[MissionConfig]):
     def summary(self) -> dict[str, str]:
         """Return the states of the missions and what they did."""
         runs = list(self.missions.runs.values())
-        if not runs:
-            return {}
         told = "; ".join(f"{one.name}: {one.end.result if one.end else one.state}" for one in runs)
         skills = "; ".join(text for one in runs if (text := one.story.skills()))
-        return {"mission": told, **({"skills": skills} if skills else {})}
+        return {name: text for name, text in (("mission", told), ("skills", skills)) if text}

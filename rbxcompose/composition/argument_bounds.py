@@ -15,8 +15,14 @@ ScopedBounds = Mapping[str, Mapping[str, tuple[Bound, ...]]]
 
 def bounds_of(written: TreeNode | None, bounds: ScopedBounds) -> tuple[Bound, ...]:
     """Return what bounds a value as written: that of the argument which it names, if it is nothing else."""
-    found = _ARGUMENT.fullmatch(written.text) if isinstance(written, ScalarNode) else None
-    return bounds.get(written.scope, {}).get(found[1], ()) if found and isinstance(written, ScalarNode) else ()
+    found = argument_of(written) if isinstance(written, ScalarNode) else None
+    return bounds.get(written.scope, {}).get(found, ()) if found and isinstance(written, ScalarNode) else ()
+
+
+def argument_of(written: ScalarNode) -> str | None:
+    """Return the argument that a value is taken from, if it is nothing else: `speed` of `${args.speed}`."""
+    found = _ARGUMENT.fullmatch(written.text)
+    return found[1] if found else None
 
 
 def own_bounds(name: str, argument: DeclaredArgument | None, whose: str) -> tuple[Bound, ...]:

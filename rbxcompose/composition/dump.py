@@ -18,6 +18,7 @@ from rbxcompose.manifest.registry import sections
 from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.section import ROBOT
 from rbxcompose.manifest.tree import BROKEN, Entry, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode
+from rbxcompose.manifest.unit_choice import rounder_unit
 from rbxcompose.manifest.validate import to_plain
 from rbxcompose.printable import FORBIDDEN, escaped
 from rbxcompose.references import FILE
@@ -117,10 +118,10 @@ def _text(text: str, plain: bool) -> str:
 
 
 def exact(value: float, dimension: Dimension) -> str:
-    """Return a quantity in its usual unit, with as many digits as its value needs."""
-    usual = format_quantity(value, dimension)
+    """Return a quantity in its usual or rounder unit, with as many digits as its value needs."""
+    first = rounder_unit(value, dimension)
     units = [unit for unit in UNITS.values() if unit.dimension == dimension]
-    units.sort(key=lambda unit: (not usual.endswith(f" {unit.name}"), unit.name))
+    units.sort(key=lambda unit: (unit.name != first, unit.name))
     texts = [f"{digits} {unit.name}" for unit in units for digits in _digits(unit.from_si(value))] or [repr(value)]
     found = next((text for text in texts if _read(text, dimension) == value), None)
     # Some ratios have no text in percent that is exact to the last bit; a product is.

@@ -17,7 +17,7 @@ from rbxcompose.levels import LOG_LEVELS
 from rbxcompose.manifest.registry import sections
 from rbxcompose.manifest.section import ROBOT, Contents
 from rbxcompose.manifest.wanted_components import WantedComponent
-from rbxcompose.missions.analysis.effects import sent_by
+from rbxcompose.missions.analysis.effects import sent_by, settings_of
 from rbxcompose.missions.program.sources import ValueSource
 from rbxcompose.model.missions import read_missions
 from rbxcompose.model.robot import Robot, RobotComponent
@@ -29,6 +29,7 @@ from rbxcompose.sdk.ports import In, Out
 from rbxcompose.sdk.registry import component_type
 
 MISSION = "mission"
+CHANGE = "rbxcompose_parameters/srv/ChangeParameters"  # of a setting, by a mission
 ALWAYS = ("transforms", "diagnostics")  # the components of every robot
 
 
@@ -45,6 +46,8 @@ def build_robot(
     )
     missions = read_missions(manifest, environment, report, sources, names_of_skills(components))
     skills = skills_of(components, [one.program for one in missions.read.values()])
+    changed = settings_of(node for one in missions.read.values() for node in one.program.nodes)
+    services |= {one.service: CHANGE for one in changed if one.component.text in components}
     robot = Robot(manifest, components, values, skills, missions.read, missions.unread, topics, services)
     if manifest.missions:
         components[MISSION] = mission_component(robot)
@@ -141,6 +144,7 @@ def mission_component(robot: Robot) -> RobotComponent:
         "skills": robot.skills,
         "topics": {name: topic for name, topic in robot.topics.items() if name in published},
         "services": {name: service for name, service in robot.services.items() if name in called},
+        "settings": {name: types for name, types in robot.settings.items() if f"{name}/change_parameters" in called},
     }
     return _own(manifest, MISSION, config)
 

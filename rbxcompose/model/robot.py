@@ -16,6 +16,7 @@ from rbxcompose.levels import Level
 from rbxcompose.manifest.open_names import OpenNames
 from rbxcompose.manifest.registry import naming, sections
 from rbxcompose.manifest.tree import KeyPath, at, key_span, value_span
+from rbxcompose.missions.analysis.effects import settings_of
 from rbxcompose.missions.program.program import Program, RobotNames
 from rbxcompose.missions.program.sources import SkillSource, TopicSource, ValueSource, events_of
 from rbxcompose.model.doubts import doubts_of
@@ -99,6 +100,18 @@ class Robot:
     services: Mapping[str, str] = field(default_factory=dict)  # that missions may call, with their ROS types
 
     @cached_property
+    def settings(self) -> Mapping[str, Mapping[str, Type]]:
+        """Return the types of the settings that missions change in components, and of all others that are live there.
+
+        Without a mission that changes any, nothing: looking at all takes time.
+        """
+        if not any(settings_of(one.program.nodes) for one in self.missions.values()):
+            return {}
+        from rbxcompose.params.live_types import live_types  # with messages that few robots need for a check
+
+        return {name: types for name, one in self.components.items() if (types := live_types(one.config))}
+
+    @cached_property
     def names(self) -> RobotNames:
         """Return the names that the robot gives to its missions."""
         return RobotNames(
@@ -109,6 +122,7 @@ class Robot:
             missions={name: one.program for name, one in self.missions.items() if name not in self.unread},
             topics={name: topic.message for name, topic in self.topics.items()},
             services=self.services,
+            settings=self.settings,
             unread=self.unread,
             events=events_of(self.values),
             is_complete=self.is_complete,

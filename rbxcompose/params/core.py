@@ -6,8 +6,10 @@ Numbers are SI. A client may also send text with a unit (`30 s`), as in a manife
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from enum import Enum
 from types import MappingProxyType
 from typing import Any, Literal, get_args, get_origin
 
@@ -19,6 +21,7 @@ from rbxcompose.config import Bound, Config, Dimensioned, is_live
 from rbxcompose.dataclass import dataclass
 from rbxcompose.field_docs import field_docs
 from rbxcompose.findings import suggest
+from rbxcompose.manifest.unit_choice import is_nearly, rounder_unit
 from rbxcompose.msgs.rcl_interfaces import (
     FloatingPointRange,
     IntegerRange,
@@ -96,22 +99,40 @@ class ParameterField:
                 if limit is not None:
                     yield key, limit
 
+    @property
+    def _step(self) -> float:
+        return next((step for mark in self._marks if (step := getattr(mark, "multiple_of", None)) is not None), 0)
+
     def _ranges(self) -> tuple[tuple[FloatingPointRange, ...], tuple[IntegerRange, ...]]:
-        low = [bound for key, bound in self._bounds() if key in ("gt", "ge")]
-        high = [bound for key, bound in self._bounds() if key in ("lt", "le")]
-        if not low and not high:
+        """Return the ranges that the wire has; they have no bounds that are not part of them."""
+        low = [(bound, key) for key, bound in self._bounds() if key in ("gt", "ge")]
+        high = [(bound, key) for key, bound in self._bounds() if key in ("lt", "le")]
+        if isinstance(self.value, bool) or not (low or high or self._step):
             return (), ()
         if isinstance(self.value, int):
-            least, most = int(max(low, default=LOWEST)), int(min(high, default=HIGHEST))
-            return (), (IntegerRange(from_value=least, to_value=most),)
-        lowest, highest = max(low, default=-math.inf), min(high, default=math.inf)
-        return (FloatingPointRange(from_value=lowest, to_value=highest),), ()
+            lows = (math.floor(bound) + 1 if key == "gt" else math.ceil(bound) for bound, key in low)
+            highs = (math.ceil(bound) - 1 if key == "lt" else math.floor(bound) for bound, key in high)
+            least, most = max(lows, default=LOWEST), min(highs, default=HIGHEST)
+            return (), (IntegerRange(from_value=least, to_value=most, step=int(self._step)),)
+        up = (math.nextafter(bound, math.inf) if key == "gt" else bound for bound, key in low)
+        down = (math.nextafter(bound, -math.inf) if key == "lt" else bound for bound, key in high)
+        lowest, highest = max(up, default=-math.inf), min(down, default=math.inf)
+        return (FloatingPointRange(from_value=lowest, to_value=highest, step=float(self._step)),), ()
 
     def _constraints(self) -> str:
         words = [f"{_BOUNDS[key]} {self._shown(bound)}" for key, bound in self._bounds()]
-        if self.field is not None and get_origin(self.field.annotation) is Literal:
-            words.append(f"one of {', '.join(map(str, get_args(self.field.annotation)))}")
+        words += [f"in steps of {self._shown(self._step)}"] if self._step else []
+        if choices := self.choices:
+            words.append(f"one of {', '.join(choices)}")
         return ", ".join(words)
+
+    @property
+    def choices(self) -> Sequence[str]:
+        """Return the words that it may be; none if it is not a choice."""
+        hint = self.field.annotation if self.field else None
+        if get_origin(hint) is Literal:
+            return [str(one) for one in get_args(hint)]
+        return [str(one.value) for one in hint] if isinstance(hint, type) and issubclass(hint, Enum) else []
 
     def _shown(self, bound: float) -> str:
         return format_quantity(bound, self.dimension) if self.dimension else f"{bound:g}"
@@ -126,12 +147,12 @@ def told_dimension(description: str) -> Dimension | None:
 
 
 def shown(value: object, dimension: Dimension | None, unit: str | None = None) -> str:
-    """Return the value of a parameter as a person writes it: with its `unit`, else the usual one of the dimension."""
+    """Return the value of a parameter as a person writes it: in its `unit`, else a usual or rounder one."""
     match value:
         case bool():
             return "true" if value else "false"
         case float() if dimension is not None:
-            return format_quantity(value, dimension, unit)
+            return format_quantity(value, dimension, rounder_unit(value, dimension, unit))
         case int() | float():
             return format_number(value)
         case tuple():
@@ -199,19 +220,32 @@ def changed(config: Config, parameters: Sequence[Parameter], bounds: SettingBoun
         UnsettableError: if one of them is unknown, is read-only or refuses the value, or if they do not fit together.
     """
     known = settings(config)
+    _require_single(parameters)
     wanted = {one.name: _wanted(known, one) for one in parameters}
     fields = type(config).model_fields
     data: dict[str, object] = {}
     for name, field in fields.items():
         value = _with_unit(wanted.get(name, getattr(config, name)), dimension_of(field))
-        data[field.alias or name] = value
+        data[field.alias or name] = _as_choice(name, value, field)
     try:
         new = type(config).model_validate(data, strict=True)
     except ValidationError as error:
         raise UnsettableError(_reason(error.errors(include_url=False)[0])) from error
     for name in wanted:
         _require_within(name, getattr(new, name), dimension_of(fields[name]), bounds.get(name, ()))
-    return new
+    same = {name: old for name in wanted if _is_same(old := getattr(config, name), getattr(new, name))}
+    return new.model_copy(update=same)
+
+
+def _is_same(old: object, new: object) -> bool:
+    """Return whether a number is what it was, but for the last digits of a conversion: `3 deg`, for example."""
+    return isinstance(old, float) and isinstance(new, float) and is_nearly(old, new)
+
+
+def _require_single(parameters: Sequence[Parameter]) -> None:
+    names = Counter(one.name for one in parameters)
+    if twice := next((name for name, times in names.items() if times > 1), None):
+        raise UnsettableError(f"'{twice}' is set twice")
 
 
 def _require_within(name: str, value: object, dimension: Dimension | None, bounds: Iterable[Bound]) -> None:
@@ -231,9 +265,25 @@ def _wanted(known: Mapping[str, ParameterField], parameter: Parameter) -> object
     if not setting.is_live:
         raise UnsettableError(f"'{parameter.name}' cannot change while the robot runs")
     value = from_message(parameter.value)
+    if type(setting.value) is int and isinstance(value, float) and value.is_integer():
+        value = int(value)  # a client that has only one kind of numbers
     if value is None:
         raise UnsettableError(f"'{parameter.name}' needs a value")
+    if any(
+        isinstance(one, float) and not math.isfinite(one) for one in (value if isinstance(value, tuple) else [value])
+    ):
+        raise UnsettableError(f"'{parameter.name}' must be a finite number")
     return value
+
+
+def _as_choice(name: str, value: object, field: FieldInfo) -> object:
+    """Return a word as the member of an enumeration, which a strict field requires; any other value stays."""
+    hint = field.annotation
+    if isinstance(value, Enum) or not (isinstance(hint, type) and issubclass(hint, Enum)):
+        return value
+    if (member := next((one for one in hint if one.value == value), None)) is None:
+        raise UnsettableError(f"'{name}' must be one of {', '.join(str(one.value) for one in hint)}")
+    return member
 
 
 def _with_unit(value: object, dimension: Dimension | None) -> object:

@@ -24,6 +24,19 @@ _ARRAYS = {
 }
 
 
+TYPE_WORDS = {
+    ParameterType.PARAMETER_BOOL: "a flag",
+    ParameterType.PARAMETER_INTEGER: "a whole number",
+    ParameterType.PARAMETER_DOUBLE: "a number",
+    ParameterType.PARAMETER_STRING: "text",
+    ParameterType.PARAMETER_BYTE_ARRAY: "bytes",
+    ParameterType.PARAMETER_BOOL_ARRAY: "flags",
+    ParameterType.PARAMETER_INTEGER_ARRAY: "whole numbers",
+    ParameterType.PARAMETER_DOUBLE_ARRAY: "numbers",
+    ParameterType.PARAMETER_STRING_ARRAY: "texts",
+}
+
+
 def to_message(value: object) -> ParameterValue | None:
     """Return a value as a message, None if no parameter can have its type."""
     number = parameter_type(value)

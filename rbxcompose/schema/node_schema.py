@@ -32,6 +32,16 @@ DEEDS: Schema = {"$ref": f"{DEFINITIONS}deeds"}
 ANYTHING: Schema = {"type": ["string", "number", "boolean", "object", "array"]}
 MAPS: dict[str, Schema] = {  # by the key whose value is the map
     "machine": MACHINE,
+    "set_parameter": {
+        "type": "object",
+        "required": ["component", "parameter", "value"],
+        "properties": {
+            "component": {**ITEM_NAME, "description": "The component."},
+            "parameter": {"type": "string", "description": "One of its settings that may change while it runs."},
+            "value": {**EXPRESSION, "description": "The new value, of the type of the setting."},
+        },
+        "additionalProperties": False,
+    },
     "outcomes": {"type": "object", "minProperties": 1, "propertyNames": ITEM_NAME, "additionalProperties": EXPRESSION},
     "with": {"type": "object", "minProperties": 1, "propertyNames": ITEM_NAME, "additionalProperties": ANYTHING},
 }

@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 from pydantic import TypeAdapter
 
+from rbxcompose.manifest.unit_choice import rounder_unit
 from rbxcompose.schema.scalars import DEFINITIONS, DIMENSION, Schema, or_filled, quantities, quantity
 from rbxcompose.units import DIMENSIONS, format_quantity
 
@@ -64,7 +65,7 @@ def _quantity(raw: Schema) -> Schema:
     dimension = DIMENSIONS[raw[DIMENSION]]
     notes = {key: raw[key] for key in ("description",) if key in raw}
     if "default" in raw:
-        notes["default"] = format_quantity(raw["default"], dimension)
+        notes["default"] = format_quantity(raw["default"], dimension, rounder_unit(raw["default"], dimension))
     return {**quantity(dimension), **notes}
 
 

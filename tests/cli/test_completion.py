@@ -55,7 +55,7 @@ def test_verbs_are_completed() -> None:
         (("completion", "z"), ["zsh"]),
         (("record", "--topics", "a", "PAT"), ["PATTERN:topics"]),
         (("record", "--topics", "a", "--cla"), ["--class"]),
-        (("param", "get", "base", "NA"), ["NAME:name"]),
+        (("param", "get", "base", "PA"), ["PARAMETER:name"]),
     ],
 )
 def test_words_options_and_values_are_completed_where_they_may_stand(
@@ -87,7 +87,8 @@ def up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = RobotFolder.of("cart")
     folder.make()
     part, here = ComponentState("base", "toy", "active", "robot", 77, 0), Process.of(os.getpid())
-    folder.write_state(RobotState("cart", "/a/robot.yaml", here, {}, (part,), "tcp/127.0.0.1:1", boot_id(), 7))
+    battery = ComponentState("battery", "battery_sim", "active", "world", 78, 0)
+    folder.write_state(RobotState("cart", "/a/robot.yaml", here, {}, (part, battery), "tcp/127.0.0.1:1", boot_id(), 7))
 
 
 @pytest.mark.usefixtures("up")
@@ -100,7 +101,12 @@ def test_robots_components_and_topics_are_known() -> None:
 
     known = KnownValues(graph)
     assert candidates(["down", "--robot", ""], known) == ["cart"]
-    assert candidates(["param", "get", "b"], known) == ["base"]
+    assert candidates(["param", "get", "b"], known) == ["base", "battery"]
+    assert candidates(["param", "get", "battery", ""], known) == ["error", "runtime", "warn"]
+    assert candidates(["param", "set", "battery", "r"], known) == ["runtime"]
+    assert candidates(["param", "set", "battery.w"], known) == ["battery.warn"]
+    assert candidates(["param", "set", "battery.warn=3%", "battery.e"], known) == ["battery.error"]
+    assert candidates(["param", "get", "base", ""], known) == []
     assert candidates(["down", "c"], known) == ["cart"]
     assert candidates(["topic", "echo", ""], known) == ["/odom"]
     assert candidates(["topic", "echo", "od"], known) == ["odom"]

@@ -52,21 +52,21 @@ def set_to(config: Config, name: str, value: object) -> Config:
 
 def test_a_value_that_breaks_a_rule_across_components_is_found(robot: Robot) -> None:
     go_to = robot.components["go_to"].config
-    assert broken_rules(robot, {}, "go_to", set_to(go_to, "speed", "0.4 m/s")) == []
-    (broken,) = broken_rules(robot, {}, "go_to", set_to(go_to, "speed", "0.55 m/s"))
+    assert broken_rules(robot, {}, {"go_to": set_to(go_to, "speed", "0.4 m/s")}) == []
+    (broken,) = broken_rules(robot, {}, {"go_to": set_to(go_to, "speed", "0.55 m/s")})
     assert broken.code == "RBX3503"
 
 
 def test_what_other_components_have_now_counts(robot: Robot) -> None:
     now = {"base": set_to(robot.components["base"].config, "max_speed", "0.9 m/s")}
     new = set_to(robot.components["go_to"].config, "speed", "0.55 m/s")
-    assert broken_rules(robot, now, "go_to", new) == []
+    assert broken_rules(robot, now, {"go_to": new}) == []
 
 
 def test_what_was_broken_before_is_not_the_fault_of_a_change(robot: Robot) -> None:
     go_to = robot.components["go_to"].config
     now = {"go_to": set_to(go_to, "speed", "0.6 m/s")}
-    assert broken_rules(robot, now, "go_to", set_to(go_to, "speed", "0.55 m/s")) == []
+    assert broken_rules(robot, now, {"go_to": set_to(go_to, "speed", "0.55 m/s")}) == []
 
 
 def test_the_limits_of_an_argument_are_in_the_plan_and_change_live(tmp_path: Path) -> None:

@@ -66,6 +66,7 @@ STANDS_BELOW = {
 """The lines above an example that is less than a section, and how far it is indented below them."""
 
 _EXAMPLE = re.compile(r"^(Bad|Good):[^\n]*\n\n?```yaml\n(.*?)^```", re.MULTILINE | re.DOTALL)
+OF_MISSIONS = ("RBX41", "RBX7010", "RBX7011")  # whose examples are missions
 
 
 def examples(kind: FindingKind) -> dict[str, str]:
@@ -79,7 +80,7 @@ def codes_of(kind: FindingKind, text: str, folder: Path) -> set[str]:
 def compiled(kind: FindingKind, text: str, folder: Path) -> Checked:
     above, depth = STANDS_BELOW.get(kind.code, ("", 0))
     fragment = above + textwrap.indent(text, " " * depth)
-    if kind.code.startswith("RBX41") and not fragment.startswith(("missions:", "values:")):
+    if kind.code.startswith(OF_MISSIONS) and not fragment.startswith(("missions:", "values:")):
         return check_mission(HEADER + fragment, folder)
     robot = with_sections(ROBOT, fragment)
     return check_robot(robot, folder, profiles=profiles_of(fragment), real=kind.code.startswith("RBX80"))

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import re
+from enum import StrEnum
 from typing import Annotated, Literal
 
 import pytest
@@ -101,7 +103,9 @@ def test_a_descriptor_tells_unit_range_and_whether_it_may_change() -> None:
     speed, count, mode = (known[name].descriptor for name in ("speed", "count", "mode"))
     assert (speed.description, speed.read_only) == ("Largest speed. [m/s]", False)
     assert speed.additional_constraints == "greater than 0 m/s"
-    assert [(one.from_value, one.to_value) for one in speed.floating_point_range] == [(0.0, math.inf)]
+    assert [(one.from_value, one.to_value) for one in speed.floating_point_range] == [
+        (math.nextafter(0.0, 1.0), math.inf)
+    ]
     assert [(one.from_value, one.to_value) for one in count.integer_range] == [(1, 9)]
     assert mode.additional_constraints == "one of calm, wild"
     assert known["fixed"].descriptor.read_only
@@ -204,7 +208,7 @@ def test_a_bound_beside_the_field_holds_and_is_told() -> None:
 def test_values_are_shown_in_the_unit_that_their_description_tells() -> None:
     known = settings(SAMPLE)
     found = {name: shown(one.value, told_dimension(one.descriptor.description)) for name, one in known.items()}
-    assert found["heading"] == "28.6479 deg"
+    assert found["heading"] == "0.5 rad"
     assert (found["speed"], found["low"], found["count"], found["mode"]) == ("0.3 m/s", "20 %", "3", "calm")
     assert (found["inputs.door.timeout"], found["nothing"], found["turns"]) == ("0.5 s", "-", "[]")
 
@@ -212,3 +216,48 @@ def test_values_are_shown_in_the_unit_that_their_description_tells() -> None:
 @pytest.mark.parametrize("description", ["", "[", "]", "speed", "of [its] kind", "a list [x]"])
 def test_other_descriptions_tell_no_unit(description: str) -> None:
     assert told_dimension(description) is None
+
+
+class Shade(StrEnum):
+    """What a lamp may be."""
+
+    WARM = "warm"
+    COLD = "cold"
+
+
+class Lamp(Config):
+    """Steps, open bounds and choices."""
+
+    power: Annotated[Ratio, Live()] = Field(0.5, gt=0, lt=1, multiple_of=0.25)
+    """How bright it is."""
+    blinks: Annotated[int, Live()] = Field(2, gt=0, lt=10, multiple_of=2)
+    """How often it blinks."""
+    shade: Annotated[Shade, Live()] = Shade.WARM
+    """Which white it has."""
+
+
+def test_the_wire_has_steps_and_no_bound_that_a_value_may_not_have() -> None:
+    power, blinks, shade = (one.descriptor for one in settings(Lamp()).values())
+    ((low, high, step),) = [(one.from_value, one.to_value, one.step) for one in power.floating_point_range]
+    assert (low, high, step) == (math.nextafter(0.0, 1.0), math.nextafter(1.0, 0.0), 0.25)
+    assert [(one.from_value, one.to_value, one.step) for one in blinks.integer_range] == [(1, 9, 2)]
+    assert power.additional_constraints == "greater than 0 %, less than 100 %, in steps of 25 %"
+    assert shade.additional_constraints == "one of warm, cold"
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "reason"),
+    [
+        ("power", 0.3, "'power' must be a multiple of 0.25"),
+        ("power", 1.0, "'power' must be less than 1"),
+        ("blinks", 3, "'blinks' must be a multiple of 2"),
+        ("shade", "green", "'shade' must be one of warm, cold"),
+    ],
+)
+def test_steps_and_choices_are_enforced(name: str, value: object, reason: str) -> None:
+    with pytest.raises(UnsettableError, match=re.escape(reason)):
+        changed(Lamp(), [parameter(name, value)])
+
+
+def test_a_choice_is_set_by_its_word() -> None:
+    assert changed(Lamp(), [parameter("shade", "cold")]) == Lamp(shade=Shade.COLD)

@@ -52,7 +52,7 @@ ABOVE = {
     "bus": "sdk.bound",
     "bus_types": "actuation",
     "check_runner": "missions.analysis model.doubts model.robot",
-    "checks": "actuation body.model check_runner composition diagnostics missions model mux sdk sections",
+    "checks": "actuation body.model check_runner composition diagnostics missions model mux params sdk sections",
     "cli": "actuation body bus compiler composition controller_requests devices diagnostics.requests doctor "
     "executive.requests finding_pages importing inspection lsp.server mission_tests missions model mux.requests params "
     "plan recording rendering replay runtime scaffold schema.documents sdk sections",
@@ -79,7 +79,7 @@ ABOVE = {
     "testing.bench twins.fault_script twins.servo_faults",
     "missions": "",
     "monitors": "diagnostics.limits sdk",
-    "model": "actuation body.model composition missions sdk sections servo_bus_config",
+    "model": "actuation body.model composition missions params.live_types sdk sections servo_bus_config",
     "mux": "",
     "navigation": "",
     "params": "",

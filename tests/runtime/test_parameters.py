@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import pytest
 
 from rbxcompose.msgs import rcl_interfaces as rcl
+from rbxcompose.msgs.rbxcompose_parameters import ChangeParameters
 from rbxcompose.msgs.types import Message, Service
 from rbxcompose.params.values import to_message
 from rbxcompose.sdk import Component, Config, Live, Refused, component
@@ -131,3 +132,42 @@ def test_a_component_that_breaks_by_a_change_comes_back_without_it(bench: Bench)
     bench.advance(1.0)
     assert bench.host.states()["toy"] == ("active", 1)
     assert bench.component("toy").config.size == 1.0
+
+
+def change(bench: Bench, expected: float, wanted: float, **fields: Any) -> ChangeParameters.Response:
+    request = ChangeParameters.Request(
+        parameters=(_parameter("size", wanted),), expected=(_parameter("size", expected),), **fields
+    )
+    answer: ChangeParameters.Response = ask(bench, "toy/change_parameters", ChangeParameters, request)
+    return answer
+
+
+def test_a_change_knows_what_was_there_and_who_asked(bench: Bench) -> None:
+    assert change(bench, 1.0, 2.0, by="somebody", only_check=True).success
+    assert bench.component("toy").config.size == 1.0
+    assert change(bench, 1.0, 2.0, by="somebody", together="abc").success
+    assert set_each(bench, size=3.0) == [(True, "")]
+    late = change(bench, 2.0, 4.0, tell_changes=True)
+    assert (late.success, late.message) == (False, "'size' was changed meanwhile by a ROS 2 tool (toy:2)")
+    told = [(one.number, one.before.double_value, one.after.double_value, one.by) for one in late.changes]
+    assert told == [(1, 1.0, 2.0, "somebody"), (2, 2.0, 3.0, "a ROS 2 tool")]
+    assert "toy: set: size = 2.0, by somebody" in bench.texts()
+
+
+def test_the_history_outlives_a_restart_of_the_component(bench: Bench) -> None:
+    set_each(bench, size=7.0)
+    bench.advance(3.0)
+    told = ask(bench, "toy/change_parameters", ChangeParameters, ChangeParameters.Request(tell_changes=True))
+    assert [one.number for one in told.changes] == [1]
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), "text", True, (1.0, 2.0)])
+def test_what_no_number_may_be_is_refused_and_changes_nothing(bench: Bench, value: object) -> None:
+    ((successful, reason),) = set_each(bench, size=value)
+    assert (successful, bool(reason), bench.component("toy").config.size) == (False, True, 1.0)
+
+
+def test_a_parameter_that_is_set_twice_in_one_list_is_refused(bench: Bench) -> None:
+    request = rcl.SetParametersAtomically.Request(parameters=(_parameter("size", 2.0), _parameter("size", 3.0)))
+    answer = ask(bench, "toy/set_parameters_atomically", rcl.SetParametersAtomically, request)
+    assert (answer.result.reason, bench.component("toy").config.size) == ("'size' is set twice", 1.0)

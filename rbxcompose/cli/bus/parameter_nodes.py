@@ -22,11 +22,11 @@ _GET = "/get_parameters"
 
 
 class ParameterNodes:
-    """The nodes on the bus that have parameters: `names`, and their answers."""
+    """The nodes on the bus that have parameters, by their `names`; `guest` is how they are reached."""
 
     def __init__(self, guest: Guest, timeout: float) -> None:
         """An answer may take `timeout` [s]."""
-        self._guest, self._timeout = guest, timeout
+        self.guest, self._timeout = guest, timeout
         self._services: Mapping[str, GraphName] = {one.name: one for one in guest.graph().services if one.givers}
         self.names = sorted(name.removesuffix(_GET) for name in self._services if name.endswith(_GET))
 
@@ -44,13 +44,17 @@ class ParameterNodes:
         words = f"no component '{wanted}' has parameters"
         raise NotDoneError(NO_NAME.misspelt(None, words, wanted.removeprefix("/"), bare, "components"))
 
+    def serves(self, node: str, what: str) -> bool:
+        """Return whether a node has a service, such as `set_parameters`."""
+        return f"{node}/{what}" in self._services
+
     def ask(self, nodes: Sequence[str], what: str, service: type[Service[Q, R]], requests: Sequence[Q]) -> list[R]:
         """Request `what` from all `nodes` in parallel, and return their answers.
 
         Raises:
             NotDoneError: if one of them does not answer.
         """
-        guest, replies = self._guest, dict[str, Reply[R]]()
+        guest, replies = self.guest, dict[str, Reply[R]]()
         clients = [self._client(node, what) for node in nodes]
         guest.run(lambda: all(client.is_available for client in clients), self._timeout)
         for node, client, request in zip(nodes, clients, requests, strict=True):
@@ -63,7 +67,7 @@ class ParameterNodes:
         if found is None:
             raise NotDoneError(NOBODY.at(None, f"'{node}' has no service '{what}'"))
         kind = found.kinds[0]
-        return self._guest.bus(kind).client(NAME, found.name, type_of(kind, "srv", registry.service))
+        return self.guest.bus(kind).client(NAME, found.name, type_of(kind, "srv", registry.service))
 
 
 def _response(node: str, reply: Reply[R]) -> R:

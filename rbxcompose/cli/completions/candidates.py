@@ -21,7 +21,7 @@ class CandidateValues(Protocol):
     """Finds candidates for the value of an argument."""
 
     def of(self, metavar: str, dest: str, current: str, given: Mapping[str, str]) -> Iterable[str]:
-        """Return the candidates; `given` has the values of options typed so far, by their `dest`."""
+        """Return the candidates; `given` has the options typed so far by `dest`, other words by metavar."""
         ...
 
 
@@ -57,8 +57,10 @@ class _Place:
             if word in first.choices:
                 self.parser = first.choices[word]
                 self.__post_init__()
-        elif first.nargs not in _SEVERAL:
-            self.positionals.pop(0)
+        else:
+            self.given.setdefault(str(first.metavar), word)
+            if first.nargs not in _SEVERAL:
+                self.positionals.pop(0)
 
     def fitting(self, current: str, values: CandidateValues) -> Iterable[str]:
         """Yield the candidates for the current word."""

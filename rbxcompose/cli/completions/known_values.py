@@ -33,7 +33,10 @@ class KnownValues:
         """Return the candidates for an argument."""
         if dest == "robot" and metavar == "NAME":
             return robots()
-        return [one for what in metavar.split("|") for one in self._of(what, current, given)]
+        kinds = metavar.split("|")
+        if metavar in given and "PARAMETER" in kinds:  # the words that follow the first one
+            kinds = ["SETTING" if "=" in given[metavar] else "PARAMETER"]
+        return [one for what in kinds for one in self._of(what, current, given)]
 
     def _of(self, what: str, current: str, given: Mapping[str, str]) -> Iterable[str]:
         match what:
@@ -46,11 +49,16 @@ class KnownValues:
             case "FILE" | "DIR":
                 return files(current)
             case "COMPONENT":
-                return self._components(given)
+                return [one.name for one in _states(given)]
             case "MUX":
-                return [one.name for one in self._states(given) if one.type == MUX]
+                return [one.name for one in _states(given) if one.type == MUX]
             case "INPUT":
-                return self._inputs(given)
+                return _inputs(given)
+            case "SETTING":
+                return [f"{one.name}.{name}" for one in _states(given) for name in _live(one)]
+            case "PARAMETER":
+                component = given.get("COMPONENT") or next((given[one] for one in given if "PARAMETER" in one), "")
+                return [name for one in _states(given) if one.name == component for name in _live(one)]
             case "TYPE":
                 return _types()
         return ()
@@ -63,25 +71,37 @@ class KnownValues:
         names = [one.name for one in getattr(graph, what) if not one.is_hidden]
         return names if current[:1] in ("/", "") else [name.removeprefix("/") for name in names]
 
-    def _components(self, given: Mapping[str, str]) -> list[str]:
-        return [one.name for one in self._states(given)]
 
-    def _states(self, given: Mapping[str, str]) -> Sequence[ComponentState]:
-        try:
-            state = known_state(find_robot(given.get("robot")))
-        except NotDoneError:
-            return []
-        return state.components if state else []
+def _states(given: Mapping[str, str]) -> Sequence[ComponentState]:
+    try:
+        state = known_state(find_robot(given.get("robot")))
+    except NotDoneError:
+        return []
+    return state.components if state else []
 
-    def _inputs(self, given: Mapping[str, str]) -> list[str]:
-        """Return the inputs of all muxes of a robot."""
-        names = [one.name for one in self._states(given) if one.type == MUX]
-        try:
-            folder = find_robot(given.get("robot"))
-            states = [answer_of(folder, LookAtMux(name), timeout=PATIENCE) for name in names]
-        except NotDoneError:
-            return []
-        return [each.name for one in states for each in one.inputs]
+
+def _inputs(given: Mapping[str, str]) -> list[str]:
+    """Return the inputs of all muxes of a robot."""
+    names = [one.name for one in _states(given) if one.type == MUX]
+    try:
+        folder = find_robot(given.get("robot"))
+        states = [answer_of(folder, LookAtMux(name), timeout=PATIENCE) for name in names]
+    except NotDoneError:
+        return []
+    return [each.name for one in states for each in one.inputs]
+
+
+def _live(component: ComponentState) -> list[str]:
+    """Return the settings of a component that may change, as its type declares them: the bus is not asked."""
+    from rbxcompose.config import is_live
+    from rbxcompose.plugins import BrokenPluginError
+    from rbxcompose.sdk.registry import component_type
+
+    try:
+        fields = component_type(component.type).config_type().model_fields
+    except (KeyError, BrokenPluginError):
+        return []
+    return [name for name, field in fields.items() if is_live(field)]
 
 
 def _place(given: Mapping[str, str]) -> BusPlace:

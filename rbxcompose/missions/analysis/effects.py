@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 
 from rbxcompose.missions.language.asked import Assignment
 from rbxcompose.missions.program.messages import MessageTemplate
-from rbxcompose.missions.program.moments import Deeds
+from rbxcompose.missions.program.moments import Deeds, WrittenSetting
 from rbxcompose.missions.program.program import MissionNode, Program
 
 
@@ -45,7 +45,13 @@ def sent_by(programs: Iterable[Program]) -> tuple[set[str], set[str]]:
     """Return the topics on which missions publish, and the services that they call, as they write them."""
     nodes = [node for program in programs for node in program.nodes]
     topics = {message.target.text for node in nodes for message in published(node)}
-    return topics, {message.target.text for node in nodes for message in called(node)}
+    services = {message.target.text for node in nodes for message in called(node)}
+    return topics, services | {one.service for one in settings_of(nodes)}
+
+
+def settings_of(nodes: Iterable[MissionNode]) -> list[WrittenSetting]:
+    """Return the settings of components that nodes change."""
+    return [setting for node in nodes if (setting := node.step.effects.setting) is not None]
 
 
 def _deeds(node: MissionNode) -> Iterator[Deeds]:

@@ -7,6 +7,7 @@ from dataclasses import field
 
 from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.text import Template
+from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.language.asked import Assignment
 from rbxcompose.missions.program.messages import MessageTemplate
 
@@ -38,6 +39,24 @@ class Moments:
 
 
 @dataclass(frozen=True, slots=True)
+class WrittenSetting:
+    """A setting of a component that is changed, as written."""
+
+    component: ScalarNode
+    parameter: ScalarNode
+
+    @property
+    def path(self) -> str:
+        """Return its name: `battery.runtime`."""
+        return f"{self.component.text}.{self.parameter.text}"
+
+    @property
+    def service(self) -> str:
+        """Return the service of the component that changes it."""
+        return f"{self.component.text}/change_parameters"
+
+
+@dataclass(frozen=True, slots=True)
 class NodeEffects:
     """What a node does to the mission and the robot by itself: what it sets, publishes and calls.
 
@@ -48,6 +67,7 @@ class NodeEffects:
     assignments: tuple[Assignment, ...] = ()
     published: MessageTemplate | None = None
     called: MessageTemplate | None = None
+    setting: WrittenSetting | None = None
     shortened: str | None = None
 
 

@@ -61,10 +61,9 @@ class Skill:
 class RobotNames:
     """What the robot offers every mission: types of its values, its places, its skills, its missions, all by name.
 
-    `events` are the values whose messages are events.
+    `events` are the values whose messages are events; `settings` are those of components that may change, by component;
     `topics` and `services` have the ROS names of their types; `unread` are missions whose files could not be read;
-    `removed` are places that a layer has removed, each with where it did so.
-    It is not complete if a part of the robot has errors: a missing skill may then belong to that part.
+    `removed` are places that a layer has removed, each with where. It is not complete if a part has errors.
     """
 
     values: Mapping[str, Type] = field(default_factory=dict)
@@ -73,6 +72,7 @@ class RobotNames:
     missions: Mapping[str, Program] = field(default_factory=dict)
     topics: Mapping[str, str] = field(default_factory=dict)
     services: Mapping[str, str] = field(default_factory=dict)
+    settings: Mapping[str, Mapping[str, Type]] = field(default_factory=dict)
     unread: frozenset[str] = frozenset()
     removed: Mapping[str, Span] = field(default_factory=dict)
     is_complete: bool = True
@@ -394,6 +394,6 @@ class Program:
             step, messages = node.step, (node.step.effects.published, node.step.effects.called)
             read.update(step.reads, *(message.names for message in messages if message))
             read.update(*(one.moments.names for one in node.modifiers.values() if one.moments))
-            texts = (one.value.text for one in step.arguments if isinstance(one.value, ScalarNode))
-            read.update(name.name for text in texts for name in parse_template(text).names)
+            scalars = (one.value for one in step.arguments if isinstance(one.value, ScalarNode))
+            read.update(name.name for one in scalars for name in parse_template(one.text).names)
         return frozenset(read)

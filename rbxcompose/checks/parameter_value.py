@@ -1,0 +1,96 @@
+"""Values that missions give to settings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.check_runner import check
+from rbxcompose.expressions.evaluate import evaluate
+from rbxcompose.expressions.types import Type, TypeKind
+from rbxcompose.expressions.values import EvaluationError, Value
+from rbxcompose.findings import Finding
+from rbxcompose.manifest.tree import ScalarNode
+from rbxcompose.missions.analysis.examined import Examined
+from rbxcompose.missions.analysis.facts import Constants, constants_of
+from rbxcompose.missions.language.argument_types import check_written
+from rbxcompose.missions.language.spans import expression_of
+from rbxcompose.model.robot import Robot, RobotComponent
+from rbxcompose.rules import NAMES
+
+
+@check("RBX7011", closed=(NAMES,))
+def parameter_value(robot: Robot) -> Iterator[Finding]:
+    """A mission gives a setting a value that it cannot have
+
+    The value has the type of the setting. One that is written out must also lie within the limits of the setting, and
+    of the argument from which the manifest takes it.
+
+    Bad:
+    ```yaml
+    do:
+      set_parameter: {component: battery, parameter: warn, value: 120 %}
+    ```
+    Good:
+    ```yaml
+    do:
+      set_parameter: {component: battery, parameter: warn, value: 60 %}
+    ```
+    """
+    for mission in robot.missions.values():
+        for view in Examined(mission.program, robot.names).views:
+            setting = view.node.step.effects.setting
+            if setting is None:
+                continue
+            wanted = robot.names.settings.get(setting.component.text, {}).get(setting.parameter.text)
+            value = view.node.step.arguments[0].value
+            if wanted is None or not isinstance(value, ScalarNode) or not value.text:
+                continue
+            found = list(check_written(view, value, wanted, parameter_value))
+            known = constants_of(mission.program, mission.inputs)
+            component = robot.components[setting.component.text]
+            yield from found or _beyond(component, setting.parameter.text, value, wanted, known)
+
+
+class _Constants:
+    """What is known before the mission runs."""
+
+    def __init__(self, known: Constants) -> None:
+        self._known = known
+
+    def variable(self, name: str) -> Value:
+        """Return a value that nothing changes."""
+        return self._known[name]
+
+    def word(self, name: str) -> Value:
+        """Know no places."""
+        raise KeyError(name)
+
+    def age(self, name: str) -> float:
+        """Know no messages."""
+        raise KeyError(name)
+
+    def is_new(self, name: str) -> bool:
+        """Know no messages."""
+        raise KeyError(name)
+
+
+def _beyond(
+    component: RobotComponent, name: str, value: ScalarNode, wanted: Type, known: Constants
+) -> Iterator[Finding]:
+    """Yield the finding on a value that is known and that the component would refuse."""
+    if wanted.kind in (TypeKind.TEXT, TypeKind.CHOICE):
+        return  # its words are checked as its type
+    try:
+        given = evaluate(expression_of(value), _Constants(known))
+    except (EvaluationError, KeyError):
+        return
+    from rbxcompose.msgs.rcl_interfaces import Parameter  # messages that few robots need for a check
+    from rbxcompose.params.core import UnsettableError, changed
+    from rbxcompose.params.values import to_message
+
+    if (message := to_message(given)) is None:
+        return
+    try:
+        changed(component.config, [Parameter(name, message)], component.bounds)
+    except UnsettableError as error:
+        yield parameter_value.at(value.span, f"'{component.name}' would refuse this: {error}")

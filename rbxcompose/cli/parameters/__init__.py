@@ -1,0 +1,1 @@
+"""What the verbs of `param` do with the settings of a robot that runs."""

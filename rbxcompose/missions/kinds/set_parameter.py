@@ -1,0 +1,110 @@
+"""`set_parameter`: change a setting of a component while the robot runs."""
+
+from __future__ import annotations
+
+from dataclasses import field
+from typing import Self
+
+from rbxcompose.dataclass import dataclass
+from rbxcompose.expressions.types import Type, TypeKind
+from rbxcompose.expressions.values import Value
+from rbxcompose.manifest.tree import MappingNode, ScalarNode
+from rbxcompose.missions.engine.leaf import Leaf
+from rbxcompose.missions.engine.task import Site
+from rbxcompose.missions.language.asked import WrittenArgument
+from rbxcompose.missions.language.node_reader import NodeReader
+from rbxcompose.missions.language.written import getter
+from rbxcompose.missions.program.families import LeafStep
+from rbxcompose.missions.program.moments import NodeEffects, WrittenSetting
+from rbxcompose.missions.program.outcomes import ANY, Outcomes
+from rbxcompose.missions.program.program import Endings, MissionNode
+from rbxcompose.missions.program.registry import kind
+from rbxcompose.missions.program.statuses import RUNNING
+
+COMPONENT, PARAMETER, VALUE = KEYS = ("component", "parameter", "value")
+_ENCODED = {  # the number of `rcl_interfaces/ParameterType` and the field of the value, by the type of a setting
+    TypeKind.FLAG: (1, "bool_value"),
+    TypeKind.COUNT: (2, "integer_value"),
+    TypeKind.QUANTITY: (3, "double_value"),
+    TypeKind.TEXT: (4, "string_value"),
+    TypeKind.CHOICE: (4, "string_value"),
+}
+
+
+class SetParameterTask(Leaf):
+    """Computes the value, sends it to the component, and waits until that has it."""
+
+    __slots__ = ("get", "setting", "value", "wanted")
+    saved = (*Leaf.saved, "value")
+
+    def __init__(self, site: Site, step: SetParameterStep) -> None:
+        super().__init__(site)
+        self.setting = step.setting
+        self.wanted: Type = self.engine.robot.settings[self.setting.component.text][self.setting.parameter.text]
+        self.get = getter(step.arguments[0].value, self.wanted)
+        self.value: Value = 0.0
+
+    def begin(self) -> int:
+        """Compute the value and send it."""
+        self.value = self.get(self)
+        return self.ask()
+
+    def ask(self) -> int:
+        """Send the value; this happens again after a pause."""
+        number, key = _ENCODED[self.wanted.kind]
+        parameter = {"name": self.setting.parameter.text, "value": {"type": number, key: self.value}}
+        fields: dict[str, Value] = {"parameters": [parameter], "by": f"mission {self.run.program.name}"}
+        self.status, self.is_asked = RUNNING, True
+        try:
+            self.engine.world.call(self.number, self.setting.service, fields)
+        except Exception:
+            self.is_asked = False
+            raise
+        return RUNNING
+
+
+@kind("set_parameter", SetParameterTask)
+@dataclass(frozen=True, slots=True)
+class SetParameterStep(LeafStep):
+    """Change a setting of a component that may change while the robot runs; it fails if the component refuses.
+
+    Example:
+        do:
+          set_parameter: {component: battery, parameter: runtime, value: 30 s}
+    """
+
+    setting: WrittenSetting = field()
+    arguments: tuple[WrittenArgument, ...] = field()
+
+    waits = True
+    has_result = False
+    lasts = None
+    only_asks = False
+
+    @classmethod
+    def read(cls, reader: NodeReader) -> Self:
+        """Read the component, the parameter and the value."""
+        shape = "a map with 'component', 'parameter' and 'value'"
+        mapping = reader.map_of(reader.key, shape)
+        inner = reader.inside(mapping or MappingNode(), KEYS, f"'{reader.key}'")
+        empty = ScalarNode("", reader.key_span(reader.key))
+        given = [empty] * len(KEYS)
+        if mapping is not None:
+            words = ("the name of a component", "the name of a setting", "a value")
+            given = [inner.scalar(key, what) or empty for key, what in zip(KEYS, words, strict=True)]
+        component, parameter, value = given
+        return cls(WrittenSetting(component, parameter), (WrittenArgument(VALUE, value, value.span),))
+
+    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
+        """Return that it may fail: the component may refuse."""
+        return ANY
+
+    def text(self, node: MissionNode) -> str:
+        """Return the setting and its value."""
+        value = self.arguments[0].value
+        return f"{self.setting.path} {value.text if isinstance(value, ScalarNode) else ''}".strip()
+
+    @property
+    def effects(self) -> NodeEffects:
+        """Return the setting."""
+        return NodeEffects(setting=self.setting)
