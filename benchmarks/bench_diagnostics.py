@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import json
+import statistics
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
-from benchmarks.measuring import Row, in_turns
+from benchmarks.measuring import Row, Samples, in_turns
+from benchmarks.peers import ROS_PYTHON, Ros, free_port, running, wait_for
 from rbxcompose.msgs.cdr import decode, encode
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray, DiagnosticStatus, KeyValue
 from rbxcompose.qos import Qos
@@ -13,6 +19,8 @@ from rbxcompose.testing import Bench, instance
 RATE, GROUPS, ITEMS, MANY = 10, 20, 200, 10_000  # [Hz] in and out; groups; items of a robot, and of a flood
 ROUNDS = 15
 PARTS = tuple(f"part_{group}" for group in range(GROUPS))
+AGGREGATOR = Path("/usr/lib/diagnostic_aggregator/aggregator_node")  # of Debian's packages
+SECONDS, SETTLE = 8, 3.0  # [s] of ROS 1's aggregator, after it has begun
 
 
 def rows() -> list[Row]:
@@ -20,9 +28,10 @@ def rows() -> list[Row]:
     usual, flapping, flood = _second(ITEMS), _second(ITEMS, flaps=True), _second(MANY)
     levels, changes = in_turns(usual, flapping, rounds=ROUNDS)
     (flooded,) = in_turns(flood, rounds=3)
+    ros = _ros()
     how = f"{ITEMS} items with 3 values at {RATE} Hz in, {GROUPS} analyzers, {RATE} Hz out, with decoding and encoding"
     return [
-        Row("aggregated diagnostics", "% of a core", how, 100 * levels.median, 100 * levels.p99, most=8),
+        _row("aggregated diagnostics", f"{how}; theirs in C++", levels, ros),
         Row(
             "the same, every level changes each time",
             "% of a core",
@@ -38,6 +47,49 @@ def rows() -> list[Row]:
             100 * flooded.p99,
         ),
     ]
+
+
+def _row(name: str, how: str, ours: Samples, ros: float | None) -> Row:
+    theirs, against = (100 * ros, Ros.name) if ros else (None, "")
+    return Row(name, "% of a core", how, 100 * ours.median, 100 * ours.p99, theirs, against, most=8)
+
+
+def _ros() -> float | None:
+    """Return the share of a core that ROS 1's aggregator takes for the same; None where it is not installed."""
+    if not (Ros.is_here() and AGGREGATOR.exists()):
+        return None
+    with TemporaryDirectory() as folder:
+        ros = Ros(Path(folder), free_port())
+        settings: Mapping[str, object] = {
+            "pub_rate": RATE,
+            "analyzers": {
+                name: {"type": "diagnostic_aggregator/GenericAnalyzer", "path": name, "startswith": name}
+                for name in PARTS
+            },
+        }
+        load = [ROS_PYTHON, "/usr/bin/rosparam", "set", "/diagnostic_aggregator", json.dumps(settings)]
+        robot = [ROS_PYTHON, str(Path(__file__).with_name("ros_diagnostics.py")), str(ITEMS), str(GROUPS)]
+        with ros.master(), running(load, ros.environment, ros.folder) as loading:
+            wait_for(lambda: loading.poll() is not None, "rosparam")
+            with (
+                running([str(AGGREGATOR)], ros.environment, ros.folder) as aggregator,
+                running(robot, ros.environment, ros.folder),
+            ):
+                time.sleep(SETTLE)
+                return statistics.median(_load(aggregator.pid) for _ in range(SECONDS))
+
+
+def _load(pid: int) -> float:
+    """Return the share of a core that a process takes for a second."""
+    before, began = _processor_time(pid), time.monotonic()
+    time.sleep(1.0)
+    return (_processor_time(pid) - before) / (time.monotonic() - began)
+
+
+def _processor_time(pid: int) -> float:
+    tasks = Path(f"/proc/{pid}/task")
+    spent = (int((task / "schedstat").read_text(encoding="ascii").split()[0]) for task in tasks.iterdir())
+    return sum(spent) / 1e9
 
 
 def _second(items: int, *, flaps: bool = False) -> Callable[[], object]:
