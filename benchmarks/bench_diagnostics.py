@@ -19,7 +19,8 @@ from rbxcompose.testing import Bench, instance
 RATE, GROUPS, ITEMS, MANY = 10, 20, 200, 10_000  # [Hz] in and out; groups; items of a robot, and of a flood
 ROUNDS = 15
 PARTS = tuple(f"part_{group}" for group in range(GROUPS))
-AGGREGATOR = Path("/usr/lib/diagnostic_aggregator/aggregator_node")  # of Debian's packages
+AGGREGATOR = Path("/usr/lib/diagnostic_aggregator/aggregator_node")  # of Debian's libdiagnostic-aggregator-tools
+PLUGINS = Path("/usr/share/diagnostic_aggregator/package.xml")  # of libdiagnostic-aggregator-dev
 SECONDS, SETTLE = 8, 3.0  # [s] of ROS 1's aggregator, after it has begun
 
 
@@ -56,7 +57,7 @@ def _row(name: str, how: str, ours: Samples, ros: float | None) -> Row:
 
 def _ros() -> float | None:
     """Return the share of a core that ROS 1's aggregator takes for the same; None where it is not installed."""
-    if not (Ros.is_here() and AGGREGATOR.exists()):
+    if not (Ros.is_here() and AGGREGATOR.exists() and PLUGINS.exists()):
         return None
     with TemporaryDirectory() as folder:
         ros = Ros(Path(folder), free_port())

@@ -17,6 +17,7 @@ from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Severity, Span, kind, suggest
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.printable import plain
+from rbxcompose.regular_files import read_regular
 
 NOT_EXPANDED = kind(
     "RBX2007",
@@ -51,6 +52,7 @@ _UNKNOWN = (
     (re.compile(r"Undefined substitution argument (\w+)"), "arg", "arguments"),
 )
 """What an error of xacro says of a name, the element that declares such names, and what they are called."""
+_LARGEST = 1_000_000  # [B] of a file whose names are proposed
 _PLACES = re.compile(rf' {PLACE}="[^"]*"')
 
 
@@ -144,7 +146,7 @@ def _cure(message: str, files: Sequence[Path]) -> str:
 def _texts(files: Sequence[Path]) -> Iterator[str]:
     for file in files:
         with suppress(OSError, ValueError):  # the file was read a moment ago; without it there is only no suggestion
-            yield file.read_text(encoding="utf-8")
+            yield read_regular(file, _LARGEST).decode()
 
 
 def _unused(xacro: XacroFile, answer: XacroAnswer) -> Iterator[Finding]:

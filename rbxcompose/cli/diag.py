@@ -1,4 +1,4 @@
-"""Show how a running robot is: its groups and their parts, live or as changes, and acknowledge what is latched.
+"""Show how a running robot is: its groups and their parts, live or as changes; acknowledge levels.
 
 Exit codes of `tree`: the level of the robot, 0 OK, 1 WARN, 2 ERROR, 3 STALE. The others: 0 fine, 1 refused, 2 wrong
 usage.

@@ -35,9 +35,7 @@ _CURES = {
 }
 CURES: Mapping[str, str] = {name: cure for cure, names in _CURES.items() for name in names.split()}
 """What to do instead of a key that has no counterpart."""
-BELOW: Mapping[tuple[str, str], str] = {
-    ("locks", "topic"): "a lock listens on the topic of its mux and its own name: 'MUX/NAME'; remove 'topic'",
-}
+BELOW: Mapping[tuple[str, str], str] = {}
 """What to do instead of a key below an entry of such a map."""
 MESSAGES: Mapping[str, str] = {
     "Bool": "flag",

@@ -26,6 +26,7 @@ MAY_OPEN = {
     "actuation/dynamixel_port.py",
     "devices/serial_ports.py",
     "atomic_files.py",
+    "cli/parameters/changed_values.py",
     "runtime/process_group/capture.py",
     "runtime/folder.py",
     "runtime/follow.py",

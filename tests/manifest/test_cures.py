@@ -72,11 +72,6 @@ CURES = [
     ("places:", "ros2_control: {}\nplaces:", "'actuators', 'joints' and 'controllers'"),
     (
         "missions:",
-        "    locks:\n      b: {topic: b, priority: 5, timeout: 1 s}\nmissions:",
-        "remove 'topic'",
-    ),
-    (
-        "missions:",
         "profiles: [home]\nmissions:",
         "below: 'home:' instead of '[home]'",
     ),

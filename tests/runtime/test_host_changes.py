@@ -108,7 +108,7 @@ def test_settings_that_changed_are_followed_and_what_a_person_has_set_stays() ->
     assert hosted.config == CounterConfig(by=5.0)
     assert one.host.follow([new], {"counter": ["by"]}) == {}
     assert hosted.config == CounterConfig(by=7.0)
-    assert "counter: set: by = 7.0" in one.texts()
+    assert "counter: set: by = 7.0, by apply" in one.texts()
 
 
 def test_a_setting_that_is_refused_stays_as_it_was() -> None:

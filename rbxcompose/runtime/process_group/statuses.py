@@ -109,7 +109,11 @@ class Statuses:
     def _publish_soon(self) -> None:
         if not self._is_due:
             self._is_due = True
-            self._scheduler.post(self._owner, self.publish)
+            self._scheduler.post(self._owner, self._publish_due)
+
+    def _publish_due(self) -> None:
+        if self._is_due:  # else it was published meanwhile
+            self.publish()
 
     def _shown(self, status: DiagnosticStatus) -> DiagnosticStatus:
         cause = self._blocked.get(status.name) or self._busy.get(status.name)
