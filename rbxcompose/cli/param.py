@@ -1,4 +1,4 @@
-"""See and change the parameters of components while the robot runs, and of ROS 2 nodes; keep them in the manifest.
+"""See and change parameters while the robot runs, also of ROS 2 nodes; keep them in the manifest.
 
 A value is written as in a manifest (`param set battery runtime "30 s"`); a bare number is SI, and so is JSON. What
 changes values refuses what `check` would refuse, with the values that all components have now, and changes all of
