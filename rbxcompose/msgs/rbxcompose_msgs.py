@@ -149,6 +149,139 @@ class Grip(Action["Grip.Goal", "Grip.Result", "Grip.Feedback"]):
         feedback: Grip.Feedback = field(default_factory=lambda: Grip.Feedback())
 
 
+class MoveArm(Action["MoveArm.Goal", "MoveArm.Result", "MoveArm.Feedback"]):
+    """Plan a motion of an arm, verify it, and carry it out."""
+
+    TYPE: ClassVar[str] = "rbxcompose_msgs/action/MoveArm"
+    HASH: ClassVar[str] = "RIHS01_30f676c93edb50a13fddf10ef0af05a4321ea40619db64d4e56d599c44235a4c"
+
+    @dataclass(frozen=True, slots=True, eq=False)
+    class Goal(ArrayMessage):
+        """Goal of `MoveArm`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/MoveArm_Goal"
+        HASH: ClassVar[str] = "RIHS01_95469303712bb0672df99dedc8afcdd94c54cfa516aff05d12a0a7d09cfcbbb4"
+        FIELDS: ClassVar[Fields] = {
+            "pose": "string",
+            "joints": "string[]",
+            "positions": "float64[]",
+            "speed": "float64",
+            "acceleration": "float64",
+        }
+
+        pose: str = ""  # its name; empty if only joints are given
+        joints: tuple[str, ...] = ()  # of the arm; the others go to the pose, or stay where they are
+        positions: NDArray[np.float64] = field(default_factory=lambda: zeros("float64", 0))  # [rad or m]
+        speed: float = 0.0  # share of the greatest speeds of joints; 0 is all
+        acceleration: float = 0.0  # share of the greatest accelerations; 0 is all
+
+    @dataclass(frozen=True, slots=True)
+    class Result(Message):
+        """Result of `MoveArm`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/MoveArm_Result"
+        HASH: ClassVar[str] = "RIHS01_9607155dadb75d128bc37378039cf504d336325f1c45cfa242bd6dacc009e41b"
+        FIELDS: ClassVar[Fields] = {
+            "outcome": "string",
+            "message": "string",
+        }
+
+        outcome: str = ""  # the reason of a failure, of a closed list
+        message: str = ""
+
+    @dataclass(frozen=True, slots=True)
+    class Feedback(Message):
+        """Feedback of `MoveArm`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/MoveArm_Feedback"
+        HASH: ClassVar[str] = "RIHS01_18b2fe9dc92af3d0acf1cc6de2e28577b280107eeeee3148b81b9acf8c16c72f"
+        FIELDS: ClassVar[Fields] = {
+            "stage": "string",
+        }
+
+        stage: str = ""  # planning or moving
+
+    class SendGoal(Service["MoveArm.SendGoal.Request", "MoveArm.SendGoal.Response"]):
+        """Sends a goal of `MoveArm`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/MoveArm_SendGoal"
+        HASH: ClassVar[str] = "RIHS01_ba3a140029257a750ed3523d212ba0ee87c96f76e9ae5890e42d86fba5f411c3"
+
+        @dataclass(frozen=True, slots=True)
+        class Request(Message):
+            """Request of `MoveArm.SendGoal`."""
+
+            TYPE: ClassVar[str] = "rbxcompose_msgs/action/MoveArm_SendGoal_Request"
+            HASH: ClassVar[str] = "RIHS01_a4bc3dc33a507592c277f35cb9092f4324ac073da0e2d6154a27aee5544862cc"
+            FIELDS: ClassVar[Fields] = {
+                "goal_id": "unique_identifier_msgs/msg/UUID",
+                "goal": "rbxcompose_msgs/action/MoveArm_Goal",
+            }
+
+            goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+            goal: MoveArm.Goal = field(default_factory=lambda: MoveArm.Goal())
+
+        @dataclass(frozen=True, slots=True)
+        class Response(Message):
+            """Response of `MoveArm.SendGoal`."""
+
+            TYPE: ClassVar[str] = "rbxcompose_msgs/action/MoveArm_SendGoal_Response"
+            HASH: ClassVar[str] = "RIHS01_c987bb09a932e2b3186a163b8e913034257a29b4fd8c3feb1ff3ea5613c9ad33"
+            FIELDS: ClassVar[Fields] = {
+                "accepted": "bool",
+                "stamp": "builtin_interfaces/msg/Time",
+            }
+
+            accepted: bool = False
+            stamp: builtin_interfaces.Time = field(default_factory=builtin_interfaces.Time)
+
+    class GetResult(Service["MoveArm.GetResult.Request", "MoveArm.GetResult.Response"]):
+        """Waits for the result of a goal of `MoveArm`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/MoveArm_GetResult"
+        HASH: ClassVar[str] = "RIHS01_d37fc2fd008f2c5114fedb39b1a0f38cbe8aa8e24528ca97fbb69e04256b8b95"
+
+        @dataclass(frozen=True, slots=True)
+        class Request(Message):
+            """Request of `MoveArm.GetResult`."""
+
+            TYPE: ClassVar[str] = "rbxcompose_msgs/action/MoveArm_GetResult_Request"
+            HASH: ClassVar[str] = "RIHS01_91e0767d7bb8c5b6ab04ed2742b55fedf91632ddc54732505a85a11433062563"
+            FIELDS: ClassVar[Fields] = {
+                "goal_id": "unique_identifier_msgs/msg/UUID",
+            }
+
+            goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+
+        @dataclass(frozen=True, slots=True)
+        class Response(Message):
+            """Response of `MoveArm.GetResult`."""
+
+            TYPE: ClassVar[str] = "rbxcompose_msgs/action/MoveArm_GetResult_Response"
+            HASH: ClassVar[str] = "RIHS01_b8ed29adde0414a975f549c64b9c9f6c91e8e626846901828461ec722e75107b"
+            FIELDS: ClassVar[Fields] = {
+                "status": "int8",
+                "result": "rbxcompose_msgs/action/MoveArm_Result",
+            }
+
+            status: int = 0
+            result: MoveArm.Result = field(default_factory=lambda: MoveArm.Result())
+
+    @dataclass(frozen=True, slots=True)
+    class FeedbackMessage(Message):
+        """Feedback of `MoveArm` and the goal that it is about."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/MoveArm_FeedbackMessage"
+        HASH: ClassVar[str] = "RIHS01_3fd62d2e41d0c2d3d5789aac4c4a75e8b88f41594fec7b3434cc4544ff9be205"
+        FIELDS: ClassVar[Fields] = {
+            "goal_id": "unique_identifier_msgs/msg/UUID",
+            "feedback": "rbxcompose_msgs/action/MoveArm_Feedback",
+        }
+
+        goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+        feedback: MoveArm.Feedback = field(default_factory=lambda: MoveArm.Feedback())
+
+
 class MoveJoints(Action["MoveJoints.Goal", "MoveJoints.Result", "MoveJoints.Feedback"]):
     """Move some joints of a controller in a time; 0 is as fast as their limits allow."""
 

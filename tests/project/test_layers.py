@@ -62,7 +62,7 @@ ABOVE = {
     "controllers": "control controller_interface sdk",
     "compiler": "check_runner composition model plan",
     "components": "actuation body control controller_interface controller_manager controller_requests diagnostics "
-    "executive missions monitors mux.core navigation sdk servo_bus_config servo_bus_line servo_report sim "
+    "executive missions monitors motion mux.core navigation sdk servo_bus_config servo_bus_line servo_report sim "
     "twins.fault_script",
     "servo_report": "actuation control",
     "composition": "body.description sections",
@@ -79,6 +79,7 @@ ABOVE = {
     "testing.bench twins.fault_script twins.servo_faults",
     "missions": "",
     "monitors": "diagnostics.limits sdk",
+    "motion": "body control",
     "model": "actuation body.model composition missions sdk sections servo_bus_config",
     "mux": "",
     "navigation": "",
@@ -93,7 +94,8 @@ ABOVE = {
     "schema": "controller_interface missions sdk sections",
     "sdk": "diagnostics.updater",
     "sections": "actuation.bus_types actuation.control_tables actuation.serial_ports actuation.servo_models "
-    "actuation.torques body control.calibration control.limits controller_interface sdk twins.servo_faults",
+    "actuation.torques body control.calibration control.limits controller_interface motion.groups "
+    "motion.planner_types sdk twins.servo_faults",
     "servo_bus_config": "actuation control controller_interface sdk.ports twins.fault_script",
     "servo_bus_line": "actuation servo_bus_config twins",
     "sim": "",
@@ -103,7 +105,7 @@ ABOVE = {
     "runtime.process_group runtime.records sdk",
 }
 # Pure: no bus, thread or clock.
-CORES = {"body", "control", "diagnostics", "missions", "mux", "navigation", "params", "sim"}
+CORES = {"body", "control", "diagnostics", "missions", "motion", "mux", "navigation", "params", "sim"}
 TABLE = {
     **{name: frozenset(row.split()) for name, row in GROUND.items()},
     **{name: frozenset(row.split()) | GROUND.keys() for name, row in ABOVE.items()},
