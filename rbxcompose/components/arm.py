@@ -12,18 +12,20 @@ from rbxcompose.body.description import Description
 from rbxcompose.body.urdf import read_body
 from rbxcompose.body.xml_reader import XmlElement, read_urdf
 from rbxcompose.control.limits import MotionLimits
+from rbxcompose.geometry import Transform3, quaternion_from_rpy
 from rbxcompose.motion.arm_kinematics import ArmKinematics
 from rbxcompose.motion.arm_task import ArmGoal, ArmTask
 from rbxcompose.motion.collisions import told
 from rbxcompose.motion.groups import ArmGroup
+from rbxcompose.motion.inverse_kinematics import ANGLE_TOLERANCE, TOLERANCE, PoseTarget
 from rbxcompose.motion.joint_space import ArmJoint, JointSpace
 from rbxcompose.motion.parametrisation import Trajectory
 from rbxcompose.motion.planner import MotionPlanner, PlannerSettings
-from rbxcompose.motion.reasons import REASONS, MotionFailure, MotionReason
+from rbxcompose.motion.reasons import REASONS
 from rbxcompose.motion.setting_up import load_libraries, made_checker
 from rbxcompose.msgs.control_msgs import FollowJointTrajectory
 from rbxcompose.msgs.entries import ArrayEntries
-from rbxcompose.msgs.rbxcompose_msgs import MoveArm
+from rbxcompose.msgs.rbxcompose_msgs import MoveArm, ReachPose
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.stamps import to_duration
 from rbxcompose.msgs.trajectory_msgs import JointTrajectory, JointTrajectoryPoint
@@ -45,7 +47,13 @@ from rbxcompose.sdk import (
 )
 from rbxcompose.units import ANGLE, LENGTH, RATIO, Dimension
 
-MOVE, FOLLOW = "move", "follow"  # its ports
+MOVE, REACH, FOLLOW = "move", "reach", "follow"  # its ports
+Goal = ServedGoal[Any, Any, Any]
+REACH_MEASURES = {
+    **dict.fromkeys(("x", "y", "z", "tolerance"), LENGTH),
+    **dict.fromkeys(("roll", "pitch", "yaw", "angle_tolerance"), ANGLE),
+    **dict.fromkeys(("speed", "acceleration"), RATIO),
+}
 
 
 class ArmJointConfig(Config):
@@ -105,11 +113,12 @@ class ArmConfig(Config):
 
 @component("arm")
 class Arm(Component[ArmConfig]):
-    """Moves an arm to poses by name, and to positions of its joints, on ways on which it does not collide.
+    """Moves an arm to poses by name, to positions of its joints, or its tip to a pose, on ways without collisions.
 
-    The action is `NAME/move`, and the skill of missions `move_NAME`. A way is searched on the shapes of the whole body,
-    timed within the limits of the joints, examined finely as the controller will follow it, and only then carried out.
-    A failure names one reason of a closed list. If the goal is cancelled or the robot stops, the arm comes to rest.
+    The actions are `NAME/move` and `NAME/reach`, the skills of missions `move_NAME` and `reach_NAME`. A way is searched
+    on the shapes of the whole body, timed within the limits of the joints, examined finely as the controller will
+    follow it, and only then carried out. A failure names one reason of a closed list. If the goal is cancelled or the
+    robot stops, the arm comes to rest.
 
     Example:
         neck: {type: arm, name: neck, base: base, tip: head, controller: look, follow: look/follow_joint_trajectory,
@@ -128,17 +137,26 @@ class Arm(Component[ArmConfig]):
     @classmethod
     def ports(cls, config: ArmConfig) -> dict[str, Port[Any]]:
         """Return the ports: its goals, and those of its controller."""
+        outcomes = dict.fromkeys(REASONS, "failure")
         return super().ports(config) | {
             MOVE: ServesAction(
                 MoveArm,
                 f"{config.name}/move",
                 claims=config.controller,
                 skill=f"move_{config.name}",
-                outcomes=dict.fromkeys(REASONS, "failure"),
+                outcomes=outcomes,
                 entries=ArrayEntries("joints", "positions", dimensions_of(config)),
                 measures={"speed": RATIO, "acceleration": RATIO},
                 choices={"pose": tuple(config.poses)} if config.poses else {},
             ).named(MOVE),
+            REACH: ServesAction(
+                ReachPose,
+                f"{config.name}/reach",
+                claims=config.controller,
+                skill=f"reach_{config.name}",
+                outcomes=outcomes,
+                measures=REACH_MEASURES,
+            ).named(REACH),
             FOLLOW: CallsAction(FollowJointTrajectory, config.follow).named(FOLLOW),
         }
 
@@ -162,7 +180,7 @@ class Arm(Component[ArmConfig]):
         self.planner = MotionPlanner(self.space, checker, settings, lambda: self.now)
         self.measured: dict[str, tuple[float, float]] = {}  # position and velocity of all joints of the body
         self.task: ArmTask | None = None
-        self.goal: ServedGoal[MoveArm.Goal, MoveArm.Result, MoveArm.Feedback]  # that of the task
+        self.goal: Goal | None = None  # that of the task
 
     @property
     def occupation(self) -> str:
@@ -177,27 +195,32 @@ class Arm(Component[ArmConfig]):
 
     def step(self, dt: float) -> None:
         """Continue the goal; a newer one waits until the arm has come to rest from the last one."""
-        goal = self.bound[MOVE].current
-        if self.task is not None and (self.goal is not goal or goal.cancel_requested):
+        there: list[Goal] = [one for port in (MOVE, REACH) if (one := self.bound[port].current) is not None]
+        newer = [one for one in there if one is not self.goal]
+        is_wanted = self.goal in there and not newer
+        if self.task is not None and (not is_wanted or (self.goal is not None and self.goal.cancel_requested)):
             self.task.cancel()
-        if self.task is None and goal is not None:
-            self.goal, self.task = goal, ArmTask(self, self.planner, goal_of(goal.request))
+            self.end()
+        if self.task is None and newer:
+            self.goal = newer[0]
+            self.task = ArmTask(self, self.kinematics, self.planner, goal_of(self.goal.request))
         if self.task is not None:
             self.task.advance()
             self.end()
 
     def end(self) -> None:
         """End the goal with its task."""
-        task = self.task
-        if task is None or not task.is_over:
+        task, goal = self.task, self.goal
+        if task is None or goal is None or not task.is_over:
             return
-        self.task, goal, failure = None, self.goal, task.failure
+        self.task = self.goal = None
+        failure, result = task.failure, (MoveArm if isinstance(goal.request, MoveArm.Goal) else ReachPose).Result
         if failure is None:
             goal.succeeded()
-        elif failure.reason is MotionReason.INTERRUPTED:
-            goal.canceled(result_of(failure))
+        elif goal.cancel_requested:
+            goal.canceled(result(outcome=failure.reason, message=failure.text))
         else:
-            goal.aborted(f"{failure.reason}: {failure.text}", result_of(failure))
+            goal.aborted(f"{failure.reason}: {failure.text}", result(outcome=failure.reason, message=failure.text))
 
     # What a task needs
 
@@ -205,10 +228,6 @@ class Arm(Component[ArmConfig]):
     def poses(self) -> Mapping[str, Mapping[str, float]]:
         """Return the poses by name."""
         return self.config.poses
-
-    def place(self, positions: Mapping[str, float]) -> None:
-        """Set where the rest of the body is."""
-        self.kinematics.place(positions)
 
     def follow(self, names: tuple[str, ...], trajectory: Trajectory, ended: Callable[[str, bool], None]) -> None:
         """Send a trajectory to the controller."""
@@ -225,18 +244,25 @@ class Arm(Component[ArmConfig]):
 
     def told(self, stage: str) -> None:
         """Tell the client in which stage its goal is."""
-        self.goal.feedback(MoveArm.Feedback(stage=stage))
+        if self.goal is not None:
+            kind = MoveArm if isinstance(self.goal.request, MoveArm.Goal) else ReachPose
+            self.goal.feedback(kind.Feedback(stage=stage))
 
 
-def goal_of(message: MoveArm.Goal) -> ArmGoal:
+def goal_of(message: MoveArm.Goal | ReachPose.Goal) -> ArmGoal:
     """Return a goal as the task takes it: a share of 0 is all."""
-    positions = dict(zip(message.joints, message.positions.tolist(), strict=False))
-    return ArmGoal(message.pose, positions, message.speed or 1.0, message.acceleration or 1.0)
-
-
-def result_of(failure: MotionFailure) -> MoveArm.Result:
-    """Return how a goal failed."""
-    return MoveArm.Result(outcome=failure.reason, message=failure.text)
+    speed, acceleration = message.speed or 1.0, message.acceleration or 1.0
+    if isinstance(message, MoveArm.Goal):
+        positions = dict(zip(message.joints, message.positions.tolist(), strict=False))
+        return ArmGoal(message.pose, positions, speed=speed, acceleration=acceleration)
+    turn = quaternion_from_rpy(message.roll, message.pitch, message.yaw)
+    target = PoseTarget(
+        Transform3((message.x, message.y, message.z), turn),
+        message.any_orientation,
+        message.tolerance or TOLERANCE,
+        message.angle_tolerance or ANGLE_TOLERANCE,
+    )
+    return ArmGoal(target=target, frame=message.frame, speed=speed, acceleration=acceleration)
 
 
 def follow_goal(names: tuple[str, ...], trajectory: Trajectory) -> FollowJointTrajectory.Goal:

@@ -3,36 +3,44 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import field
+from collections.abc import Callable, Generator, Mapping
+from dataclasses import field, replace
 from functools import partial
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rbxcompose.dataclass import dataclass
+from rbxcompose.motion.arm_kinematics import ArmKinematics
+from rbxcompose.motion.collisions import told
+from rbxcompose.motion.inverse_kinematics import PoseSolutions, PoseTarget, solved
 from rbxcompose.motion.joint_space import JointSpace
 from rbxcompose.motion.parametrisation import Trajectory
 from rbxcompose.motion.planner import MotionPlan, MotionPlanner, MotionRequest, Planning
 from rbxcompose.motion.reasons import MotionFailure, MotionReason
 
 Array = NDArray[np.float64]
+T = TypeVar("T")
+Solving = Generator[None, None, PoseSolutions]
 
 MOVED = 0.02  # [rad or m] by which a joint may be elsewhere when a motion begins than when it was planned
 AT_REST = 0.05  # [rad/s or m/s]; no motion is planned for an arm that is faster
 SETTLING = 3.0  # [s] that an arm may take to report itself, and to come to rest
 REPLANS = 2  # times that a motion is planned again because the arm was elsewhere
-SLICES = 8  # of planning in one call, so that the same goal takes the same time on a stepped clock
+SLICES = 16  # of planning in one call, so that the same goal takes the same time on a stepped clock
 LONGEST_CALL = 0.2  # [s] of planning in one call, after which others may run
 
 
 @dataclass(frozen=True, slots=True)
 class ArmGoal:
-    """What is asked for: a pose by name, positions of joints [rad or m] beside it, shares of the greatest speeds."""
+    """What is asked for: a pose by name and positions of joints [rad or m] beside it, or a target for the tip."""
 
     pose: str = ""
     positions: Mapping[str, float] = field(default_factory=dict)
+    target: PoseTarget | None = None
+    frame: str = ""
+    """The link in whose frame the target is; without it, the root."""
     speed: float = 1.0
     acceleration: float = 1.0
 
@@ -52,9 +60,6 @@ class ArmSite(Protocol):
     def poses(self) -> Mapping[str, Mapping[str, float]]:
         """Return the poses by name: positions of joints [rad or m]."""
 
-    def place(self, positions: Mapping[str, float]) -> None:
-        """Set where the joints of the rest of the body are."""
-
     def follow(self, names: tuple[str, ...], trajectory: Trajectory, ended: Callable[[str, bool], None]) -> None:
         """Send a trajectory to the controller; `ended` gets the reason if it failed, and whether it was cancelled."""
 
@@ -71,10 +76,11 @@ class ArmSite(Protocol):
 class ArmTask:
     """Plans and carries out one goal. Call `advance` until `is_over`; then `failure` is why it failed, if it did."""
 
-    def __init__(self, site: ArmSite, planner: MotionPlanner, goal: ArmGoal) -> None:
+    def __init__(self, site: ArmSite, kinematics: ArmKinematics, planner: MotionPlanner, goal: ArmGoal) -> None:
         self.failure: MotionFailure | None = None
         self.is_over = self.is_canceled = False
-        self._site, self._planner, self._goal = site, planner, goal
+        self._site, self._kinematics, self._planner, self._goal = site, kinematics, planner, goal
+        self._aims: list[Array] = []  # positions that would do, the next one to try first
         self._stage: Callable[[], None] = self._settle
         self._began, self._replans = site.now, 0
         self._start = np.zeros(len(self.space.joints))
@@ -114,56 +120,100 @@ class ArmTask:
                 self._fail(MotionReason.START_MOVED, f"{words} did not come to rest within {SETTLING:g} s")
 
     def _begin_planning(self) -> None:
+        measured, names = self._site.measured, self.space.names
         self._start = self._where()
-        request = self._request()
-        if isinstance(request, MotionFailure):
-            self._end(request)
-            return
-        others = {name: one for name, (one, _) in self._site.measured.items() if name not in self.space.names}
-        self._site.place(others)
-        self._stage = partial(self._continue_planning, self._planner.plan(request))
+        self._kinematics.place({name: one for name, (one, _) in measured.items() if name not in names})
         self._site.told("planning")
-        self._stage()
+        if problem := self._mistake():
+            self._fail(MotionReason.UNKNOWN_GOAL, problem)
+        elif self._goal.target is None:
+            self._aims = [self._aim()]
+            self._plan_next()
+        else:
+            self._stage = partial(self._solve, self._solutions(self._goal.target))
+            self._stage()
 
     def _where(self) -> Array:
         return np.array([self._site.measured[name][0] for name in self.space.names])
 
-    def _request(self) -> MotionRequest | MotionFailure:
-        """Return what is to be planned, or why it cannot be."""
-        goal, poses, names = self._goal, self._site.poses, self.space.names
-        if goal.pose and goal.pose not in poses:
-            there = ", ".join(poses) or "none"
-            return MotionFailure(
-                MotionReason.UNKNOWN_GOAL, f"there is no pose '{goal.pose}'; the poses of this arm: {there}"
-            )
-        wanted = {**(poses[goal.pose] if goal.pose else {}), **goal.positions}
-        if not wanted:
-            return MotionFailure(MotionReason.UNKNOWN_GOAL, "the goal has neither a pose nor positions of joints")
-        if unknown := [name for name in wanted if name not in names]:
-            return MotionFailure(MotionReason.UNKNOWN_GOAL, f"'{unknown[0]}' is no joint of this arm")
+    def _mistake(self) -> str:
+        """Return what is wrong with the goal, or nothing."""
+        goal, poses = self._goal, self._site.poses
         for word, share in (("speed", goal.speed), ("acceleration", goal.acceleration)):
             if not (math.isfinite(share) and 0.0 < share <= 1.0):
-                return MotionFailure(MotionReason.UNKNOWN_GOAL, f"a {word} of {share:.0%} is none")
-        aim = np.array([wanted.get(name, at) for name, at in zip(names, self._start.tolist(), strict=True)])
-        if not all(name in wanted for name in names):  # what stays where it is may be just outside of its limits
-            stays = np.array([name not in wanted for name in names])
-            aim = np.where(stays, self.space.clamped(aim), aim)
-        return MotionRequest(self._start, aim, goal.speed, goal.acceleration)
+                return f"a {word} of {share:.0%} is none"
+        if goal.target is not None:
+            there = self._kinematics.body.links
+            is_known = not goal.frame or goal.frame in there
+            return goal.target.mistake if is_known else f"there is no link '{goal.frame}'"
+        if goal.pose and goal.pose not in poses:
+            return f"there is no pose '{goal.pose}'; the poses of this arm: {', '.join(poses) or 'none'}"
+        if not (goal.pose or goal.positions):
+            return "the goal has neither a pose nor positions of joints"
+        unknown = [name for name in goal.positions if name not in self.space.names]
+        return f"'{unknown[0]}' is no joint of this arm" if unknown else ""
+
+    def _aim(self) -> Array:
+        """Return where all joints should be; one that the goal leaves out stays, within its limits."""
+        goal = self._goal
+        wanted = {**(self._site.poses[goal.pose] if goal.pose else {}), **goal.positions}
+        stays = self.space.clamped(self._start).tolist()
+        return np.array([wanted.get(name, at) for name, at in zip(self.space.names, stays, strict=True)])
+
+    def _solutions(self, target: PoseTarget) -> Solving:
+        """Return the search for positions that bring the tip to the target."""
+        if self._goal.frame:
+            frame = self._kinematics.poses(self._start)[self._goal.frame]
+            target = replace(target, pose=frame.compose(target.pose))
+        is_free, seed = self._planner.checker.is_free, self._planner.settings.seed
+        return solved(self._kinematics, self.space, target, self._start, is_free, seed=seed)
+
+    def _solve(self, solving: Solving) -> None:
+        found = self._worked(solving)
+        if found is None:
+            return
+        checker, colliding = self._planner.checker, found.colliding
+        self._aims = list(found.free)
+        if self._aims:
+            self._plan_next()
+        elif colliding:
+            self._fail(MotionReason.GOAL_IN_COLLISION, told(checker.colliding(colliding[0])))
+        else:
+            away, angle = found.nearest
+            text = f"the tip got within {away * 100:.1f} cm and {math.degrees(angle):.1f} deg of it"
+            self._fail(MotionReason.GOAL_OUT_OF_REACH, f"{text} in {found.attempts} attempts")
+
+    def _plan_next(self) -> None:
+        """Plan to the next of the positions that would do."""
+        goal = self._goal
+        request = MotionRequest(self._start, self._aims.pop(0), goal.speed, goal.acceleration)
+        self._stage = partial(self._continue_planning, self._planner.plan(request))
+        self._stage()
 
     def _continue_planning(self, planning: Planning) -> None:
+        found = self._worked(planning)
+        if found is not None:
+            self._planned(found)
+
+    def _worked(self, work: Generator[None, None, T]) -> T | None:
+        """Go on with some work; return its result when there is one."""
         begin = self._site.now
         for _ in range(SLICES):
             try:
-                next(planning)
+                next(work)
             except StopIteration as ended:
-                self._planned(ended.value)
-                return
+                result: T = ended.value
+                return result
             if self._site.now - begin >= LONGEST_CALL:
-                return
+                break
+        return None
 
     def _planned(self, found: MotionPlan | MotionFailure) -> None:
         if isinstance(found, MotionFailure):
-            self._end(found)
+            if self._aims and found.reason in (MotionReason.NO_PATH_IN_TIME, MotionReason.PATH_IN_COLLISION):
+                self._plan_next()
+            else:
+                self._end(found)
         elif found.trajectory is None:
             self._end(None)
         else:

@@ -16,6 +16,7 @@ class MotionReason(StrEnum):
     START_IN_COLLISION = "start_in_collision"
     GOAL_OUTSIDE_LIMITS = "goal_outside_limits"
     GOAL_IN_COLLISION = "goal_in_collision"
+    GOAL_OUT_OF_REACH = "goal_out_of_reach"  # no positions of joints bring the tip there
     NO_PATH_IN_TIME = "no_path_in_time"
     PATH_IN_COLLISION = "path_in_collision"  # found, but not when examined finely
     NO_TIMING = "no_timing"  # no velocities were found within the limits

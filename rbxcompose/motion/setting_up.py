@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import atexit
+import gc
 from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
@@ -18,6 +20,7 @@ def load_libraries() -> None:
     Raises:
         ModuleNotFoundError: if the extra `arm` is not installed.
     """
+    atexit.unregister(gc.freeze)  # without a last collection at the exit, OMPL prints all that it had
     import_module("ompl.geometric")
     import_module("toppra.algorithm")
 

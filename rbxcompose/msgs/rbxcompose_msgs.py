@@ -405,6 +405,153 @@ class MoveJoints(Action["MoveJoints.Goal", "MoveJoints.Result", "MoveJoints.Feed
         feedback: MoveJoints.Feedback = field(default_factory=lambda: MoveJoints.Feedback())
 
 
+class ReachPose(Action["ReachPose.Goal", "ReachPose.Result", "ReachPose.Feedback"]):
+    """Bring the tip of an arm to a pose, on a way that is planned and verified."""
+
+    TYPE: ClassVar[str] = "rbxcompose_msgs/action/ReachPose"
+    HASH: ClassVar[str] = "RIHS01_e7492a87895b6a80e43e0a107ceecb4d793605a9e83e798555b3d5907fccaad0"
+
+    @dataclass(frozen=True, slots=True)
+    class Goal(Message):
+        """Goal of `ReachPose`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/ReachPose_Goal"
+        HASH: ClassVar[str] = "RIHS01_d1bc502410968d73c30acdd0f23c7a070bc4faaf4de84fc5b4e1aab2298918e7"
+        FIELDS: ClassVar[Fields] = {
+            "x": "float64",
+            "y": "float64",
+            "z": "float64",
+            "roll": "float64",
+            "pitch": "float64",
+            "yaw": "float64",
+            "frame": "string",
+            "any_orientation": "bool",
+            "tolerance": "float64",
+            "angle_tolerance": "float64",
+            "speed": "float64",
+            "acceleration": "float64",
+        }
+
+        x: float = 0.0  # [m] of the tip in `frame`
+        y: float = 0.0
+        z: float = 0.0
+        roll: float = 0.0  # [rad]
+        pitch: float = 0.0
+        yaw: float = 0.0
+        frame: str = ""  # a link of the body; empty is its root
+        any_orientation: bool = False  # whether only the position counts
+        tolerance: float = 0.0  # [m]; 0 is 1 mm
+        angle_tolerance: float = 0.0  # [rad]; 0 is 0.5 degrees
+        speed: float = 0.0  # share of the greatest speeds of joints; 0 is all
+        acceleration: float = 0.0  # share of the greatest accelerations; 0 is all
+
+    @dataclass(frozen=True, slots=True)
+    class Result(Message):
+        """Result of `ReachPose`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/ReachPose_Result"
+        HASH: ClassVar[str] = "RIHS01_2fc892259d6f8839e17298cb15ccc551b704672f53bcb5ce84f81b82fdd34a63"
+        FIELDS: ClassVar[Fields] = {
+            "outcome": "string",
+            "message": "string",
+        }
+
+        outcome: str = ""  # the reason of a failure, of a closed list
+        message: str = ""
+
+    @dataclass(frozen=True, slots=True)
+    class Feedback(Message):
+        """Feedback of `ReachPose`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/ReachPose_Feedback"
+        HASH: ClassVar[str] = "RIHS01_29ec6d28d86a2e1e353fa679d9d4de8eb682d5667f807fd9ea1696c0e2e87f05"
+        FIELDS: ClassVar[Fields] = {
+            "stage": "string",
+        }
+
+        stage: str = ""  # planning or moving
+
+    class SendGoal(Service["ReachPose.SendGoal.Request", "ReachPose.SendGoal.Response"]):
+        """Sends a goal of `ReachPose`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/ReachPose_SendGoal"
+        HASH: ClassVar[str] = "RIHS01_44d60ea8d34e7f0411c2ed9586678c3bb3c7f67c9ef6123db2c5108d80dc4c61"
+
+        @dataclass(frozen=True, slots=True)
+        class Request(Message):
+            """Request of `ReachPose.SendGoal`."""
+
+            TYPE: ClassVar[str] = "rbxcompose_msgs/action/ReachPose_SendGoal_Request"
+            HASH: ClassVar[str] = "RIHS01_e618a13b379b157bab031f07f70096e29cd21739a0e3531c369c4f85cc8f7d5c"
+            FIELDS: ClassVar[Fields] = {
+                "goal_id": "unique_identifier_msgs/msg/UUID",
+                "goal": "rbxcompose_msgs/action/ReachPose_Goal",
+            }
+
+            goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+            goal: ReachPose.Goal = field(default_factory=lambda: ReachPose.Goal())
+
+        @dataclass(frozen=True, slots=True)
+        class Response(Message):
+            """Response of `ReachPose.SendGoal`."""
+
+            TYPE: ClassVar[str] = "rbxcompose_msgs/action/ReachPose_SendGoal_Response"
+            HASH: ClassVar[str] = "RIHS01_8edd97a311bee43a2c72bad935469b6c539b88f8aec493f83bd2a22bbdb567b8"
+            FIELDS: ClassVar[Fields] = {
+                "accepted": "bool",
+                "stamp": "builtin_interfaces/msg/Time",
+            }
+
+            accepted: bool = False
+            stamp: builtin_interfaces.Time = field(default_factory=builtin_interfaces.Time)
+
+    class GetResult(Service["ReachPose.GetResult.Request", "ReachPose.GetResult.Response"]):
+        """Waits for the result of a goal of `ReachPose`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/ReachPose_GetResult"
+        HASH: ClassVar[str] = "RIHS01_40f0ef6a94fd7c85f39022ec9fd7f608232d2aefa0b1f8b2ea3d93c38b16b899"
+
+        @dataclass(frozen=True, slots=True)
+        class Request(Message):
+            """Request of `ReachPose.GetResult`."""
+
+            TYPE: ClassVar[str] = "rbxcompose_msgs/action/ReachPose_GetResult_Request"
+            HASH: ClassVar[str] = "RIHS01_668a06a4a6d6dc14b7733e0eefa5bcf74859346c90835eb652fe4ec75fa832a9"
+            FIELDS: ClassVar[Fields] = {
+                "goal_id": "unique_identifier_msgs/msg/UUID",
+            }
+
+            goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+
+        @dataclass(frozen=True, slots=True)
+        class Response(Message):
+            """Response of `ReachPose.GetResult`."""
+
+            TYPE: ClassVar[str] = "rbxcompose_msgs/action/ReachPose_GetResult_Response"
+            HASH: ClassVar[str] = "RIHS01_8cc451d8a7a5f4e56d84a4287abef7624167406635fa2c1b023e5b9b0546ab87"
+            FIELDS: ClassVar[Fields] = {
+                "status": "int8",
+                "result": "rbxcompose_msgs/action/ReachPose_Result",
+            }
+
+            status: int = 0
+            result: ReachPose.Result = field(default_factory=lambda: ReachPose.Result())
+
+    @dataclass(frozen=True, slots=True)
+    class FeedbackMessage(Message):
+        """Feedback of `ReachPose` and the goal that it is about."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/ReachPose_FeedbackMessage"
+        HASH: ClassVar[str] = "RIHS01_8812d90ff5bfac8f3b134e46836b7fda67528da46a047b8a3e2f9f7b2733d151"
+        FIELDS: ClassVar[Fields] = {
+            "goal_id": "unique_identifier_msgs/msg/UUID",
+            "feedback": "rbxcompose_msgs/action/ReachPose_Feedback",
+        }
+
+        goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+        feedback: ReachPose.Feedback = field(default_factory=lambda: ReachPose.Feedback())
+
+
 class Recharge(Action["Recharge.Goal", "Recharge.Result", "Recharge.Feedback"]):
     """Charge the battery at the dock until it is full."""
 

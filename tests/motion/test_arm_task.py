@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 
+import numpy as np
 import pytest
 
+from rbxcompose.geometry import Transform3
 from rbxcompose.motion.arm_task import SETTLING, ArmGoal, ArmTask
+from rbxcompose.motion.inverse_kinematics import PoseTarget
 from rbxcompose.motion.parametrisation import Trajectory
 from rbxcompose.motion.reasons import MotionReason
-from tests.motion.toy_arm import planner
+from tests.motion.toy_arm import kinematics, planner
 
-PLANNER = planner()
+KINEMATICS, PLANNER = kinematics(), planner()
 AT = {"turn": 0.8, "lift": 0.0, "bend": 0.2}
 
 
@@ -35,9 +39,6 @@ class Site:
         self.stops = 0
         self.stages: list[str] = []
 
-    def place(self, positions: Mapping[str, float]) -> None:
-        assert "turn" not in positions
-
     def follow(self, names: tuple[str, ...], trajectory: Trajectory, ended: Callable[[str, bool], None]) -> None:
         self.sent.append((trajectory, ended))
 
@@ -52,7 +53,7 @@ class Site:
 
 
 def begun(site: Site, goal: ArmGoal) -> ArmTask:
-    task = ArmTask(site, PLANNER, goal)
+    task = ArmTask(site, KINEMATICS, PLANNER, goal)
     for _ in range(100):
         if task.is_over or site.sent:
             break
@@ -134,3 +135,27 @@ def test_a_controller_that_fails_is_the_reason(problem: str, is_canceled: bool) 
     assert task.failure is not None
     assert task.failure.reason is MotionReason.NOT_FOLLOWED
     assert problem in task.failure.text
+
+
+def test_the_tip_goes_to_a_target_in_the_frame_of_a_link() -> None:
+    site = Site()
+    goal = ArmGoal(target=PoseTarget(Transform3((0.1, 0.0, 0.3)), any_orientation=True), frame="fore")
+    begun(site, goal)
+    before = KINEMATICS.poses(np.array(list(AT.values())))["fore"].apply((0.1, 0.0, 0.3))
+    after = KINEMATICS.tip_pose(site.sent[0][0].positions[-1]).translation
+    assert after == pytest.approx(before, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("goal", "reason", "named"),
+    [
+        (PoseTarget(Transform3((9.0, 0.0, 0.0)), True), MotionReason.GOAL_OUT_OF_REACH, "the tip got within 8"),
+        (PoseTarget(Transform3((0.45, 0.0, 0.25)), True), MotionReason.GOAL_IN_COLLISION, "'ground'"),
+        (PoseTarget(Transform3((math.nan, 0.0, 0.0))), MotionReason.UNKNOWN_GOAL, "not a finite pose"),
+    ],
+)
+def test_a_target_without_a_solution_says_why(goal: PoseTarget, reason: MotionReason, named: str) -> None:
+    task = begun(Site(), ArmGoal(target=goal))
+    assert task.failure is not None
+    assert task.failure.reason is reason
+    assert named in task.failure.text

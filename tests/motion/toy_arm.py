@@ -54,14 +54,19 @@ def urdf(wall: tuple[float, float, float] = WALL) -> str:
 </robot>"""
 
 
-def planner(wall: tuple[float, float, float] = WALL, **settings: object) -> MotionPlanner:
-    """Return a planner for the arm, for which no time passes."""
+def kinematics(wall: tuple[float, float, float] = WALL) -> ArmKinematics:
+    """Return the arm in Pinocchio."""
     description = description_of(urdf(wall))
     group = chain(description.body, "ground", "tip")
     assert group is not None
-    joints = tuple(ArmJoint(name, _limits(description.body, name)) for name in group.joints)
-    kinematics = ArmKinematics(description, group)
-    checker = MeshChecker(kinematics, {}, adjacent_pairs(description.body))
+    return ArmKinematics(description, group)
+
+
+def planner(wall: tuple[float, float, float] = WALL, **settings: object) -> MotionPlanner:
+    """Return a planner for the arm, for which no time passes."""
+    arm = kinematics(wall)
+    joints = tuple(ArmJoint(name, _limits(arm.body, name)) for name in arm.group.joints)
+    checker = MeshChecker(arm, {}, adjacent_pairs(arm.body))
     return MotionPlanner(JointSpace(joints), checker, PlannerSettings(**settings), lambda: 0.0)  # type: ignore[arg-type]
 
 
