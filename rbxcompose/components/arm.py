@@ -48,7 +48,7 @@ from rbxcompose.sdk import (
 from rbxcompose.units import ANGLE, LENGTH, RATIO, Dimension
 
 MOVE, REACH, FOLLOW = "move", "reach", "follow"  # its ports
-Goal = ServedGoal[Any, Any, Any]
+AnyGoal = ServedGoal[Any, Any, Any]
 REACH_MEASURES = {
     **dict.fromkeys(("x", "y", "z", "tolerance"), LENGTH),
     **dict.fromkeys(("roll", "pitch", "yaw", "angle_tolerance"), ANGLE),
@@ -180,7 +180,7 @@ class Arm(Component[ArmConfig]):
         self.planner = MotionPlanner(self.space, checker, settings, lambda: self.now)
         self.measured: dict[str, tuple[float, float]] = {}  # position and velocity of all joints of the body
         self.task: ArmTask | None = None
-        self.goal: Goal | None = None  # that of the task
+        self.goal: AnyGoal | None = None  # that of the task
 
     @property
     def occupation(self) -> str:
@@ -195,7 +195,7 @@ class Arm(Component[ArmConfig]):
 
     def step(self, dt: float) -> None:
         """Continue the goal; a newer one waits until the arm has come to rest from the last one."""
-        there: list[Goal] = [one for port in (MOVE, REACH) if (one := self.bound[port].current) is not None]
+        there: list[AnyGoal] = [one for port in (MOVE, REACH) if (one := self.bound[port].current) is not None]
         newer = [one for one in there if one is not self.goal]
         is_wanted = self.goal in there and not newer
         if self.task is not None and (not is_wanted or (self.goal is not None and self.goal.cancel_requested)):
