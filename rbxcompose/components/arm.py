@@ -9,23 +9,25 @@ from typing import Any
 from pydantic import Field
 
 from rbxcompose.body.description import Description
+from rbxcompose.body.model import Geometry
 from rbxcompose.body.urdf import read_body
 from rbxcompose.body.xml_reader import XmlElement, read_urdf
 from rbxcompose.control.limits import MotionLimits
 from rbxcompose.geometry import Transform3, quaternion_from_rpy
 from rbxcompose.motion.arm_kinematics import ArmKinematics
 from rbxcompose.motion.arm_task import ArmGoal, ArmTask
-from rbxcompose.motion.collisions import told
+from rbxcompose.motion.collisions import MeshChecker, told
 from rbxcompose.motion.groups import ArmGroup
 from rbxcompose.motion.inverse_kinematics import ANGLE_TOLERANCE, TOLERANCE, PoseTarget
 from rbxcompose.motion.joint_space import ArmJoint, JointSpace
 from rbxcompose.motion.parametrisation import Trajectory
 from rbxcompose.motion.planner import MotionPlanner, PlannerSettings
 from rbxcompose.motion.reasons import REASONS
-from rbxcompose.motion.setting_up import load_libraries, made_checker
+from rbxcompose.motion.scene import PlacedObject, mistake_in
+from rbxcompose.motion.setting_up import always_colliding, load_libraries
 from rbxcompose.msgs.control_msgs import FollowJointTrajectory
 from rbxcompose.msgs.entries import ArrayEntries
-from rbxcompose.msgs.rbxcompose_msgs import MoveArm, ReachPose
+from rbxcompose.msgs.rbxcompose_msgs import MoveArm, ReachPose, SceneObject, SceneObjects
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.stamps import to_duration
 from rbxcompose.msgs.trajectory_msgs import JointTrajectory, JointTrajectoryPoint
@@ -133,6 +135,7 @@ class Arm(Component[ArmConfig]):
     rate = 20.0
     steps_for_goals = True
     joint_states = In(JointState, "joint_states", is_open=True)
+    scene = In(SceneObjects, "scene", qos="latched")
 
     @classmethod
     def ports(cls, config: ArmConfig) -> dict[str, Port[Any]]:
@@ -170,14 +173,16 @@ class Arm(Component[ArmConfig]):
         load_libraries()
         config = self.config
         self.space = space_of(config)
-        description = description_of(config)
-        self.kinematics = ArmKinematics(description, ArmGroup(self.space.names, config.base, config.tip))
-        checker, always = made_checker(self.kinematics, self.space, description.meshes)
+        self.description = description_of(config)
+        self.kinematics = ArmKinematics(self.description, ArmGroup(self.space.names, config.base, config.tip))
+        adjacent, always = always_colliding(self.kinematics, self.space, self.description.meshes)
+        self.allowed = adjacent | always
         if always:
             self.info(f"links that always collide are not watched: {told(always, len(always))}")
         one = config.planner
         settings = PlannerSettings(one.type, one.time, one.attempts, one.seed)
-        self.planner = MotionPlanner(self.space, checker, settings, lambda: self.now)
+        self.planner = MotionPlanner(self.space, self.checker_of(()), settings, lambda: self.now)
+        self.objects: tuple[PlacedObject, ...] | None = None  # of the scene; None while it is unknown
         self.measured: dict[str, tuple[float, float]] = {}  # position and velocity of all joints of the body
         self.task: ArmTask | None = None
         self.goal: AnyGoal | None = None  # that of the task
@@ -192,6 +197,28 @@ class Arm(Component[ArmConfig]):
         velocities = message.velocity.tolist() or [0.0] * len(message.name)
         for name, position, velocity in zip(message.name, message.position.tolist(), velocities, strict=False):
             self.measured[name] = position, velocity
+
+    def checker_of(self, objects: tuple[PlacedObject, ...]) -> MeshChecker:
+        """Return what tells collisions among these objects."""
+        return MeshChecker(self.kinematics, self.description.meshes, self.allowed, objects)
+
+    def on_scene(self, message: SceneObjects) -> None:
+        """Plan among other objects from now on; an object that cannot be is left out and told."""
+        found = []
+        for one in map(placed, message.objects):
+            if mistake := mistake_in(one, self.kinematics.body):
+                self.warn(f"the object '{one.name}' is left out: {mistake}")
+            else:
+                found.append(one)
+        self.objects = tuple(found)
+        self.planner.checker = self.checker_of(self.objects)
+        if self.task is not None:
+            self.task.look_again()
+
+    @property
+    def is_ready(self) -> bool:
+        """Return whether the scene is known."""
+        return self.objects is not None
 
     def step(self, dt: float) -> None:
         """Continue the goal; a newer one waits until the arm has come to rest from the last one."""
@@ -281,6 +308,15 @@ def problem_of(end: Ended[FollowJointTrajectory.Result]) -> str:
         return ""
     told = end.result.error_string if end.result is not None else ""
     return told or end.message or f"its trajectory was {end.outcome}"
+
+
+def placed(message: SceneObject) -> PlacedObject:
+    """Return an object of the scene."""
+    at, turn = message.pose.position, message.pose.orientation
+    pose = Transform3((at.x, at.y, at.z), (turn.x, turn.y, turn.z, turn.w))
+    return PlacedObject(
+        message.name, Geometry(message.shape, tuple(message.size.tolist())), message.link, pose, message.touches
+    )
 
 
 def dimensions_of(config: ArmConfig) -> dict[str, Dimension]:

@@ -17,7 +17,7 @@ from rbxcompose.motion.collisions import told
 from rbxcompose.motion.inverse_kinematics import PoseSolutions, PoseTarget, solved
 from rbxcompose.motion.joint_space import JointSpace
 from rbxcompose.motion.parametrisation import Trajectory
-from rbxcompose.motion.planner import MotionPlan, MotionPlanner, MotionRequest, Planning
+from rbxcompose.motion.planner import FINE, MotionPlan, MotionPlanner, MotionRequest, Planning
 from rbxcompose.motion.reasons import MotionFailure, MotionReason
 
 Array = NDArray[np.float64]
@@ -60,6 +60,10 @@ class ArmSite(Protocol):
     def poses(self) -> Mapping[str, Mapping[str, float]]:
         """Return the poses by name: positions of joints [rad or m]."""
 
+    @property
+    def is_ready(self) -> bool:
+        """Return whether it is known what is around the robot."""
+
     def follow(self, names: tuple[str, ...], trajectory: Trajectory, ended: Callable[[str, bool], None]) -> None:
         """Send a trajectory to the controller; `ended` gets the reason if it failed, and whether it was cancelled."""
 
@@ -80,6 +84,8 @@ class ArmTask:
         self.failure: MotionFailure | None = None
         self.is_over = self.is_canceled = False
         self._site, self._kinematics, self._planner, self._goal = site, kinematics, planner, goal
+        self._trajectory: Trajectory | None = None
+        self._obstacle = ""  # what the motion would hit, since the scene has changed
         self._aims: list[Array] = []  # positions that would do, the next one to try first
         self._stage: Callable[[], None] = self._settle
         self._began, self._replans = site.now, 0
@@ -105,9 +111,24 @@ class ArmTask:
         else:
             self._end(MotionFailure(MotionReason.INTERRUPTED, "it was cancelled while it was planned"))
 
+    def look_again(self) -> None:
+        """Stop if what is left of the motion collides, now that something else is around the robot."""
+        if self._stage != self._move or self._obstacle or self._trajectory is None:
+            return
+        points = self._trajectory.dense(FINE)
+        here = int(np.argmin(np.max(np.abs(points - self._where()), axis=1)))
+        bad = next((one for one in points[here:] if not self._planner.checker.is_free(one)), None)
+        if bad is not None:
+            self._obstacle = told(self._planner.checker.colliding(bad))
+            self._site.stop_following()
+
     def _settle(self) -> None:
         """Wait until all joints are known and at rest."""
         measured, names = self._site.measured, self.space.names
+        if not self._site.is_ready:
+            if self._site.now - self._began >= SETTLING:
+                self._fail(MotionReason.UNKNOWN_SCENE, "nothing has told what is around the robot")
+            return
         unknown = [name for name in names if name not in measured]
         fast = [name for name in names if name in measured and abs(measured[name][1]) > AT_REST]
         if not unknown and not fast:
@@ -232,7 +253,7 @@ class ArmTask:
             self._began, self._stage = self._site.now, self._settle
             return
         self._site.info(f"a motion of {trajectory.duration:.1f} s: {words}")
-        self._stage = self._move
+        self._stage, self._trajectory = self._move, trajectory
         self._site.told("moving")
         self._site.follow(self.space.names, trajectory, self._followed)
 
@@ -242,6 +263,8 @@ class ArmTask:
     def _followed(self, problem: str, is_canceled: bool) -> None:
         if self.is_canceled:
             self._end(MotionFailure(MotionReason.INTERRUPTED, "it was cancelled on its way"))
+        elif self._obstacle and (is_canceled or problem):
+            self._fail(MotionReason.PATH_IN_COLLISION, f"{self._obstacle}, since the scene has changed")
         elif is_canceled:
             self._fail(MotionReason.NOT_FOLLOWED, "somebody else cancelled its trajectory")
         elif problem:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from itertools import combinations
 from pathlib import Path
 from typing import Any, Protocol
@@ -14,6 +14,7 @@ from rbxcompose.body.model import Body, Geometry
 from rbxcompose.geometry import Transform3
 from rbxcompose.motion.arm_kinematics import ArmKinematics
 from rbxcompose.motion.groups import moved_links
+from rbxcompose.motion.scene import PlacedObject
 
 Array = NDArray[np.float64]
 LinkPair = tuple[str, str]
@@ -49,15 +50,13 @@ def told(pairs: Collection[LinkPair], most: int = 3) -> str:
 
 
 def adjacent_pairs(body: Body) -> frozenset[LinkPair]:
-    """Return the links that a joint connects; links without a shape between them do not count."""
+    """Return the links that a joint connects, also if frames without a shape are fixed between it and the upper one."""
     found = set()
     for joint in body.joints.values():
-        link: str | None = joint.parent
-        while link is not None and not body.links[link].collisions:
-            above = body.joint_above.get(link)
-            link = above.parent if above is not None else None
-        if link is not None:
-            found.add(pair_of(link, joint.child))
+        link = joint.parent
+        while not body.links[link].collisions and link in body.joint_above and not body.joint_above[link].moves:
+            link = body.joint_above[link].parent
+        found.add(pair_of(link, joint.child))
     return frozenset(found)
 
 
@@ -69,7 +68,11 @@ class MeshChecker:
     """
 
     def __init__(
-        self, model: ArmKinematics, meshes: Mapping[str, Path], allowed: Collection[LinkPair] = frozenset()
+        self,
+        model: ArmKinematics,
+        meshes: Mapping[str, Path],
+        allowed: Collection[LinkPair] = frozenset(),
+        objects: Iterable[PlacedObject] = (),
     ) -> None:
         """Build it; `meshes` are the files of meshes by their names in the URDF.
 
@@ -82,10 +85,16 @@ class MeshChecker:
         self._pinocchio, self._model = pinocchio, model
         self._geometry: Any = pinocchio.GeometryModel()
         self._owners: list[str] = []
+        self._moved = dict(moved_links(model.body, model.group.joints))
         for link in model.body.links.values():
             for shape in link.collisions:
-                self._add(link.name, coal_shape(shape.geometry, meshes), shape.origin)
-        self._pair(frozenset(allowed))
+                self._add(link.name, link.name, coal_shape(shape.geometry, meshes), shape.origin)
+        touching = set(allowed)
+        for one in objects:
+            self._moved[one.name] = self._moved[one.link]
+            self._add(one.name, one.link, coal_shape(one.shape, {}), one.pose)
+            touching |= {pair_of(one.name, link) for link in one.touches}
+        self._pair(touching)
         self._data = self._geometry.createData()
         for request in self._data.collisionRequests:
             request.security_margin = -TOUCH
@@ -121,19 +130,19 @@ class MeshChecker:
         owners = pair_of(self._owners[pair.first], self._owners[pair.second])
         return float(self._data.distanceResults[nearest].min_distance), owners
 
-    def _add(self, link: str, shape: Coal, origin: Transform3) -> None:
+    def _add(self, owner: str, link: str, shape: Coal, origin: Transform3) -> None:
         frame = self._model.whole.model.frames[self._model.whole.frames[link]]
         placement = frame.placement * self._pinocchio.XYZQUATToSE3(
             np.array((*origin.translation, *origin.rotation), dtype=float)
         )
-        name = f"{link}_{len(self._owners)}"
-        self._owners.append(link)
+        name = f"{owner}_{len(self._owners)}"
+        self._owners.append(owner)
         self._geometry.addGeometryObject(
             self._pinocchio.GeometryObject(name, frame.parentJoint, frame.parentFrame, placement, shape)
         )
 
-    def _pair(self, allowed: frozenset[LinkPair]) -> None:
-        moved = moved_links(self._model.body, self._model.group.joints)
+    def _pair(self, allowed: Collection[LinkPair]) -> None:
+        moved = self._moved
         for first, second in combinations(range(len(self._owners)), 2):
             one, other = self._owners[first], self._owners[second]
             if moved[one] != moved[other] and pair_of(one, other) not in allowed:

@@ -25,15 +25,14 @@ def load_libraries() -> None:
     import_module("toppra.algorithm")
 
 
-def made_checker(
+def always_colliding(
     kinematics: ArmKinematics, space: JointSpace, meshes: Mapping[str, Path]
-) -> tuple[MeshChecker, frozenset[LinkPair]]:
-    """Return a checker, and the pairs of links that it does not watch because they always collide.
+) -> tuple[frozenset[LinkPair], frozenset[LinkPair]]:
+    """Return the links that a joint connects, and further pairs that collide wherever the arm is.
 
     Raises:
         ValueError: if a mesh cannot be read.
     """
     adjacent = adjacent_pairs(kinematics.body)
     checker = MeshChecker(kinematics, meshes, adjacent)
-    always = unavoidable_pairs(space.samples(SAMPLES, SEED), checker.colliding)
-    return (MeshChecker(kinematics, meshes, adjacent | always) if always else checker), always
+    return adjacent, unavoidable_pairs(space.samples(SAMPLES, SEED), checker.colliding)

@@ -9,7 +9,7 @@ from dataclasses import field
 from typing import TYPE_CHECKING, ClassVar
 
 from rbxcompose.dataclass import dataclass
-from rbxcompose.msgs import builtin_interfaces, unique_identifier_msgs
+from rbxcompose.msgs import builtin_interfaces, geometry_msgs, unique_identifier_msgs
 from rbxcompose.msgs.arrays import ArrayMessage, zeros
 from rbxcompose.msgs.types import Action, Fields, Message, Service
 
@@ -671,6 +671,44 @@ class Recharge(Action["Recharge.Goal", "Recharge.Result", "Recharge.Feedback"]):
 
         goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
         feedback: Recharge.Feedback = field(default_factory=lambda: Recharge.Feedback())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SceneObject(ArrayMessage):
+    """A thing that arms must not hit, or that one of them holds."""
+
+    TYPE: ClassVar[str] = "rbxcompose_msgs/msg/SceneObject"
+    HASH: ClassVar[str] = "RIHS01_5b77623c22d0b72daf6a4eb34ce6855092adb89e37398d507dfce74c2134107a"
+    FIELDS: ClassVar[Fields] = {
+        "name": "string",
+        "shape": "string",
+        "size": "float64[]",
+        "link": "string",
+        "pose": "geometry_msgs/msg/Pose",
+        "touches": "string[]",
+    }
+
+    name: str = ""
+    shape: str = ""  # box, cylinder or sphere
+    size: NDArray[np.float64] = field(
+        default_factory=lambda: zeros("float64", 0)
+    )  # [m]: of a box its lengths along x, y and z, of a cylinder its radius and length, of a sphere its radius
+    link: str = ""  # of the body, with which it moves
+    pose: geometry_msgs.Pose = field(default_factory=geometry_msgs.Pose)  # in the frame of the link
+    touches: tuple[str, ...] = ()  # links that it may touch
+
+
+@dataclass(frozen=True, slots=True)
+class SceneObjects(Message):
+    """All things that arms must not hit."""
+
+    TYPE: ClassVar[str] = "rbxcompose_msgs/msg/SceneObjects"
+    HASH: ClassVar[str] = "RIHS01_240364b75c24b838a25b6d4e78e08e6a41019075adce1ab9151d98fdd59f6144"
+    FIELDS: ClassVar[Fields] = {
+        "objects": "rbxcompose_msgs/msg/SceneObject[]",
+    }
+
+    objects: tuple[SceneObject, ...] = ()
 
 
 class SetBatteryLevel(Service["SetBatteryLevel.Request", "SetBatteryLevel.Response"]):

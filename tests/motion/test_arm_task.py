@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from rbxcompose.body.model import Geometry
 from rbxcompose.geometry import Transform3
 from rbxcompose.motion.arm_task import SETTLING, ArmGoal, ArmTask
+from rbxcompose.motion.collisions import MeshChecker, adjacent_pairs
 from rbxcompose.motion.inverse_kinematics import PoseTarget
 from rbxcompose.motion.parametrisation import Trajectory
 from rbxcompose.motion.reasons import MotionReason
+from rbxcompose.motion.scene import PlacedObject
 from tests.motion.toy_arm import kinematics, planner
 
 KINEMATICS, PLANNER = kinematics(), planner()
@@ -32,7 +36,7 @@ class Site:
     """What a task needs; `sent` are trajectories that nobody has ended yet."""
 
     def __init__(self) -> None:
-        self.now = 0.0
+        self.now, self.is_ready = 0.0, True
         self.measured: dict[str, tuple[float, float]] = {name: (value, 0.0) for name, value in AT.items()}
         self.poses: Mapping[str, Mapping[str, float]] = {"aside": {"turn": 1.2}, "up": {"lift": 1.0, "bend": 0.0}}
         self.sent: list[tuple[Trajectory, Callable[[str, bool], None]]] = []
@@ -159,3 +163,21 @@ def test_a_target_without_a_solution_says_why(goal: PoseTarget, reason: MotionRe
     assert task.failure is not None
     assert task.failure.reason is reason
     assert named in task.failure.text
+
+
+def test_a_motion_stops_for_an_object_that_comes_into_its_way() -> None:
+    site, used = Site(), planner()
+    task = ArmTask(site, KINEMATICS, used, ArmGoal("up"))
+    while not site.sent:
+        task.advance()
+    at_end = KINEMATICS.tip_pose(site.sent[0][0].positions[-1])
+    block = PlacedObject("block", Geometry("box", (0.1, 0.1, 0.1)), "ground", at_end)
+    far = replace(block, pose=Transform3((-1.0, 0.0, 1.0)))
+    for one, stops in ((far, 0), (block, 1), (block, 1)):
+        used.checker = MeshChecker(KINEMATICS, {}, adjacent_pairs(KINEMATICS.body), [one])
+        task.look_again()
+        assert site.stops == stops
+    site.sent[0][1]("its trajectory was canceled", True)
+    assert task.failure is not None
+    assert task.failure.reason is MotionReason.PATH_IN_COLLISION
+    assert "'block'" in task.failure.text

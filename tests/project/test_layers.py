@@ -55,15 +55,15 @@ ABOVE = {
     "checks": "actuation body.model check_runner composition diagnostics.core missions model sdk sections",
     "cli": "actuation body bus compiler composition controller_requests doctor executive.requests finding_pages "
     "importing inspection lsp.server mission_tests missions model params plan recording rendering replay runtime "
-    "scaffold schema.documents sdk sections",
+    "scaffold scene_requests schema.documents sdk sections",
     "controller_interface": "control sdk",
     "controller_manager": "controller_interface sdk",
     "controller_requests": "",
     "controllers": "control controller_interface sdk",
     "compiler": "check_runner composition model plan",
     "components": "actuation body control controller_interface controller_manager controller_requests diagnostics "
-    "executive missions monitors motion mux.core navigation sdk servo_bus_config servo_bus_line servo_report sim "
-    "twins.fault_script",
+    "executive missions monitors motion mux.core navigation scene_requests sdk servo_bus_config servo_bus_line "
+    "servo_report sim twins.fault_script",
     "servo_report": "actuation control",
     "composition": "body.description sections",
     "control": "",
@@ -95,7 +95,8 @@ ABOVE = {
     "sdk": "diagnostics.updater",
     "sections": "actuation.bus_types actuation.control_tables actuation.serial_ports actuation.servo_models "
     "actuation.torques body control.calibration control.limits controller_interface motion.groups "
-    "motion.planner_types sdk twins.servo_faults",
+    "motion.planner_types motion.scene sdk twins.servo_faults",
+    "scene_requests": "",
     "servo_bus_config": "actuation control controller_interface sdk.ports twins.fault_script",
     "servo_bus_line": "actuation servo_bus_config twins",
     "sim": "",
