@@ -19,6 +19,7 @@ FAMILIES = {
     "13": "files and composition",
     "20": "body",
     "22": "servos",
+    "23": "arms",
     "30": "wiring",
     "31": "muxes",
     "35": "rates and units",

@@ -128,7 +128,12 @@ class Renaming:
         return any(one.has_topics and topic in self.own.get(one.name, ()) for one in sections())
 
     def _new(self, section: Section[Any, Any], name: str) -> str:
-        return self.topic(name) if section.has_topics else f"{self.prefix}{name}"
+        if section.has_topics:
+            return self.topic(name)
+        instance = self.prefix.removesuffix("_")
+        if section.repeats or not (instance == name or instance.endswith(f"_{name}")):
+            return f"{self.prefix}{name}"
+        return instance
 
     def _section(self, section: Section[Any, Any], node: TreeNode) -> TreeNode:
         node = section.with_references(node, lambda kind, one: self.texts(one, lambda text: self.name(kind, text)))
@@ -143,7 +148,7 @@ class Renaming:
         changed = {name: Entry(entry.key, values[name]) for name, entry in node.entries.items()}
         if section.has_topics:
             return self.topics(replace(node, entries=changed))
-        new = {name: f"{self.prefix}{name}" for name in changed}
+        new = {name: self._new(section, name) for name in changed}
         entries = {new[name]: Entry(replace(one.key, text=new[name]), one.value) for name, one in changed.items()}
         return replace(node, entries=entries)
 

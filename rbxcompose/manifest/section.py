@@ -89,6 +89,9 @@ class Declaration(Generic[M]):
     """Tells of what two parts bring under a path in the section: what it is, and what helps."""
     models: Callable[[TreeNode], Iterable[Any]] | None = None
     """Returns the models of one entry, if they depend on its content."""
+    repeats: bool = True
+    """Whether a name in a part gets the instance's name as a prefix even if that ends with it: without, the entry `arm`
+    of the part `right_arm` is `right_arm`."""
     rename: Callable[[Renames, str, TreeNode], TreeNode] = lambda renames, name, node: node
     """Further changes to an entry of a part after its references were renamed."""
     topics: Callable[[str, TreeNode], Iterable[str]] = lambda name, node: ()

@@ -48,6 +48,7 @@ def _actions(components: Mapping[str, RobotComponent]) -> Iterable[SkillSource]:
                 outcomes=port.outcomes,
                 entries=port.entries,
                 measures=port.measures,
+                choices=port.choices,
             )
             yield SkillSource(skill, end.type_name, end.topic)
 

@@ -9,7 +9,7 @@ from dataclasses import field
 from typing import TYPE_CHECKING, ClassVar
 
 from rbxcompose.dataclass import dataclass
-from rbxcompose.msgs import builtin_interfaces, unique_identifier_msgs
+from rbxcompose.msgs import builtin_interfaces, geometry_msgs, unique_identifier_msgs
 from rbxcompose.msgs.arrays import ArrayMessage, zeros
 from rbxcompose.msgs.types import Action, Fields, Message, Service
 
@@ -149,6 +149,139 @@ class Grip(Action["Grip.Goal", "Grip.Result", "Grip.Feedback"]):
         feedback: Grip.Feedback = field(default_factory=lambda: Grip.Feedback())
 
 
+class MoveArm(Action["MoveArm.Goal", "MoveArm.Result", "MoveArm.Feedback"]):
+    """Plan a motion of an arm, verify it, and carry it out."""
+
+    TYPE: ClassVar[str] = "rbxcompose_msgs/action/MoveArm"
+    HASH: ClassVar[str] = "RIHS01_30f676c93edb50a13fddf10ef0af05a4321ea40619db64d4e56d599c44235a4c"
+
+    @dataclass(frozen=True, slots=True, eq=False)
+    class Goal(ArrayMessage):
+        """Goal of `MoveArm`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/MoveArm_Goal"
+        HASH: ClassVar[str] = "RIHS01_95469303712bb0672df99dedc8afcdd94c54cfa516aff05d12a0a7d09cfcbbb4"
+        FIELDS: ClassVar[Fields] = {
+            "pose": "string",
+            "joints": "string[]",
+            "positions": "float64[]",
+            "speed": "float64",
+            "acceleration": "float64",
+        }
+
+        pose: str = ""  # its name; empty if only joints are given
+        joints: tuple[str, ...] = ()  # of the arm; the others go to the pose, or stay where they are
+        positions: NDArray[np.float64] = field(default_factory=lambda: zeros("float64", 0))  # [rad or m]
+        speed: float = 0.0  # share of the greatest speeds of joints; 0 is all
+        acceleration: float = 0.0  # share of the greatest accelerations; 0 is all
+
+    @dataclass(frozen=True, slots=True)
+    class Result(Message):
+        """Result of `MoveArm`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/MoveArm_Result"
+        HASH: ClassVar[str] = "RIHS01_9607155dadb75d128bc37378039cf504d336325f1c45cfa242bd6dacc009e41b"
+        FIELDS: ClassVar[Fields] = {
+            "outcome": "string",
+            "message": "string",
+        }
+
+        outcome: str = ""  # the reason of a failure, of a closed list
+        message: str = ""
+
+    @dataclass(frozen=True, slots=True)
+    class Feedback(Message):
+        """Feedback of `MoveArm`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/MoveArm_Feedback"
+        HASH: ClassVar[str] = "RIHS01_18b2fe9dc92af3d0acf1cc6de2e28577b280107eeeee3148b81b9acf8c16c72f"
+        FIELDS: ClassVar[Fields] = {
+            "stage": "string",
+        }
+
+        stage: str = ""  # planning or moving
+
+    class SendGoal(Service["MoveArm.SendGoal.Request", "MoveArm.SendGoal.Response"]):
+        """Sends a goal of `MoveArm`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/MoveArm_SendGoal"
+        HASH: ClassVar[str] = "RIHS01_ba3a140029257a750ed3523d212ba0ee87c96f76e9ae5890e42d86fba5f411c3"
+
+        @dataclass(frozen=True, slots=True)
+        class Request(Message):
+            """Request of `MoveArm.SendGoal`."""
+
+            TYPE: ClassVar[str] = "rbxcompose_msgs/action/MoveArm_SendGoal_Request"
+            HASH: ClassVar[str] = "RIHS01_a4bc3dc33a507592c277f35cb9092f4324ac073da0e2d6154a27aee5544862cc"
+            FIELDS: ClassVar[Fields] = {
+                "goal_id": "unique_identifier_msgs/msg/UUID",
+                "goal": "rbxcompose_msgs/action/MoveArm_Goal",
+            }
+
+            goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+            goal: MoveArm.Goal = field(default_factory=lambda: MoveArm.Goal())
+
+        @dataclass(frozen=True, slots=True)
+        class Response(Message):
+            """Response of `MoveArm.SendGoal`."""
+
+            TYPE: ClassVar[str] = "rbxcompose_msgs/action/MoveArm_SendGoal_Response"
+            HASH: ClassVar[str] = "RIHS01_c987bb09a932e2b3186a163b8e913034257a29b4fd8c3feb1ff3ea5613c9ad33"
+            FIELDS: ClassVar[Fields] = {
+                "accepted": "bool",
+                "stamp": "builtin_interfaces/msg/Time",
+            }
+
+            accepted: bool = False
+            stamp: builtin_interfaces.Time = field(default_factory=builtin_interfaces.Time)
+
+    class GetResult(Service["MoveArm.GetResult.Request", "MoveArm.GetResult.Response"]):
+        """Waits for the result of a goal of `MoveArm`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/MoveArm_GetResult"
+        HASH: ClassVar[str] = "RIHS01_d37fc2fd008f2c5114fedb39b1a0f38cbe8aa8e24528ca97fbb69e04256b8b95"
+
+        @dataclass(frozen=True, slots=True)
+        class Request(Message):
+            """Request of `MoveArm.GetResult`."""
+
+            TYPE: ClassVar[str] = "rbxcompose_msgs/action/MoveArm_GetResult_Request"
+            HASH: ClassVar[str] = "RIHS01_91e0767d7bb8c5b6ab04ed2742b55fedf91632ddc54732505a85a11433062563"
+            FIELDS: ClassVar[Fields] = {
+                "goal_id": "unique_identifier_msgs/msg/UUID",
+            }
+
+            goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+
+        @dataclass(frozen=True, slots=True)
+        class Response(Message):
+            """Response of `MoveArm.GetResult`."""
+
+            TYPE: ClassVar[str] = "rbxcompose_msgs/action/MoveArm_GetResult_Response"
+            HASH: ClassVar[str] = "RIHS01_b8ed29adde0414a975f549c64b9c9f6c91e8e626846901828461ec722e75107b"
+            FIELDS: ClassVar[Fields] = {
+                "status": "int8",
+                "result": "rbxcompose_msgs/action/MoveArm_Result",
+            }
+
+            status: int = 0
+            result: MoveArm.Result = field(default_factory=lambda: MoveArm.Result())
+
+    @dataclass(frozen=True, slots=True)
+    class FeedbackMessage(Message):
+        """Feedback of `MoveArm` and the goal that it is about."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/MoveArm_FeedbackMessage"
+        HASH: ClassVar[str] = "RIHS01_3fd62d2e41d0c2d3d5789aac4c4a75e8b88f41594fec7b3434cc4544ff9be205"
+        FIELDS: ClassVar[Fields] = {
+            "goal_id": "unique_identifier_msgs/msg/UUID",
+            "feedback": "rbxcompose_msgs/action/MoveArm_Feedback",
+        }
+
+        goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+        feedback: MoveArm.Feedback = field(default_factory=lambda: MoveArm.Feedback())
+
+
 class MoveJoints(Action["MoveJoints.Goal", "MoveJoints.Result", "MoveJoints.Feedback"]):
     """Move some joints of a controller in a time; 0 is as fast as their limits allow."""
 
@@ -272,6 +405,153 @@ class MoveJoints(Action["MoveJoints.Goal", "MoveJoints.Result", "MoveJoints.Feed
         feedback: MoveJoints.Feedback = field(default_factory=lambda: MoveJoints.Feedback())
 
 
+class ReachPose(Action["ReachPose.Goal", "ReachPose.Result", "ReachPose.Feedback"]):
+    """Bring the tip of an arm to a pose, on a way that is planned and verified."""
+
+    TYPE: ClassVar[str] = "rbxcompose_msgs/action/ReachPose"
+    HASH: ClassVar[str] = "RIHS01_e7492a87895b6a80e43e0a107ceecb4d793605a9e83e798555b3d5907fccaad0"
+
+    @dataclass(frozen=True, slots=True)
+    class Goal(Message):
+        """Goal of `ReachPose`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/ReachPose_Goal"
+        HASH: ClassVar[str] = "RIHS01_d1bc502410968d73c30acdd0f23c7a070bc4faaf4de84fc5b4e1aab2298918e7"
+        FIELDS: ClassVar[Fields] = {
+            "x": "float64",
+            "y": "float64",
+            "z": "float64",
+            "roll": "float64",
+            "pitch": "float64",
+            "yaw": "float64",
+            "frame": "string",
+            "any_orientation": "bool",
+            "tolerance": "float64",
+            "angle_tolerance": "float64",
+            "speed": "float64",
+            "acceleration": "float64",
+        }
+
+        x: float = 0.0  # [m] of the tip in `frame`
+        y: float = 0.0
+        z: float = 0.0
+        roll: float = 0.0  # [rad]
+        pitch: float = 0.0
+        yaw: float = 0.0
+        frame: str = ""  # a link of the body; empty is its root
+        any_orientation: bool = False  # whether only the position counts
+        tolerance: float = 0.0  # [m]; 0 is 1 mm
+        angle_tolerance: float = 0.0  # [rad]; 0 is 0.5 degrees
+        speed: float = 0.0  # share of the greatest speeds of joints; 0 is all
+        acceleration: float = 0.0  # share of the greatest accelerations; 0 is all
+
+    @dataclass(frozen=True, slots=True)
+    class Result(Message):
+        """Result of `ReachPose`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/ReachPose_Result"
+        HASH: ClassVar[str] = "RIHS01_2fc892259d6f8839e17298cb15ccc551b704672f53bcb5ce84f81b82fdd34a63"
+        FIELDS: ClassVar[Fields] = {
+            "outcome": "string",
+            "message": "string",
+        }
+
+        outcome: str = ""  # the reason of a failure, of a closed list
+        message: str = ""
+
+    @dataclass(frozen=True, slots=True)
+    class Feedback(Message):
+        """Feedback of `ReachPose`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/ReachPose_Feedback"
+        HASH: ClassVar[str] = "RIHS01_29ec6d28d86a2e1e353fa679d9d4de8eb682d5667f807fd9ea1696c0e2e87f05"
+        FIELDS: ClassVar[Fields] = {
+            "stage": "string",
+        }
+
+        stage: str = ""  # planning or moving
+
+    class SendGoal(Service["ReachPose.SendGoal.Request", "ReachPose.SendGoal.Response"]):
+        """Sends a goal of `ReachPose`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/ReachPose_SendGoal"
+        HASH: ClassVar[str] = "RIHS01_44d60ea8d34e7f0411c2ed9586678c3bb3c7f67c9ef6123db2c5108d80dc4c61"
+
+        @dataclass(frozen=True, slots=True)
+        class Request(Message):
+            """Request of `ReachPose.SendGoal`."""
+
+            TYPE: ClassVar[str] = "rbxcompose_msgs/action/ReachPose_SendGoal_Request"
+            HASH: ClassVar[str] = "RIHS01_e618a13b379b157bab031f07f70096e29cd21739a0e3531c369c4f85cc8f7d5c"
+            FIELDS: ClassVar[Fields] = {
+                "goal_id": "unique_identifier_msgs/msg/UUID",
+                "goal": "rbxcompose_msgs/action/ReachPose_Goal",
+            }
+
+            goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+            goal: ReachPose.Goal = field(default_factory=lambda: ReachPose.Goal())
+
+        @dataclass(frozen=True, slots=True)
+        class Response(Message):
+            """Response of `ReachPose.SendGoal`."""
+
+            TYPE: ClassVar[str] = "rbxcompose_msgs/action/ReachPose_SendGoal_Response"
+            HASH: ClassVar[str] = "RIHS01_8edd97a311bee43a2c72bad935469b6c539b88f8aec493f83bd2a22bbdb567b8"
+            FIELDS: ClassVar[Fields] = {
+                "accepted": "bool",
+                "stamp": "builtin_interfaces/msg/Time",
+            }
+
+            accepted: bool = False
+            stamp: builtin_interfaces.Time = field(default_factory=builtin_interfaces.Time)
+
+    class GetResult(Service["ReachPose.GetResult.Request", "ReachPose.GetResult.Response"]):
+        """Waits for the result of a goal of `ReachPose`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/ReachPose_GetResult"
+        HASH: ClassVar[str] = "RIHS01_40f0ef6a94fd7c85f39022ec9fd7f608232d2aefa0b1f8b2ea3d93c38b16b899"
+
+        @dataclass(frozen=True, slots=True)
+        class Request(Message):
+            """Request of `ReachPose.GetResult`."""
+
+            TYPE: ClassVar[str] = "rbxcompose_msgs/action/ReachPose_GetResult_Request"
+            HASH: ClassVar[str] = "RIHS01_668a06a4a6d6dc14b7733e0eefa5bcf74859346c90835eb652fe4ec75fa832a9"
+            FIELDS: ClassVar[Fields] = {
+                "goal_id": "unique_identifier_msgs/msg/UUID",
+            }
+
+            goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+
+        @dataclass(frozen=True, slots=True)
+        class Response(Message):
+            """Response of `ReachPose.GetResult`."""
+
+            TYPE: ClassVar[str] = "rbxcompose_msgs/action/ReachPose_GetResult_Response"
+            HASH: ClassVar[str] = "RIHS01_8cc451d8a7a5f4e56d84a4287abef7624167406635fa2c1b023e5b9b0546ab87"
+            FIELDS: ClassVar[Fields] = {
+                "status": "int8",
+                "result": "rbxcompose_msgs/action/ReachPose_Result",
+            }
+
+            status: int = 0
+            result: ReachPose.Result = field(default_factory=lambda: ReachPose.Result())
+
+    @dataclass(frozen=True, slots=True)
+    class FeedbackMessage(Message):
+        """Feedback of `ReachPose` and the goal that it is about."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/ReachPose_FeedbackMessage"
+        HASH: ClassVar[str] = "RIHS01_8812d90ff5bfac8f3b134e46836b7fda67528da46a047b8a3e2f9f7b2733d151"
+        FIELDS: ClassVar[Fields] = {
+            "goal_id": "unique_identifier_msgs/msg/UUID",
+            "feedback": "rbxcompose_msgs/action/ReachPose_Feedback",
+        }
+
+        goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+        feedback: ReachPose.Feedback = field(default_factory=lambda: ReachPose.Feedback())
+
+
 class Recharge(Action["Recharge.Goal", "Recharge.Result", "Recharge.Feedback"]):
     """Charge the battery at the dock until it is full."""
 
@@ -391,6 +671,44 @@ class Recharge(Action["Recharge.Goal", "Recharge.Result", "Recharge.Feedback"]):
 
         goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
         feedback: Recharge.Feedback = field(default_factory=lambda: Recharge.Feedback())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SceneObject(ArrayMessage):
+    """A thing that arms must not hit, or that one of them holds."""
+
+    TYPE: ClassVar[str] = "rbxcompose_msgs/msg/SceneObject"
+    HASH: ClassVar[str] = "RIHS01_5b77623c22d0b72daf6a4eb34ce6855092adb89e37398d507dfce74c2134107a"
+    FIELDS: ClassVar[Fields] = {
+        "name": "string",
+        "shape": "string",
+        "size": "float64[]",
+        "link": "string",
+        "pose": "geometry_msgs/msg/Pose",
+        "touches": "string[]",
+    }
+
+    name: str = ""
+    shape: str = ""  # box, cylinder or sphere
+    size: NDArray[np.float64] = field(
+        default_factory=lambda: zeros("float64", 0)
+    )  # [m]: of a box its lengths along x, y and z, of a cylinder its radius and length, of a sphere its radius
+    link: str = ""  # of the body, with which it moves
+    pose: geometry_msgs.Pose = field(default_factory=geometry_msgs.Pose)  # in the frame of the link
+    touches: tuple[str, ...] = ()  # links that it may touch
+
+
+@dataclass(frozen=True, slots=True)
+class SceneObjects(Message):
+    """All things that arms must not hit."""
+
+    TYPE: ClassVar[str] = "rbxcompose_msgs/msg/SceneObjects"
+    HASH: ClassVar[str] = "RIHS01_240364b75c24b838a25b6d4e78e08e6a41019075adce1ab9151d98fdd59f6144"
+    FIELDS: ClassVar[Fields] = {
+        "objects": "rbxcompose_msgs/msg/SceneObject[]",
+    }
+
+    objects: tuple[SceneObject, ...] = ()
 
 
 class SetBatteryLevel(Service["SetBatteryLevel.Request", "SetBatteryLevel.Response"]):

@@ -223,6 +223,7 @@ def _skills(cls: type[Any]) -> Iterator[Skill]:
                 port.restartable,
                 entries=port.entries,
                 measures=port.measures,
+                choices=port.choices,
             )
         if isinstance(port, ServesTopic) and port.interface is not None:
             yield topic_skill(port.interface, name, None, port.claims, port.restartable, entries=port.entries)

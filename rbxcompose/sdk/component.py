@@ -77,8 +77,9 @@ class Component(Generic[C]):
     The runtime calls one method at a time. Time comes from `now`, never from Python's clocks.
 
     A `blocking` component is called in its own thread, so that it delays nothing else. During a call its messages wait,
-    as many as their quality class allows; goals and commands are refused. `is_at_rest`, `occupation` and `summary` are
-    read at any time, even during a call: they should only read plain attributes.
+    as many as their quality class allows; commands, and goals of an action with a method `accept_<port>`, are refused.
+    `is_at_rest`, `occupation` and `summary` are read at any time, even during a call: they should only read plain
+    attributes.
     """
 
     rate: ClassVar[float] = 0.0  # [Hz] of `step`; 0: no steps

@@ -199,7 +199,8 @@ class ServesAction(Port[ActionServer[G, R, F]]):
     method `accept_<port>` may refuse a goal by returning the reason. `skill` is its name in missions; without it, that
     is the last word of the topic, and None means that missions do not have it. Its arguments are the fields of the
     goal, and the `entries` of two of its arrays. `measures` are the dimensions of numbers of the goal, so that missions
-    write them with units: `{"opening": LENGTH}`.
+    write them with units: `{"opening": LENGTH}`. `choices` are the words that texts of the goal may be; the first of
+    these texts is the main argument.
     """
 
     kind = "serves_action"
@@ -216,12 +217,13 @@ class ServesAction(Port[ActionServer[G, R, F]]):
         skill: str | None = "",
         entries: ArrayEntries | None = None,
         measures: Mapping[str, Dimension] = MappingProxyType({}),
+        choices: Mapping[str, Collection[str]] = MappingProxyType({}),
     ) -> None:
         """Declare the port.
 
         Raises:
             ValueError: if there are outcomes but the result has no field for them, one counts as something else, or the
-                goal does not have the `entries`, or a number that `measures` names.
+                goal does not have the `entries`, a number that `measures` names, or a text that `choices` names.
         """
         super().__init__(topic)
         self.skill = skill
@@ -231,7 +233,9 @@ class ServesAction(Port[ActionServer[G, R, F]]):
         self.entries = entries
         if wrong := [name for name in measures if action.Goal.FIELDS.get(name) not in ("float32", "float64")]:
             raise ValueError(f"{action.Goal.TYPE} has no number '{wrong[0]}'")
-        self.measures = measures
+        if wrong := [name for name in choices if action.Goal.FIELDS.get(name) != "string"]:
+            raise ValueError(f"{action.Goal.TYPE} has no text '{wrong[0]}'")
+        self.measures, self.choices = measures, choices
         self.interface, self.claims, self.restartable = action, claims, restartable
         self.pausable, self.outcomes = pausable, outcomes
 

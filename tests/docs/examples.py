@@ -31,6 +31,7 @@ buses: {servos: {type: dynamixel}}
 actuators: {pan_servo: {bus: servos, model: AX-12, id: 1}}
 joints: {pan_joint: {actuator: pan_servo, limits: {acceleration: 360 deg/s^2}}}
 controllers: {head: {type: joint_trajectory, joints: [pan_joint]}}
+arms: {neck: {joints: [pan_joint], controller: head, poses: {ahead: {pan_joint: 0 deg}, aside: {pan_joint: 60 deg}}}}
 """  # of a mission that says `head` behind its fence
 
 WALKED_THROUGH = ("tutorial.md", "missions.md", "sdk.md")  # their manifests need each other, or a package

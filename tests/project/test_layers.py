@@ -55,15 +55,15 @@ ABOVE = {
     "checks": "actuation body.model check_runner composition diagnostics missions model mux params sdk sections",
     "cli": "actuation body bus compiler composition controller_requests devices diagnostics.requests doctor "
     "executive.requests finding_pages importing inspection lsp.server mission_tests missions model mux.requests params "
-    "plan recording rendering replay runtime scaffold schema.documents sdk sections",
+    "plan recording rendering replay runtime scaffold scene_requests schema.documents sdk sections",
     "controller_interface": "control sdk",
     "controller_manager": "controller_interface sdk",
     "controller_requests": "",
     "controllers": "control controller_interface sdk",
     "compiler": "check_runner composition model plan",
     "components": "actuation body control controller_interface controller_manager controller_requests devices "
-    "diagnostics executive missions monitors mux navigation sdk servo_bus_config servo_bus_line servo_report sim "
-    "twins.fault_script",
+    "diagnostics executive missions monitors motion mux navigation scene_requests sdk servo_bus_config servo_bus_line "
+    "servo_report sim twins.fault_script",
     "servo_report": "actuation control",
     "composition": "body.description diagnostics.settings sections",
     "control": "",
@@ -79,6 +79,7 @@ ABOVE = {
     "testing.bench twins.fault_script twins.servo_faults",
     "missions": "",
     "monitors": "diagnostics.limits sdk",
+    "motion": "body control",
     "model": "actuation body.model composition missions params.live_types sdk sections servo_bus_config",
     "mux": "",
     "navigation": "",
@@ -93,8 +94,9 @@ ABOVE = {
     "schema": "controller_interface missions sdk sections",
     "sdk": "diagnostics.updater",
     "sections": "actuation.bus_types actuation.control_tables actuation.servo_models actuation.torques body "
-    "control.calibration control.limits controller_interface devices.usb diagnostics.settings mux.words sdk "
-    "twins.servo_faults",
+    "control.calibration control.limits controller_interface devices.usb diagnostics.settings motion.groups "
+    "motion.planner_types motion.scene mux.words sdk twins.servo_faults",
+    "scene_requests": "",
     "servo_bus_config": "actuation control controller_interface sdk.ports twins.fault_script",
     "servo_bus_line": "actuation servo_bus_config twins",
     "sim": "",
@@ -104,7 +106,7 @@ ABOVE = {
     "rendering.text runtime.process_group runtime.records sdk",
 }
 # Pure: no bus, thread or clock.
-CORES = {"body", "control", "devices", "diagnostics", "missions", "mux", "navigation", "params", "sim"}
+CORES = {"body", "control", "devices", "diagnostics", "missions", "motion", "mux", "navigation", "params", "sim"}
 TABLE = {
     **{name: frozenset(row.split()) for name, row in GROUND.items()},
     **{name: frozenset(row.split()) | GROUND.keys() for name, row in ABOVE.items()},

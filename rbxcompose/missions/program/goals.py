@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from types import MappingProxyType
 from typing import Any, TypeVar
 
 from rbxcompose.config import Place
-from rbxcompose.expressions.types import COUNT, FLAG, POSE, TEXT, Type, quantity_of
+from rbxcompose.expressions.types import COUNT, FLAG, POSE, TEXT, Type, choice_of, quantity_of
 from rbxcompose.expressions.values import Value
 from rbxcompose.geometry import Pose2
 from rbxcompose.missions.program.program import Skill
@@ -50,14 +50,15 @@ def skill_of(
     outcomes: Mapping[str, str] = MappingProxyType({}),
     entries: ArrayEntries | None = None,
     measures: Mapping[str, Dimension] = MappingProxyType({}),
+    choices: Mapping[str, Collection[str]] = MappingProxyType({}),
 ) -> Skill:
     """Return an action as a skill: the fields of its goal are the arguments, the first one is the main one.
 
     A field that is not a pose, time, text, flag or number is not an argument and keeps its zero value. `measures` are
-    the dimensions of numbers. A main argument that is a pose, a time or has a dimension is required. With `entries`,
-    those are arguments, too, and none is the main one.
+    the dimensions of numbers, `choices` the words that texts may be. A main argument that is a pose, a time or has a
+    dimension is required. With `entries`, those are arguments, too, and only a text with choices is the main one.
     """
-    asked, results = _asked(action.Goal, entries, measures), typed_fields(action.Result)
+    asked, results = _asked(action.Goal, entries, measures, choices), typed_fields(action.Result)
     return Skill(name, *asked, claims, restartable, pausable, dict(outcomes), results, entries)
 
 
@@ -92,11 +93,14 @@ def _asked(
     message: type[Message],
     entries: ArrayEntries | None = None,
     measures: Mapping[str, Dimension] = MappingProxyType({}),
+    choices: Mapping[str, Collection[str]] = MappingProxyType({}),
 ) -> tuple[dict[str, Type], str, frozenset[str]]:
     """Return the arguments that a message has fields or entries for, the main one, and the required ones."""
     arguments = typed_fields(message) | {name: quantity_of(one) for name, one in measures.items()}
+    arguments |= {name: choice_of(*words) for name, words in choices.items()}
     if entries is not None:
-        return {name: quantity_of(one) for name, one in entries.each.items()} | arguments, "", frozenset()
+        main = next(iter(choices), "")
+        return {name: quantity_of(one) for name, one in entries.each.items()} | arguments, main, frozenset()
     main = next(iter(arguments), "")
     is_needed = main in measures or (main and message.FIELDS[main] in (STAMPED, POSED, LASTING))
     needed = frozenset({main} if is_needed else ())

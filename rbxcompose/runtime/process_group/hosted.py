@@ -276,7 +276,7 @@ class Hosted:
             return "the robot is going down"
         if is_claiming and self.host.is_stopped:
             return "the robot is stopped"
-        if isinstance(port, ServesAction) and self.is_busy:
+        if isinstance(port, ServesAction) and self.is_busy and hasattr(self.component, f"accept_{port.name}"):
             return f"'{self.instance.name}' is busy"
         return ""
 

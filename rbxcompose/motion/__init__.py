@@ -1,0 +1,1 @@
+"""Motions of arms: planned on the body's real geometry, verified, and timed within the limits of joints."""

@@ -1,0 +1,280 @@
+"""One goal of an arm, from the request to the end of the motion; time and messages come from its site."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Generator, Mapping
+from dataclasses import field, replace
+from functools import partial
+from typing import Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbxcompose.dataclass import dataclass
+from rbxcompose.motion.arm_kinematics import ArmKinematics
+from rbxcompose.motion.collisions import told
+from rbxcompose.motion.inverse_kinematics import PoseSolutions, PoseTarget, solved
+from rbxcompose.motion.joint_space import JointSpace
+from rbxcompose.motion.parametrisation import Trajectory
+from rbxcompose.motion.planner import FINE, MotionPlan, MotionPlanner, MotionRequest, Planning
+from rbxcompose.motion.reasons import MotionFailure, MotionReason
+
+Array = NDArray[np.float64]
+T = TypeVar("T")
+Solving = Generator[None, None, PoseSolutions]
+
+MOVED = 0.02  # [rad or m] by which a joint may be elsewhere when a motion begins than when it was planned
+AT_REST = 0.05  # [rad/s or m/s]; no motion is planned for an arm that is faster
+SETTLING = 3.0  # [s] that an arm may take to report itself, and to come to rest
+REPLANS = 2  # times that a motion is planned again because the arm was elsewhere
+SLICES = 16  # of planning in one call, so that the same goal takes the same time on a stepped clock
+LONGEST_CALL = 0.2  # [s] of planning in one call, after which others may run
+
+
+@dataclass(frozen=True, slots=True)
+class ArmGoal:
+    """What is asked for: a pose by name and positions of joints [rad or m] beside it, or a target for the tip."""
+
+    pose: str = ""
+    positions: Mapping[str, float] = field(default_factory=dict)
+    target: PoseTarget | None = None
+    frame: str = ""
+    """The link in whose frame the target is; without it, the root."""
+    speed: float = 1.0
+    acceleration: float = 1.0
+
+
+class ArmSite(Protocol):
+    """What a goal needs of the component that carries it out."""
+
+    @property
+    def now(self) -> float:
+        """Return robot time [s]."""
+
+    @property
+    def measured(self) -> Mapping[str, tuple[float, float]]:
+        """Return the position and velocity of each joint of the body that has reported them."""
+
+    @property
+    def poses(self) -> Mapping[str, Mapping[str, float]]:
+        """Return the poses by name: positions of joints [rad or m]."""
+
+    @property
+    def is_ready(self) -> bool:
+        """Return whether it is known what is around the robot."""
+
+    def follow(self, names: tuple[str, ...], trajectory: Trajectory, ended: Callable[[str, bool], None]) -> None:
+        """Send a trajectory to the controller; `ended` gets the reason if it failed, and whether it was cancelled."""
+
+    def stop_following(self) -> None:
+        """Ask the controller to end the trajectory; `ended` still follows."""
+
+    def told(self, stage: str) -> None:
+        """Tell in which stage it is."""
+
+    def info(self, text: str) -> None:
+        """Log an event."""
+
+
+class ArmTask:
+    """Plans and carries out one goal. Call `advance` until `is_over`; then `failure` is why it failed, if it did."""
+
+    def __init__(self, site: ArmSite, kinematics: ArmKinematics, planner: MotionPlanner, goal: ArmGoal) -> None:
+        self.failure: MotionFailure | None = None
+        self.is_over = self.is_canceled = False
+        self._site, self._kinematics, self._planner, self._goal = site, kinematics, planner, goal
+        self._trajectory: Trajectory | None = None
+        self._obstacle = ""  # what the motion would hit, since the scene has changed
+        self._aims: list[Array] = []  # positions that would do, the next one to try first
+        self._stage: Callable[[], None] = self._settle
+        self._began, self._replans = site.now, 0
+        self._start = np.zeros(len(self.space.joints))
+
+    @property
+    def space(self) -> JointSpace:
+        """Return the joints of the arm."""
+        return self._planner.space
+
+    def advance(self) -> None:
+        """Continue."""
+        if not self.is_over:
+            self._stage()
+
+    def cancel(self) -> None:
+        """End it soon: planning at once, a motion as soon as the arm has come to rest."""
+        if self.is_canceled or self.is_over:
+            return
+        self.is_canceled = True
+        if self._stage == self._move:
+            self._site.stop_following()
+        else:
+            self._end(MotionFailure(MotionReason.INTERRUPTED, "it was cancelled while it was planned"))
+
+    def look_again(self) -> None:
+        """Stop if what is left of the motion collides, now that something else is around the robot."""
+        if self._stage != self._move or self._obstacle or self._trajectory is None:
+            return
+        points = self._trajectory.dense(FINE)
+        here = int(np.argmin(np.max(np.abs(points - self._where()), axis=1)))
+        bad = next((one for one in points[here:] if not self._planner.checker.is_free(one)), None)
+        if bad is not None:
+            self._obstacle = told(self._planner.checker.colliding(bad))
+            self._site.stop_following()
+
+    def _settle(self) -> None:
+        """Wait until all joints are known and at rest."""
+        measured, names = self._site.measured, self.space.names
+        if not self._site.is_ready:
+            if self._site.now - self._began >= SETTLING:
+                self._fail(MotionReason.UNKNOWN_SCENE, "nothing has told what is around the robot")
+            return
+        unknown = [name for name in names if name not in measured]
+        fast = [name for name in names if name in measured and abs(measured[name][1]) > AT_REST]
+        if not unknown and not fast:
+            self._begin_planning()
+        elif self._site.now - self._began >= SETTLING:
+            words = ", ".join(f"'{name}'" for name in unknown or fast)
+            if unknown:
+                self._fail(MotionReason.UNKNOWN_START, f"nothing has reported where {words} is")
+            else:
+                self._fail(MotionReason.START_MOVED, f"{words} did not come to rest within {SETTLING:g} s")
+
+    def _begin_planning(self) -> None:
+        measured, names = self._site.measured, self.space.names
+        self._start = self._where()
+        self._kinematics.place({name: one for name, (one, _) in measured.items() if name not in names})
+        self._site.told("planning")
+        if problem := self._mistake():
+            self._fail(MotionReason.UNKNOWN_GOAL, problem)
+        elif self._goal.target is None:
+            self._aims = [self._aim()]
+            self._plan_next()
+        else:
+            self._stage = partial(self._solve, self._solutions(self._goal.target))
+            self._stage()
+
+    def _where(self) -> Array:
+        return np.array([self._site.measured[name][0] for name in self.space.names])
+
+    def _mistake(self) -> str:
+        """Return what is wrong with the goal, or nothing."""
+        goal, poses = self._goal, self._site.poses
+        for word, share in (("speed", goal.speed), ("acceleration", goal.acceleration)):
+            if not (math.isfinite(share) and 0.0 < share <= 1.0):
+                return f"a {word} of {share:.0%} is none"
+        if goal.target is not None:
+            there = self._kinematics.body.links
+            is_known = not goal.frame or goal.frame in there
+            return goal.target.mistake if is_known else f"there is no link '{goal.frame}'"
+        if goal.pose and goal.pose not in poses:
+            return f"there is no pose '{goal.pose}'; the poses of this arm: {', '.join(poses) or 'none'}"
+        if not (goal.pose or goal.positions):
+            return "the goal has neither a pose nor positions of joints"
+        unknown = [name for name in goal.positions if name not in self.space.names]
+        return f"'{unknown[0]}' is no joint of this arm" if unknown else ""
+
+    def _aim(self) -> Array:
+        """Return where all joints should be; one that the goal leaves out stays, within its limits."""
+        goal = self._goal
+        wanted = {**(self._site.poses[goal.pose] if goal.pose else {}), **goal.positions}
+        stays = self.space.clamped(self._start).tolist()
+        return np.array([wanted.get(name, at) for name, at in zip(self.space.names, stays, strict=True)])
+
+    def _solutions(self, target: PoseTarget) -> Solving:
+        """Return the search for positions that bring the tip to the target."""
+        if self._goal.frame:
+            frame = self._kinematics.poses(self._start)[self._goal.frame]
+            target = replace(target, pose=frame.compose(target.pose))
+        is_free, seed = self._planner.checker.is_free, self._planner.settings.seed
+        return solved(self._kinematics, self.space, target, self._start, is_free, seed=seed)
+
+    def _solve(self, solving: Solving) -> None:
+        found = self._worked(solving)
+        if found is None:
+            return
+        checker, colliding = self._planner.checker, found.colliding
+        self._aims = list(found.free)
+        if self._aims:
+            self._plan_next()
+        elif colliding:
+            self._fail(MotionReason.GOAL_IN_COLLISION, told(checker.colliding(colliding[0])))
+        else:
+            away, angle = found.nearest
+            text = f"the tip got within {away * 100:.1f} cm and {math.degrees(angle):.1f} deg of it"
+            self._fail(MotionReason.GOAL_OUT_OF_REACH, f"{text} in {found.attempts} attempts")
+
+    def _plan_next(self) -> None:
+        """Plan to the next of the positions that would do."""
+        goal = self._goal
+        request = MotionRequest(self._start, self._aims.pop(0), goal.speed, goal.acceleration)
+        self._stage = partial(self._continue_planning, self._planner.plan(request))
+        self._stage()
+
+    def _continue_planning(self, planning: Planning) -> None:
+        found = self._worked(planning)
+        if found is not None:
+            self._planned(found)
+
+    def _worked(self, work: Generator[None, None, T]) -> T | None:
+        """Go on with some work; return its result when there is one."""
+        begin = self._site.now
+        for _ in range(SLICES):
+            try:
+                next(work)
+            except StopIteration as ended:
+                result: T = ended.value
+                return result
+            if self._site.now - begin >= LONGEST_CALL:
+                break
+        return None
+
+    def _planned(self, found: MotionPlan | MotionFailure) -> None:
+        if isinstance(found, MotionFailure):
+            if self._aims and found.reason in (MotionReason.NO_PATH_IN_TIME, MotionReason.PATH_IN_COLLISION):
+                self._plan_next()
+            else:
+                self._end(found)
+        elif found.trajectory is None:
+            self._end(None)
+        else:
+            words = f"{len(found.waypoints)} points, {found.examined} positions examined, attempt {found.attempts}"
+            self._set_out(found.trajectory, words)
+
+    def _set_out(self, trajectory: Trajectory, words: str) -> None:
+        """Send the trajectory, if the arm is still where it begins."""
+        away = float(np.max(np.abs(self._where() - self._start)))
+        if away > MOVED:
+            self._replans += 1
+            if self._replans > REPLANS:
+                text = f"joints were up to {away:.3f} away from where the motion was planned from"
+                self._fail(MotionReason.START_MOVED, text)
+                return
+            self._began, self._stage = self._site.now, self._settle
+            return
+        self._site.info(f"a motion of {trajectory.duration:.1f} s: {words}")
+        self._stage, self._trajectory = self._move, trajectory
+        self._site.told("moving")
+        self._site.follow(self.space.names, trajectory, self._followed)
+
+    def _move(self) -> None:
+        """Wait for the controller."""
+
+    def _followed(self, problem: str, is_canceled: bool) -> None:
+        if self.is_canceled:
+            self._end(MotionFailure(MotionReason.INTERRUPTED, "it was cancelled on its way"))
+        elif self._obstacle and (is_canceled or problem):
+            self._fail(MotionReason.PATH_IN_COLLISION, f"{self._obstacle}, since the scene has changed")
+        elif is_canceled:
+            self._fail(MotionReason.NOT_FOLLOWED, "somebody else cancelled its trajectory")
+        elif problem:
+            self._fail(MotionReason.NOT_FOLLOWED, problem)
+        else:
+            self._end(None)
+
+    def _fail(self, reason: MotionReason, text: str) -> None:
+        self._end(MotionFailure(reason, text))
+
+    def _end(self, failure: MotionFailure | None) -> None:
+        self._stage = self._move  # lets go of what was being planned
+        self.is_over, self.failure = True, failure

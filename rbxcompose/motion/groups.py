@@ -1,0 +1,50 @@
+"""An arm: joints of the body, from a base to a tip."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from rbxcompose.body.model import Body
+from rbxcompose.dataclass import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class ArmGroup:
+    """Joints that move together, in order from the base; `base` and `tip` are links."""
+
+    joints: tuple[str, ...]
+    base: str
+    tip: str
+
+
+def chain(body: Body, base: str, tip: str) -> ArmGroup | None:
+    """Return the joints between two links that have positions of their own; None if the tip is not below the base."""
+    found: list[str] = []
+    link = tip
+    while link != base:
+        above = body.joint_above.get(link)
+        if above is None:
+            return None
+        if above.moves and above.mimic is None:
+            found.append(above.name)
+        link = above.parent
+    return ArmGroup(tuple(reversed(found)), base, tip)
+
+
+def group_of(body: Body, joints: Iterable[str]) -> ArmGroup:
+    """Return joints as an arm, in the order of the body; its base carries the first one, its tip is below the last."""
+    wanted = set(joints)
+    found = [joint for joint in body.joints_downwards if joint.name in wanted]
+    return ArmGroup(tuple(one.name for one in found), found[0].parent, found[-1].child)
+
+
+def moved_links(body: Body, joints: Iterable[str]) -> dict[str, frozenset[str]]:
+    """Return which of some joints move each link in the root's frame, also those that others mimic."""
+    own = set(joints)
+    found = {body.root: frozenset[str]()}
+    for joint in body.joints_downwards:
+        leader = joint
+        while leader.mimic is not None:
+            leader = body.joints[leader.mimic.joint]
+        found[joint.child] = found[joint.parent] | ({joint.name} if joint.moves and leader.name in own else set())
+    return found

@@ -1,0 +1,183 @@
+"""A goal of an arm from its request to its end, without a bus."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rbxcompose.body.model import Geometry
+from rbxcompose.geometry import Transform3
+from rbxcompose.motion.arm_task import SETTLING, ArmGoal, ArmTask
+from rbxcompose.motion.collisions import MeshChecker, adjacent_pairs
+from rbxcompose.motion.inverse_kinematics import PoseTarget
+from rbxcompose.motion.parametrisation import Trajectory
+from rbxcompose.motion.reasons import MotionReason
+from rbxcompose.motion.scene import PlacedObject
+from tests.motion.toy_arm import kinematics, planner
+
+KINEMATICS, PLANNER = kinematics(), planner()
+AT = {"turn": 0.8, "lift": 0.0, "bend": 0.2}
+
+
+class Pushed(dict[str, tuple[float, float]]):
+    """An arm that is moved a little whenever somebody looks."""
+
+    def __getitem__(self, name: str) -> tuple[float, float]:
+        position, velocity = super().__getitem__(name)
+        self[name] = position + 0.02, velocity
+        return position, velocity
+
+
+class Site:
+    """What a task needs; `sent` are trajectories that nobody has ended yet."""
+
+    def __init__(self) -> None:
+        self.now, self.is_ready = 0.0, True
+        self.measured: dict[str, tuple[float, float]] = {name: (value, 0.0) for name, value in AT.items()}
+        self.poses: Mapping[str, Mapping[str, float]] = {"aside": {"turn": 1.2}, "up": {"lift": 1.0, "bend": 0.0}}
+        self.sent: list[tuple[Trajectory, Callable[[str, bool], None]]] = []
+        self.stops = 0
+        self.stages: list[str] = []
+
+    def follow(self, names: tuple[str, ...], trajectory: Trajectory, ended: Callable[[str, bool], None]) -> None:
+        self.sent.append((trajectory, ended))
+
+    def stop_following(self) -> None:
+        self.stops += 1
+
+    def told(self, stage: str) -> None:
+        self.stages.append(stage)
+
+    def info(self, text: str) -> None:
+        assert "positions examined" in text
+
+
+def begun(site: Site, goal: ArmGoal) -> ArmTask:
+    task = ArmTask(site, KINEMATICS, PLANNER, goal)
+    for _ in range(100):
+        if task.is_over or site.sent:
+            break
+        task.advance()
+    return task
+
+
+def test_a_pose_is_planned_and_followed() -> None:
+    site = Site()
+    task = begun(site, ArmGoal("aside"))
+    trajectory, ended = site.sent[0]
+    assert trajectory.positions[-1].tolist() == pytest.approx([1.2, 0.0, 0.2])  # what it leaves out stays
+    assert not task.is_over
+    ended("", False)
+    assert (task.is_over, task.failure) == (True, None)
+    assert site.stages == ["planning", "moving"]
+
+
+def test_positions_of_joints_take_precedence_over_the_pose() -> None:
+    site = Site()
+    begun(site, ArmGoal("up", {"bend": 0.5}))
+    assert site.sent[0][0].positions[-1].tolist() == pytest.approx([0.8, 1.0, 0.5])
+
+
+@pytest.mark.parametrize(
+    ("goal", "named"),
+    [
+        (ArmGoal("asid"), "there is no pose 'asid'; the poses of this arm: aside, up"),
+        (ArmGoal(), "neither a pose nor positions"),
+        (ArmGoal("up", {"nose": 1.0}), "'nose' is no joint of this arm"),
+        (ArmGoal("up", speed=1.5), "a speed of 150%"),
+        (ArmGoal("up", acceleration=float("nan")), "acceleration"),
+    ],
+)
+def test_a_goal_that_is_none_says_why(goal: ArmGoal, named: str) -> None:
+    task = begun(Site(), goal)
+    assert task.failure is not None
+    assert task.failure.reason is MotionReason.UNKNOWN_GOAL
+    assert named in task.failure.text
+
+
+def test_an_arm_that_nobody_reports_is_waited_for_and_then_given_up() -> None:
+    site = Site()
+    del site.measured["lift"]
+    task = begun(site, ArmGoal("aside"))
+    assert not task.is_over
+    site.now = SETTLING
+    task.advance()
+    assert task.failure is not None
+    assert task.failure.reason is MotionReason.UNKNOWN_START
+    assert "'lift'" in task.failure.text
+
+
+def test_nothing_is_carried_out_from_elsewhere_than_it_was_planned_from() -> None:
+    site = Site()
+    site.measured = Pushed(site.measured)
+    task = begun(site, ArmGoal("aside"))
+    assert not site.sent
+    assert task.failure is not None
+    assert task.failure.reason is MotionReason.START_MOVED
+
+
+def test_a_cancelled_motion_ends_when_the_controller_has_stopped() -> None:
+    site = Site()
+    task = begun(site, ArmGoal("aside"))
+    task.cancel()
+    task.cancel()
+    assert (site.stops, task.is_over) == (1, False)
+    site.sent[0][1]("its trajectory was canceled", True)
+    assert task.failure is not None
+    assert task.failure.reason is MotionReason.INTERRUPTED
+
+
+@pytest.mark.parametrize(("problem", "is_canceled"), [("path tolerance violated", False), ("", True)])
+def test_a_controller_that_fails_is_the_reason(problem: str, is_canceled: bool) -> None:
+    site = Site()
+    task = begun(site, ArmGoal("aside"))
+    site.sent[0][1](problem, is_canceled)
+    assert task.failure is not None
+    assert task.failure.reason is MotionReason.NOT_FOLLOWED
+    assert problem in task.failure.text
+
+
+def test_the_tip_goes_to_a_target_in_the_frame_of_a_link() -> None:
+    site = Site()
+    goal = ArmGoal(target=PoseTarget(Transform3((0.1, 0.0, 0.3)), any_orientation=True), frame="fore")
+    begun(site, goal)
+    before = KINEMATICS.poses(np.array(list(AT.values())))["fore"].apply((0.1, 0.0, 0.3))
+    after = KINEMATICS.tip_pose(site.sent[0][0].positions[-1]).translation
+    assert after == pytest.approx(before, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("goal", "reason", "named"),
+    [
+        (PoseTarget(Transform3((9.0, 0.0, 0.0)), True), MotionReason.GOAL_OUT_OF_REACH, "the tip got within 8"),
+        (PoseTarget(Transform3((0.45, 0.0, 0.25)), True), MotionReason.GOAL_IN_COLLISION, "'ground'"),
+        (PoseTarget(Transform3((math.nan, 0.0, 0.0))), MotionReason.UNKNOWN_GOAL, "not a finite pose"),
+    ],
+)
+def test_a_target_without_a_solution_says_why(goal: PoseTarget, reason: MotionReason, named: str) -> None:
+    task = begun(Site(), ArmGoal(target=goal))
+    assert task.failure is not None
+    assert task.failure.reason is reason
+    assert named in task.failure.text
+
+
+def test_a_motion_stops_for_an_object_that_comes_into_its_way() -> None:
+    site, used = Site(), planner()
+    task = ArmTask(site, KINEMATICS, used, ArmGoal("up"))
+    while not site.sent:
+        task.advance()
+    at_end = KINEMATICS.tip_pose(site.sent[0][0].positions[-1])
+    block = PlacedObject("block", Geometry("box", (0.1, 0.1, 0.1)), "ground", at_end)
+    far = replace(block, pose=Transform3((-1.0, 0.0, 1.0)))
+    for one, stops in ((far, 0), (block, 1), (block, 1)):
+        used.checker = MeshChecker(KINEMATICS, {}, adjacent_pairs(KINEMATICS.body), [one])
+        task.look_again()
+        assert site.stops == stops
+    site.sent[0][1]("its trajectory was canceled", True)
+    assert task.failure is not None
+    assert task.failure.reason is MotionReason.PATH_IN_COLLISION
+    assert "'block'" in task.failure.text

@@ -1,0 +1,117 @@
+"""Inverse kinematics: what it finds is there by other code, and what it does not find has a distance."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rbxcompose.control.limits import MotionLimits
+from rbxcompose.geometry import Transform3
+from rbxcompose.motion.arm_kinematics import ArmKinematics
+from rbxcompose.motion.groups import chain
+from rbxcompose.motion.inverse_kinematics import PoseSolutions, PoseTarget, solved
+from rbxcompose.motion.joint_space import ArmJoint, JointSpace
+from tests.body.kinematics import Three, description_of, matrix
+from tests.motion.toy_arm import Array, ended
+
+AXES = ("0 0 1", "0 1 0", "0 1 0", "1 0 0", "0 1 0", "1 0 0")
+LIMIT = '<limit lower="-2.6" upper="2.6" effort="1" velocity="1"/>'
+
+
+def six_joints() -> str:
+    """Return an arm of six joints: the fourth turns without an end, and a finger on the last link mimics the fifth."""
+    parts = ['<robot name="six"><link name="l0"/>']
+    for number, axis in enumerate(AXES, 1):
+        kind = "continuous" if number == 4 else "revolute"
+        parts.append(
+            f'<link name="l{number}"/><joint name="j{number}" type="{kind}"><origin xyz="0.2 0 0.05"/>'
+            f'<parent link="l{number - 1}"/><child link="l{number}"/><axis xyz="{axis}"/>{LIMIT}</joint>'
+        )
+    parts.append(
+        '<link name="tip"/><joint name="finger" type="revolute"><origin xyz="0.1 0 0"/><parent link="l6"/>'
+        f'<child link="tip"/><axis xyz="0 0 1"/><mimic joint="j5" multiplier="-0.5" offset="0.1"/>{LIMIT}</joint>'
+        "</robot>"
+    )
+    return "".join(parts)
+
+
+DESCRIPTION = description_of(six_joints())
+GROUP = chain(DESCRIPTION.body, "l0", "tip")
+assert GROUP is not None
+ARM = ArmKinematics(DESCRIPTION, GROUP)
+SPACE = JointSpace(
+    tuple(
+        ArmJoint(name, MotionLimits() if name == "j4" else MotionLimits(-2.6, 2.6), is_continuous=name == "j4")
+        for name in GROUP.joints
+    )
+)
+
+
+def solve(target: PoseTarget, start: Array | None = None, free: bool = True) -> PoseSolutions:
+    first = np.zeros(6) if start is None else start
+    return ended(solved(ARM, SPACE, target, first, lambda values: free, seed=1))
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.integers(0, 2**31))
+def test_each_solution_is_at_the_target_by_two_other_libraries_and_within_limits(seed: int) -> None:
+    goal = SPACE.samples(1, seed)[0]
+    pose = ARM.tip_pose(goal)
+    found = solve(PoseTarget(pose, tolerance=1e-4, angle_tolerance=1e-4))
+    assert found.free
+    for values in found.free:
+        assert not SPACE.outside(values)
+        assert abs(values[3]) <= math.pi + 1e-9  # the turn nearest to the start
+        positions = dict(zip(SPACE.names, values.tolist(), strict=True))
+        for frames in Three(DESCRIPTION).poses(positions).values():
+            assert np.allclose(frames["tip"], matrix(pose), atol=2e-4)
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.integers(0, 2**31))
+def test_the_jacobian_is_what_small_steps_do(seed: int) -> None:
+    values, step = SPACE.samples(1, seed)[0], 1e-6
+    for index in range(6):
+        moved = values.copy()
+        moved[index] += step
+        error, _ = ARM.error(values, ARM.placement(ARM.tip_pose(moved)))
+        _, jacobian = ARM.error(values, ARM.placement(ARM.tip_pose(values)))
+        assert np.allclose(error / step, jacobian[:, index], atol=1e-4)
+
+
+def test_the_same_seed_finds_the_same_and_the_nearest_comes_first() -> None:
+    target = PoseTarget(ARM.tip_pose(np.array([0.4, -0.7, 1.0, 0.3, -0.6, 0.2])))
+    first, second = solve(target), solve(target)
+    assert [one.tolist() for one in first.free] == [one.tolist() for one in second.free]
+    ways = [float(np.max(np.abs(one))) for one in first.free]
+    assert ways == sorted(ways)
+
+
+def test_what_is_out_of_reach_tells_how_near_the_tip_gets() -> None:
+    found = solve(PoseTarget(Transform3((5.0, 0.0, 0.3)), any_orientation=True))
+    assert (found.free, found.colliding) == ((), ())
+    assert 3.5 < found.nearest[0] < 4.0
+
+
+def test_solutions_that_collide_are_told_apart() -> None:
+    found = solve(PoseTarget(ARM.tip_pose(np.full(6, 0.3))), free=False)
+    assert not found.free
+    assert found.colliding
+
+
+@pytest.mark.parametrize(
+    ("target", "named"),
+    [
+        (PoseTarget(Transform3((math.nan, 0.0, 0.0))), "not a finite pose"),
+        (PoseTarget(Transform3(rotation=(0.0, 0.0, 0.0, 0.0))), "no rotation"),
+        (PoseTarget(Transform3(), tolerance=0.0), "tolerance"),
+        (PoseTarget(Transform3()), ""),
+    ],
+)
+def test_a_target_that_is_none_says_why(target: PoseTarget, named: str) -> None:
+    assert named in target.mistake
+    assert bool(named) is bool(target.mistake)
