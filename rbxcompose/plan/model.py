@@ -63,8 +63,28 @@ class BusPlan:
 
 
 @dataclass(frozen=True, slots=True)
+class OtherHost:
+    """Another host of the robot and what runs on it; `is_optional` means that the others start without it."""
+
+    name: str
+    instances: tuple[Instance, ...]
+    is_optional: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Share:
+    """What one host runs of a robot that runs on several, and how its router is linked with those of the others."""
+
+    host: str
+    others: tuple[OtherHost, ...] = ()
+    listen: tuple[str, ...] = ()  # endpoints for the routers of other hosts
+    connect: tuple[str, ...] = ()  # endpoints of routers of other hosts
+    version: str = ""  # of the files that the robot was compiled from; the same on all hosts
+
+
+@dataclass(frozen=True, slots=True)
 class Plan:
-    """Everything that `up` needs; `instances` are in start order."""
+    """Everything that `up` needs; `instances` are in start order, on several hosts those of this one."""
 
     robot: str
     file: str
@@ -72,6 +92,13 @@ class Plan:
     bus: BusPlan = BusPlan()
     start: str | None = None  # the mission that starts by itself
     is_simulated: bool = True
+    share: Share | None = None  # None: the robot runs on one host
+
+    @property
+    def everywhere(self) -> tuple[Instance, ...]:
+        """Return the instances of all hosts; their order means nothing."""
+        others = self.share.others if self.share else ()
+        return (*self.instances, *(one for other in others for one in other.instances))
 
     @property
     def follows_clock(self) -> bool:

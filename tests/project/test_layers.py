@@ -55,7 +55,7 @@ ABOVE = {
     "checks": "actuation body.model check_runner composition diagnostics.core missions model sdk sections",
     "cli": "actuation body bus compiler composition controller_requests doctor executive.requests finding_pages "
     "importing inspection lsp.server mission_tests missions model params plan recording rendering replay runtime "
-    "scaffold schema.documents sdk sections",
+    "scaffold schema.documents sdk sections systems",
     "controller_interface": "control sdk",
     "controller_manager": "controller_interface sdk",
     "controller_requests": "",
@@ -73,7 +73,7 @@ ABOVE = {
     "executive": "missions sdk",
     "finding_pages": "check_runner missions.analysis",
     "importing": "actuation.servo_models composition.dump scaffold.answers sections",
-    "inspection": "body.model bus.names bus.wire composition missions model plan schema sdk sections",
+    "inspection": "body.model bus.names bus.wire composition missions model plan schema sdk sections systems",
     "lsp": "compiler composition missions model.robot schema sections",
     "mission_tests": "compiler components.mission composition executive missions model plan.model sdk sections.faults "
     "testing.bench twins.fault_script twins.servo_faults",
@@ -90,7 +90,7 @@ ABOVE = {
     "runtime": "body.transform_errors body.transforms bus diagnostics.updater missions.program.sources params plan "
     "recording sdk",
     "scaffold": "actuation.bus_load actuation.servo_models actuation.torques composition missions sdk",
-    "schema": "controller_interface missions sdk sections",
+    "schema": "controller_interface missions sdk sections systems.system_file",
     "sdk": "diagnostics.updater",
     "sections": "actuation.bus_types actuation.control_tables actuation.serial_ports actuation.servo_models "
     "actuation.torques body control.calibration control.limits controller_interface sdk twins.servo_faults",
@@ -99,6 +99,7 @@ ABOVE = {
     "sim": "",
     "skills": "sdk",
     "twins": "actuation",
+    "systems": "compiler model plan sdk",
     "testing": "twins bus compiler components missions model.wires params plan.model recording.message rendering.text "
     "runtime.process_group runtime.records sdk",
 }

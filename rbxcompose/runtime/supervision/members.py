@@ -11,6 +11,7 @@ from rbxcompose.dataclass import dataclass
 from rbxcompose.levels import Level
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.faults import RestartPolicy
+from rbxcompose.runtime.host_report import HostReport
 from rbxcompose.runtime.processes import KILLED
 
 
@@ -23,6 +24,10 @@ class ConductorEffects(Protocol):
 
     def send(self, process: str, message: say.ChannelOrder) -> None:
         """Send a message to a process."""
+        ...
+
+    def to_hosts(self, report: HostReport) -> None:
+        """Tell the other hosts of the robot how this one is."""
         ...
 
     def end(self, process: str) -> None:

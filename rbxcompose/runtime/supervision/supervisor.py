@@ -11,6 +11,7 @@ import selectors
 import signal
 import socket
 from collections.abc import Callable
+from dataclasses import replace
 from types import FrameType
 
 from rbxcompose.clock import MonotonicClock
@@ -21,6 +22,7 @@ from rbxcompose.plan.model import Plan
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.control import ControlServer
 from rbxcompose.runtime.folder import SILENT, SUSPENDED, ComponentState, RobotFolder, RobotState
+from rbxcompose.runtime.host_report import HostReport
 from rbxcompose.runtime.process_group.watchdog import MARK
 from rbxcompose.runtime.processes import Process, adopt_orphans, boot_id, describe_exit, signal_descriptor
 from rbxcompose.runtime.records import Record
@@ -142,6 +144,13 @@ class Supervisor:
             channel = self._children[process].channel
             channel.send(message)
             self._watch(channel)
+
+    def to_hosts(self, report: HostReport) -> None:
+        """Tell the other hosts of the robot how this one is; a router that is behind has newer reports to come."""
+        child = self._children.get(ROUTER)
+        if child is not None and not child.channel.is_behind:
+            run = f"{os.getpid()}, {self._clock.start}"
+            self.send(ROUTER, say.ToHosts(replace(report, run=run)))
 
     def _watch(self, channel: say.Channel) -> None:
         """Wait for messages of a process, and until it can take the rest of a message too long for one send."""
@@ -346,7 +355,7 @@ class Supervisor:
 
     def _component(self, name: str, type_name: str, process: str) -> ComponentState:
         state, restarts = self.conductor.states[name]
-        waits_for = self.conductor.blocked.get(name)
+        waits_for = self.conductor.blocked.causes.get(name)
         child = self._children.get(process)
         pid = child.process.pid if child and child.process else None
         restarts += self.conductor.members[process].restarts

@@ -1,0 +1,67 @@
+"""The keys of a system's file, and the models of its sections."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, BeforeValidator, Field
+
+from rbxcompose.config import Config, Name
+from rbxcompose.manifest.header import ManifestHeader
+
+_ADDRESS = re.compile(r"[0-9A-Fa-f:.]{2,45}|[A-Za-z0-9]([A-Za-z0-9.-]{0,252}[A-Za-z0-9])?")
+
+
+def _address(text: str) -> str:
+    """Read an address or a name of a machine."""
+    if not _ADDRESS.fullmatch(text):
+        raise ValueError("must be an address or the name of a machine, such as 10.42.0.2 or robot.local")
+    return text
+
+
+def _in_full(value: object) -> object:
+    return {} if value is None else value
+
+
+class SystemFile(ManifestHeader):
+    """Robots on several hosts: the hosts, the robots, and which host runs what."""
+
+    hosts: Any = None
+    """The machines, by name."""
+    robots: Any = None
+    """The robots that run on them, by name; this is the name that `ps` and other verbs know."""
+
+
+class HostModel(Config):
+    """A machine that runs a share of the robots."""
+
+    address: Annotated[str, AfterValidator(_address)] | None = None
+    """Where the other hosts reach it: an IP address or a name. Of two hosts of one robot, at least one needs it."""
+    labels: tuple[Name, ...] = ()
+    """What robots may call it by in `on` and `place`, such as `gpu`."""
+    devices: tuple[str, ...] = ()
+    """Serial ports that are connected here, as components name them: `/dev/ttyUSB0`, `usb:0403:6014`."""
+    optional: bool = False
+    """Whether the others start without it."""
+
+
+class SystemRobotModel(Config):
+    """A robot of the system, and which host runs what of it."""
+
+    robot: str
+    """The robot's file, relative to this one, or `rbx:robots/NAME`."""
+    profile: Name | None = None
+    """A profile of the robot."""
+    on: Name | None = None
+    """The host, or a label of hosts, for all that `place` does not mention. Without it, components are placed by
+    their devices, and the rest goes to the host that has most of the robot by then."""
+    place: dict[str, Name] = {}
+    """The host, or a label of hosts, for single components, or for parts with all that they bring."""
+    link_port: int | None = Field(None, ge=1, le=65535)
+    """The TCP port at which the robot's routers reach each other; without it, that of `bus.port` of the robot."""
+
+
+ShortHost = Annotated[HostModel, BeforeValidator(_in_full, json_schema_input_type=HostModel | None)]
+SECTIONS = {"hosts": dict[Name, ShortHost], "robots": dict[Name, SystemRobotModel]}
+"""Content of each section."""
