@@ -1,4 +1,4 @@
-"""Start a robot, or the share of a host of a system: check it, bring all components up, run its mission.
+"""Start a robot, or what a host runs of it: check it, bring all components up, run its mission.
 
 In the foreground it goes down when the mission named by `start:` has ended, or at Ctrl-C; with -d it stays up.
 Exit codes: 0 fine, 1 findings, 2 wrong usage, 3 the mission failed, 4 the robot failed, 130 interrupted.

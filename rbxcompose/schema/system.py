@@ -6,10 +6,10 @@ from collections.abc import Iterable
 
 from rbxcompose.field_docs import field_docs
 from rbxcompose.manifest.section import SYSTEM
+from rbxcompose.manifest.system_file import SECTIONS, SystemFile
 from rbxcompose.schema.robot import document, or_empty
 from rbxcompose.schema.scalars import Schema
 from rbxcompose.schema.settle import opened, schemas_of
-from rbxcompose.systems.system_file import SECTIONS, SystemFile
 
 
 def system_schema(types: Iterable[str]) -> Schema:

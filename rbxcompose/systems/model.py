@@ -9,11 +9,11 @@ from pathlib import Path
 
 from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Report, Span
+from rbxcompose.manifest.system_file import HostModel, SystemRobotModel
 from rbxcompose.manifest.tree import MappingNode, value_span
 from rbxcompose.model.robot import Robot
 from rbxcompose.plan.model import Plan
 from rbxcompose.systems.placement import Placement
-from rbxcompose.systems.system_file import HostModel, SystemRobotModel
 from rbxcompose.systems.traffic import Crossing, crossings
 
 

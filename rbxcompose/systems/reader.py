@@ -17,6 +17,7 @@ from rbxcompose.manifest.fill import fill
 from rbxcompose.manifest.fill_names import names_of
 from rbxcompose.manifest.library import PREFIX
 from rbxcompose.manifest.section import SYSTEM
+from rbxcompose.manifest.system_file import SECTIONS, SystemFile, SystemRobotModel
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, key_span, value_span
 from rbxcompose.manifest.validate import MISSING_KEY, validate
 from rbxcompose.plan.model import Plan
@@ -25,7 +26,6 @@ from rbxcompose.systems import codes
 from rbxcompose.systems.model import PlacedRobot, System
 from rbxcompose.systems.placement import HostOffer, Wishes, hosts_called, place
 from rbxcompose.systems.rules import system_findings
-from rbxcompose.systems.system_file import SECTIONS, SystemFile, SystemRobotModel
 
 
 def compile_system(path: str, *, environment: Mapping[str, str], real: bool = False) -> System:
@@ -135,8 +135,8 @@ def _link_port(model: SystemRobotModel, plan: Plan, out: System) -> int:
     if model.link_port is not None:
         return model.link_port
     taken = {one.link_port for one in out.robots.values()}
-    free = (port for port in (*range(plan.bus.port, 65536), *range(1024, plan.bus.port)) if port not in taken)
-    return next(free)
+    ports: Iterable[int] = (*range(plan.bus.port, 65536), *range(1024, plan.bus.port))
+    return next(port for port in ports if port not in taken)
 
 
 def _version(compilation: Compilation) -> str:

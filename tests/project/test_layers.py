@@ -90,7 +90,7 @@ ABOVE = {
     "runtime": "body.transform_errors body.transforms bus diagnostics.updater missions.program.sources params plan "
     "recording sdk",
     "scaffold": "actuation.bus_load actuation.servo_models actuation.torques composition missions sdk",
-    "schema": "controller_interface missions sdk sections systems.system_file",
+    "schema": "controller_interface missions sdk sections",
     "sdk": "diagnostics.updater",
     "sections": "actuation.bus_types actuation.control_tables actuation.serial_ports actuation.servo_models "
     "actuation.torques body control.calibration control.limits controller_interface sdk twins.servo_faults",

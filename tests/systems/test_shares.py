@@ -10,12 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.inspection.system_text import system_text
+from rbxcompose.manifest.system_file import HostModel
 from rbxcompose.plan.dump import dump, load
 from rbxcompose.systems.model import PlacedRobot, System
 from rbxcompose.systems.placement import Placement
 from rbxcompose.systems.reader import compile_system
 from rbxcompose.systems.share import share_of
-from rbxcompose.systems.system_file import HostModel
 from rbxcompose.testing.golden import Golden
 from tests.conftest import ROOT
 
