@@ -42,6 +42,7 @@ class Stage:
         self, plan: Plan | None = None, options: RunOptions | None = None, router: str | None = "router"
     ) -> None:
         self.scheduler = Scheduler()
+        self.run_id = "this run"
         self.plan = plan or robot()
         self.alive: set[str] = set()
         self.forks: list[tuple[str, bool, bool]] = []

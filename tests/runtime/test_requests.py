@@ -54,6 +54,7 @@ class Desk:
     """A supervisor without processes: everything that it would do is noted."""
 
     def __init__(self, plan: Plan = PLAN, *, is_stepped: bool = False) -> None:
+        self.run_id = "this run"
         self.sent: list[tuple[str, say.ChannelOrder]] = []
         self.texts: list[str] = []
         self.replies: list[tuple[int, object, bool]] = []

@@ -284,16 +284,16 @@ class Conductor:
         self._tell_hosts()
 
     def _heard_host(self, report: HostReport) -> None:
-        end = self._hosts.heard(report, self._scheduler.now)
-        if end is not None:
+        if (end := self._hosts.heard(report, self._scheduler.now)) is not None:
             self.go_down(end.exit_code, f"{end.reason} (host '{report.host}')")
+        self.latch.heard_host(report)
         self.blocked.look(self.plan, self.states, self._hosts.failed, self.members)
         self._proceed()
 
     def _tell_hosts(self) -> None:
         is_of_all = self.is_going_down and self.exit_code != INTERRUPTED  # a signal is for this host alone
         end = RobotEnd(self.exit_code, self.reason) if is_of_all else None
-        self._hosts.report(self.states, end, is_going_down=self.is_going_down)
+        self._hosts.report(self.states, self.latch.shared, end, is_going_down=self.is_going_down)
 
     def _alive(self, member: Member) -> None:
         if member.is_told_lost and member.is_configured:

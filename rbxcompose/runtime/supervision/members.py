@@ -18,6 +18,8 @@ from rbxcompose.runtime.processes import KILLED
 class ConductorEffects(Protocol):
     """What the conductor can do to the world."""
 
+    run_id: str  # tells this start of the robot from any other
+
     def fork(self, process: str, *, is_restart: bool, is_stopped: bool) -> None:
         """Start a process."""
         ...

@@ -13,7 +13,7 @@ from rbxcompose.dataclass import dataclass
 from rbxcompose.levels import Level
 from rbxcompose.plan.model import Instance, OtherHost, Share
 from rbxcompose.runtime import channel as say
-from rbxcompose.runtime.host_report import HostReport, RobotEnd
+from rbxcompose.runtime.host_report import HostReport, RobotEnd, SharedStop
 from rbxcompose.runtime.supervision.members import ConductorEffects
 
 SILENT = 2.0  # [s] without a report after which the components of a host count as lost; links lose more than processes
@@ -35,16 +35,18 @@ class OtherHosts:
     def __init__(self, share: Share | None, effects: ConductorEffects, tell: Callable[[say.Lost], None]) -> None:
         """Take `tell`, which tells all own processes."""
         self._share, self._effects, self._tell = share, effects, tell
-        self._own = HostReport(share.host, share.version) if share else None
+        self._own = HostReport(share.host, share.version, effects.run_id) if share else None
         self._others = {one.name: one for one in share.others} if share else {}
         self._known: dict[str, _Known] = {}
         self._told_waiting = ""
 
-    def report(self, states: Mapping[str, tuple[str, int]], end: RobotEnd | None, *, is_going_down: bool) -> None:
+    def report(
+        self, states: Mapping[str, tuple[str, int]], stop: SharedStop, end: RobotEnd | None, *, is_going_down: bool
+    ) -> None:
         """Tell the other hosts how this one is."""
         if self._own is not None:
             told = {name: state for name, (state, _) in states.items()}
-            now = replace(self._own, states=told, end=end, is_going_down=is_going_down)
+            now = replace(self._own, states=told, stop=stop, end=end, is_going_down=is_going_down)
             self._effects.to_hosts(now)
 
     def heard(self, report: HostReport, now: float) -> RobotEnd | None:

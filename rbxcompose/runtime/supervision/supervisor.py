@@ -11,7 +11,6 @@ import selectors
 import signal
 import socket
 from collections.abc import Callable
-from dataclasses import replace
 from types import FrameType
 
 from rbxcompose.clock import MonotonicClock
@@ -62,6 +61,7 @@ class Supervisor:
         """`lock` is the descriptor that holds the lock of `folder`."""
         self._launch, self._folder, self._lock, self._on_up = launch, folder, lock, on_up
         self._clock: MonotonicClock = launch.clock
+        self.run_id = f"{os.getpid()}, {launch.clock.start}"
         self._scheduler = Scheduler()
         self._selector = selectors.DefaultSelector()
         self._children: dict[str, _Child] = {}
@@ -149,8 +149,7 @@ class Supervisor:
         """Tell the other hosts of the robot how this one is; a router that is behind has newer reports to come."""
         child = self._children.get(ROUTER)
         if child is not None and not child.channel.is_behind:
-            run = f"{os.getpid()}, {self._clock.start}"
-            self.send(ROUTER, say.ToHosts(replace(report, run=run)))
+            self.send(ROUTER, say.ToHosts(report))
 
     def _watch(self, channel: say.Channel) -> None:
         """Wait for messages of a process, and until it can take the rest of a message too long for one send."""
