@@ -18,6 +18,7 @@ from rbxcompose.cli.project.targets import is_system
 from rbxcompose.cli.robots.live_reload import LiveReload
 from rbxcompose.cli.robots.run_view import run_plan
 from rbxcompose.cli.robots.this_machine import is_fit
+from rbxcompose.cli.systems.options import add_system_options
 from rbxcompose.compiler import compile_robot
 from rbxcompose.recording.codes import UNWRITABLE
 from rbxcompose.runtime.options import RunOptions
@@ -39,6 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--watch", action="store_true", help="apply changes to its files as you edit them")
     parser.add_argument("--host", metavar="NAME", help="of a system: run what this host runs")
+    add_system_options(parser)
     parser.add_argument("--robot", metavar="NAME", help="with --host: only this robot")
     parser.add_argument("--for", type=_duration, dest="duration", metavar="30s", help="end after this robot time")
 

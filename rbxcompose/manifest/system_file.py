@@ -10,6 +10,8 @@ from pydantic import AfterValidator, BeforeValidator, Field
 from rbxcompose.config import Config, Name
 from rbxcompose.manifest.header import ManifestHeader
 
+_SSH = re.compile(r"(ssh://)?([A-Za-z0-9_][A-Za-z0-9_.-]*@)?[A-Za-z0-9\[][A-Za-z0-9.:\]_-]*")
+_COMMAND = re.compile(r"[A-Za-z0-9_./][A-Za-z0-9_./+-]*")
 _ADDRESS = re.compile(r"[0-9A-Fa-f:.]{2,45}|[A-Za-z0-9]([A-Za-z0-9.-]{0,252}[A-Za-z0-9])?")
 
 
@@ -17,6 +19,20 @@ def _address(text: str) -> str:
     """Read an address or a name of a machine."""
     if not _ADDRESS.fullmatch(text):
         raise ValueError("must be an address or the name of a machine, such as 10.42.0.2 or robot.local")
+    return text
+
+
+def _ssh(text: str) -> str:
+    """Read what one types after `ssh`, but no options: with those, a text of others could run programs here."""
+    if not _SSH.fullmatch(text):
+        raise ValueError("must be a host as one types it after ssh, such as pi@robot; options go to ~/.ssh/config")
+    return text
+
+
+def _command(text: str) -> str:
+    """Read the path of a program."""
+    if not _COMMAND.fullmatch(text):
+        raise ValueError("must be the path of a program, such as /home/pi/venv/bin/rbxcompose")
     return text
 
 
@@ -38,6 +54,10 @@ class HostModel(Config):
 
     address: Annotated[str, AfterValidator(_address)] | None = None
     """Where the other hosts reach it: an IP address or a name. Of two hosts of one robot, at least one needs it."""
+    ssh: Annotated[str, AfterValidator(_ssh)] | None = None
+    """What one types after `ssh` to reach it, such as `pi@robot`. Without it, this is the machine of the command."""
+    command: Annotated[str, AfterValidator(_command)] = "rbxcompose"
+    """Its program `rbxcompose`, if that is not in the path of commands over ssh."""
     labels: tuple[Name, ...] = ()
     """What robots may call it by in `on` and `place`, such as `gpu`."""
     devices: tuple[str, ...] = ()

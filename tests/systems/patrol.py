@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 from rbxcompose.runtime.folder import RobotFolder, RobotState
 from tests.conftest import ROOT
@@ -48,6 +49,14 @@ class PatrolOnTwoHosts:
         (folder / "missions/patrol.yaml").write_bytes((ROOT / "missions/patrol.yaml").read_bytes())
         (folder / "system.yaml").write_text(SYSTEM.replace("NAME", self.name), encoding="utf-8")
         self._motion = folder / "motion"
+
+    def reach_by_ssh(self, host: str, program: Path) -> None:
+        """Have a host reached by ssh, with its own program `rbxcompose`."""
+        path = self.hosts.folder / "system.yaml"
+        text = path.read_text(encoding="utf-8")
+        path.write_text(
+            text.replace(f"  {host}: {{", f"  {host}: {{ssh: {host}, command: {program}, "), encoding="utf-8"
+        )
 
     def rbx(self, host: str, *words: str) -> subprocess.Popen[str]:
         """Start a command of rbxcompose on a host."""

@@ -9,6 +9,7 @@ import pytest
 
 from tests.systems.namespaces import NotPermittedError, TwoHosts
 from tests.systems.patrol import ACCELERATION, ADDRESSES, CYCLE, DEADLINE, SPEED, PatrolOnTwoHosts
+from tests.systems.sshd import serve, wrapper
 
 LATE = 0.15  # [s] that a loaded machine may hold up what is seen from outside
 BRAKED = DEADLINE + 2 * CYCLE + SPEED / ACCELERATION  # [s] from the last command to rest
@@ -23,6 +24,34 @@ def patrol(tmp_path: Path) -> Iterator[PatrolOnTwoHosts]:
         pytest.skip(str(reason))
     with hosts:
         yield PatrolOnTwoHosts(hosts)
+
+
+@pytest.mark.timeout(150)
+def test_one_command_starts_shows_stops_and_ends_the_robot_on_all_hosts_over_ssh(patrol: PatrolOnTwoHosts) -> None:
+    try:
+        config = serve(patrol.hosts, "r")
+    except NotPermittedError as reason:
+        pytest.skip(str(reason))
+    patrol.reach_by_ssh("r", wrapper(patrol.hosts.folder))
+    options = ("--ssh-config", str(config))
+
+    def run(*words: str) -> str:
+        output, _ = (process := patrol.rbx("d", *words, *options)).communicate(timeout=60)
+        assert process.returncode == 0, output
+        return output
+
+    told = run("up", "system.yaml", "-d")
+    assert "r | " in told
+    patrol.watch()
+    patrol.wait_until(lambda: patrol.has_moved_since(0.0))
+    shown = run("ps", "system.yaml")
+    assert "diff_drive_sim" in shown
+    assert "go_to" in shown
+    assert "stopped" in run("stop", "--robot", "system.yaml")
+    assert all(state is not None and state.stop is not None for state in map(patrol.state, ADDRESSES))
+    assert "is there" in run("logs", "system.yaml")
+    run("down", "system.yaml")
+    assert (patrol.state("r"), patrol.state("d")) == (None, None)
 
 
 @pytest.mark.timeout(150)

@@ -11,6 +11,7 @@ from dataclasses import replace
 from rbxcompose.cli.output.console import FINDINGS, refuse, tell_report
 from rbxcompose.cli.robots.run_view import run_plan
 from rbxcompose.cli.robots.this_machine import is_fit
+from rbxcompose.cli.systems.everywhere import up_everywhere
 from rbxcompose.findings import Finding, kind
 from rbxcompose.model.robot import Robot
 from rbxcompose.plan.model import Plan
@@ -24,7 +25,8 @@ WHICH_HOST = kind(
     "RBX6110",
     """It is not clear which host this is
 
-`up SYSTEM --host NAME` runs what the system places on the host of this name.
+`up SYSTEM --host NAME` runs what the system places on the host of this name. Without `--host`, `up` starts all hosts by
+their `ssh`; a host without it is the machine of the command.
 
 Bad: `rbxcompose up systems/two_hosts.yaml --host rboot`
 Good: `rbxcompose up systems/two_hosts.yaml --host robot`
@@ -66,6 +68,8 @@ def run_share(path: str, arguments: argparse.Namespace, options: RunOptions) -> 
     tell_report(system.report, system.sources)
     if system.report.has_errors:
         return FINDINGS
+    if arguments.host is None and any(one.ssh for one in system.hosts.values()):
+        return up_everywhere(path, system, arguments)
     chosen = _chosen(system, arguments)
     if isinstance(chosen, Finding):
         return refuse(chosen)
@@ -84,7 +88,7 @@ def _chosen(system: System, arguments: argparse.Namespace) -> list[PlacedRobot] 
     """Return the robots to run on this host."""
     host = arguments.host
     if host is None:
-        message = "a system runs on several hosts, and none is named"
+        message = "no host is named, and none of the system has 'ssh', by which all could be started from here"
         return WHICH_HOST.at(None, message, help=f"--host {' or --host '.join(system.hosts)}")
     if host not in system.hosts:
         return WHICH_HOST.misspelt(None, f"the system has no host '{host}'", host, system.hosts, "hosts")
