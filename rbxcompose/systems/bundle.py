@@ -30,13 +30,23 @@ def bundle_of(system: System) -> Bundle:
         OSError: if one cannot be read.
         ValueError: if there is no system.
     """
+    name, files = files_of(system)
+    return Bundle(digest_of(files), _archive(files), name)
+
+
+def files_of(system: System) -> tuple[str, dict[str, bytes]]:
+    """Return the path of a system's file in its project, and all files of the project that it was compiled from.
+
+    Raises:
+        OSError: if one cannot be read.
+        ValueError: if there is no system.
+    """
     if system.path is None:
         raise ValueError("the system could not be read")
     root = project_of(system.path)
     shown = [Path(name).resolve() for name in system.sources if not name.startswith(PREFIX)]
     own = {path for path in (system.path, *shown) if path.is_file() and path.is_relative_to(root)}
-    files = {_within(path, root): path.read_bytes() for path in own}
-    return Bundle(digest_of(files), _archive(files), _within(system.path, root))
+    return _within(system.path, root), {_within(path, root): path.read_bytes() for path in own}
 
 
 def _within(path: Path, root: Path) -> str:

@@ -53,8 +53,8 @@ ABOVE = {
     "bus_types": "actuation",
     "check_runner": "missions.analysis model.doubts model.robot",
     "checks": "actuation body.model check_runner composition diagnostics.core missions model sdk sections",
-    "cli": "actuation body bus compiler composition controller_requests doctor executive.requests finding_pages "
-    "importing inspection lsp.server mission_tests missions model params plan recording rendering replay runtime "
+    "cli": "actuation body bus compiler composition controller_requests doctor executive.requests "
+    "exporting finding_pages importing inspection lsp.server mission_tests missions model params plan recording rendering replay runtime "
     "scaffold schema.documents sdk sections systems",
     "controller_interface": "control sdk",
     "controller_manager": "controller_interface sdk",
@@ -71,6 +71,7 @@ ABOVE = {
     "doctor": "actuation.port_errors actuation.serial_ports bus.graph composition model.flow model.robot "
     "runtime.folder runtime.processes sdk sections",
     "executive": "missions sdk",
+    "exporting": "plan sdk systems",
     "finding_pages": "check_runner missions.analysis",
     "importing": "actuation.servo_models composition.dump scaffold.answers sections",
     "inspection": "body.model bus.names bus.wire composition missions model plan schema sdk sections systems",

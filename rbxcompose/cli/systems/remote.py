@@ -67,13 +67,14 @@ class Remote:
         """Return the command that runs rbxcompose there; with a terminal, it ends when the connection does."""
         if self.is_here:
             return [sys.executable, "-m", "rbxcompose", *words]
-        command = f"exec {shlex.join([self.model.command, *words])}"
+        command = f"NO_COLOR=1 exec {shlex.join([self.model.command, *words])}"  # its lines stand behind ours
         return self.ssh(f"cd {shlex.quote(folder)} && {command}" if folder else command, has_terminal=has_terminal)
 
     def ssh(self, script: str, *, has_terminal: bool = False) -> list[str]:
         """Return the command that runs a script of the shell there."""
         own = ["-F", str(self.config)] if self.config else []
-        options = ["-o", "BatchMode=yes", "-o", f"ConnectTimeout={CONNECT}", "-o", "ServerAliveInterval=5"]
+        settings = ("BatchMode=yes", f"ConnectTimeout={CONNECT}", "ServerAliveInterval=5", "LogLevel=ERROR")
+        options = [word for one in settings for word in ("-o", one)]
         return ["ssh", *own, *options, "-tt" if has_terminal else "-T", "--", self.model.ssh or "", script]
 
 

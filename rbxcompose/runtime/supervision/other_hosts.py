@@ -63,7 +63,7 @@ class OtherHosts:
             self._greet(host, report, is_back=known is not None)
         elif known is not None and known.is_lost and not report.is_going_down:
             self._effects.log(Level.WARN, f"host '{host.name}' answers again")
-        elif known is not None and not known.is_lost and report.is_going_down:
+        elif known is not None and not known.is_lost and report.is_going_down and report.end is None:
             self._lose(host, "goes down")
         return report.end
 

@@ -25,6 +25,7 @@ from rbxcompose.runtime.host_report import HostReport
 from rbxcompose.runtime.process_group.watchdog import MARK
 from rbxcompose.runtime.processes import Process, adopt_orphans, boot_id, describe_exit, signal_descriptor
 from rbxcompose.runtime.records import Record
+from rbxcompose.runtime.service_manager import ALIVE, READY, of_this_process
 from rbxcompose.runtime.supervision import silence
 from rbxcompose.runtime.supervision.conductor import INTERRUPTED, ROBOT_FAILED, Conductor
 from rbxcompose.runtime.supervision.gauges import gauges_of
@@ -66,6 +67,7 @@ class Supervisor:
         self._selector = selectors.DefaultSelector()
         self._children: dict[str, _Child] = {}
         self._interrupts = 0
+        self._manager = of_this_process()
         self._is_state_old = False  # the state file is out of date
         self._complained = ""
         router = None if launch.plan.bus.router else ROUTER
@@ -188,6 +190,7 @@ class Supervisor:
     def is_up(self) -> None:
         """Notify those who wait that everything is active."""
         self._write_state()
+        self._manager.tell(READY)
         self._on_up()
 
     def states_changed(self) -> None:
@@ -257,6 +260,7 @@ class Supervisor:
             return ""
 
     def _look_around(self) -> None:
+        self._manager.tell(ALIVE)
         self._look_at_parent()
         if self._folder.has_lost(self._lock):
             self._restore_folder()
