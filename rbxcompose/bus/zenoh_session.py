@@ -10,6 +10,7 @@ import itertools
 import json
 import os
 from collections.abc import Mapping
+from dataclasses import field
 
 import zenoh
 
@@ -36,6 +37,20 @@ class RouterLink:
 
     listen: tuple[str, ...] = ()
     connect: tuple[str, ...] = ()
+    tls: Mapping[str, object] = field(default_factory=dict)  # settings of `transport/link/tls`
+
+
+def tls_settings(authority: str, certificate: str, key: str, *, mutual: bool) -> dict[str, object]:
+    """Return how a router proves who it is, from the paths of its files; if `mutual`, those that dial it must, too.
+
+    A host is dialled by the address that its certificate has.
+    """
+    own = {
+        f"{side}_{what}": path
+        for side in ("listen", "connect")
+        for what, path in (("certificate", certificate), ("private_key", key))
+    }
+    return {"root_ca_certificate": authority, **own, "enable_mtls": mutual, "verify_name_on_connect": True}
 
 
 NO_LINK = RouterLink()
@@ -91,6 +106,7 @@ def router_settings(endpoint: str, link: RouterLink = NO_LINK) -> dict[str, obje
         "connect/retry": _RETRY,
         "connect/timeout_ms": -1,  # forever: the other host may come later
         "connect/exit_on_failure": False,
+        **{f"transport/link/tls/{name}": value for name, value in link.tls.items()},
     }
 
 

@@ -12,6 +12,12 @@ from rbxcompose.systems.share import hosts_of, robots_on, share_of
 from rbxcompose.systems.traffic import Crossing
 from rbxcompose.units import BIT_RATE, FREQUENCY, format_quantity
 
+_OPEN_TO = {
+    "none": "open to every machine of the network",
+    "tls": "encrypted, open to every machine of the network",
+    "mtls": "for hosts of the system",
+}
+
 
 def system_extent(system: System) -> str:
     """Return the size of a system in words: `1 robot on 2 hosts`."""
@@ -45,7 +51,7 @@ def _share(system: System, robot: PlacedRobot, host: str) -> Iterator[str]:
     plan = share_of(system, robot, host)
     yield f"{robot.name}: {extent(len(plan.instances), len(plan.groups))}"
     if plan.share is not None:
-        yield from (f"  its router listens at {one}" for one in plan.share.listen)
+        yield from (f"  its router listens at {one}, {_OPEN_TO[system.security]}" for one in plan.share.listen)
         yield from (f"  its router dials {one}" for one in plan.share.connect)
     for group in plan.groups:
         yield f"  process {group}"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
@@ -47,6 +47,9 @@ class SystemFile(ManifestHeader):
     """The machines, by name."""
     robots: Any = None
     """The robots that run on them, by name; this is the name that `ps` and other verbs know."""
+    security: Literal["none", "tls", "mtls"] = "none"
+    """How routers of different hosts trust each other: not at all; by `tls`, the one that dials knows that the other
+    is of this system, and what crosses is encrypted; by `mtls`, both know. `security init` makes the certificates."""
 
 
 class HostModel(Config):
@@ -83,5 +86,6 @@ class SystemRobotModel(Config):
 
 
 ShortHost = Annotated[HostModel, BeforeValidator(_in_full, json_schema_input_type=HostModel | None)]
+SECURITY = "security"
 SECTIONS = {"hosts": dict[Name, ShortHost], "robots": dict[Name, SystemRobotModel]}
 """Content of each section."""

@@ -72,6 +72,16 @@ class OtherHost:
 
 
 @dataclass(frozen=True, slots=True)
+class LinkTls:
+    """The files by which a router proves who it is; if `mutual`, those that dial it must prove it, too."""
+
+    authority: str
+    certificate: str
+    key: str
+    mutual: bool = True
+
+
+@dataclass(frozen=True, slots=True)
 class Share:
     """What one host runs of a robot that runs on several, and how its router is linked with those of the others."""
 
@@ -80,6 +90,7 @@ class Share:
     listen: tuple[str, ...] = ()  # endpoints for the routers of other hosts
     connect: tuple[str, ...] = ()  # endpoints of routers of other hosts
     version: str = ""  # of the files that the robot was compiled from; the same on all hosts
+    tls: LinkTls | None = None
 
 
 @dataclass(frozen=True, slots=True)

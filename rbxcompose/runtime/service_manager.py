@@ -16,14 +16,13 @@ class ServiceManager:
     def __init__(self, environment: Mapping[str, str]) -> None:
         name = environment.get("NOTIFY_SOCKET", "")
         self._address = f"\0{name[1:]}" if name.startswith("@") else name
-        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) if self._address else None
         self._is_watched = "WATCHDOG_USEC" in environment
 
     def tell(self, state: bytes) -> None:
         """Send a state; if it cannot be taken now, it is not needed any more."""
-        if self._socket is not None and (state is not ALIVE or self._is_watched):
-            with suppress(OSError):
-                self._socket.sendto(state, socket.MSG_DONTWAIT, self._address)
+        if self._address and (state is not ALIVE or self._is_watched):
+            with suppress(OSError), socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sender:
+                sender.sendto(state, socket.MSG_DONTWAIT, self._address)
 
 
 def of_this_process() -> ServiceManager:

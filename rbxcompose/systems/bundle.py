@@ -31,7 +31,7 @@ def bundle_of(system: System) -> Bundle:
         ValueError: if there is no system.
     """
     name, files = files_of(system)
-    return Bundle(digest_of(files), _archive(files), name)
+    return Bundle(digest_of(files), archive_of(files), name)
 
 
 def files_of(system: System) -> tuple[str, dict[str, bytes]]:
@@ -59,8 +59,8 @@ def digest_of(files: Mapping[str, bytes]) -> str:
     return hashlib.sha256("".join(lines).encode()).hexdigest()[:32]
 
 
-def _archive(files: Mapping[str, bytes]) -> bytes:
-    """Return a tar archive with nothing in it that depends on this machine or the time."""
+def archive_of(files: Mapping[str, bytes], mode: int = 0o644) -> bytes:
+    """Return a tar archive of files of this mode, with nothing in it that depends on this machine or the time."""
     out = io.BytesIO()
     with tarfile.open(fileobj=out, mode="w", format=tarfile.PAX_FORMAT) as archive:
         for folder in _folders(files):
@@ -69,7 +69,7 @@ def _archive(files: Mapping[str, bytes]) -> bytes:
             archive.addfile(info)
         for name, data in sorted(files.items()):
             info = tarfile.TarInfo(name)
-            info.size, info.mode = len(data), 0o644
+            info.size, info.mode = len(data), mode
             archive.addfile(info, io.BytesIO(data))
     return out.getvalue()
 

@@ -51,6 +51,7 @@ class System:
     path: Path | None = None
     name: str = ""
     root: MappingNode = field(default_factory=MappingNode)
+    security: str = "none"
     hosts: Mapping[str, HostModel] = field(default_factory=dict)
     robots: dict[str, PlacedRobot] = field(default_factory=dict)
     report: Report = field(default_factory=Report)

@@ -23,6 +23,7 @@ from rbxcompose.manifest.validate import MISSING_KEY, validate
 from rbxcompose.plan.model import Plan
 from rbxcompose.sdk.capabilities import OpensPort
 from rbxcompose.systems import codes
+from rbxcompose.systems.certificates import NO_SECURITY
 from rbxcompose.systems.model import PlacedRobot, System
 from rbxcompose.systems.placement import HostOffer, Wishes, hosts_called, place
 from rbxcompose.systems.rules import system_findings
@@ -42,7 +43,7 @@ def compile_system(path: str, *, environment: Mapping[str, str], real: bool = Fa
     out.root = root = documents.meant(SystemFile, root)
     documents.check(SystemFile, root)
     out.root = root = fill(root, names_of(_text(root, "name"), not real, environment), out.report)
-    out.path, out.name = file, _text(root, "name")
+    out.path, out.name, out.security = file, _text(root, "name"), _text(root, "security") or NO_SECURITY
     sections = {key: _section(key, model, out) for key, model in SECTIONS.items()}
     if sections["hosts"] is None or sections["robots"] is None:
         return out

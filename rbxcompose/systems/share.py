@@ -8,6 +8,7 @@ from dataclasses import replace
 from rbxcompose.plan.model import OtherHost, Plan, Share
 from rbxcompose.sdk.capabilities import RunsMissions
 from rbxcompose.sdk.registry import declared
+from rbxcompose.systems.certificates import NO_SECURITY
 from rbxcompose.systems.model import PlacedRobot, System
 
 
@@ -71,4 +72,5 @@ def _dialled(system: System, robot: PlacedRobot) -> dict[tuple[str, str], str]:
 def link_endpoint(system: System, robot: PlacedRobot, host: str) -> str:
     """Return the endpoint at which a host's router takes those of others; the host has an address."""
     address = system.hosts[host].address or ""
-    return f"tcp/{f'[{address}]' if ':' in address else address}:{robot.link_port}"
+    protocol = "tcp" if system.security == NO_SECURITY else "tls"
+    return f"{protocol}/{f'[{address}]' if ':' in address else address}:{robot.link_port}"

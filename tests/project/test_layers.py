@@ -53,9 +53,9 @@ ABOVE = {
     "bus_types": "actuation",
     "check_runner": "missions.analysis model.doubts model.robot",
     "checks": "actuation body.model check_runner composition diagnostics.core missions model sdk sections",
-    "cli": "actuation body bus compiler composition controller_requests doctor executive.requests "
-    "exporting finding_pages importing inspection lsp.server mission_tests missions model params plan recording rendering replay runtime "
-    "scaffold schema.documents sdk sections systems",
+    "cli": "actuation body bus compiler composition controller_requests doctor executive.requests exporting "
+    "finding_pages importing inspection lsp.server mission_tests missions model params plan recording rendering replay "
+    "runtime scaffold schema.documents sdk sections systems",
     "controller_interface": "control sdk",
     "controller_manager": "controller_interface sdk",
     "controller_requests": "",

@@ -77,10 +77,16 @@ class TwoHosts:
 
     def start(self, host: str, *words: str, environment: Mapping[str, str] | None = None) -> subprocess.Popen[str]:
         """Start a command on a host; what it prints is collected."""
-        own = {"XDG_RUNTIME_DIR": str(self.folder / host), "TMPDIR": str(self.folder / host / "temporary")}
+        folder = self.folder / host
+        own = {"XDG_RUNTIME_DIR": folder, "TMPDIR": folder / "temporary", "XDG_CONFIG_HOME": folder / "config"}
         process = subprocess.Popen(
             ["ip", "netns", "exec", self.namespace(host), "sh", "-c", _OWN_MEMORY, "sh", *words],
-            env={**os.environ, **own, "NO_COLOR": "1", **(environment or {})},
+            env={
+                **os.environ,
+                **{name: str(path) for name, path in own.items()},
+                "NO_COLOR": "1",
+                **(environment or {}),
+            },
             cwd=self.folder,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,

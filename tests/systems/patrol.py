@@ -17,6 +17,7 @@ from tests.systems.namespaces import TwoHosts
 ADDRESSES = {"r": "10.42.7.2", "d": "10.42.7.1"}
 SPEED, ACCELERATION, DEADLINE, CYCLE = 0.3, 1.0, 0.5, 0.02  # [m/s], [m/s^2], [s], [s]
 LONGEST = 40.0  # [s] for anything to happen
+ENVIRONMENT = {"PYTHONPATH": str(ROOT)}
 SYSTEM = """
 rbx: 1
 kind: System
@@ -52,16 +53,22 @@ class PatrolOnTwoHosts:
 
     def reach_by_ssh(self, host: str, program: Path) -> None:
         """Have a host reached by ssh, with its own program `rbxcompose`."""
+        entry = f"  {host}: {{"
+        self.change_system(entry, f"{entry}ssh: {host}, command: {program}, ")
+
+    def change_system(self, before: str, after: str) -> None:
+        """Change the text of the system."""
         path = self.hosts.folder / "system.yaml"
-        text = path.read_text(encoding="utf-8")
-        path.write_text(
-            text.replace(f"  {host}: {{", f"  {host}: {{ssh: {host}, command: {program}, "), encoding="utf-8"
-        )
+        path.write_text(path.read_text(encoding="utf-8").replace(before, after), encoding="utf-8")
+
+    def stranger(self, host: str) -> str:
+        """Return how a router without a certificate fares that dials `r` from a host: `linked` or `refused`."""
+        process = self.hosts.start(host, sys.executable, "-m", "tests.systems.stranger", environment=ENVIRONMENT)
+        return process.communicate(timeout=30)[0].strip()
 
     def rbx(self, host: str, *words: str) -> subprocess.Popen[str]:
         """Start a command of rbxcompose on a host."""
-        environment = {"PYTHONPATH": str(ROOT)}
-        return self.hosts.start(host, sys.executable, "-m", "rbxcompose", *words, environment=environment)
+        return self.hosts.start(host, sys.executable, "-m", "rbxcompose", *words, environment=ENVIRONMENT)
 
     def up(self, host: str) -> subprocess.Popen[str]:
         """Start the share of a host."""
@@ -83,7 +90,7 @@ class PatrolOnTwoHosts:
         assert state is not None
         assert state.router is not None
         words = (sys.executable, "-m", "tests.systems.motion", state.router, str(self._motion))
-        self.hosts.start("r", *words, environment={"PYTHONPATH": str(ROOT)})
+        self.hosts.start("r", *words, environment=ENVIRONMENT)
 
     def motion(self) -> list[tuple[float, bool]]:
         """Return when it moved and when it stood still so far [s, monotonic]."""

@@ -28,7 +28,7 @@ PidFile none
 StrictModes no
 UsePAM no
 PermitRootLogin prohibit-password
-SetEnv XDG_RUNTIME_DIR={home} TMPDIR={home}/temporary XDG_CACHE_HOME={home}/cache
+SetEnv XDG_RUNTIME_DIR={home} TMPDIR={home}/temporary XDG_CACHE_HOME={home}/cache XDG_CONFIG_HOME={home}/config
 """
 _CLIENT = """
 Host {host}

@@ -40,6 +40,10 @@ def test_one_command_starts_shows_stops_and_ends_the_robot_on_all_hosts_over_ssh
         assert process.returncode == 0, output
         return output
 
+    patrol.change_system("name: two_hosts", "name: two_hosts\nsecurity: mtls")
+    run("security", "init", "system.yaml")
+    audit = patrol.rbx("d", "security", "audit", "system.yaml")
+    assert audit.wait(20) == 0
     told = run("up", "system.yaml", "-d")
     assert "r | " in told
     patrol.watch()
@@ -47,6 +51,7 @@ def test_one_command_starts_shows_stops_and_ends_the_robot_on_all_hosts_over_ssh
     shown = run("ps", "system.yaml")
     assert "diff_drive_sim" in shown
     assert "go_to" in shown
+    assert patrol.stranger("d") == "refused"
     assert "stopped" in run("stop", "--robot", "system.yaml")
     assert all(state is not None and state.stop is not None for state in map(patrol.state, ADDRESSES))
     assert "is there" in run("logs", "system.yaml")

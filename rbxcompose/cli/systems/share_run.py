@@ -16,6 +16,7 @@ from rbxcompose.findings import Finding, kind
 from rbxcompose.model.robot import Robot
 from rbxcompose.plan.model import Plan
 from rbxcompose.runtime.options import RunOptions
+from rbxcompose.systems.certificates import NO_SECURITY, folder_of, missing, tls_of
 from rbxcompose.systems.model import PlacedRobot, System
 from rbxcompose.systems.reader import compile_system
 from rbxcompose.systems.share import robots_on, share_of
@@ -41,6 +42,18 @@ that address: it is another one, or its network is not up yet.
 
 Bad: `rbxcompose up systems/two_hosts.yaml --host robot`, on the desk.
 Good: `rbxcompose up systems/two_hosts.yaml --host desk`, on the desk.
+""",
+)
+NO_CERTIFICATE = kind(
+    "RBX6117",
+    """The host has no certificate
+
+With `security: tls` or `mtls`, each host needs a certificate of the system, its key, and the certificate of the
+authority. They are in `~/.config/rbxcompose/systems/SYSTEM/HOST` of the user that runs it. `security init` makes them
+and brings them to hosts that have `ssh`.
+
+Bad: `rbxcompose up systems/two_hosts.yaml --host robot`, on a robot that never got its files.
+Good: `rbxcompose security init systems/two_hosts.yaml` on the desk, then the same.
 """,
 )
 WHICH_ROBOT = kind(
@@ -77,7 +90,9 @@ def run_share(path: str, arguments: argparse.Namespace, options: RunOptions) -> 
         plan = share_of(system, robot, arguments.host)
         if not is_fit(_here(robot, arguments.host), system.sources):
             return FINDINGS
-        if (problem := _address_problem(plan, arguments.host)) is not None:
+        plan = _secured(plan, system)
+        problem = _certificate_problem(plan, path) or _address_problem(plan, arguments.host)
+        if problem is not None:
             return refuse(problem)
         if (exit_code := run_plan(plan, options)) or not options.is_detached:
             return exit_code
@@ -106,6 +121,20 @@ def _here(robot: PlacedRobot, host: str) -> Robot:
     """Return the robot with what runs on a host only."""
     here = {name: one for name, one in robot.robot.components.items() if robot.hosts.get(name) == host}
     return replace(robot.robot, components=here)
+
+
+def _secured(plan: Plan, system: System) -> Plan:
+    """Return the plan with the certificates of its host."""
+    if plan.share is None or system.security == NO_SECURITY:
+        return plan
+    tls = tls_of(folder_of(system.name, os.environ), plan.share.host, system.security)
+    return replace(plan, share=replace(plan.share, tls=tls))
+
+
+def _certificate_problem(plan: Plan, path: str) -> Finding | None:
+    if plan.share is None or plan.share.tls is None or not (lacking := missing(plan.share.tls)):
+        return None
+    return NO_CERTIFICATE.at(None, f"'{lacking[0]}' cannot be read", help=f"rbxcompose security init {path}")
 
 
 def _address_problem(plan: Plan, host: str) -> Finding | None:

@@ -12,11 +12,11 @@ from pathlib import Path
 from types import FrameType
 
 from rbxcompose.bus.probe import probe_key
-from rbxcompose.bus.zenoh_session import NO_LINK, RouterLink, open_router
+from rbxcompose.bus.zenoh_session import NO_LINK, RouterLink, open_router, tls_settings
 from rbxcompose.bus.zenoh_transport import ZenohTransport
 from rbxcompose.clock import MonotonicClock
 from rbxcompose.endpoints import tcp_endpoint, unix_endpoint
-from rbxcompose.plan.model import Plan
+from rbxcompose.plan.model import Plan, Share
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.host_report import HostReport
 from rbxcompose.runtime.process_group.driver import RealTimeDriver
@@ -43,7 +43,7 @@ class Router:
         self._watchdog = Watchdog()
         self._transport: ZenohTransport | None = None
         self._hosts: HostLine | None = None
-        self._link = RouterLink(plan.share.listen, plan.share.connect) if plan.share else NO_LINK
+        self._link = _link(plan.share) if plan.share else NO_LINK
 
     def run(self) -> None:
         """Run until it is over."""
@@ -111,6 +111,12 @@ class Router:
             yield unix_endpoint(self._sockets, "router")
         else:
             yield from map(tcp_endpoint, range(bus.port, bus.port + TRIES))
+
+
+def _link(share: Share) -> RouterLink:
+    own = share.tls
+    tls = tls_settings(own.authority, own.certificate, own.key, mutual=own.mutual) if own else {}
+    return RouterLink(share.listen, share.connect, tls)
 
 
 def _end(number: int, frame: FrameType | None) -> None:
