@@ -38,6 +38,7 @@ class RouterLink:
     listen: tuple[str, ...] = ()
     connect: tuple[str, ...] = ()
     tls: Mapping[str, object] = field(default_factory=dict)  # settings of `transport/link/tls`
+    downsample: Mapping[str, float] = field(default_factory=dict)  # key -> most messages per second that leave [Hz]
 
 
 def tls_settings(authority: str, certificate: str, key: str, *, mutual: bool) -> dict[str, object]:
@@ -107,7 +108,14 @@ def router_settings(endpoint: str, link: RouterLink = NO_LINK) -> dict[str, obje
         "connect/timeout_ms": -1,  # forever: the other host may come later
         "connect/exit_on_failure": False,
         **{f"transport/link/tls/{name}": value for name, value in link.tls.items()},
+        **_downsampling(link.downsample),
     }
+
+
+def _downsampling(rates: Mapping[str, float]) -> dict[str, object]:
+    """Return the limits for what leaves; peers of this host get it from each other, past the router."""
+    rules = [{"key_expr": key, "freq": rate} for key, rate in rates.items()]
+    return {"downsampling": [{"messages": ["put"], "flows": ["egress"], "rules": rules}]} if rules else {}
 
 
 def client_settings(router: str) -> dict[str, object]:

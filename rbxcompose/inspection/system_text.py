@@ -53,6 +53,8 @@ def _share(system: System, robot: PlacedRobot, host: str) -> Iterator[str]:
     if plan.share is not None:
         yield from (f"  its router listens at {one}, {_OPEN_TO[system.security]}" for one in plan.share.listen)
         yield from (f"  its router dials {one}" for one in plan.share.connect)
+        for topic, rate in plan.share.downsample.items():
+            yield f"  at most {format_quantity(rate, FREQUENCY)} of {topic} leave it"
     for group in plan.groups:
         yield f"  process {group}"
         yield from (f"    {one.name} ({one.type}): {robot.placed[one.name].reason}" for one in plan.of_group(group))

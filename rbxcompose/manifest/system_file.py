@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
-from rbxcompose.config import Config, Name
+from rbxcompose.config import BitRate, Config, Frequency, Name
 from rbxcompose.manifest.header import ManifestHeader
 
 _SSH = re.compile(r"(ssh://)?([A-Za-z0-9_][A-Za-z0-9_.-]*@)?[A-Za-z0-9\[][A-Za-z0-9.:\]_-]*")
@@ -47,6 +47,8 @@ class SystemFile(ManifestHeader):
     """The machines, by name."""
     robots: Any = None
     """The robots that run on them, by name; this is the name that `ps` and other verbs know."""
+    links: Any = None
+    """What is known of the ways between hosts, by name."""
     security: Literal["none", "tls", "mtls"] = "none"
     """How routers of different hosts trust each other: not at all; by `tls`, the one that dials knows that the other
     is of this system, and what crosses is encrypted; by `mtls`, both know. `security init` makes the certificates."""
@@ -85,7 +87,20 @@ class SystemRobotModel(Config):
     """The TCP port at which the robot's routers reach each other; without it, that of `bus.port` of the robot."""
 
 
+class LinkModel(Config):
+    """The way between two hosts."""
+
+    between: tuple[Name, Name]
+    """The two hosts."""
+    limit: Annotated[BitRate, Field(gt=0)] | None = None
+    """What it carries; `check` warns if what is known to cross needs more."""
+    downsample: dict[str, Annotated[Frequency, Field(gt=0)]] = {}
+    """Topics of which no more messages than these cross; the others are left out. Commands cannot be left out. A host
+    with several links sends a topic on all of them as often as the fastest of them asks for."""
+
+
 ShortHost = Annotated[HostModel, BeforeValidator(_in_full, json_schema_input_type=HostModel | None)]
 SECURITY = "security"
 SECTIONS = {"hosts": dict[Name, ShortHost], "robots": dict[Name, SystemRobotModel]}
-"""Content of each section."""
+LINKS = {"links": dict[Name, LinkModel]}
+"""Content of each section; a system need not have links."""

@@ -91,6 +91,7 @@ class Share:
     connect: tuple[str, ...] = ()  # endpoints of routers of other hosts
     version: str = ""  # of the files that the robot was compiled from; the same on all hosts
     tls: LinkTls | None = None
+    downsample: Mapping[str, float] = field(default_factory=dict)  # topic -> most messages per second that cross [Hz]
 
 
 @dataclass(frozen=True, slots=True)

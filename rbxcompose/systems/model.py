@@ -9,7 +9,7 @@ from pathlib import Path
 
 from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Report, Span
-from rbxcompose.manifest.system_file import HostModel, SystemRobotModel
+from rbxcompose.manifest.system_file import HostModel, LinkModel, SystemRobotModel
 from rbxcompose.manifest.tree import MappingNode, value_span
 from rbxcompose.model.robot import Robot
 from rbxcompose.plan.model import Plan
@@ -53,6 +53,7 @@ class System:
     root: MappingNode = field(default_factory=MappingNode)
     security: str = "none"
     hosts: Mapping[str, HostModel] = field(default_factory=dict)
+    links: Mapping[str, LinkModel] = field(default_factory=dict)
     robots: dict[str, PlacedRobot] = field(default_factory=dict)
     report: Report = field(default_factory=Report)
     sources: dict[str, str] = field(default_factory=dict)

@@ -17,7 +17,7 @@ from rbxcompose.manifest.fill import fill
 from rbxcompose.manifest.fill_names import names_of
 from rbxcompose.manifest.library import PREFIX
 from rbxcompose.manifest.section import SYSTEM
-from rbxcompose.manifest.system_file import SECTIONS, SystemFile, SystemRobotModel
+from rbxcompose.manifest.system_file import LINKS, SECTIONS, SystemFile, SystemRobotModel
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, key_span, value_span
 from rbxcompose.manifest.validate import MISSING_KEY, validate
 from rbxcompose.plan.model import Plan
@@ -48,6 +48,8 @@ def compile_system(path: str, *, environment: Mapping[str, str], real: bool = Fa
     if sections["hosts"] is None or sections["robots"] is None:
         return out
     out.hosts = sections["hosts"]
+    if "links" in root:
+        out.links = validate(LINKS["links"], root.entries["links"].value, ("links",), out.report) or {}
     for name_, model in sections["robots"].items():
         if (robot := _placed_robot(name_, model, out, environment, real)) is not None:
             out.robots[name_] = robot

@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from rbxcompose.findings import Finding, Related, Severity, Span, kind
-from rbxcompose.manifest.tree import value_span
+from rbxcompose.manifest.tree import key_span, value_span
+from rbxcompose.model.wires import resolve
 from rbxcompose.qos import Qos
 from rbxcompose.sdk.capabilities import Drives, OpensPort
+from rbxcompose.systems.codes import UNKNOWN_HOST
 from rbxcompose.systems.model import PlacedRobot, System
 from rbxcompose.systems.share import hosts_of, listens
 from rbxcompose.systems.traffic import Crossing
-from rbxcompose.units import FREQUENCY, TIME, format_quantity
+from rbxcompose.units import BIT_RATE, FREQUENCY, TIME, format_quantity
 
 FASTEST = 100.0  # [Hz] of commands across a link; wireless links pause for tens of milliseconds
 SHORTEST = 0.2  # [s] without a command, within which a base should not brake because of a link
@@ -107,6 +109,55 @@ Good: the same robot without `bus.router`.
 )
 
 
+IDLE_LINK = kind(
+    "RBX6118",
+    """The topic does not cross this link
+
+`downsample` of a link is for topics with a publisher on one of its hosts and a subscriber on the other. This one stays
+within a host, goes another way, or does not exist.
+
+Bad:
+```yaml
+links:
+  wifi: {between: [robot, desk], downsample: {odm: 2 Hz}}
+```
+Good:
+```yaml
+links:
+  wifi: {between: [robot, desk], downsample: {odom: 2 Hz}}
+```
+""",
+    Severity.WARNING,
+    is_fixable=True,
+)
+FEWER_COMMANDS = kind(
+    "RBX6119",
+    """Commands would be left out
+
+A base brakes when no command has come for a while, and what steers it relies on each. Messages of the class `command`
+are not downsampled.
+
+Bad:
+```yaml
+links:
+  wifi: {between: [robot, desk], downsample: {cmd_vel: 1 Hz}}
+```
+Good: run what commands on the host of what moves.
+""",
+)
+TOO_MUCH = kind(
+    "RBX6120",
+    """More crosses than the link carries
+
+The topics whose rates are known need more than `limit`, by the least size of their messages.
+
+Bad: a lidar with 40 Hz across `wifi: {between: [robot, desk], limit: 100 kbit/s}`.
+Good: `downsample: {scan: 2 Hz}` on this link.
+""",
+    Severity.WARNING,
+)
+
+
 def system_findings(system: System) -> Iterator[Finding]:
     """Yield what is wrong with a system whose robots are placed."""
     for robot in system.robots.values():
@@ -118,6 +169,8 @@ def system_findings(system: System) -> Iterator[Finding]:
             yield from _commands(system, robot, crossing)
             yield from _bulk(system, robot, crossing)
     yield from _ports(system)
+    for name in system.links:
+        yield from _link(system, name)
 
 
 def _place(system: System, robot: PlacedRobot, component: str) -> Span:
@@ -195,3 +248,40 @@ def _ports(system: System) -> Iterator[Finding]:
                     span = value_span(system.root, ("robots", robot.name, "link_port"))
                     message = f"the routers of '{other.name}' and '{robot.name}' on '{host}' both listen at {endpoint}"
                     yield SAME_ENDPOINT.at(span, message, help="give one of them another 'link_port', or none")
+
+
+def _link(system: System, name: str) -> Iterator[Finding]:
+    link, known = system.links[name], True
+    for index, host in enumerate(link.between):
+        if host not in system.hosts:
+            known, span = False, value_span(system.root, ("links", name, "between", index))
+            yield UNKNOWN_HOST.misspelt(span, f"the system has no host '{host}'", host, system.hosts, "hosts")
+    if not known:
+        return
+    crossing = {
+        (robot.name, one.topic): one
+        for robot in system.robots.values()
+        for one in robot.crossings
+        if one.passes(link.between)
+    }
+    for topic in link.downsample:
+        span = key_span(system.root, ("links", name, "downsample", topic))
+        found = [one for (robot, full), one in crossing.items() if full == _full(system, robot, topic)]
+        if not any(one.qos for one in found):
+            valid = sorted(full.removeprefix("/") for (_, full), one in crossing.items() if one.qos)
+            message = f"no topic '{topic}' crosses between '{link.between[0]}' and '{link.between[1]}'"
+            yield IDLE_LINK.misspelt(span, message, topic, valid, "topics that do")
+        elif any(one.qos is Qos.COMMAND for one in found):
+            yield FEWER_COMMANDS.at(span, f"{found[0].topic} has commands", help="remove it here")
+    if link.limit is not None:
+        rates = {full: link.downsample.get(full.removeprefix("/")) for _, full in crossing}
+        needed = sum(one.bandwidth_at(rates[full]) or 0.0 for (_, full), one in crossing.items())
+        if needed > link.limit:
+            message = f"what is known to cross '{name}' needs about {format_quantity(needed, BIT_RATE)}"
+            yield TOO_MUCH.at(
+                value_span(system.root, ("links", name, "limit")), message, help="'downsample' some topics"
+            )
+
+
+def _full(system: System, robot: str, topic: str) -> str:
+    return resolve(topic, system.robots[robot].plan.bus.namespace)

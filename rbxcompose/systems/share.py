@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
+from rbxcompose.model.wires import resolve
 from rbxcompose.plan.model import OtherHost, Plan, Share
 from rbxcompose.sdk.capabilities import RunsMissions
 from rbxcompose.sdk.registry import declared
@@ -40,8 +41,20 @@ def share_of(system: System, robot: PlacedRobot, host: str) -> Plan:
         tuple(listens(system, robot, host)),
         tuple(_connects(system, robot, host)),
         robot.version,
+        downsample=downsampled(system, robot, host),
     )
     return replace(plan, instances=mine, start=plan.start if runs_missions else None, share=share)
+
+
+def downsampled(system: System, robot: PlacedRobot, host: str) -> dict[str, float]:
+    """Return how often topics of a robot that a host gives may cross [Hz]; of several links, the fastest counts."""
+    given = {one.topic for one in robot.crossings if any(end.host == host for end in one.givers)}
+    found: dict[str, float] = {}
+    for link in system.links.values():
+        for name, rate in link.downsample.items() if host in link.between else ():
+            if (topic := resolve(name, robot.plan.bus.namespace)) in given:
+                found[topic] = max(rate, found.get(topic, 0.0))
+    return found
 
 
 def _other(system: System, robot: PlacedRobot, host: str) -> OtherHost:

@@ -6,7 +6,7 @@ they are lower bounds for messages with lists.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
 from rbxcompose.dataclass import dataclass
@@ -53,11 +53,21 @@ class Crossing:
 
     @property
     def bandwidth(self) -> float | None:
-        """Return the estimated bandwidth [bit/s] per host that takes it; None if no rate is known."""
+        """Return the estimated bandwidth [bit/s] to one host that takes it; None if no rate is known."""
+        return self.bandwidth_at(None)
+
+    def bandwidth_at(self, most: float | None) -> float | None:
+        """Return the same if at most so many messages cross per second [Hz]."""
         interface = self.givers[0].port.interface
         if self.rate is None or interface is None:
             return None
-        return 8 * self.rate * (least_size(interface) + OVERHEAD)
+        rate = self.rate if most is None else min(self.rate, most)
+        return 8 * rate * (least_size(interface) + OVERHEAD)
+
+    def passes(self, hosts: Collection[str]) -> bool:
+        """Return whether it crosses between two of these hosts."""
+        givers, takers = ({end.host for end in ends} & {*hosts} for ends in (self.givers, self.takers))
+        return any(giver != taker for giver in givers for taker in takers)
 
 
 _GIVES = (Out, Serves, ServesAction)

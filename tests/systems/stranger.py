@@ -21,7 +21,7 @@ def main() -> None:
     while not session.info.routers_zid() and time.monotonic() < deadline:
         time.sleep(0.05)
     print("linked" if session.info.routers_zid() else "refused")  # noqa: T201 - its output is its answer
-    session.close()
+    session.close()  # type: ignore[no-untyped-call]
 
 
 if __name__ == "__main__":

@@ -23,6 +23,10 @@ WRONG = {
     "RBX6105": {"file:command_timeout: 0.5 s": "command_timeout: 0.15 s"},
     "RBX6107": {"on: desk": "on: desk\n    link_port: 7000", "robots:": "robots:\n  second:\n    robot: "
                 "../robots/turtlebot/robot.yaml\n    on: desk\n    link_port: 7000\n    place: {base: robot}"},
+    "RBX6118": {"robots:": "links:\n  wifi: {between: [robot, desk], downsample: {batery_level: 1 Hz}}\nrobots:"},
+    "RBX6119": {"robots:": "links:\n  wifi: {between: [robot, desk], downsample: {cmd_vel: 1 Hz}}\nrobots:"},
+    "RBX6120": {"robots:": "links:\n  wifi: {between: [robot, desk], limit: 500 bit/s}\n"
+                "  eth: {between: [robot, dsk]}\nrobots:"},
     "RBX6108": {"file:places:": "bus: {router: tcp/10.0.0.1:7447}\n\nplaces:"},
     "RBX1001": {"hosts:": "hots:"},
     "RBX1002": {"robots:": "other:"},

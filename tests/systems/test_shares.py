@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.inspection.system_text import system_text
-from rbxcompose.manifest.system_file import HostModel
+from rbxcompose.manifest.system_file import HostModel, LinkModel
 from rbxcompose.plan.dump import dump, load
 from rbxcompose.systems.model import PlacedRobot, System
 from rbxcompose.systems.placement import Placement
@@ -28,7 +28,7 @@ SHARES = st.fixed_dictionaries({one.name: st.sampled_from(sorted(HOSTS)) for one
 def spread(hosts: dict[str, str]) -> tuple[System, PlacedRobot]:
     """Return the patrol robot with its components on these hosts."""
     robot = replace(ROBOT, placed={name: Placement(name, host, "by lot") for name, host in hosts.items()})
-    return System(SYSTEM.path, "spread", SYSTEM.root, HOSTS, {robot.name: robot}), robot
+    return System(SYSTEM.path, "spread", SYSTEM.root, hosts=HOSTS, robots={robot.name: robot}), robot
 
 
 @given(SHARES)
@@ -71,6 +71,17 @@ def test_what_crosses_is_what_has_ends_on_two_hosts(hosts: dict[str, str]) -> No
         assert "/cmd_vel" in crossing
     if len(set(hosts.values())) == 1:
         assert not crossing
+
+
+@given(SHARES)
+def test_a_topic_is_downsampled_where_it_leaves_and_by_nobody_else(hosts: dict[str, str]) -> None:
+    system, robot = spread(hosts)
+    system.links = {"wifi": LinkModel(between=("a", "b"), downsample={"battery_level": 0.5, "odom": 1.0})}
+    for host in set(hosts.values()):
+        share = share_of(system, robot, host).share
+        crosses = share is not None and {hosts[name] for name in ("charger", "mission")} - {hosts["battery"]}
+        leaves = crosses and hosts["battery"] == host and host in ("a", "b")
+        assert share is None or share.downsample == ({"/battery_level": 0.5} if leaves else {})
 
 
 def test_a_plan_shows_hosts_reasons_and_what_crosses(golden: Golden, repository: Path) -> None:

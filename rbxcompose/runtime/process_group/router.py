@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from types import FrameType
 
+from rbxcompose.bus.names import topic_pattern
 from rbxcompose.bus.probe import probe_key
 from rbxcompose.bus.zenoh_session import NO_LINK, RouterLink, open_router, tls_settings
 from rbxcompose.bus.zenoh_transport import ZenohTransport
@@ -43,7 +44,7 @@ class Router:
         self._watchdog = Watchdog()
         self._transport: ZenohTransport | None = None
         self._hosts: HostLine | None = None
-        self._link = _link(plan.share) if plan.share else NO_LINK
+        self._link = _link(plan, plan.share) if plan.share else NO_LINK
 
     def run(self) -> None:
         """Run until it is over."""
@@ -113,10 +114,11 @@ class Router:
             yield from map(tcp_endpoint, range(bus.port, bus.port + TRIES))
 
 
-def _link(share: Share) -> RouterLink:
+def _link(plan: Plan, share: Share) -> RouterLink:
     own = share.tls
     tls = tls_settings(own.authority, own.certificate, own.key, mutual=own.mutual) if own else {}
-    return RouterLink(share.listen, share.connect, tls)
+    rates = {topic_pattern(plan.bus.domain, topic): rate for topic, rate in share.downsample.items()}
+    return RouterLink(share.listen, share.connect, tls, rates)
 
 
 def _end(number: int, frame: FrameType | None) -> None:
