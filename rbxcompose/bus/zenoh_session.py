@@ -38,6 +38,7 @@ class RouterLink:
     listen: tuple[str, ...] = ()
     connect: tuple[str, ...] = ()
     tls: Mapping[str, object] = field(default_factory=dict)  # settings of `transport/link/tls`
+    access: Mapping[str, object] = field(default_factory=dict)  # `access_control`
     downsample: Mapping[str, float] = field(default_factory=dict)  # key -> most messages per second that leave [Hz]
 
 
@@ -108,6 +109,7 @@ def router_settings(endpoint: str, link: RouterLink = NO_LINK) -> dict[str, obje
         "connect/timeout_ms": -1,  # forever: the other host may come later
         "connect/exit_on_failure": False,
         **{f"transport/link/tls/{name}": value for name, value in link.tls.items()},
+        **({"access_control": link.access} if link.access else {}),
         **_downsampling(link.downsample),
     }
 

@@ -82,6 +82,16 @@ class LinkTls:
 
 
 @dataclass(frozen=True, slots=True)
+class HostAccess:
+    """What another host may do here, by the name in its certificate: topics and services that it gives and takes."""
+
+    certificate: str
+    gives: tuple[str, ...]
+    takes: tuple[str, ...]
+    both: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Share:
     """What one host runs of a robot that runs on several, and how its router is linked with those of the others."""
 
@@ -91,6 +101,7 @@ class Share:
     connect: tuple[str, ...] = ()  # endpoints of routers of other hosts
     version: str = ""  # of the files that the robot was compiled from; the same on all hosts
     tls: LinkTls | None = None
+    access: tuple[HostAccess, ...] = ()  # with mutual TLS
     downsample: Mapping[str, float] = field(default_factory=dict)  # topic -> most messages per second that cross [Hz]
 
 

@@ -9,7 +9,8 @@ from rbxcompose.model.wires import resolve
 from rbxcompose.plan.model import OtherHost, Plan, Share
 from rbxcompose.sdk.capabilities import RunsMissions
 from rbxcompose.sdk.registry import declared
-from rbxcompose.systems.certificates import NO_SECURITY
+from rbxcompose.systems.access import access_of
+from rbxcompose.systems.certificates import MUTUAL, NO_SECURITY
 from rbxcompose.systems.model import PlacedRobot, System
 
 
@@ -41,6 +42,7 @@ def share_of(system: System, robot: PlacedRobot, host: str) -> Plan:
         tuple(listens(system, robot, host)),
         tuple(_connects(system, robot, host)),
         robot.version,
+        access=tuple(access_of(system, robot, host, one) for one in others) if system.security == MUTUAL else (),
         downsample=downsampled(system, robot, host),
     )
     return replace(plan, instances=mine, start=plan.start if runs_missions else None, share=share)

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from types import FrameType
 
+from rbxcompose.bus.access_control import AllowedHost, access_control
 from rbxcompose.bus.names import topic_pattern
 from rbxcompose.bus.probe import probe_key
 from rbxcompose.bus.zenoh_session import NO_LINK, RouterLink, open_router, tls_settings
@@ -118,7 +119,9 @@ def _link(plan: Plan, share: Share) -> RouterLink:
     own = share.tls
     tls = tls_settings(own.authority, own.certificate, own.key, mutual=own.mutual) if own else {}
     rates = {topic_pattern(plan.bus.domain, topic): rate for topic, rate in share.downsample.items()}
-    return RouterLink(share.listen, share.connect, tls, rates)
+    allowed = [AllowedHost(one.certificate, one.gives, one.takes, one.both) for one in share.access]
+    access = access_control(plan.robot, plan.bus.domain, allowed) if allowed else {}
+    return RouterLink(share.listen, share.connect, tls, access, rates)
 
 
 def _end(number: int, frame: FrameType | None) -> None:
