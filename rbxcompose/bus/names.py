@@ -59,6 +59,11 @@ def data_key(domain: int, full_name: str, ros_type: str, type_hash: str) -> str:
     return f"{domain}/{full_name.strip('/')}/{dds_type(ros_type)}/{type_hash}"
 
 
+def topic_pattern(domain: int, full_name: str) -> str:
+    """Return the pattern of the Zenoh keys of a topic, whatever its type."""
+    return f"{domain}/{full_name.strip('/')}/*/*"
+
+
 @dataclass(frozen=True, slots=True)
 class ActionNames:
     """The names of the three services and two topics that make up an action."""

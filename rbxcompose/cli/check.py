@@ -1,7 +1,7 @@
 """Report every error of a robot before a motor moves.
 
-PATH is a robot's file or folder, a folder with robots or tests below it, a test, or a mission or part: it checks
-the robots of the project that use it. Check an overlay on a robot: check ROBOT -f FILE. Exit codes: 0 fine, 1
+PATH is a robot's file or folder, a folder with robots or tests below it, a test, a system, or a mission or part: it
+checks the robots of the project that use it. Check an overlay on a robot: check ROBOT -f FILE. Exit codes: 0 fine, 1
 errors found (with --strict also warnings), 2 wrong usage.
 """
 
@@ -44,6 +44,7 @@ class CheckedRobots:
     sources: dict[str, str] = field(default_factory=dict)
     fine: list[Plan] = field(default_factory=list)
     tests: list[str] = field(default_factory=list)  # names of the tests that can run
+    systems: list[str] = field(default_factory=list)  # systems that can run, in words
 
     def add(self, one: Compilation) -> None:
         """Add the findings of one robot."""
@@ -74,7 +75,9 @@ def _check(wanted: Targets, arguments: argparse.Namespace) -> CheckedRobots:
             checked.add(one)
     if wanted.tests:
         _check_tests(wanted.tests, checked)
-    projects = projects_of([*wanted.robots, *wanted.users, *wanted.tests])
+    for path in wanted.systems:
+        _check_system(path, arguments, checked)
+    projects = projects_of([*wanted.robots, *wanted.users, *wanted.tests, *wanted.systems])
     checked.report = Report([*only_ours(checked.report, checked.sources, projects), *wanted.unused(checked.sources)])
     return checked
 
@@ -92,12 +95,23 @@ def _check_tests(tests: list[str], checked: CheckedRobots) -> None:
     checked.sources.update(reading.sources)
 
 
+def _check_system(path: str, arguments: argparse.Namespace, checked: CheckedRobots) -> None:
+    from rbxcompose.inspection.system_text import system_extent  # only needed for systems
+    from rbxcompose.systems.reader import compile_system
+
+    system = compile_system(path, environment=os.environ, real=arguments.real)
+    checked.report.extend(system.report)
+    checked.sources.update(system.sources)
+    if not system.report.has_errors:
+        checked.systems.append(f"{system.name} is fine: {system_extent(system)}")
+
+
 def _written(checked: CheckedRobots, form: str) -> str:
     if any(checked.report) or form not in FOR_PEOPLE:
         return renderer(form)(checked.report, checked.sources, has_colour(sys.stdout))
     lines = [f"{plan.robot} is fine: {extent(len(plan.instances), len(plan.groups))}" for plan in checked.fine]
     lines += [f"the test {name} is fine" for name in checked.tests]
-    return "\n".join(map(good, lines))
+    return "\n".join(map(good, [*lines, *checked.systems]))
 
 
 def _whisper(text: str) -> None:

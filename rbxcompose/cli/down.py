@@ -6,7 +6,9 @@ import argparse
 import json
 
 from rbxcompose.cli.output.console import refuse, tell
-from rbxcompose.cli.robots.lookup import NO_ANSWER, NotDoneError, add_robot_option, find_robot, known_state
+from rbxcompose.cli.project.targets import is_system
+from rbxcompose.cli.robots.lookup import NO_ANSWER, NOT_UP, NotDoneError, add_robot_option, find_robot, known_state
+from rbxcompose.cli.systems.options import add_system_options
 from rbxcompose.requests import Refused
 from rbxcompose.runtime.control import NoAnswerError, ask, supervisor_of
 from rbxcompose.runtime.folder import RobotFolder, RobotState
@@ -20,15 +22,22 @@ _ORDERLY = 3.0  # [s] for a supervisor to bring everything down, after it has co
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("path", nargs="?", metavar="ROBOT|PATH", help="the robot, by name or file")
+    parser.add_argument("path", nargs="?", metavar="ROBOT|PATH", help="the robot, by name or file; or a system")
     add_robot_option(parser)
+    add_system_options(parser)
     parser.add_argument("--json", action="store_true", help="answer in JSON")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """End the robot: orderly if its supervisor answers, else by force."""
+    wanted = arguments.robot or arguments.path
+    if wanted is not None and is_system(wanted):
+        from rbxcompose.cli.systems.everywhere import ask_everywhere  # only needed for systems
+
+        options = ["--json"] if arguments.json else []  # the end on one host may end it on the others before they do
+        return ask_everywhere(wanted, arguments, lambda robot: ["down", robot, *options], tolerates=NOT_UP.code)
     try:
-        folder = find_robot(arguments.robot or arguments.path)
+        folder = find_robot(wanted)
         told = _end(folder)
     except NotDoneError as error:
         return refuse(error.finding)

@@ -11,8 +11,10 @@ import time
 from collections.abc import Iterable, Sequence
 
 from rbxcompose.cli.output.console import has_colour, refuse, tell
+from rbxcompose.cli.project.targets import is_system
 from rbxcompose.cli.robots.lookup import NOT_UP, NotDoneError, add_robot_option, find_robot, known_state
 from rbxcompose.cli.robots.story import StoryWriter
+from rbxcompose.cli.systems.options import add_system_options
 from rbxcompose.findings import suggest
 from rbxcompose.levels import LOG_LEVELS
 from rbxcompose.runtime.folder import RobotFolder, base_folder
@@ -26,9 +28,13 @@ _PAUSE = 0.05  # [s] between checks for new records
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument(
-        "names", nargs="*", metavar="ROBOT|PATH|COMPONENT", help="the robot, by name or file, then components to show"
+        "names",
+        nargs="*",
+        metavar="ROBOT|PATH|COMPONENT",
+        help="the robot, by name or file, or a system; then components",
     )
     add_robot_option(parser)
+    add_system_options(parser)
     parser.add_argument("--level", choices=LOG_LEVELS, default="info", help="the lowest level to show")
     parser.add_argument("-f", "--follow", action="store_true", help="follow new records, until interrupted")
     parser.add_argument("-n", "--lines", type=int, metavar="N", help="start with the last N records")
@@ -37,6 +43,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the existing records and, if requested, new ones as they come."""
+    if arguments.names and is_system(arguments.names[0]):
+        return _of_system(arguments)
     try:
         folder, names = _meant(arguments.robot, arguments.names)
         follower = Follower(folder.path / NAME)
@@ -62,6 +70,16 @@ def run(arguments: argparse.Namespace) -> int:
         show(wanted(follower.read()))
     follower.close()
     return 0
+
+
+def _of_system(arguments: argparse.Namespace) -> int:
+    from rbxcompose.cli.systems.everywhere import follow_everywhere  # only needed for systems
+
+    options = ["--level", arguments.level, *(["-f"] if arguments.follow else [])]
+    options += ["-n", str(arguments.lines)] if arguments.lines is not None else []
+    options += ["--json"] if arguments.json else []
+    system, *names = arguments.names
+    return follow_everywhere(system, arguments, lambda robot: ["logs", robot, *names, *options])
 
 
 def _meant(robot: str | None, names: Sequence[str]) -> tuple[RobotFolder, Sequence[str]]:

@@ -7,11 +7,14 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
+import sys
 from pathlib import Path
 
 from rbxcompose.cli.output.console import FINDINGS, refuse, tell, tell_report
 from rbxcompose.cli.project.robot_choice import add_path_argument, robot_path
 from rbxcompose.cli.project.robot_options import add_layer_options, layers_of
+from rbxcompose.cli.project.targets import is_system
 from rbxcompose.compiler import compile_robot
 from rbxcompose.findings import Finding, kind
 from rbxcompose.inspection.plan_text import plan_text
@@ -33,6 +36,7 @@ Good: `rbxcompose plan robots/turtlebot --json > before.json`, and later
 """,
 )
 SAVED = ".json"
+USAGE = 2
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -49,6 +53,8 @@ def run(arguments: argparse.Namespace) -> int:
     path = robot_path(arguments.path)
     if path is None:
         return FINDINGS
+    if is_system(path):
+        return _show_system(path, arguments)
     after = _compiled(path, arguments, is_layered=True)
     if after is None:
         return FINDINGS
@@ -60,6 +66,24 @@ def run(arguments: argparse.Namespace) -> int:
         return refuse(before) if before else FINDINGS
     found = difference(before, after)
     tell(json.dumps(found.data(), indent=2, ensure_ascii=False) if arguments.json else found.text())
+    return 0
+
+
+def _show_system(path: str, arguments: argparse.Namespace) -> int:
+    from rbxcompose.inspection.system_text import system_data, system_text  # only needed for systems
+    from rbxcompose.systems.reader import compile_system
+
+    if arguments.diff is not None or arguments.profile or arguments.overlays or arguments.sets:
+        sys.stderr.write("rbxcompose plan: --diff, --profile, -f and --set are for robots, not for systems\n")
+        return USAGE
+    system = compile_system(path, environment=os.environ, real=arguments.real)
+    tell_report(system.report, system.sources)
+    if system.report.has_errors:
+        return FINDINGS
+    if arguments.json:
+        tell(json.dumps(system_data(system), indent=2, ensure_ascii=False))
+    else:
+        tell(system_text(system, with_keys=arguments.keys))
     return 0
 
 

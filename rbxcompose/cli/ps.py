@@ -9,7 +9,9 @@ from dataclasses import replace
 from typing import Any
 
 from rbxcompose.cli.output.console import refuse, tell
+from rbxcompose.cli.project.targets import is_system
 from rbxcompose.cli.robots.lookup import NotDoneError, add_robot_option, answer_of, find_robot, known_state, robots_up
+from rbxcompose.cli.systems.options import add_system_options
 from rbxcompose.runtime.folder import SUSPENDED, ComponentState, RobotFolder, RobotState
 from rbxcompose.runtime.processes import Process
 from rbxcompose.runtime.requests import RobotStatus
@@ -23,14 +25,19 @@ _BLOCKED = "blocked"  # the state of a component that runs but cannot do its wor
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("path", nargs="?", metavar="ROBOT|PATH", help="only this robot, by name or file")
+    parser.add_argument("path", nargs="?", metavar="ROBOT|PATH", help="only this robot, by name or file; or a system")
     add_robot_option(parser)
+    add_system_options(parser)
     parser.add_argument("--json", action="store_true", help="answer in JSON; several robots are a list 'robots'")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Show the supervisor's answer or, if it does not answer, the last state that it wrote."""
     wanted = arguments.robot or arguments.path
+    if wanted is not None and is_system(wanted):
+        from rbxcompose.cli.systems.everywhere import ask_everywhere  # only needed for systems
+
+        return ask_everywhere(wanted, arguments, lambda robot: ["ps", robot, *(["--json"] if arguments.json else [])])
     try:
         several = robots_up() if wanted is None else []
         if len(several) > 1:

@@ -1,4 +1,4 @@
-"""Start a robot: check it, bring all components up, run its mission.
+"""Start a robot, or what a host runs of it: check it, bring all components up, run its mission.
 
 In the foreground it goes down when the mission named by `start:` has ended, or at Ctrl-C; with -d it stays up.
 Exit codes: 0 fine, 1 findings, 2 wrong usage, 3 the mission failed, 4 the robot failed, 130 interrupted.
@@ -14,9 +14,11 @@ from pathlib import Path
 from rbxcompose.cli.output.console import FINDINGS, refuse, tell_report
 from rbxcompose.cli.project.robot_choice import add_path_argument, robot_path
 from rbxcompose.cli.project.robot_options import add_layer_options, chosen_layers, compiled, layers_of
+from rbxcompose.cli.project.targets import is_system
 from rbxcompose.cli.robots.live_reload import LiveReload
 from rbxcompose.cli.robots.run_view import run_plan
 from rbxcompose.cli.robots.this_machine import is_fit
+from rbxcompose.cli.systems.options import add_system_options
 from rbxcompose.compiler import compile_robot
 from rbxcompose.recording.codes import UNWRITABLE
 from rbxcompose.runtime.options import RunOptions
@@ -37,6 +39,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--record", type=Path, metavar="FILE", help="with --rate: record everything that happens, for replay"
     )
     parser.add_argument("--watch", action="store_true", help="apply changes to its files as you edit them")
+    parser.add_argument("--host", metavar="NAME", help="of a system: run what this host runs")
+    add_system_options(parser)
+    parser.add_argument("--robot", metavar="NAME", help="with --host: only this robot")
     parser.add_argument("--for", type=_duration, dest="duration", metavar="30s", help="end after this robot time")
 
 
@@ -52,6 +57,11 @@ def run(arguments: argparse.Namespace) -> int:
     path = robot_path(arguments.path, may_run=False)
     if path is None:
         return FINDINGS
+    if is_system(path):
+        return _run_share(path, arguments)
+    if arguments.host or arguments.robot:
+        sys.stderr.write("rbxcompose up: --host and --robot are for systems\n")
+        return USAGE
     compilation = compile_robot(path, **layers_of(arguments))
     tell_report(compilation.report, compilation.sources)
     if compilation.plan is None or compilation.report.has_errors:
@@ -59,14 +69,7 @@ def run(arguments: argparse.Namespace) -> int:
     if compilation.plan.follows_clock and arguments.rate.is_stepped:
         sys.stderr.write("rbxcompose up: the robot follows /clock ('bus.clock'), so --rate cannot be given with it\n")
         return USAGE
-    options = RunOptions(
-        is_stepped=arguments.rate.is_stepped,
-        rate=arguments.rate.rate,
-        duration=arguments.duration,
-        is_detached=arguments.detach,
-        record=arguments.record.absolute() if arguments.record else None,
-        layers=chosen_layers(arguments),
-    )
+    options = _options(arguments)
     if options.record is not None and not options.is_stepped:
         sys.stderr.write(
             "rbxcompose up: --record needs --rate; a run in real time is recorded by 'rbxcompose record'\n"
@@ -77,12 +80,29 @@ def run(arguments: argparse.Namespace) -> int:
     if options.is_stepped and options.rate is None and options.duration is None and compilation.plan.start is None:
         sys.stderr.write("rbxcompose up: without 'start:' nothing ends a run at --rate max: give --for\n")
         return USAGE
-    if not is_fit(compilation):
+    if compilation.robot is not None and not is_fit(compilation.robot, compilation.sources):
         return FINDINGS
     reload = None
     if arguments.watch:
         reload = LiveReload(lambda: compiled(path, arguments), compilation, options.layers)
     return run_plan(compilation.plan, options, reload)
+
+
+def _options(arguments: argparse.Namespace) -> RunOptions:
+    return RunOptions(
+        is_stepped=arguments.rate.is_stepped,
+        rate=arguments.rate.rate,
+        duration=arguments.duration,
+        is_detached=arguments.detach,
+        record=arguments.record.absolute() if arguments.record else None,
+        layers=chosen_layers(arguments),
+    )
+
+
+def _run_share(path: str, arguments: argparse.Namespace) -> int:
+    from rbxcompose.cli.systems.share_run import run_share  # only needed for systems
+
+    return run_share(path, arguments, _options(arguments))
 
 
 def _write_problem(path: Path) -> str:

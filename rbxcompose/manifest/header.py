@@ -6,7 +6,7 @@ from typing import Literal
 
 from rbxcompose.config import Config, Name
 
-KINDS = ("Robot", "Part", "Overlay", "Mission", "Test")
+KINDS = ("Robot", "Part", "Overlay", "Mission", "Test", "System")
 """What a manifest may describe."""
 
 
@@ -16,7 +16,7 @@ class ManifestHeader(Config):
     rbx: Literal[1]
     """Version of the language."""
     kind: str
-    """What this file describes: `Robot`, `Part`, `Overlay`, `Mission` or `Test`."""
+    """What this file describes: `Robot`, `Part`, `Overlay`, `Mission`, `Test` or `System`."""
     name: Name
     """Its name: lower-case letters, digits and underscores."""
     about: str = ""

@@ -35,7 +35,7 @@ M = TypeVar("M")
 R = TypeVar("R")
 T = TypeVar("T")
 
-ROBOT, PART, OVERLAY, TEST = "Robot", "Part", "Overlay", "Test"
+ROBOT, PART, OVERLAY, TEST, SYSTEM = "Robot", "Part", "Overlay", "Test", "System"
 EVERYWHERE = (ROBOT, PART, OVERLAY)
 ANY = "*"
 """Any key, in a path of `Section.shared`."""

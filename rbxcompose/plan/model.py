@@ -63,8 +63,51 @@ class BusPlan:
 
 
 @dataclass(frozen=True, slots=True)
+class OtherHost:
+    """Another host of the robot and what runs on it; `is_optional` means that the others start without it."""
+
+    name: str
+    instances: tuple[Instance, ...]
+    is_optional: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class LinkTls:
+    """The files by which a router proves who it is; if `mutual`, those that dial it must prove it, too."""
+
+    authority: str
+    certificate: str
+    key: str
+    mutual: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class HostAccess:
+    """What another host may do here, by the name in its certificate: topics and services that it gives and takes."""
+
+    certificate: str
+    gives: tuple[str, ...]
+    takes: tuple[str, ...]
+    both: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Share:
+    """What one host runs of a robot that runs on several, and how its router is linked with those of the others."""
+
+    host: str
+    others: tuple[OtherHost, ...] = ()
+    listen: tuple[str, ...] = ()  # endpoints for the routers of other hosts
+    connect: tuple[str, ...] = ()  # endpoints of routers of other hosts
+    version: str = ""  # of the files that the robot was compiled from; the same on all hosts
+    tls: LinkTls | None = None
+    access: tuple[HostAccess, ...] = ()  # with mutual TLS
+    downsample: Mapping[str, float] = field(default_factory=dict)  # topic -> most messages per second that cross [Hz]
+
+
+@dataclass(frozen=True, slots=True)
 class Plan:
-    """Everything that `up` needs; `instances` are in start order."""
+    """Everything that `up` needs; `instances` are in start order, on several hosts those of this one."""
 
     robot: str
     file: str
@@ -72,6 +115,13 @@ class Plan:
     bus: BusPlan = BusPlan()
     start: str | None = None  # the mission that starts by itself
     is_simulated: bool = True
+    share: Share | None = None  # None: the robot runs on one host
+
+    @property
+    def everywhere(self) -> tuple[Instance, ...]:
+        """Return the instances of all hosts; their order means nothing."""
+        others = self.share.others if self.share else ()
+        return (*self.instances, *(one for other in others for one in other.instances))
 
     @property
     def follows_clock(self) -> bool:

@@ -9,6 +9,7 @@ from typing import Any, get_args
 
 from rbxcompose.dataclass import dataclass
 from rbxcompose.robot_events import ComponentNoted, MissionOver, RobotHeld
+from rbxcompose.runtime.host_report import HostReport
 from rbxcompose.typed_json import Family
 
 _CHUNK = 65536
@@ -106,6 +107,13 @@ class Blocked:
 
 
 @dataclass(frozen=True, slots=True)
+class ToHosts:
+    """For a router: tell the other hosts of the robot how this one is."""
+
+    report: HostReport
+
+
+@dataclass(frozen=True, slots=True)
 class Shutdown:
     """Send `Summary`, deactivate, clean up and end."""
 
@@ -200,6 +208,13 @@ class Alive:
     runs: dict[str, str] = field(default_factory=dict)
 
 
+@dataclass(frozen=True, slots=True)
+class FromHost:
+    """Another host of the robot has told how it is."""
+
+    report: HostReport
+
+
 ChannelOrder = (
     Configure
     | Activate
@@ -214,6 +229,7 @@ ChannelOrder = (
     | Prepare
     | Reconfigure
     | Blocked
+    | ToHosts
     | Shutdown
 )
 ChannelWord = (
@@ -232,6 +248,7 @@ ChannelWord = (
     | Summary
     | Retired
     | Reconfigured
+    | FromHost
     | Alive
 )
 ChannelMessage = ChannelOrder | ChannelWord

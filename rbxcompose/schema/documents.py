@@ -17,6 +17,7 @@ from rbxcompose.missions.program.program import Skill
 from rbxcompose.schema.mission import mission_schema
 from rbxcompose.schema.robot import overlay_schema, part_schema, robot_schema
 from rbxcompose.schema.scalars import Schema
+from rbxcompose.schema.system import system_schema
 from rbxcompose.schema.trial import trial_schema
 from rbxcompose.sdk import registry
 
@@ -26,6 +27,7 @@ MAKERS: Mapping[str, Callable[[Iterable[str]], Schema]] = {
     "Overlay": overlay_schema,
     "Mission": mission_schema,
     "Test": trial_schema,
+    "System": system_schema,
 }
 """Makes the schema of a kind from the names of component types."""
 

@@ -46,8 +46,10 @@ SOMETIMES_FIXED = {  # not as they show
     f"RBX{n}" for n in (1002, 1003, 1102, 1106, 1201, 1304, 3006, 3007, 4105, 4106, 4110, 4113, 4114, 4150)
 }
 ONLY_SAID = {
-    code for code in KINDS if code.startswith(("RBX22", "RBX23", "RBX42", "RBX90", "RBX91", "RBX92", "RBX93", "RBX94"))
-}  # servos, arms, tests, running robots, files
+    code
+    for code in KINDS
+    if code.startswith(("RBX22", "RBX23", "RBX42", "RBX61", "RBX90", "RBX91", "RBX92", "RBX93", "RBX94"))
+}  # servos, arms, tests, systems, running robots, files
 
 BATTERY = "components:\n  battery:\n    type: battery_sim\n", 4
 BASE = "components:\n  base:\n    type: diff_drive_sim\n", 4

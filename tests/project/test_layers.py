@@ -54,8 +54,9 @@ ABOVE = {
     "check_runner": "missions.analysis model.doubts model.robot",
     "checks": "actuation body.model check_runner composition diagnostics missions model mux params sdk sections",
     "cli": "actuation body bus compiler composition controller_requests devices diagnostics.requests doctor "
-    "executive.requests finding_pages importing inspection lsp.server mission_tests missions model mux.requests params "
-    "plan recording rendering replay runtime scaffold scene_requests schema.documents sdk sections",
+    "executive.requests exporting finding_pages importing inspection lsp.server mission_tests missions model "
+    "mux.requests params plan recording rendering replay runtime scaffold scene_requests schema.documents sdk sections "
+    "systems",
     "controller_interface": "control sdk",
     "controller_manager": "controller_interface sdk",
     "controller_requests": "",
@@ -71,9 +72,10 @@ ABOVE = {
     "diagnostics": "",
     "doctor": "devices bus.graph composition model.flow model.robot runtime.folder runtime.processes sdk sections",
     "executive": "missions sdk",
+    "exporting": "plan sdk systems",
     "finding_pages": "check_runner missions.analysis",
     "importing": "actuation.servo_models composition.dump mux.words scaffold.answers sdk.registry sections",
-    "inspection": "body.model bus.names bus.wire composition missions model plan schema sdk sections",
+    "inspection": "body.model bus.names bus.wire composition missions model plan schema sdk sections systems",
     "lsp": "compiler composition missions model.robot schema sections",
     "mission_tests": "compiler components.mission composition executive missions model plan.model sdk sections.faults "
     "testing.bench twins.fault_script twins.servo_faults",
@@ -102,6 +104,7 @@ ABOVE = {
     "sim": "",
     "skills": "sdk",
     "twins": "actuation devices.port_errors",
+    "systems": "compiler model plan sdk",
     "testing": "twins bus compiler components missions model.wires mux.config params plan.model recording.message "
     "rendering.text runtime.process_group runtime.records sdk",
 }

@@ -7,6 +7,7 @@ from dataclasses import replace
 from rbxcompose.levels import Level
 from rbxcompose.plan.model import Instance, Plan
 from rbxcompose.runtime import channel as say
+from rbxcompose.runtime.host_report import HostReport
 from rbxcompose.runtime.options import RunOptions
 from rbxcompose.runtime.supervision.conductor import Conductor
 from rbxcompose.scheduler import Scheduler
@@ -41,6 +42,7 @@ class Stage:
         self, plan: Plan | None = None, options: RunOptions | None = None, router: str | None = "router"
     ) -> None:
         self.scheduler = Scheduler()
+        self.run_id = "this run"
         self.plan = plan or robot()
         self.alive: set[str] = set()
         self.forks: list[tuple[str, bool, bool]] = []
@@ -48,6 +50,7 @@ class Stage:
         self.killed: list[str] = []
         self.suspended: set[str] = set()
         self.ended: list[str] = []
+        self.reports: list[HostReport] = []
         self.records: list[tuple[Level, str]] = []
         self.answers: list[tuple[int, object, bool]] = []
         self.ups = 0
@@ -65,6 +68,9 @@ class Stage:
 
     def send(self, process: str, message: say.ChannelOrder) -> None:
         self.sent.append((process, message))
+
+    def to_hosts(self, report: HostReport) -> None:
+        self.reports.append(report)
 
     def end(self, process: str) -> None:
         self.ended.append(process)

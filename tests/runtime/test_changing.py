@@ -216,7 +216,7 @@ def test_signs_of_life_tell_what_moves_and_what_a_restart_would_cut_off() -> Non
 def test_who_needs_what_has_failed_for_good_is_marked_and_told() -> None:
     stage = Changed(with_never("mux", "go_to"))
     stage.exit("robot")
-    assert stage.conductor.blocked == {"base": "mux"}
+    assert stage.conductor.blocked.causes == {"base": "mux"}
     assert (Level.WARN, "'base' waits for mux, which failed") in stage.records
     assert stage.orders(say.Blocked) == [("world", say.Blocked({"base": "waits for mux, which failed"}))]
 
@@ -239,7 +239,7 @@ def test_what_has_failed_for_good_comes_back_with_the_next_change_and_nobody_wai
     stage.configure("robot")
     stage.activate()
     assert stage.done == [("mux go_to restarted", False)]
-    assert stage.conductor.blocked == {}
+    assert stage.conductor.blocked.causes == {}
     assert stage.orders(say.Blocked)[-1] == ("world", say.Blocked({}))
 
 

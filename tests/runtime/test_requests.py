@@ -19,6 +19,7 @@ from rbxcompose.restarts import Restart
 from rbxcompose.robot_events import RobotHeld
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.folder import RobotState
+from rbxcompose.runtime.host_report import HostReport
 from rbxcompose.runtime.options import RunOptions
 from rbxcompose.runtime.plan_requests import ApplyPlan, ComparePlan, PlanComparison
 from rbxcompose.runtime.processes import Process
@@ -53,6 +54,7 @@ class Desk:
     """A supervisor without processes: everything that it would do is noted."""
 
     def __init__(self, plan: Plan = PLAN, *, is_stepped: bool = False) -> None:
+        self.run_id = "this run"
         self.sent: list[tuple[str, say.ChannelOrder]] = []
         self.texts: list[str] = []
         self.replies: list[tuple[int, object, bool]] = []
@@ -78,6 +80,8 @@ class Desk:
 
     def fork(self, process: str, *, is_restart: bool, is_stopped: bool) -> None:
         raise AssertionError("no process is to be forked")
+
+    def to_hosts(self, report: HostReport) -> None: ...
 
     def end(self, process: str) -> None:
         raise AssertionError("no process is to be ended")

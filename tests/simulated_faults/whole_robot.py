@@ -15,6 +15,7 @@ from rbxcompose.recording.tape import Tape
 from rbxcompose.requests import Command, Refused, as_data
 from rbxcompose.robot_events import MissionWaits
 from rbxcompose.runtime import channel as say
+from rbxcompose.runtime.host_report import HostReport
 from rbxcompose.runtime.options import RunOptions
 from rbxcompose.runtime.process_group.driver import BEAT
 from rbxcompose.runtime.process_group.host import Host, Notice
@@ -178,6 +179,7 @@ class WholeRobot:
         self.processes: dict[str, SimulatedProcess] = {}
         self.guests: list[Guest] = []
         self.births = 0
+        self.run_id = "this run"
         self.told: list[Recorded | Ordered] = []
         self.records: list[Record] = []
         self.answers: list[tuple[object, bool]] = []
@@ -215,6 +217,9 @@ class WholeRobot:
         """Pass a person's command on to a component."""
         process = next(one.process for one in self.plan.instances if one.name == instance)
         self.send(process, say.Ask(0, instance, as_data(command)))
+
+    def to_hosts(self, report: HostReport) -> None:
+        """Tell nobody: there is one host."""
 
     def set_stopped(self, is_stopped: bool) -> None:
         """Stop the robot, or release it."""

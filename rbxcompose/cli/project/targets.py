@@ -11,7 +11,7 @@ from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Severity, Span, kind
 from rbxcompose.manifest.files import ROBOT_FILE, find, project_of, shown_name
 from rbxcompose.manifest.library import PREFIX
-from rbxcompose.manifest.section import TEST
+from rbxcompose.manifest.section import SYSTEM, TEST
 from rbxcompose.regular_files import open_regular
 
 UNUSED = kind(
@@ -36,12 +36,13 @@ _ROBOTS = "robots"
 
 @dataclass(slots=True)
 class Targets:
-    """The robots to check: `robots` in any case, `users` only if they use one of `files`; and `tests` of missions."""
+    """What to check: `robots`, `tests` of missions, `systems`; and `users`, but only if they use one of `files`."""
 
     robots: list[str] = field(default_factory=list)
     users: list[str] = field(default_factory=list)
     files: list[str] = field(default_factory=list)
     tests: list[str] = field(default_factory=list)
+    systems: list[str] = field(default_factory=list)
 
     def unused(self, read: Iterable[str]) -> Iterator[Finding]:
         """Yield a finding for each of `files` that is not among the `read` names."""
@@ -75,12 +76,19 @@ def targets(paths: Iterable[str]) -> Targets:
             out.robots.append(written)
         elif _kind_of(path) == TEST:
             out.tests.append(written)
+        elif _kind_of(path) == SYSTEM:
+            out.systems.append(written)
         else:
             out.files.append(shown_name(path.resolve()))
             out.users += robots_below(project_of(path))
     out.robots = list(dict.fromkeys(out.robots))
     out.users = [user for user in dict.fromkeys(out.users) if user not in out.robots]
     return out
+
+
+def is_system(written: str) -> bool:
+    """Return whether a command-line path names the file of a system."""
+    return not written.startswith(PREFIX) and Path(written).is_file() and _kind_of(Path(written)) == SYSTEM
 
 
 def robots_below(folder: Path) -> list[str]:

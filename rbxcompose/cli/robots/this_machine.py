@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from importlib.util import find_spec
 
 from rbxcompose.cli.output.console import tell_report
-from rbxcompose.compiler import Compilation
 from rbxcompose.devices.serial_ports import serial_ports
 from rbxcompose.doctor.serial_ports import look_at, port_findings
 from rbxcompose.findings import Finding, Report, kind
@@ -26,12 +25,10 @@ Good: `pip install 'rbxcompose[servos]'`
 )
 
 
-def is_fit(compilation: Compilation) -> bool:
+def is_fit(robot: Robot, sources: Mapping[str, str]) -> bool:
     """Tell what is wrong with this machine for a robot, and return whether it may start."""
-    report = Report()
-    if compilation.robot is not None:
-        report.extend([*missing_extras(compilation.robot), *port_findings(compilation.robot, serial_ports(), look_at)])
-    tell_report(report, compilation.sources)
+    report = Report([*missing_extras(robot), *port_findings(robot, serial_ports(), look_at)])
+    tell_report(report, sources)
     return not report.has_errors
 
 

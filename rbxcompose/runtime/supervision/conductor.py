@@ -14,11 +14,14 @@ from rbxcompose.levels import Level
 from rbxcompose.plan.model import Plan
 from rbxcompose.robot_events import ComponentNoted, MissionOver, RobotHeld
 from rbxcompose.runtime import channel as say
+from rbxcompose.runtime.host_report import HostReport, RobotEnd
 from rbxcompose.runtime.options import RunOptions
+from rbxcompose.runtime.supervision.blocked import BlockedComponents
 from rbxcompose.runtime.supervision.changes import WORLD, Changes
-from rbxcompose.runtime.supervision.dependents import blocked_by, blocked_text, is_commanding
+from rbxcompose.runtime.supervision.dependents import is_commanding
 from rbxcompose.runtime.supervision.kept_words import KeptWords
 from rbxcompose.runtime.supervision.members import ConductorEffects, Member, Phase
+from rbxcompose.runtime.supervision.other_hosts import OtherHosts
 from rbxcompose.runtime.supervision.plan_change import LONGEST, Changing, WhenDone, text_of
 from rbxcompose.runtime.supervision.shutdown import END_BOUND, Closing, rest_time
 from rbxcompose.runtime.supervision.silence import LOOK, Silence
@@ -44,7 +47,7 @@ class Conductor:
         self.time = 0.0  # [s] of robot time, as far as known
         self.states: dict[str, tuple[str, int]] = {one.name: ("unconfigured", 0) for one in plan.instances}
         self.is_real_time = not options.is_stepped and not plan.follows_clock
-        self.blocked: dict[str, str] = {}  # blocked component -> failed component
+        self.blocked = BlockedComponents(effects)
         self.plan, self.layers = plan, options.layers
         self.generation = 0  # of the plan: how often it was changed
         self._changing: Changing | None = None
@@ -56,6 +59,7 @@ class Conductor:
         self.latch = StopLatch(effects, self._holding, lambda: scheduler.now if self.is_real_time else self.time)
         self._is_running = False  # everything has been active
         self._silence = Silence(effects, self._tell_lost, scheduler.now)
+        self._hosts = OtherHosts(plan.share, effects, self._to_configured)
         self._closing: Closing | None = None  # set once the robot goes down
 
     @property
@@ -98,11 +102,16 @@ class Conductor:
         fresh = [one for one in waiting if one.name not in self.members[one.process].requested]
         if self.phase is Phase.STARTING and waiting[:1] != fresh[:1]:
             return  # the answer of the first one is pending, or it is being restarted in place
+        fresh = list(self._hosts.reached(fresh))
         if fresh:
             group = fresh[0].process
-            self._activate(group, [one.name for one in takewhile(lambda one: one.process == group, fresh)])
+            names = [one.name for one in takewhile(lambda one: one.process == group, fresh)]
+            self.members[group].requested.update(names)
+            self._effects.send(group, say.Activate(names))
             return
         if self.phase is Phase.STARTING:
+            if waiting or not self._hosts.is_complete():
+                return
             self._is_running = True
             self._effects.is_up()  # before anything that starts can report
             if self._options.duration is not None and self.is_real_time:
@@ -115,10 +124,6 @@ class Conductor:
     def _all_configured(self) -> bool:
         members = (self.members[group] for group in self.plan.groups)
         return all(member.is_configured or member.is_given_up for member in members)
-
-    def _activate(self, group: str, names: list[str]) -> None:
-        self.members[group].requested.update(names)
-        self._effects.send(group, say.Activate(names))
 
     def _start(self, member: Member) -> None:
         if not member.is_started and not member.is_given_up:
@@ -164,6 +169,8 @@ class Conductor:
             case say.Summary(time, facts):
                 self.time = max(self.time, time)
                 self.facts.update(facts)
+            case say.FromHost(report):
+                self._heard_host(report)
             case say.Retired() if self._changing:
                 self._changing.retired(name)
                 self._proceed()
@@ -179,7 +186,7 @@ class Conductor:
         member.is_configured = True
         if member.is_stopped is not self.is_stopped:  # that changed after it was forked
             self.latch.tell(member)
-        self._tell_blocked(member)
+        self.blocked.tell(self.plan, member)
         if member.name == self._router and self.endpoint is None:
             self.endpoint = endpoint
             for group in self.plan.groups:
@@ -254,29 +261,15 @@ class Conductor:
         new = {name for name, (state, _) in states.items() if state == "failed" and self.states[name][0] != "failed"}
         self.states.update(states)
         self._effects.states_changed()
+        self._tell_hosts()
         if self._options.is_stepped:  # there it would be received at another instant in each run
             return
-        self._look_who_is_blocked()
+        self.blocked.look(self.plan, self.states, self._hosts.failed, self.members)
         commanding = [one.name for one in self.plan.instances if one.name in new and is_commanding(one)]
         if commanding and not self.is_stopped and self.phase is Phase.RUNNING:
             text = f"'{commanding[0]}' failed on the path of commands"
             self._effects.log(Level.ERROR, f"{text}: all motion is held until 'release'")
             self.stop(text)
-
-    def _look_who_is_blocked(self) -> None:
-        before, failed = self.blocked, {name for name, (state, _) in self.states.items() if state == "failed"}
-        self.blocked = blocked_by(self.plan, failed)
-        for name in self.blocked.keys() - before.keys():
-            self._effects.log(Level.WARN, f"'{name}' {blocked_text(self.blocked, name)}")
-        touched = {name for name in {*before, *self.blocked} if before.get(name) != self.blocked.get(name)}
-        for group in dict.fromkeys(one.process for one in self.plan.instances if one.name in touched):
-            if self.members[group].is_configured:
-                self._tell_blocked(self.members[group], is_news=True)
-
-    def _tell_blocked(self, member: Member, *, is_news: bool = False) -> None:
-        names = [one.name for one in self.plan.of_group(member.name) if one.name in self.blocked]
-        if names or is_news:
-            self._effects.send(member.name, say.Blocked({name: blocked_text(self.blocked, name) for name in names}))
 
     def _tell_lost(self, member: Member, cause: str) -> None:
         names = [one.name for one in self.plan.of_group(member.name)]
@@ -286,15 +279,21 @@ class Conductor:
 
     def _look_for_silence(self) -> None:
         now = self._scheduler.now
-        held_up = self._silence.held_up(now)
-        if held_up and not self.is_going_down:
-            text = f"time stood still for {held_up:.1f} s: the machine slept, or the supervisor was suspended"
-            self._effects.log(Level.WARN, text)
-        for member in self.members.values():
-            if held_up:
-                member.last_word = now
-            elif member.is_there and not self.is_going_down:
-                self._silence.look(member, now)
+        is_excused = self._silence.look_at_all(self.members.values(), now, is_going_down=self.is_going_down)
+        self._hosts.look(now, is_excused=is_excused)
+        self._tell_hosts()
+
+    def _heard_host(self, report: HostReport) -> None:
+        if (end := self._hosts.heard(report, self._scheduler.now)) is not None:
+            self.go_down(end.exit_code, f"{end.reason} (host '{report.host}')")
+        self.latch.heard_host(report)
+        self.blocked.look(self.plan, self.states, self._hosts.failed, self.members)
+        self._proceed()
+
+    def _tell_hosts(self) -> None:
+        is_of_all = self.is_going_down and self.exit_code != INTERRUPTED  # a signal is for this host alone
+        end = RobotEnd(self.exit_code, self.reason) if is_of_all else None
+        self._hosts.report(self.states, self.latch.shared, end, is_going_down=self.is_going_down)
 
     def _alive(self, member: Member) -> None:
         if member.is_told_lost and member.is_configured:
@@ -386,6 +385,7 @@ class Conductor:
             self._changing.cut_off(f"the robot goes down: {reason}")
         if level > Level.OK:
             self._effects.log(level, f"{reason}; the robot goes down", detail)
+        self._tell_hosts()
         bound = rest_time(self.plan)
         self._after(bound, closing.close)
         self._after(bound + END_BOUND, closing.hurry)

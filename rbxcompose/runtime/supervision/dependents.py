@@ -29,7 +29,7 @@ def _cause(plan: Plan, one: Instance, failed: Collection[str]) -> str:
     if late:
         return late[0]
     for wire in _needed(one):
-        feeding = [other.name for other in plan.instances if _feeds(other, wire)]
+        feeding = [other.name for other in plan.everywhere if _feeds(other, wire)]
         if feeding and all(name in failed for name in feeding):
             return feeding[0]
     return ""

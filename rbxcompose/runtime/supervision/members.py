@@ -11,11 +11,14 @@ from rbxcompose.dataclass import dataclass
 from rbxcompose.levels import Level
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.faults import RestartPolicy
+from rbxcompose.runtime.host_report import HostReport
 from rbxcompose.runtime.processes import KILLED
 
 
 class ConductorEffects(Protocol):
     """What the conductor can do to the world."""
+
+    run_id: str  # tells this start of the robot from any other
 
     def fork(self, process: str, *, is_restart: bool, is_stopped: bool) -> None:
         """Start a process."""
@@ -23,6 +26,10 @@ class ConductorEffects(Protocol):
 
     def send(self, process: str, message: say.ChannelOrder) -> None:
         """Send a message to a process."""
+        ...
+
+    def to_hosts(self, report: HostReport) -> None:
+        """Tell the other hosts of the robot how this one is."""
         ...
 
     def end(self, process: str) -> None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
+from rbxcompose.levels import Level
 from rbxcompose.runtime.supervision.members import ConductorEffects, Member
 
 SILENT = 1.0  # [s] without a sign of life after which the others are informed
@@ -20,7 +21,20 @@ class Silence:
         self._effects, self._tell_lost = effects, tell_lost
         self._looked = now
 
-    def look(self, member: Member, now: float) -> None:
+    def look_at_all(self, members: Iterable[Member], now: float, *, is_going_down: bool) -> bool:
+        """Check all processes; return whether silence is nobody's fault this time."""
+        held_up = self._held_up(now)
+        if held_up and not is_going_down:
+            text = f"time stood still for {held_up:.1f} s: the machine slept, or the supervisor was suspended"
+            self._effects.log(Level.WARN, text)
+        for member in members:
+            if held_up:
+                member.last_word = now
+            elif member.is_there and not is_going_down:
+                self._look(member, now)
+        return bool(held_up)
+
+    def _look(self, member: Member, now: float) -> None:
         """Check a process that exists."""
         silence, is_suspended = now - member.last_word, self._effects.is_suspended(member.name)
         if not (member.is_configured or is_suspended):
@@ -34,7 +48,7 @@ class Silence:
             member.killed_for = f"was {_STATE[is_suspended]} for {DEAD:g} s and was killed"
             self._effects.kill(member.name)
 
-    def held_up(self, now: float) -> float:
+    def _held_up(self, now: float) -> float:
         """Return for how long silence is nobody's fault [s], counted from the previous call; mostly 0.
 
         In that time the supervisor itself was suspended or waited for a disk, or the whole machine slept.

@@ -21,9 +21,11 @@ from rbxcompose.plan.model import Plan
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.control import ControlServer
 from rbxcompose.runtime.folder import SILENT, SUSPENDED, ComponentState, RobotFolder, RobotState
+from rbxcompose.runtime.host_report import HostReport
 from rbxcompose.runtime.process_group.watchdog import MARK
 from rbxcompose.runtime.processes import Process, adopt_orphans, boot_id, describe_exit, signal_descriptor
 from rbxcompose.runtime.records import Record
+from rbxcompose.runtime.service_manager import ALIVE, READY, of_this_process
 from rbxcompose.runtime.supervision import silence
 from rbxcompose.runtime.supervision.conductor import INTERRUPTED, ROBOT_FAILED, Conductor
 from rbxcompose.runtime.supervision.gauges import gauges_of
@@ -60,10 +62,12 @@ class Supervisor:
         """`lock` is the descriptor that holds the lock of `folder`."""
         self._launch, self._folder, self._lock, self._on_up = launch, folder, lock, on_up
         self._clock: MonotonicClock = launch.clock
+        self.run_id = f"{os.getpid()}, {launch.clock.start}"
         self._scheduler = Scheduler()
         self._selector = selectors.DefaultSelector()
         self._children: dict[str, _Child] = {}
         self._interrupts = 0
+        self._manager = of_this_process()
         self._is_state_old = False  # the state file is out of date
         self._complained = ""
         router = None if launch.plan.bus.router else ROUTER
@@ -143,6 +147,12 @@ class Supervisor:
             channel.send(message)
             self._watch(channel)
 
+    def to_hosts(self, report: HostReport) -> None:
+        """Tell the other hosts of the robot how this one is; a router that is behind has newer reports to come."""
+        child = self._children.get(ROUTER)
+        if child is not None and not child.channel.is_behind:
+            self.send(ROUTER, say.ToHosts(report))
+
     def _watch(self, channel: say.Channel) -> None:
         """Wait for messages of a process, and until it can take the rest of a message too long for one send."""
         if channel.is_open:
@@ -180,6 +190,7 @@ class Supervisor:
     def is_up(self) -> None:
         """Notify those who wait that everything is active."""
         self._write_state()
+        self._manager.tell(READY)
         self._on_up()
 
     def states_changed(self) -> None:
@@ -249,6 +260,7 @@ class Supervisor:
             return ""
 
     def _look_around(self) -> None:
+        self._manager.tell(ALIVE)
         self._look_at_parent()
         if self._folder.has_lost(self._lock):
             self._restore_folder()
@@ -346,7 +358,7 @@ class Supervisor:
 
     def _component(self, name: str, type_name: str, process: str) -> ComponentState:
         state, restarts = self.conductor.states[name]
-        waits_for = self.conductor.blocked.get(name)
+        waits_for = self.conductor.blocked.causes.get(name)
         child = self._children.get(process)
         pid = child.process.pid if child and child.process else None
         restarts += self.conductor.members[process].restarts

@@ -1,0 +1,67 @@
+"""Zenoh's access control for a router: programs of its host may do all, each other host what was computed for it.
+
+A host is known by the name in its certificate, which only TLS proves; programs of this host come by TCP on the loopback
+interface or by Unix sockets. Messages that are not allowed are dropped without a word, at the router that receives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from rbxcompose.bus.names import ADMIN, topic_pattern
+from rbxcompose.dataclass import dataclass
+
+_TOKENS = ("liveliness_token", "liveliness_query", "declare_liveliness_subscriber")
+_GIVE = ("put", "delete", "reply", "declare_queryable")
+_TAKE = ("declare_subscriber", "query")
+_ALL = (*_GIVE, *_TAKE, *_TOKENS)
+_LOCAL = ("tcp", "unixsock-stream")
+
+
+@dataclass(frozen=True, slots=True)
+class AllowedHost:
+    """What a host may do, by topics and services: give them, take them, or both."""
+
+    certificate: str  # the name in it
+    gives: tuple[str, ...]
+    takes: tuple[str, ...]
+    both: tuple[str, ...]
+
+
+def access_control(robot: str, domain: int, hosts: Sequence[AllowedHost]) -> dict[str, object]:
+    """Return the configuration of access control; all that it does not allow is denied."""
+    rules = [_rule("all", _ALL, ("ingress", "egress"), ["**", "**/@adv/**", "@ros2_lv/**"])]
+    policies = [{"rules": ["all"], "subjects": ["this host"]}]
+    subjects: list[Mapping[str, object]] = [{"id": "this host", "link_protocols": list(_LOCAL)}]
+    tokens = [f"@ros2_lv/{domain}/**"]
+    for one in hosts:
+        gives, takes, both = (_patterns(domain, names) for names in (one.gives, one.takes, one.both))
+        everything = [*gives, *takes, *both, f"{ADMIN}{robot}/**"]
+        own = {
+            "gives": _rule(f"{one.certificate} gives", _GIVE, ("ingress",), gives),
+            "takes": _rule(f"{one.certificate} takes", _TAKE, ("ingress",), takes),
+            "runtime": _rule(f"{one.certificate} runtime", _ALL, ("ingress",), [*both, f"{ADMIN}{robot}/**"]),
+            "gets": _rule(f"{one.certificate} gets", _ALL, ("egress",), everything),
+            "tokens": _rule(
+                f"{one.certificate} tokens", _TOKENS, ("ingress", "egress"), [*tokens, *_caches(everything)]
+            ),
+            "caches": _rule(f"{one.certificate} caches", _ALL, ("ingress", "egress"), _caches([*gives, *takes, *both])),
+        }
+        kept = [rule for rule in own.values() if rule["key_exprs"]]
+        rules += kept
+        policies.append({"rules": [str(rule["id"]) for rule in kept], "subjects": [one.certificate]})
+        subjects.append({"id": one.certificate, "cert_common_names": [one.certificate], "link_protocols": ["tls"]})
+    return {"enabled": True, "default_permission": "deny", "rules": rules, "subjects": subjects, "policies": policies}
+
+
+def _rule(name: str, messages: Iterable[str], flows: Iterable[str], keys: Sequence[str]) -> dict[str, object]:
+    return {"id": name, "messages": [*messages], "flows": [*flows], "permission": "allow", "key_exprs": [*keys]}
+
+
+def _patterns(domain: int, names: Iterable[str]) -> list[str]:
+    return [topic_pattern(domain, name) for name in names]
+
+
+def _caches(keys: Iterable[str]) -> list[str]:
+    """Return where latched topics of these keys keep their last message, which no other pattern matches."""
+    return [f"{key}/@adv/**" for key in keys]

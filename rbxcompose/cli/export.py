@@ -1,0 +1,107 @@
+"""Write what keeps a system's robots alive: units of systemd, a Compose file, manifests of Kubernetes.
+
+The files go to a new or empty folder. Exit codes: 0 fine, 1 errors found, 2 wrong usage.
+"""
+
+from __future__ import annotations
+
+import argparse
+import getpass
+import os
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+
+from rbxcompose import __version__
+from rbxcompose.cli.output.console import FINDINGS, refuse, tell, tell_report
+from rbxcompose.cli.project.targets import is_system
+from rbxcompose.exporting import compose, kubernetes, systemd
+from rbxcompose.exporting.exported_share import shares
+from rbxcompose.findings import Finding, kind
+from rbxcompose.systems.bundle import files_of
+from rbxcompose.systems.model import System
+from rbxcompose.systems.reader import compile_system
+
+NOT_EXPORTED = kind(
+    "RBX6115",
+    """The system cannot be exported there
+
+`export` writes to a new or empty folder, so that nothing of yours is overwritten. It takes the file of a system: a
+robot on a single host is a system with one host. A ConfigMap of Kubernetes holds at most a megabyte.
+
+Bad: `rbxcompose export systemd systems/two_hosts.yaml --out robots`
+Good: `rbxcompose export systemd systems/two_hosts.yaml --out units`
+""",
+)
+PROGRAMS = ("systemd", "compose", "k8s")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("program", choices=PROGRAMS, help="for which program")
+    parser.add_argument("path", metavar="SYSTEM", help="the file of the system")
+    parser.add_argument("--out", metavar="FOLDER", required=True, help="a new or empty folder")
+    parser.add_argument("--host", metavar="NAME", help="only what this host runs")
+    parser.add_argument("--real", action="store_true", help="use the real devices; without it, they are simulated")
+    parser.add_argument("--user", metavar="NAME", help="systemd: the user that runs it (default: you)")
+    parser.add_argument("--file", metavar="PATH", help="systemd: the system's file on the host (default: as here)")
+    parser.add_argument("--command", metavar="PATH", help="systemd: rbxcompose on the host (default: as here)")
+    parser.add_argument("--image", metavar="NAME", default=f"rbxcompose:{__version__}", help="k8s: the image")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Compile the system and write the files."""
+    if not is_system(arguments.path):
+        return refuse(NOT_EXPORTED.at(None, f"'{arguments.path}' is not the file of a system"))
+    system = compile_system(arguments.path, environment=os.environ, real=arguments.real)
+    tell_report(system.report, system.sources)
+    if system.report.has_errors:
+        return FINDINGS
+    if arguments.host is not None and arguments.host not in system.hosts:
+        message = f"the system has no host '{arguments.host}'"
+        return refuse(NOT_EXPORTED.misspelt(None, message, arguments.host, system.hosts, "hosts"))
+    try:
+        made = _made(system, arguments)
+    except ValueError as error:
+        return refuse(NOT_EXPORTED.at(None, f"'{system.name}' cannot be exported: {error}"))
+    if (problem := _write(Path(arguments.out), made)) is not None:
+        return refuse(problem)
+    for name in made:
+        tell(str(Path(arguments.out, name)))
+    return 0
+
+
+def _made(system: System, arguments: argparse.Namespace) -> dict[str, bytes]:
+    found, (file, files) = list(shares(system, arguments.host)), files_of(system)
+    match arguments.program:
+        case "systemd":
+            words = {
+                "program": arguments.command or shutil.which("rbxcompose") or "/usr/local/bin/rbxcompose",
+                "file": arguments.file or str(system.path),
+                "user": arguments.user or getpass.getuser(),
+            }
+            made = {systemd.unit_name(one): systemd.unit(one, **words) for one in found}
+        case "compose":
+            text = compose.compose_file(found, system=system.name, file=file)
+            made = {"Dockerfile": compose.dockerfile(__version__), "compose.yaml": text}
+            return {**_encoded(made), **{f"project/{name}": data for name, data in files.items()}}
+        case _:
+            made = kubernetes.manifests(found, system=system.name, file=file, files=files, image=arguments.image)
+    return _encoded(made)
+
+
+def _encoded(texts: Mapping[str, str]) -> dict[str, bytes]:
+    return {name: text.encode() for name, text in texts.items()}
+
+
+def _write(folder: Path, made: Mapping[str, bytes]) -> Finding | None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if any(folder.iterdir()):
+            return NOT_EXPORTED.at(None, f"the folder '{folder}' is not empty", help="name a new one")
+        for name, data in made.items():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_bytes(data)
+    except OSError as error:
+        return NOT_EXPORTED.at(None, f"'{folder}' cannot be written: {error.strerror}")
+    return None

@@ -1,0 +1,1 @@
+"""What verbs do with the file of a system."""

@@ -1,0 +1,1 @@
+"""Systems for programs that keep services alive: systemd, Compose, Kubernetes. One file per program."""

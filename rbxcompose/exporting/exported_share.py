@@ -1,0 +1,57 @@
+"""What every export needs to know of a share: where it runs, the command that runs it, and what it opens."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.dataclass import dataclass
+from rbxcompose.plan.model import Plan
+from rbxcompose.sdk.capabilities import OpensPort
+from rbxcompose.sdk.registry import component_type
+from rbxcompose.systems.model import System
+from rbxcompose.systems.share import hosts_of, share_of
+
+GRACE = 5.0  # [s] to go down beside the time to come to rest
+REFUSED = (1, 2)  # exit codes that another try does not change: findings, wrong usage
+MISSION_FAILED = 3
+
+
+@dataclass(frozen=True, slots=True)
+class ExportedShare:
+    """The share of a host of a robot; `devices` are paths of serial ports, `rest_time` [s] is until it stands still."""
+
+    system: str
+    robot: str
+    host: str
+    command: tuple[str, ...]  # after the program's name; `{file}` stands for the path of the system's file
+    devices: tuple[str, ...]
+    rest_time: float
+
+    @property
+    def name(self) -> str:
+        """Return a name that no other share of the system has."""
+        return f"{self.robot}-{self.host}".replace("_", "-")
+
+
+FILE = "{file}"
+
+
+def shares(system: System, host: str | None = None) -> Iterator[ExportedShare]:
+    """Yield the shares of a system, or those of one host, in the order of its file."""
+    for robot in system.robots.values():
+        for one in hosts_of(system, robot):
+            if host in (None, one):
+                plan = share_of(system, robot, one)
+                real = () if plan.is_simulated else ("--real",)
+                words = ("up", FILE, "--host", one, "--robot", robot.name, *real)
+                yield ExportedShare(system.name, robot.name, one, words, tuple(_devices(plan)), _rest_time(plan))
+
+
+def _devices(plan: Plan) -> list[str]:
+    opened = (component_type(one.type).capabilities(one.config) for one in plan.instances)
+    paths = {each.port.value for capabilities in opened for each in capabilities if isinstance(each, OpensPort)}
+    return sorted(path for path in paths if path.startswith("/dev/"))
+
+
+def _rest_time(plan: Plan) -> float:
+    return max((component_type(one.type).rest_time(one.config) for one in plan.instances), default=0.0)

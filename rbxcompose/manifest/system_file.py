@@ -1,0 +1,106 @@
+"""The keys of a system's file, and the models of its sections."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BeforeValidator, Field
+
+from rbxcompose.config import BitRate, Config, Frequency, Name
+from rbxcompose.manifest.header import ManifestHeader
+
+_SSH = re.compile(r"(ssh://)?([A-Za-z0-9_][A-Za-z0-9_.-]*@)?[A-Za-z0-9\[][A-Za-z0-9.:\]_-]*")
+_COMMAND = re.compile(r"[A-Za-z0-9_./][A-Za-z0-9_./+-]*")
+_ADDRESS = re.compile(r"[0-9A-Fa-f:.]{2,45}|[A-Za-z0-9]([A-Za-z0-9.-]{0,252}[A-Za-z0-9])?")
+
+
+def _address(text: str) -> str:
+    """Read an address or a name of a machine."""
+    if not _ADDRESS.fullmatch(text):
+        raise ValueError("must be an address or the name of a machine, such as 10.42.0.2 or robot.local")
+    return text
+
+
+def _ssh(text: str) -> str:
+    """Read what one types after `ssh`, but no options: with those, a text of others could run programs here."""
+    if not _SSH.fullmatch(text):
+        raise ValueError("must be a host as one types it after ssh, such as pi@robot; options go to ~/.ssh/config")
+    return text
+
+
+def _command(text: str) -> str:
+    """Read the path of a program."""
+    if not _COMMAND.fullmatch(text):
+        raise ValueError("must be the path of a program, such as /home/pi/venv/bin/rbxcompose")
+    return text
+
+
+def _in_full(value: object) -> object:
+    return {} if value is None else value
+
+
+class SystemFile(ManifestHeader):
+    """Robots on several hosts: the hosts, the robots, and which host runs what."""
+
+    hosts: Any = None
+    """The machines, by name."""
+    robots: Any = None
+    """The robots that run on them, by name; this is the name that `ps` and other verbs know."""
+    links: Any = None
+    """What is known of the ways between hosts, by name."""
+    security: Literal["none", "tls", "mtls"] = "none"
+    """How routers of different hosts trust each other: not at all; by `tls`, the one that dials knows that the other
+    is of this system, and what crosses is encrypted; by `mtls`, both know. `security init` makes the certificates."""
+
+
+class HostModel(Config):
+    """A machine that runs a share of the robots."""
+
+    address: Annotated[str, AfterValidator(_address)] | None = None
+    """Where the other hosts reach it: an IP address or a name. Of two hosts of one robot, at least one needs it."""
+    ssh: Annotated[str, AfterValidator(_ssh)] | None = None
+    """What one types after `ssh` to reach it, such as `pi@robot`. Without it, this is the machine of the command."""
+    command: Annotated[str, AfterValidator(_command)] = "rbxcompose"
+    """Its program `rbxcompose`, if that is not in the path of commands over ssh."""
+    labels: tuple[Name, ...] = ()
+    """What robots may call it by in `on` and `place`, such as `gpu`."""
+    devices: tuple[str, ...] = ()
+    """Serial ports that are connected here, as components name them: `/dev/ttyUSB0`, `usb:0403:6014`."""
+    optional: bool = False
+    """Whether the others start without it."""
+
+
+class SystemRobotModel(Config):
+    """A robot of the system, and which host runs what of it."""
+
+    robot: str
+    """The robot's file, relative to this one, or `rbx:robots/NAME`."""
+    profile: Name | None = None
+    """A profile of the robot."""
+    on: Name | None = None
+    """The host, or a label of hosts, for all that `place` does not mention. Without it, components are placed by
+    their devices, and the rest goes to the host that has most of the robot by then."""
+    place: dict[str, Name] = {}
+    """The host, or a label of hosts, for single components, or for parts with all that they bring."""
+    link_port: int | None = Field(None, ge=1, le=65535)
+    """The TCP port at which the robot's routers reach each other; without it, that of `bus.port` of the robot."""
+
+
+class LinkModel(Config):
+    """The way between two hosts."""
+
+    between: tuple[Name, Name]
+    """The two hosts."""
+    limit: Annotated[BitRate, Field(gt=0)] | None = None
+    """What it carries; `check` warns if what is known to cross needs more."""
+    downsample: dict[str, Annotated[Frequency, Field(gt=0)]] = {}
+    """Topics of which no more messages than these cross; the others are left out. Commands cannot be left out. A host
+    with several links sends a topic on all of them as often as the fastest of them asks for."""
+
+
+ShortHost = Annotated[HostModel, BeforeValidator(_in_full, json_schema_input_type=HostModel | None)]
+SECURITY = "security"
+SECTIONS = {"hosts": dict[Name, ShortHost], "robots": dict[Name, SystemRobotModel]}
+LINKS = {"links": dict[Name, LinkModel]}
+"""Content of each section; a system need not have links."""

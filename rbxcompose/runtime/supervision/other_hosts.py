@@ -1,0 +1,127 @@
+"""The other hosts of a robot: what they have told, and which of them are silent. Pure: time is an argument.
+
+A host judges the others by what their supervisors say through the routers, several times a second. What it does with it
+is the same as for processes of its own: components that are out of reach are lost, those that have failed block others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
+
+from rbxcompose.dataclass import dataclass
+from rbxcompose.levels import Level
+from rbxcompose.plan.model import Instance, OtherHost, Share
+from rbxcompose.runtime import channel as say
+from rbxcompose.runtime.host_report import HostReport, RobotEnd, SharedStop
+from rbxcompose.runtime.supervision.members import ConductorEffects
+
+SILENT = 2.0  # [s] without a report after which the components of a host count as lost; links lose more than processes
+_DONE = ("active", "failed")
+
+
+@dataclass
+class _Known:
+    """What is known of a host that has reported."""
+
+    report: HostReport
+    heard: float  # [s]
+    is_lost: bool = False
+
+
+class OtherHosts:
+    """Judges the other hosts; without a share there are none."""
+
+    def __init__(self, share: Share | None, effects: ConductorEffects, tell: Callable[[say.Lost], None]) -> None:
+        """Take `tell`, which tells all own processes."""
+        self._share, self._effects, self._tell = share, effects, tell
+        self._own = HostReport(share.host, share.version, effects.run_id) if share else None
+        self._others = {one.name: one for one in share.others} if share else {}
+        self._known: dict[str, _Known] = {}
+        self._told_waiting = ""
+
+    def report(
+        self, states: Mapping[str, tuple[str, int]], stop: SharedStop, end: RobotEnd | None, *, is_going_down: bool
+    ) -> None:
+        """Tell the other hosts how this one is."""
+        if self._own is not None:
+            told = {name: state for name, (state, _) in states.items()}
+            now = replace(self._own, states=told, stop=stop, end=end, is_going_down=is_going_down)
+            self._effects.to_hosts(now)
+
+    def heard(self, report: HostReport, now: float) -> RobotEnd | None:
+        """Take a report; return the end of the robot if it tells one."""
+        host = self._others.get(report.host)
+        if host is None:
+            return None
+        known = self._known.get(report.host)
+        is_new = known is None or known.report.run != report.run
+        if is_new and report.is_going_down:
+            return None  # the rest of an earlier run, which this one has nothing to do with
+        self._known[report.host] = _Known(report, now, is_lost=report.is_going_down)
+        if is_new:
+            self._greet(host, report, is_back=known is not None)
+        elif known is not None and known.is_lost and not report.is_going_down:
+            self._effects.log(Level.WARN, f"host '{host.name}' answers again")
+        elif known is not None and not known.is_lost and report.is_going_down and report.end is None:
+            self._lose(host, "goes down")
+        return report.end
+
+    def _greet(self, host: OtherHost, report: HostReport, *, is_back: bool) -> None:
+        self._effects.log(Level.OK, f"host '{host.name}' {'was started again' if is_back else 'is there'}")
+        if self._own is not None and report.version != self._own.version:
+            text = f"host '{host.name}' runs other files of this robot, or another version of rbxcompose"
+            self._effects.log(Level.WARN, f"{text}: give all hosts the same and start them again")
+
+    def look(self, now: float, *, is_excused: bool) -> None:
+        """Look for hosts that have fallen silent; they are excused if this process did not run itself."""
+        for name, known in self._known.items():
+            if is_excused:
+                known.heard = now
+            elif not known.is_lost and now - known.heard > SILENT:
+                known.is_lost = True
+                self._lose(self._others[name], "does not answer")
+
+    def _lose(self, host: OtherHost, how: str) -> None:
+        text = f"host '{host.name}' {how}"
+        self._effects.log(Level.WARN, text)
+        self._tell(say.Lost([one.name for one in host.instances], text))
+
+    def told_lost(self) -> Iterator[say.Lost]:
+        """Yield what a process must know that has missed it."""
+        for name, known in self._known.items():
+            if known.is_lost:
+                yield say.Lost([one.name for one in self._others[name].instances], f"host '{name}' does not answer")
+
+    # Starting together
+
+    def reached(self, instances: Iterable[Instance]) -> Iterator[Instance]:
+        """Yield instances until the first one that starts after a component which another host has yet to activate."""
+        elsewhere = {one.name for host in self._others.values() if not host.is_optional for one in host.instances}
+        for one in instances:
+            if any(name in elsewhere and self._state(name) not in _DONE for name in one.starts_after):
+                return
+            yield one
+
+    def is_complete(self) -> bool:
+        """Return whether everything is active on all hosts that the robot needs; if not, log once what is awaited."""
+        missing = [one for one in self._others.values() if not one.is_optional and not self._is_active(one)]
+        waiting = " and ".join(f"host '{one.name}'" for one in missing)
+        if waiting and waiting != self._told_waiting:
+            self._effects.log(Level.OK, f"everything is active here; waiting for {waiting}")
+        self._told_waiting = waiting
+        return not missing
+
+    def _is_active(self, host: OtherHost) -> bool:
+        return all(self._state(one.name) in _DONE for one in host.instances) and host.name in self._known
+
+    def _state(self, name: str) -> str:
+        """Return the state of a component of another host; unconfigured if this is unknown."""
+        reports = (known.report for known in self._known.values() if not known.is_lost)
+        return next((one.states[name] for one in reports if name in one.states), "unconfigured")
+
+    @property
+    def failed(self) -> set[str]:
+        """Return the components of other hosts that have failed."""
+        reports = (known.report.states for known in self._known.values())
+        return {name for states in reports for name, state in states.items() if state == "failed"}

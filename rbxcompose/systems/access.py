@@ -1,0 +1,34 @@
+"""What other hosts may do at the router of a host: least privilege, computed from the declared ports. Pure.
+
+A host may publish and serve what its components give to this one, and subscribe to and call what they take from it.
+Besides, it may report, be probed, show tokens, and exchange what the runtime itself sends: diagnostics, frames, logs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from rbxcompose.plan.model import HostAccess
+from rbxcompose.sdk.ports import CallsAction, ServesAction
+from rbxcompose.systems.certificates import common_name
+from rbxcompose.systems.model import PlacedRobot, System
+from rbxcompose.systems.traffic import Crossing
+
+OF_RUNTIME = ("/diagnostics", "/rosout", "/parameter_events", "/tf", "/tf_static")
+
+
+def access_of(system: System, robot: PlacedRobot, host: str, other: str) -> HostAccess:
+    """Return what a host's router lets another host do."""
+    gives = {topic for one in robot.crossings if _goes(one, other, host) for topic in _names(one)}
+    takes = {topic for one in robot.crossings if _goes(one, host, other) for topic in _names(one)}
+    return HostAccess(common_name(system.name, other), tuple(sorted(gives)), tuple(sorted(takes)), OF_RUNTIME)
+
+
+def _goes(one: Crossing, giver: str, taker: str) -> bool:
+    return any(end.host == giver for end in one.givers) and any(end.host == taker for end in one.takers)
+
+
+def _names(one: Crossing) -> Iterable[str]:
+    """Return the topics and services of a crossing; those of an action by their common pattern."""
+    is_action = any(isinstance(end.port, ServesAction | CallsAction) for end in (*one.givers, *one.takers))
+    return (f"{one.topic}/_action/*",) if is_action else (one.topic,)

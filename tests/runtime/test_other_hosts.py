@@ -1,0 +1,107 @@
+"""What a supervisor decides about the other hosts of its robot, in virtual time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from rbxcompose.levels import Level
+from rbxcompose.plan.model import OtherHost, Plan, Share
+from rbxcompose.robot_events import MissionOver
+from rbxcompose.runtime import channel as say
+from rbxcompose.runtime.host_report import HostReport, RobotEnd
+from rbxcompose.runtime.supervision.conductor import INTERRUPTED
+from rbxcompose.runtime.supervision.members import Phase
+from rbxcompose.runtime.supervision.other_hosts import SILENT
+from tests.runtime.stage import Stage, robot
+
+BASE = ("base",)
+
+
+def shared(*, is_optional: bool = False) -> Plan:
+    """The robot of the stage, but that its base runs on host `robot` and the rest here, on `desk`."""
+    whole = robot()
+    base, *rest = whole.instances
+    share = Share("desk", (OtherHost("robot", (base,), is_optional),), version="1")
+    return replace(whole, instances=tuple(rest), share=share)
+
+
+def desk(*, is_optional: bool = False) -> Stage:
+    stage = Stage(shared(is_optional=is_optional))
+    stage.configure("router", "robot", "mission")
+    stage.activate()
+    return stage
+
+
+def tell(stage: Stage, state: str = "active", **more: object) -> None:
+    """Have host `robot` report."""
+    report = HostReport("robot", "1", "first", states=dict.fromkeys(BASE, state))
+    stage.speak("router", say.FromHost(replace(report, **more)))  # type: ignore[arg-type]
+    stage.activate()
+
+
+def lost(stage: Stage) -> list[tuple[str, ...]]:
+    return [tuple(message.names) for _, message in stage.orders(say.Lost) if isinstance(message, say.Lost)]
+
+
+def test_a_component_waits_for_one_of_another_host_that_it_starts_after_and_the_robot_for_all_hosts() -> None:
+    stage = desk()
+    names = [message.names for _, message in stage.orders(say.Activate) if isinstance(message, say.Activate)]
+    assert names == [["mux"]], "go_to starts after the base"
+    tell(stage, "inactive")
+    assert stage.conductor.states["go_to"][0] == "unconfigured"
+    tell(stage)
+    assert stage.conductor.states["go_to"][0] == "active"
+    assert stage.ups == 1
+
+
+def test_a_host_that_is_optional_is_not_waited_for() -> None:
+    assert desk(is_optional=True).ups == 1
+
+
+def test_components_of_a_silent_host_are_lost_until_it_answers_again_and_nothing_goes_down() -> None:
+    stage = desk()
+    tell(stage)
+    stage.pass_time(SILENT + 1.0)
+    assert set(lost(stage)) == {BASE}
+    assert (Level.WARN, "host 'robot' does not answer") in stage.records
+    before = len(lost(stage))
+    tell(stage)
+    stage.pass_time(SILENT / 2)
+    assert len(lost(stage)) == before
+    assert (Level.WARN, "host 'robot' answers again") in stage.records
+    assert stage.conductor.phase is Phase.RUNNING
+
+
+def test_what_failed_on_another_host_blocks_what_depends_on_it_here() -> None:
+    stage = desk()
+    tell(stage)
+    tell(stage, "failed")
+    assert stage.conductor.blocked.causes["go_to"] == "base"
+
+
+def test_the_end_of_the_robot_on_one_host_is_its_end_here_but_not_that_of_a_run_before() -> None:
+    end = RobotEnd(3, "mission patrol: failure")
+    stage = desk()
+    tell(stage, run="old", is_going_down=True, end=end)
+    assert not stage.conductor.is_going_down
+    tell(stage)
+    tell(stage, is_going_down=True, end=end)
+    assert (stage.conductor.exit_code, stage.conductor.reason) == (3, "mission patrol: failure (host 'robot')")
+
+
+def test_the_end_of_a_mission_is_told_to_all_hosts_and_a_signal_is_for_one() -> None:
+    stage = desk()
+    tell(stage)
+    stage.speak("mission", MissionOver("patrol", "success"))
+    assert stage.reports[-1].end == RobotEnd(0, "mission patrol: success")
+    other = desk()
+    other.conductor.go_down(INTERRUPTED, "interrupted")
+    assert other.reports[-1].is_going_down
+    assert other.reports[-1].end is None
+
+
+def test_hosts_with_other_files_are_told_once() -> None:
+    stage = desk()
+    for _ in range(3):
+        tell(stage, version="2")
+    assert len([text for _, text in stage.records if "other files" in text]) == 1

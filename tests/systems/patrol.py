@@ -1,0 +1,116 @@
+"""The patrol robot on two hosts, around a small square."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from rbxcompose.runtime.folder import RobotFolder, RobotState
+from tests.conftest import ROOT
+from tests.systems.namespaces import TwoHosts
+
+ADDRESSES = {"r": "10.42.7.2", "d": "10.42.7.1"}
+SPEED, ACCELERATION, DEADLINE, CYCLE = 0.3, 1.0, 0.5, 0.02  # [m/s], [m/s^2], [s], [s]
+LONGEST = 40.0  # [s] for anything to happen
+ENVIRONMENT = {"PYTHONPATH": str(ROOT)}
+SYSTEM = """
+rbx: 1
+kind: System
+name: two_hosts
+hosts:
+  r: {address: 10.42.7.2}
+  d: {}
+robots:
+  NAME:
+    robot: robots/robot.yaml
+    on: d
+    place: {base: r, battery: r}
+"""
+
+
+class PatrolOnTwoHosts:
+    """Its base and battery run on `r`, all else on `d`."""
+
+    def __init__(self, hosts: TwoHosts, rounds: int = 1) -> None:
+        self.name = f"two_hosts_{os.getpid()}"
+        self.hosts = hosts
+        folder = hosts.folder
+        (folder / "robots").mkdir()
+        (folder / "missions").mkdir()
+        text = (ROOT / "robots/turtlebot/robot.yaml").read_text(encoding="utf-8")
+        text = re.sub(r"\b([xy]): 1 m", r"\1: 0.5 m", text).replace("../../missions", "../missions")
+        text = text.replace("runtime: 45 s", "runtime: 10 min")
+        text = text.replace("../missions/patrol.yaml", f"{{file: ../missions/patrol.yaml, with: {{rounds: {rounds}}}}}")
+        (folder / "robots/robot.yaml").write_text(text, encoding="utf-8")
+        (folder / "missions/patrol.yaml").write_bytes((ROOT / "missions/patrol.yaml").read_bytes())
+        (folder / "system.yaml").write_text(SYSTEM.replace("NAME", self.name), encoding="utf-8")
+        self._motion = folder / "motion"
+
+    def reach_by_ssh(self, host: str, program: Path) -> None:
+        """Have a host reached by ssh, with its own program `rbxcompose`."""
+        entry = f"  {host}: {{"
+        self.change_system(entry, f"{entry}ssh: {host}, command: {program}, ")
+
+    def change_system(self, before: str, after: str) -> None:
+        """Change the text of the system."""
+        path = self.hosts.folder / "system.yaml"
+        path.write_text(path.read_text(encoding="utf-8").replace(before, after), encoding="utf-8")
+
+    def stranger(self, host: str) -> str:
+        """Return how a router without a certificate fares that dials `r` from a host: `linked` or `refused`."""
+        process = self.hosts.start(host, sys.executable, "-m", "tests.systems.stranger", environment=ENVIRONMENT)
+        return process.communicate(timeout=30)[0].strip()
+
+    def rbx(self, host: str, *words: str) -> subprocess.Popen[str]:
+        """Start a command of rbxcompose on a host."""
+        return self.hosts.start(host, sys.executable, "-m", "rbxcompose", *words, environment=ENVIRONMENT)
+
+    def up(self, host: str) -> subprocess.Popen[str]:
+        """Start the share of a host."""
+        return self.rbx(host, "up", "system.yaml", "--host", host)
+
+    def state(self, host: str) -> RobotState | None:
+        """Return what the share of a host tells of itself."""
+        return RobotFolder(self.hosts.folder / host / "rbxcompose" / self.name).read_state()
+
+    def log(self, host: str) -> str:
+        """Return the log of a host."""
+        path = self.hosts.folder / host / "rbxcompose" / self.name / "log.jsonl"
+        return path.read_text(encoding="utf-8") if path.exists() else ""
+
+    def watch(self) -> None:
+        """Write down how the base moves, from now on."""
+        self.wait_until(lambda: (state := self.state("r")) is not None and state.router is not None)
+        state = self.state("r")
+        assert state is not None
+        assert state.router is not None
+        words = (sys.executable, "-m", "tests.systems.motion", state.router, str(self._motion))
+        self.hosts.start("r", *words, environment=ENVIRONMENT)
+
+    def motion(self) -> list[tuple[float, bool]]:
+        """Return when it moved and when it stood still so far [s, monotonic]."""
+        if not self._motion.exists():
+            return []
+        lines = [line.split() for line in self._motion.read_text(encoding="utf-8").splitlines()]
+        return [(float(words[0]), words[1] == "1") for words in lines if len(words) == 2]
+
+    def has_moved_since(self, since: float) -> bool:
+        """Return whether it moved after `since`."""
+        return any(moves for at, moves in self.motion() if at > since)
+
+    @staticmethod
+    def wait_until(holds: Callable[[], bool], within: float = LONGEST) -> None:
+        """Wait until something holds.
+
+        Raises:
+            AssertionError: if it takes longer.
+        """
+        deadline = time.monotonic() + within
+        while not holds():
+            assert time.monotonic() < deadline, "it did not happen in time"
+            time.sleep(0.02)

@@ -1,0 +1,65 @@
+"""Where components go: each to exactly one host, and for a reason."""
+
+from __future__ import annotations
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rbxcompose.systems.placement import HostOffer, Wishes, hosts_called, place
+
+NAMES = st.sampled_from([f"c{number}" for number in range(8)])
+HOSTS = ("robot", "desk", "cloud")
+LABELS = ("gpu", "fast")
+PORTS = ("/dev/a", "/dev/b")
+OFFERS = st.dictionaries(
+    st.sampled_from(HOSTS),
+    st.builds(HostOffer, st.frozensets(st.sampled_from(LABELS)), st.frozensets(st.sampled_from(PORTS))),
+    min_size=1,
+)
+
+
+@st.composite
+def robots(draw: st.DrawFn) -> tuple[list[str], dict[str, HostOffer], Wishes, dict[str, set[str]], dict[str, set[str]]]:
+    components = draw(st.lists(NAMES, unique=True, min_size=1))
+    hosts = draw(OFFERS)
+    called = st.sampled_from([*hosts, *(label for label in LABELS if hosts_called(label, hosts))])
+    parts = draw(st.dictionaries(st.sampled_from(["arm", "head"]), st.sets(st.sampled_from(components), min_size=1)))
+    wishes = draw(st.dictionaries(st.sampled_from([*components, *parts]), called))
+    devices = draw(st.dictionaries(st.sampled_from(components), st.sets(st.sampled_from(PORTS))))
+    return components, hosts, Wishes(draw(st.none() | called), wishes), parts, devices
+
+
+@given(robots())
+def test_each_component_is_on_exactly_one_host_and_wishes_come_before_devices_before_the_rest(
+    robot: tuple[list[str], dict[str, HostOffer], Wishes, dict[str, set[str]], dict[str, set[str]]],
+) -> None:
+    components, hosts, wishes, parts, devices = robot
+    placed = place(components, hosts, wishes, parts, devices)
+    assert list(placed) == components
+    for name, one in placed.items():
+        assert one.host in hosts
+        assert one.reason
+        around = [wishes.place[part] for part in parts if name in parts[part] and part in wishes.place]
+        ports = devices.get(name, set())
+        having = [host for host, offer in hosts.items() if ports and offer.devices >= ports]
+        if name in wishes.place:
+            assert one.host in hosts_called(wishes.place[name], hosts)
+        elif around:
+            assert any(one.host in hosts_called(called, hosts) for called in around)
+        elif having:
+            assert one.host == having[0]
+        elif wishes.on is not None:
+            assert one.host in hosts_called(wishes.on, hosts)
+
+
+def test_the_smallest_part_around_a_component_counts_and_a_label_goes_where_least_runs() -> None:
+    hosts = {"robot": HostOffer(), "one": HostOffer(frozenset({"gpu"})), "two": HostOffer(frozenset({"gpu"}))}
+    wishes = Wishes("robot", {"arm": "one", "arm.hand": "gpu"})
+    parts = {"arm": {"elbow", "finger", "thumb"}, "arm.hand": {"finger", "thumb"}}
+    placed = place(["base", "elbow", "finger", "thumb"], hosts, wishes, parts, {})
+    assert {name: one.host for name, one in placed.items()} == {
+        "base": "robot",
+        "elbow": "one",
+        "finger": "two",
+        "thumb": "one",
+    }
