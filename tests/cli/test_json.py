@@ -49,6 +49,7 @@ MISTAKES = {
     "record": "--for 1s",
     "release": "",
     "replay": "nowhere.mcap --info",
+    "security audit": "nowhere.yaml",
     "service call": "set_battery_level",
     "service ls": "",
     "servo disable": "1 --port nowhere",
