@@ -23,7 +23,7 @@ unit: $(VENV)/.test  ## On all cores; `make unit PYTEST="-n 0 tests/bus"` runs s
 	$(BIN)/python -m pytest -q $(PYTEST)
 
 soak: $(VENV)/.test  ## Try many more random manifests and expressions, and fuzz if atheris is installed
-	$(BIN)/python -m pytest -q --soak tests/body tests/mutate tests/properties tests/hostile tests/fuzz tests/simulated_faults tests/io tests/net tests/exposure tests/faults tests/importing
+	$(BIN)/python -m pytest -q --soak tests/body tests/mutate tests/properties tests/hostile tests/fuzz tests/simulated_faults tests/io tests/net tests/exposure tests/faults tests/importing tests/systems
 	$(BIN)/python docs/quality.py
 	$(BIN)/python docs/robots_tried.py
 

@@ -6,7 +6,7 @@ import argparse
 import json
 
 from rbxcompose.cli.output.console import refuse, tell
-from rbxcompose.cli.project.targets import is_system
+from rbxcompose.cli.project.kinds import is_system
 from rbxcompose.cli.robots.lookup import NO_ANSWER, NOT_UP, NotDoneError, add_robot_option, find_robot, known_state
 from rbxcompose.cli.systems.options import add_system_options
 from rbxcompose.requests import Refused

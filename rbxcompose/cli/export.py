@@ -14,7 +14,7 @@ from pathlib import Path
 
 from rbxcompose import __version__
 from rbxcompose.cli.output.console import FINDINGS, refuse, tell, tell_report
-from rbxcompose.cli.project.targets import is_system
+from rbxcompose.cli.project.kinds import is_system
 from rbxcompose.exporting import compose, kubernetes, systemd
 from rbxcompose.exporting.exported_share import shares
 from rbxcompose.findings import Finding, kind

@@ -11,7 +11,7 @@ import time
 from collections.abc import Iterable, Sequence
 
 from rbxcompose.cli.output.console import has_colour, refuse, tell
-from rbxcompose.cli.project.targets import is_system
+from rbxcompose.cli.project.kinds import is_system
 from rbxcompose.cli.robots.lookup import NOT_UP, NotDoneError, add_robot_option, find_robot, known_state
 from rbxcompose.cli.robots.story import StoryWriter
 from rbxcompose.cli.systems.options import add_system_options

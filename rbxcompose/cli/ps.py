@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 from rbxcompose.cli.output.console import refuse, tell
-from rbxcompose.cli.project.targets import is_system
+from rbxcompose.cli.project.kinds import is_system
 from rbxcompose.cli.robots.lookup import NotDoneError, add_robot_option, answer_of, find_robot, known_state, robots_up
 from rbxcompose.cli.systems.options import add_system_options
 from rbxcompose.runtime.folder import SUSPENDED, ComponentState, RobotFolder, RobotState

@@ -16,7 +16,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from rbxcompose.cli.output.console import FINDINGS, refuse, tell, tell_report
-from rbxcompose.cli.project.targets import is_system
+from rbxcompose.cli.project.kinds import is_system
 from rbxcompose.cli.systems.options import add_system_options
 from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, kind
@@ -53,7 +53,7 @@ mkdir -p "$d"; tar -xf - -C "$d"
 
 
 @dataclass(frozen=True, slots=True)
-class GuardedPort:
+class ListeningEndpoint:
     """An endpoint that takes connections on a host: who may reach it, and how they prove who they are."""
 
     host: str
@@ -132,7 +132,7 @@ def _audit(system: System, *, in_json: bool) -> int:
     return FINDINGS if any(one.is_open for one in found) else 0
 
 
-def listeners(system: System) -> Iterator[GuardedPort]:
+def listeners(system: System) -> Iterator[ListeningEndpoint]:
     """Yield what listens on each host of a system, as far as other machines or users can reach it."""
     proofs = {
         NO_SECURITY: ("no proof asked", True),
@@ -143,7 +143,9 @@ def listeners(system: System) -> Iterator[GuardedPort]:
         for host in hosts_of(system, robot):
             bus = robot.plan.bus
             if bus.router is None and bus.access == "machine":
-                local = GuardedPort(host, robot.name, f"tcp/127.0.0.1:{bus.port}", "programs of this machine", "", False)
+                local = ListeningEndpoint(
+                    host, robot.name, f"tcp/127.0.0.1:{bus.port}", "programs of this machine", "", False
+                )
                 yield replace(local, proof="no proof asked")
             for endpoint in listens(system, robot, host):
-                yield GuardedPort(host, robot.name, endpoint, "machines of the network", *proofs[system.security])
+                yield ListeningEndpoint(host, robot.name, endpoint, "machines of the network", *proofs[system.security])

@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 
 from rbxcompose.cli.output.console import refuse
-from rbxcompose.cli.project.targets import is_system
+from rbxcompose.cli.project.kinds import is_system
 from rbxcompose.cli.robots.commands import add_asking_options, show_answer
 from rbxcompose.cli.robots.lookup import NO_ANSWER, NotDoneError, answer_of, find_robot, known_state
 from rbxcompose.cli.systems.options import add_system_options

@@ -12,9 +12,9 @@ import sys
 from pathlib import Path
 
 from rbxcompose.cli.output.console import FINDINGS, refuse, tell_report
+from rbxcompose.cli.project.kinds import is_system
 from rbxcompose.cli.project.robot_choice import add_path_argument, robot_path
 from rbxcompose.cli.project.robot_options import add_layer_options, chosen_layers, compiled, layers_of
-from rbxcompose.cli.project.targets import is_system
 from rbxcompose.cli.robots.live_reload import LiveReload
 from rbxcompose.cli.robots.run_view import run_plan
 from rbxcompose.cli.robots.this_machine import is_fit

@@ -11,10 +11,11 @@ from typing import Any
 
 from rbxcompose.dataclass import dataclass
 from rbxcompose.msgs.cdr import encode
+from rbxcompose.msgs.tf2_msgs import TFMessage
 from rbxcompose.msgs.types import Message
 from rbxcompose.plan.model import Instance, Plan
 from rbxcompose.qos import Qos
-from rbxcompose.sdk.ports import Calls, CallsAction, In, Out, Port, Serves, ServesAction
+from rbxcompose.sdk.ports import Calls, CallsAction, In, Looks, Out, Port, Serves, ServesAction
 from rbxcompose.sdk.registry import component_type
 
 OVERHEAD = 33 + 12 + 40  # [bytes] of a message: ROS 2's attachment, Zenoh's header, the header of TCP and IP
@@ -70,6 +71,7 @@ class Crossing:
         return any(giver != taker for giver in givers for taker in takers)
 
 
+FRAMES = ("/tf", "/tf_static")  # what a process subscribes to for components that look up frames
 _GIVES = (Out, Serves, ServesAction)
 _TAKES = (In, Calls, CallsAction)
 
@@ -94,6 +96,9 @@ def crossings(plan: Plan, hosts: Mapping[str, str]) -> Iterator[Crossing]:
 def _ends(one: Instance, host: str) -> Iterator[tuple[tuple[str, str], End]]:
     cls = component_type(one.type)
     ports: Mapping[str, Port[Any]] = cls.ports(one.config)
+    if any(isinstance(port, Looks) for port in ports.values()):
+        looks = next(port for port in ports.values() if isinstance(port, Looks))
+        yield from (((topic, TFMessage.TYPE), End(one.name, host, looks)) for topic in FRAMES)
     for wire in one.wires:
         port = ports.get(wire.port)
         if isinstance(port, (*_GIVES, *_TAKES)) and wire.topic:

@@ -79,6 +79,7 @@ MISTAKES = {
     "scene detach": "table",
     "scene ls": "",
     "scene remove": "table",
+    "security audit": "nowhere.yaml",
     "service call": "set_battery_level",
     "service ls": "",
     "servo disable": "1 --port nowhere",

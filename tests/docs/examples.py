@@ -34,7 +34,7 @@ controllers: {head: {type: joint_trajectory, joints: [pan_joint]}}
 arms: {neck: {joints: [pan_joint], controller: head, poses: {ahead: {pan_joint: 0 deg}, aside: {pan_joint: 60 deg}}}}
 """  # of a mission that says `head` behind its fence
 
-WALKED_THROUGH = ("tutorial.md", "missions.md", "sdk.md")  # their manifests need each other, or a package
+WALKED_THROUGH = ("tutorial.md", "missions.md", "sdk.md", "systems.md")  # their manifests need each other, or a package
 
 _FENCE = re.compile(r"^```(?P<info>[^\n`]*)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
 _SECTION = re.compile(r"^(?=[^\s#])", re.MULTILINE)

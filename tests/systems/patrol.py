@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import signal
 import subprocess
 import sys
 import time
@@ -43,7 +44,7 @@ class PatrolOnTwoHosts:
         (folder / "robots").mkdir()
         (folder / "missions").mkdir()
         text = (ROOT / "robots/turtlebot/robot.yaml").read_text(encoding="utf-8")
-        text = re.sub(r"\b([xy]): 1 m", r"\1: 0.5 m", text).replace("../../missions", "../missions")
+        text = re.sub(r"\b([xy]): 1 m", r"\1: 0.3 m", text).replace("../../missions", "../missions")
         text = text.replace("runtime: 45 s", "runtime: 10 min")
         text = text.replace("../missions/patrol.yaml", f"{{file: ../missions/patrol.yaml, with: {{rounds: {rounds}}}}}")
         (folder / "robots/robot.yaml").write_text(text, encoding="utf-8")
@@ -73,6 +74,29 @@ class PatrolOnTwoHosts:
     def up(self, host: str) -> subprocess.Popen[str]:
         """Start the share of a host."""
         return self.rbx(host, "up", "system.yaml", "--host", host)
+
+    def change_mission(self, before: str, after: str) -> None:
+        """Change the text of the mission."""
+        path = self.hosts.folder / "missions/patrol.yaml"
+        path.write_text(path.read_text(encoding="utf-8").replace(before, after), encoding="utf-8")
+
+    def kill(self, host: str, process: str) -> float:
+        """Kill a process of a share; return when [s, monotonic]."""
+        state = self.state(host)
+        assert state is not None
+        victim = state.supervisor if process == "supervisor" else state.processes[process]
+        victim.send_signal(signal.SIGKILL)
+        return time.monotonic()
+
+    def is_active(self, host: str) -> bool:
+        """Return whether all components of a share are active and all its processes are there."""
+        state = self.state(host)
+        alive = len(state.alive()) if state is not None else 0
+        return (
+            state is not None
+            and alive >= len(state.processes)
+            and all(one.state == "active" for one in state.components)
+        )
 
     def state(self, host: str) -> RobotState | None:
         """Return what the share of a host tells of itself."""

@@ -23,7 +23,7 @@ ALLOWED, DENIED = "0/cmd_vel/type/hash", "0/odom/type/hash"
 
 def test_a_host_may_give_and_take_what_its_components_declare_and_nothing_else() -> None:
     desk = access_of(SYSTEM, ROBOT, "robot", "desk")
-    assert (desk.gives, desk.takes) == (("/cmd_vel",), ("/battery_level", "/set_battery_level"))
+    assert (desk.gives, desk.takes) == (("/cmd_vel",), ("/battery_level", "/set_battery_level", "/tf"))
     robot = access_of(SYSTEM, ROBOT, "desk", "robot")
     assert (robot.gives, robot.takes) == (desk.takes, desk.gives)
 

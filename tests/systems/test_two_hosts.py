@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from tests.soak import Soak
 from tests.systems.namespaces import NotPermittedError, TwoHosts
 from tests.systems.patrol import ACCELERATION, ADDRESSES, CYCLE, DEADLINE, SPEED, PatrolOnTwoHosts
 from tests.systems.sshd import serve, wrapper
@@ -78,3 +80,28 @@ def test_the_base_stops_when_the_cable_is_pulled_and_the_patrol_succeeds_once_it
     assert base.wait(20) == 0, "the end of the mission is the end of the robot on all hosts"
     assert "mission patrol: success" in patrol.log("r") + base.communicate()[0]
     assert (patrol.state("r"), patrol.state("d")) == (None, None)
+
+
+@pytest.mark.timeout(240)
+def test_any_process_and_any_host_may_die_and_the_others_go_on(patrol: PatrolOnTwoHosts, soak: Soak) -> None:
+    if not soak.is_on:
+        pytest.skip("with --soak")
+    patrol.change_mission("repeat: $rounds", "repeat: 1000")
+    patrol.up("r")
+    patrol.up("d")
+    patrol.watch()
+    patrol.wait_until(lambda: patrol.has_moved_since(0.0))
+    for host, process in (("d", "router"), ("r", "router"), ("d", "mission"), ("d", "robot")):
+        killed = patrol.kill(host, process)
+        patrol.wait_until(lambda host=host: patrol.is_active(host))  # type: ignore[misc]
+        patrol.wait_until(lambda killed=killed: patrol.has_moved_since(killed + BRAKED))  # type: ignore[misc]
+    gone = patrol.kill("d", "supervisor")
+    patrol.wait_until(lambda: "host 'd' does not answer" in patrol.log("r"))
+    patrol.wait_until(lambda: bool(patrol.motion()) and patrol.motion()[-1][0] > gone + CUT)
+    assert not patrol.has_moved_since(gone + BRAKED + LATE + 2.0), "its processes brake before they end"
+    again = patrol.up("d")
+    patrol.wait_until(lambda: "host 'd' was started again" in patrol.log("r"))
+    back = time.monotonic()
+    patrol.wait_until(lambda: patrol.has_moved_since(back))
+    assert patrol.rbx("r", "down", patrol.name).wait(30) == 0
+    assert again.wait(30) == 0

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator
 from dataclasses import field
 from pathlib import Path
 
+from rbxcompose.cli.project.kinds import kind_of
 from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Severity, Span, kind
 from rbxcompose.manifest.files import ROBOT_FILE, find, project_of, shown_name
 from rbxcompose.manifest.library import PREFIX
 from rbxcompose.manifest.section import SYSTEM, TEST
-from rbxcompose.regular_files import open_regular
 
 UNUSED = kind(
     "RBX9007",
@@ -28,8 +27,6 @@ Good: name the mission in a robot, or leave it out of the command.
 )
 
 _USE = "name it in a robot ('missions:', 'include:')"
-_KIND = re.compile(rb"^kind:[ \t]*['\"]?(\w+)", re.MULTILINE)
-_HEAD = 4096  # bytes at the start of a file that contain its kind
 _MANIFESTS = ("*.yaml", "*.yml")
 _ROBOTS = "robots"
 
@@ -50,7 +47,7 @@ class Targets:
         for file in self.files:
             if file not in known:
                 message, how = f"no robot of the project uses '{file}'", _USE
-                if _kind_of(Path(file)) == "Overlay":
+                if kind_of(Path(file)) == "Overlay":
                     message = f"'{file}' is an overlay, and does not say for which robot"
                     how = f"name the robot, too: 'rbxcompose check ROBOT -f {file}'"
                 yield UNUSED.at(Span(file, 1, 1, 1, 2), message, help=how)
@@ -72,11 +69,11 @@ def targets(paths: Iterable[str]) -> Targets:
             tests = [] if robots else tests_below(path)
             out.tests += tests
             out.robots += robots if robots or tests else [written]
-        elif _kind_of(path) in ("Robot", ""):
+        elif kind_of(path) in ("Robot", ""):
             out.robots.append(written)
-        elif _kind_of(path) == TEST:
+        elif kind_of(path) == TEST:
             out.tests.append(written)
-        elif _kind_of(path) == SYSTEM:
+        elif kind_of(path) == SYSTEM:
             out.systems.append(written)
         else:
             out.files.append(shown_name(path.resolve()))
@@ -86,35 +83,20 @@ def targets(paths: Iterable[str]) -> Targets:
     return out
 
 
-def is_system(written: str) -> bool:
-    """Return whether a command-line path names the file of a system."""
-    return not written.startswith(PREFIX) and Path(written).is_file() and _kind_of(Path(written)) == SYSTEM
-
-
 def robots_below(folder: Path) -> list[str]:
     """Return the robot files of a project, or of a folder of robots; at most two folders deep."""
     base = folder / _ROBOTS if (folder / _ROBOTS).is_dir() else folder
     files = (path for depth in ("", "*/", "*/*/") for pattern in _MANIFESTS for path in base.glob(depth + pattern))
-    return sorted(shown_name(path.resolve()) for path in files if _kind_of(path) == "Robot")
+    return sorted(shown_name(path.resolve()) for path in files if kind_of(path) == "Robot")
 
 
 def tests_below(folder: Path) -> list[str]:
     """Return the tests of missions in a folder, at any depth."""
     files = (path for pattern in _MANIFESTS for path in folder.rglob(pattern))
-    return sorted(shown_name(path.resolve()) for path in files if _kind_of(path) == TEST)
+    return sorted(shown_name(path.resolve()) for path in files if kind_of(path) == TEST)
 
 
 def projects_of(paths: Iterable[str]) -> list[Path]:
     """Return the project folders of robots; files that ship with the package belong to no project."""
     files = [find(path) for path in paths if not path.startswith(PREFIX)]
     return list(dict.fromkeys(project_of(file) for file in files if isinstance(file, Path)))
-
-
-def _kind_of(path: Path) -> str:
-    """Return the kind that a manifest names; empty if it names none or cannot be read."""
-    try:
-        with open_regular(path) as file:
-            found = _KIND.search(file.read(_HEAD))
-    except OSError:
-        return ""
-    return found[1].decode() if found else ""
