@@ -3,28 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import Any
 
-from pydantic import Field
-
-from rbxcompose.body.description import Description
+from rbxcompose.arm_config import ArmConfig, ArmWorks, dimensions_of
 from rbxcompose.body.model import Geometry
-from rbxcompose.body.urdf import read_body
-from rbxcompose.body.xml_reader import XmlElement, read_urdf
-from rbxcompose.control.limits import MotionLimits
 from rbxcompose.geometry import Transform3, quaternion_from_rpy
-from rbxcompose.motion.arm_kinematics import ArmKinematics
 from rbxcompose.motion.arm_task import ArmGoal, ArmTask
-from rbxcompose.motion.collisions import MeshChecker, told
-from rbxcompose.motion.groups import ArmGroup
+from rbxcompose.motion.collisions import told
 from rbxcompose.motion.inverse_kinematics import ANGLE_TOLERANCE, TOLERANCE, PoseTarget
-from rbxcompose.motion.joint_space import ArmJoint, JointSpace
 from rbxcompose.motion.parametrisation import Trajectory
-from rbxcompose.motion.planner import MotionPlanner, PlannerSettings
 from rbxcompose.motion.reasons import REASONS
 from rbxcompose.motion.scene import PlacedObject, mistake_in
-from rbxcompose.motion.setting_up import always_colliding, load_libraries
 from rbxcompose.msgs.control_msgs import FollowJointTrajectory
 from rbxcompose.msgs.entries import ArrayEntries
 from rbxcompose.msgs.rbxcompose_msgs import MoveArm, ReachPose, SceneObject, SceneObjects
@@ -35,7 +24,6 @@ from rbxcompose.sdk import (
     CallsAction,
     Capability,
     Component,
-    Config,
     Ended,
     In,
     NeedsExtra,
@@ -47,7 +35,7 @@ from rbxcompose.sdk import (
     Setting,
     component,
 )
-from rbxcompose.units import ANGLE, LENGTH, RATIO, Dimension
+from rbxcompose.units import ANGLE, LENGTH, RATIO
 
 MOVE, REACH, FOLLOW = "move", "reach", "follow"  # its ports
 AnyGoal = ServedGoal[Any, Any, Any]
@@ -56,61 +44,6 @@ REACH_MEASURES = {
     **dict.fromkeys(("roll", "pitch", "yaw", "angle_tolerance"), ANGLE),
     **dict.fromkeys(("speed", "acceleration"), RATIO),
 }
-
-
-class ArmJointConfig(Config):
-    """Limits of a joint in SI; None where there is none."""
-
-    lower: float | None = None
-    """Least position."""
-    upper: float | None = None
-    """Greatest position."""
-    velocity: float | None = None
-    """Greatest speed."""
-    acceleration: float | None = None
-    """Greatest acceleration."""
-    is_continuous: bool = False
-    """Whether it turns without an end."""
-    slides: bool = False
-    """Whether its positions are lengths."""
-
-
-class ArmPlannerConfig(Config):
-    """How motions are planned."""
-
-    type: str = "rrt_connect"
-    """The planner of OMPL."""
-    time: float = 5.0
-    """How long it may search [s]."""
-    attempts: int = 5
-    """How many paths it may find that collide when they are examined finely."""
-    seed: int = 1
-    """The same seed gives the same path."""
-
-
-class ArmConfig(Config):
-    """An arm, and the body that it is part of."""
-
-    name: str
-    """Its name, which begins the topic of its action."""
-    urdf: str
-    """Text of the URDF of the whole body."""
-    meshes: dict[str, str] = {}
-    """Files of meshes by their names in the URDF."""
-    base: str
-    """The link that carries it."""
-    tip: str
-    """The link at its end."""
-    joints: dict[str, ArmJointConfig] = Field(min_length=1)
-    """Its joints, from the base to the tip."""
-    poses: dict[str, dict[str, float]] = {}
-    """Positions of joints [rad or m] by the name of the pose."""
-    controller: str
-    """The controller that leads its joints."""
-    follow: str
-    """The action of the controller."""
-    planner: ArmPlannerConfig = ArmPlannerConfig()
-    """How motions are planned."""
 
 
 @component("arm")
@@ -170,18 +103,10 @@ class Arm(Component[ArmConfig]):
 
     def configure(self) -> None:
         """Build the model of the body, its shapes and the planner."""
-        load_libraries()
-        config = self.config
-        self.space = space_of(config)
-        self.description = description_of(config)
-        self.kinematics = ArmKinematics(self.description, ArmGroup(self.space.names, config.base, config.tip))
-        adjacent, always = always_colliding(self.kinematics, self.space, self.description.meshes)
-        self.allowed = adjacent | always
-        if always:
-            self.info(f"links that always collide are not watched: {told(always, len(always))}")
-        one = config.planner
-        settings = PlannerSettings(one.type, one.time, one.attempts, one.seed)
-        self.planner = MotionPlanner(self.space, self.checker_of(()), settings, lambda: self.now)
+        self.works = ArmWorks(self.config, lambda: self.now)
+        if self.works.always:
+            words = told(self.works.always, len(self.works.always))
+            self.info(f"links that always collide are not watched: {words}")
         self.objects: tuple[PlacedObject, ...] | None = None  # of the scene; None while it is unknown
         self.measured: dict[str, tuple[float, float]] = {}  # position and velocity of all joints of the body
         self.task: ArmTask | None = None
@@ -198,20 +123,16 @@ class Arm(Component[ArmConfig]):
         for name, position, velocity in zip(message.name, message.position.tolist(), velocities, strict=False):
             self.measured[name] = position, velocity
 
-    def checker_of(self, objects: tuple[PlacedObject, ...]) -> MeshChecker:
-        """Return what tells collisions among these objects."""
-        return MeshChecker(self.kinematics, self.description.meshes, self.allowed, objects)
-
     def on_scene(self, message: SceneObjects) -> None:
         """Plan among other objects from now on; an object that cannot be is left out and told."""
         found = []
         for one in map(placed, message.objects):
-            if mistake := mistake_in(one, self.kinematics.body):
+            if mistake := mistake_in(one, self.works.kinematics.body):
                 self.warn(f"the object '{one.name}' is left out: {mistake}")
             else:
                 found.append(one)
         self.objects = tuple(found)
-        self.planner.checker = self.checker_of(self.objects)
+        self.works.place_objects(found)
         if self.task is not None:
             self.task.look_again()
 
@@ -230,7 +151,7 @@ class Arm(Component[ArmConfig]):
             self.end()
         if self.task is None and newer:
             self.goal = newer[0]
-            self.task = ArmTask(self, self.kinematics, self.planner, goal_of(self.goal.request))
+            self.task = ArmTask(self, self.works.kinematics, self.works.planner, goal_of(self.goal.request))
         if self.task is not None:
             self.task.advance()
             self.end()
@@ -317,28 +238,3 @@ def placed(message: SceneObject) -> PlacedObject:
     return PlacedObject(
         message.name, Geometry(message.shape, tuple(message.size.tolist())), message.link, pose, message.touches
     )
-
-
-def dimensions_of(config: ArmConfig) -> dict[str, Dimension]:
-    """Return what the positions of its joints measure."""
-    return {name: LENGTH if one.slides else ANGLE for name, one in config.joints.items()}
-
-
-def space_of(config: ArmConfig) -> JointSpace:
-    """Return the joints of an arm."""
-    return JointSpace(
-        tuple(
-            ArmJoint(
-                name, MotionLimits(one.lower, one.upper, one.velocity, one.acceleration), one.is_continuous, one.slides
-            )
-            for name, one in config.joints.items()
-        )
-    )
-
-
-def description_of(config: ArmConfig) -> Description:
-    """Return the body that an arm is part of; the plan has only what could be read."""
-    root = read_urdf(config.urdf, "urdf")
-    if not isinstance(root, XmlElement):
-        raise ValueError(root.message)
-    return Description(config.urdf, read_body(root)[0], {name: Path(path) for name, path in config.meshes.items()})

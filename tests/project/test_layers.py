@@ -48,13 +48,14 @@ GROUND = {
 ABOVE = {
     "__main__": "cli.main",
     "actuation": "control devices",
+    "arm_config": "body control motion",
     "body": "",
     "bus": "sdk.bound",
     "bus_types": "actuation",
     "check_runner": "missions.analysis model.doubts model.robot",
     "checks": "actuation body.model check_runner composition diagnostics missions model mux params sdk sections",
-    "cli": "actuation body bus compiler composition controller_requests devices diagnostics.requests doctor "
-    "executive.requests exporting finding_pages importing inspection lsp.server mission_tests missions model "
+    "cli": "actuation arm_config body bus compiler composition controller_requests devices diagnostics.requests "
+    "doctor executive.requests exporting finding_pages importing inspection lsp.server mission_tests missions model motion "
     "mux.requests params plan recording rendering replay runtime scaffold scene_requests schema.documents sdk sections "
     "systems",
     "controller_interface": "control sdk",
@@ -62,9 +63,9 @@ ABOVE = {
     "controller_requests": "",
     "controllers": "control controller_interface sdk",
     "compiler": "check_runner composition model plan",
-    "components": "actuation body control controller_interface controller_manager controller_requests devices "
-    "diagnostics executive missions monitors motion mux navigation scene_requests sdk servo_bus_config servo_bus_line "
-    "servo_report sim twins.fault_script",
+    "components": "actuation arm_config body control controller_interface controller_manager controller_requests "
+    "devices diagnostics executive missions monitors motion mux navigation scene_requests sdk servo_bus_config "
+    "servo_bus_line servo_report sim twins.fault_script",
     "servo_report": "actuation control",
     "composition": "body.description diagnostics.settings sections",
     "control": "",
