@@ -55,9 +55,9 @@ ABOVE = {
     "check_runner": "missions.analysis model.doubts model.robot",
     "checks": "actuation body.model check_runner composition diagnostics missions model mux params sdk sections",
     "cli": "actuation arm_config body bus compiler composition controller_requests devices diagnostics.requests "
-    "doctor executive.requests exporting finding_pages importing inspection lsp.server mission_tests missions model motion "
-    "mux.requests params plan recording rendering replay runtime scaffold scene_requests schema.documents sdk sections "
-    "systems",
+    "doctor executive.requests exporting finding_pages importing inspection lsp.server mission_tests missions model "
+    "motion mux.requests params plan recording rendering replay runtime scaffold scene_requests schema.documents sdk "
+    "sections systems",
     "controller_interface": "control sdk",
     "controller_manager": "controller_interface sdk",
     "controller_requests": "",
