@@ -177,7 +177,7 @@ class Subscription(Generic[M]):
         type_hash = self._process.wire.hash_of(self._message)
         is_part_of_an_action = "/_" in self.route[0]  # nothing is published there until there is a goal
         speaks = expects_speech(self._qos) and not is_part_of_an_action
-        return TopicReader(self.owner, self.route, type_hash, self._arrived, speaks)
+        return TopicReader(self.owner, self.route, type_hash, self._arrived, speaks, self._qos is Qos.LATCHED)
 
     def listen(self) -> None:
         """Start to receive from other processes."""

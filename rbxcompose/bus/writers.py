@@ -27,6 +27,7 @@ class TopicReader:
     type_hash: str
     arrived: float
     expects_speech: bool  # an existing writer should publish before long, unlike one of events or commands
+    is_latched: bool = False  # what came before the whole robot was active counts, too
 
 
 class Writers:
@@ -66,8 +67,10 @@ class Writers:
                 return f"'{_name(writer)}' publishes {version} than '{reader.owner}' reads"
         if not writers or not reader.expects_speech:
             return ""
-        since = max(started, min(writer.since for writer in writers))
-        if reader.arrived >= since or now - since <= SILENCE:
+        known = min(writer.since for writer in writers)
+        since = max(started, known)
+        # The only message of a latched topic may come while the robot starts, and before the token of its publisher.
+        if reader.arrived >= (known - SILENCE if reader.is_latched else since) or now - since <= SILENCE:
             return ""
         names = " and ".join(dict.fromkeys(f"'{_name(writer)}'" for writer in writers))
         return f"'{reader.owner}' has received nothing on {topic} for {now - since:.0f} s, though {names} publishes it"

@@ -79,6 +79,14 @@ def test_a_publisher_that_comes_back_must_be_heard_again() -> None:
     assert writers.trouble(spoken, 61.0 + SILENCE, 0.0)
 
 
+def test_the_only_message_of_a_latched_topic_may_come_while_the_robot_starts() -> None:
+    for arrived, is_told in ((0.9, False), (-math.inf, True), (-10.0, True)):
+        writers = Writers(HERE)
+        reader = TopicReader("charger", READER.route, Float32.HASH, arrived, expects_speech=True, is_latched=True)
+        writers.heard(token(), 1.0, is_there=True)
+        assert bool(writers.trouble(reader, 60.0, 3.0)) is is_told
+
+
 @given(st.text() | st.sampled_from([token(), "@ros2_lv/0/b2/1/2/MP/%/%/x/%level/a/b/c"]), st.booleans())
 def test_no_token_breaks_it(key: str, is_there: bool) -> None:
     writers = Writers(HERE)
