@@ -62,7 +62,7 @@ class ServoBusDriver(Component[ServoBusConfig]):
     @classmethod
     def ports(cls, config: ServoBusConfig) -> dict[str, Port[Any]]:
         """Return the ports: for each joint, for all, and those of the controllers."""
-        states = Out(JointState, "joint_states", rate=config.rate / math.ceil(config.rate / PUBLISHED - 1e-9))
+        states = Out(JointState, "joint_states", rate=config.rate / cycles_between(config))
         found = super().ports(config) | {"joint_states": states} | joint_ports(config)
         for name, setup in config.controllers.items():
             ports = controller_type(setup.type).ports(name, setup.config)
@@ -108,6 +108,7 @@ class ServoBusDriver(Component[ServoBusConfig]):
         """Open the bus, real or simulated; nothing moves."""
         config, self.at_end = self.config, ExitStack()
         self.period = 1.0 / config.rate
+        self.pause = (cycles_between(config) - 0.5) * self.period  # [s] between two joint states, cycles being late
         self.periods = Periods(self.period)
         drives, mimics = drives_of(config), mimics_of(config.joints)
         is_real_time = isinstance(self.context.clock, MonotonicClock)
@@ -195,7 +196,7 @@ class ServoBusDriver(Component[ServoBusConfig]):
         self.reboots.step(self.now)
         while self.cycle.notes:
             self.info(self.cycle.notes.pop(0))
-        if self.now - self.published_at >= 1 / PUBLISHED - 1e-9:
+        if self.now - self.published_at >= self.pause:
             self.published_at = self.now
             self.publish()
 
@@ -390,3 +391,8 @@ class ServoBusDriver(Component[ServoBusConfig]):
         except PortError as error:
             self.warn(f"the joints could not be relaxed: {error}")
         self.at_end.close()
+
+
+def cycles_between(config: ServoBusConfig) -> int:
+    """Return after how many cycles joint states are published."""
+    return math.ceil(config.rate / PUBLISHED - 1e-9)
