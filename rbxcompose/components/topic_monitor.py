@@ -35,7 +35,7 @@ class TopicMonitor(Component[TopicMonitorConfig]):
     Outputs of the robot's own components that declare a rate are watched without it.
 
     Example:
-        scan_watch: {type: topic_monitor, topic: scan, message: sensor_msgs/JointState, rate: 10 Hz, oldest: 0.5 s}
+        scan_watch: {type: topic_monitor, topic: scan, message: sensor_msgs/LaserScan, rate: 10 Hz, oldest: 0.5 s}
     """
 
     rate = 1.0

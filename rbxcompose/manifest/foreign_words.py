@@ -31,12 +31,11 @@ _CURES = {
     "the clock belongs to the bus: write 'clock: external' below 'bus'": "use_sim_time",
     "joints are driven by the sections 'buses', 'actuators', 'joints' and 'controllers'": "ros2_control "
     "controller_manager hardware_interface transmission transmissions",
+    "'rbx: 1' is the version of the file: remove it": "version",
     "a component has a 'type' instead": "package pkg executable exec node_type",
 }
 CURES: Mapping[str, str] = {name: cure for cure, names in _CURES.items() for name in names.split()}
 """What to do instead of a key that has no counterpart."""
-BELOW: Mapping[tuple[str, str], str] = {}
-"""What to do instead of a key below an entry of such a map."""
 MESSAGES: Mapping[str, str] = {
     "Bool": "flag",
     "String": "text",

@@ -9,13 +9,235 @@ from dataclasses import field
 from typing import TYPE_CHECKING, ClassVar
 
 from rbxcompose.dataclass import dataclass
-from rbxcompose.msgs import std_msgs
+from rbxcompose.msgs import geometry_msgs, std_msgs
 from rbxcompose.msgs.arrays import ArrayMessage, zeros
-from rbxcompose.msgs.types import Fields
+from rbxcompose.msgs.types import Fields, Message
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BatteryState(ArrayMessage):
+    """A battery: voltage [V], current [A], charge and capacities [Ah], percentage from 0 to 1; NaN where it is unknown."""
+
+    TYPE: ClassVar[str] = "sensor_msgs/msg/BatteryState"
+    HASH: ClassVar[str] = "RIHS01_4bee5dfce981c98faa6828b868307a0a73f992ed0789f374ee96c8f840e69741"
+    FIELDS: ClassVar[Fields] = {
+        "header": "std_msgs/msg/Header",
+        "voltage": "float32",
+        "temperature": "float32",
+        "current": "float32",
+        "charge": "float32",
+        "capacity": "float32",
+        "design_capacity": "float32",
+        "percentage": "float32",
+        "power_supply_status": "uint8",
+        "power_supply_health": "uint8",
+        "power_supply_technology": "uint8",
+        "present": "bool",
+        "cell_voltage": "float32[]",
+        "cell_temperature": "float32[]",
+        "location": "string",
+        "serial_number": "string",
+    }
+
+    POWER_SUPPLY_STATUS_UNKNOWN: ClassVar[int] = 0
+    POWER_SUPPLY_STATUS_CHARGING: ClassVar[int] = 1
+    POWER_SUPPLY_STATUS_DISCHARGING: ClassVar[int] = 2
+    POWER_SUPPLY_STATUS_NOT_CHARGING: ClassVar[int] = 3
+    POWER_SUPPLY_STATUS_FULL: ClassVar[int] = 4
+    POWER_SUPPLY_HEALTH_UNKNOWN: ClassVar[int] = 0
+    POWER_SUPPLY_HEALTH_GOOD: ClassVar[int] = 1
+    POWER_SUPPLY_HEALTH_OVERHEAT: ClassVar[int] = 2
+    POWER_SUPPLY_HEALTH_DEAD: ClassVar[int] = 3
+    POWER_SUPPLY_HEALTH_OVERVOLTAGE: ClassVar[int] = 4
+    POWER_SUPPLY_HEALTH_UNSPEC_FAILURE: ClassVar[int] = 5
+    POWER_SUPPLY_HEALTH_COLD: ClassVar[int] = 6
+    POWER_SUPPLY_HEALTH_WATCHDOG_TIMER_EXPIRE: ClassVar[int] = 7
+    POWER_SUPPLY_HEALTH_SAFETY_TIMER_EXPIRE: ClassVar[int] = 8
+    POWER_SUPPLY_TECHNOLOGY_UNKNOWN: ClassVar[int] = 0
+    POWER_SUPPLY_TECHNOLOGY_NIMH: ClassVar[int] = 1
+    POWER_SUPPLY_TECHNOLOGY_LION: ClassVar[int] = 2
+    POWER_SUPPLY_TECHNOLOGY_LIPO: ClassVar[int] = 3
+    POWER_SUPPLY_TECHNOLOGY_LIFE: ClassVar[int] = 4
+    POWER_SUPPLY_TECHNOLOGY_NICD: ClassVar[int] = 5
+    POWER_SUPPLY_TECHNOLOGY_LIMN: ClassVar[int] = 6
+    POWER_SUPPLY_TECHNOLOGY_TERNARY: ClassVar[int] = 7
+    POWER_SUPPLY_TECHNOLOGY_VRLA: ClassVar[int] = 8
+
+    header: std_msgs.Header = field(default_factory=std_msgs.Header)
+    voltage: float = 0.0
+    temperature: float = 0.0
+    current: float = 0.0
+    charge: float = 0.0
+    capacity: float = 0.0
+    design_capacity: float = 0.0
+    percentage: float = 0.0
+    power_supply_status: int = 0
+    power_supply_health: int = 0
+    power_supply_technology: int = 0
+    present: bool = False
+    cell_voltage: NDArray[np.float32] = field(default_factory=lambda: zeros("float32", 0))
+    cell_temperature: NDArray[np.float32] = field(default_factory=lambda: zeros("float32", 0))
+    location: str = ""
+    serial_number: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class RegionOfInterest(Message):
+    """A part of a picture, in pixels."""
+
+    TYPE: ClassVar[str] = "sensor_msgs/msg/RegionOfInterest"
+    HASH: ClassVar[str] = "RIHS01_ad16bcba5f9131dcdba6fbded19f726f5440e3c513b4fb586dd3027eeed8abb1"
+    FIELDS: ClassVar[Fields] = {
+        "x_offset": "uint32",
+        "y_offset": "uint32",
+        "height": "uint32",
+        "width": "uint32",
+        "do_rectify": "bool",
+    }
+
+    x_offset: int = 0
+    y_offset: int = 0
+    height: int = 0
+    width: int = 0
+    do_rectify: bool = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CameraInfo(ArrayMessage):
+    """How a camera projects: its size in pixels, distortion d, matrices k, r and p, row by row."""
+
+    TYPE: ClassVar[str] = "sensor_msgs/msg/CameraInfo"
+    HASH: ClassVar[str] = "RIHS01_b3dfd68ff46c9d56c80fd3bd4ed22c7a4ddce8c8348f2f59c299e73118e7e275"
+    FIELDS: ClassVar[Fields] = {
+        "header": "std_msgs/msg/Header",
+        "height": "uint32",
+        "width": "uint32",
+        "distortion_model": "string",
+        "d": "float64[]",
+        "k": "float64[9]",
+        "r": "float64[9]",
+        "p": "float64[12]",
+        "binning_x": "uint32",
+        "binning_y": "uint32",
+        "roi": "sensor_msgs/msg/RegionOfInterest",
+    }
+
+    header: std_msgs.Header = field(default_factory=std_msgs.Header)
+    height: int = 0
+    width: int = 0
+    distortion_model: str = ""
+    d: NDArray[np.float64] = field(default_factory=lambda: zeros("float64", 0))
+    k: NDArray[np.float64] = field(default_factory=lambda: zeros("float64", 9))
+    r: NDArray[np.float64] = field(default_factory=lambda: zeros("float64", 9))
+    p: NDArray[np.float64] = field(default_factory=lambda: zeros("float64", 12))
+    binning_x: int = 0
+    binning_y: int = 0
+    roi: RegionOfInterest = field(default_factory=RegionOfInterest)
+
+
+@dataclass(frozen=True, slots=True)
+class CompressedImage(Message):
+    """A picture as a file holds it: `jpeg`, `png`."""
+
+    TYPE: ClassVar[str] = "sensor_msgs/msg/CompressedImage"
+    HASH: ClassVar[str] = "RIHS01_15640771531571185e2efc8a100baf923961a4d15d5569652e6cb6691e8e371a"
+    FIELDS: ClassVar[Fields] = {
+        "header": "std_msgs/msg/Header",
+        "format": "string",
+        "data": "uint8[]",
+    }
+
+    header: std_msgs.Header = field(default_factory=std_msgs.Header)
+    format: str = ""
+    data: bytes = b""
+
+
+@dataclass(frozen=True, slots=True)
+class FluidPressure(Message):
+    """A pressure [Pa]."""
+
+    TYPE: ClassVar[str] = "sensor_msgs/msg/FluidPressure"
+    HASH: ClassVar[str] = "RIHS01_22dfb2b145a0bd5a31a1ac3882a1b32148b51d9b2f3bab250290d66f3595bc32"
+    FIELDS: ClassVar[Fields] = {
+        "header": "std_msgs/msg/Header",
+        "fluid_pressure": "float64",
+        "variance": "float64",
+    }
+
+    header: std_msgs.Header = field(default_factory=std_msgs.Header)
+    fluid_pressure: float = 0.0
+    variance: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Illuminance(Message):
+    """A brightness [lx]."""
+
+    TYPE: ClassVar[str] = "sensor_msgs/msg/Illuminance"
+    HASH: ClassVar[str] = "RIHS01_b954b25f452fcf81a91c9c2a7e3b3fd85c4c873d452aecb3cfd8fd1da732a22d"
+    FIELDS: ClassVar[Fields] = {
+        "header": "std_msgs/msg/Header",
+        "illuminance": "float64",
+        "variance": "float64",
+    }
+
+    header: std_msgs.Header = field(default_factory=std_msgs.Header)
+    illuminance: float = 0.0
+    variance: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Image(Message):
+    """A picture without compression, row by row; `step` is the length of a row [B]."""
+
+    TYPE: ClassVar[str] = "sensor_msgs/msg/Image"
+    HASH: ClassVar[str] = "RIHS01_d31d41a9a4c4bc8eae9be757b0beed306564f7526c88ea6a4588fb9582527d47"
+    FIELDS: ClassVar[Fields] = {
+        "header": "std_msgs/msg/Header",
+        "height": "uint32",
+        "width": "uint32",
+        "encoding": "string",
+        "is_bigendian": "uint8",
+        "step": "uint32",
+        "data": "uint8[]",
+    }
+
+    header: std_msgs.Header = field(default_factory=std_msgs.Header)
+    height: int = 0
+    width: int = 0
+    encoding: str = ""
+    is_bigendian: int = 0
+    step: int = 0
+    data: bytes = b""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Imu(ArrayMessage):
+    """Attitude, angular velocity [rad/s] and acceleration [m/s^2], each with a covariance; -1 first: not measured."""
+
+    TYPE: ClassVar[str] = "sensor_msgs/msg/Imu"
+    HASH: ClassVar[str] = "RIHS01_7d9a00ff131080897a5ec7e26e315954b8eae3353c3f995c55faf71574000b5b"
+    FIELDS: ClassVar[Fields] = {
+        "header": "std_msgs/msg/Header",
+        "orientation": "geometry_msgs/msg/Quaternion",
+        "orientation_covariance": "float64[9]",
+        "angular_velocity": "geometry_msgs/msg/Vector3",
+        "angular_velocity_covariance": "float64[9]",
+        "linear_acceleration": "geometry_msgs/msg/Vector3",
+        "linear_acceleration_covariance": "float64[9]",
+    }
+
+    header: std_msgs.Header = field(default_factory=std_msgs.Header)
+    orientation: geometry_msgs.Quaternion = field(default_factory=geometry_msgs.Quaternion)
+    orientation_covariance: NDArray[np.float64] = field(default_factory=lambda: zeros("float64", 9))
+    angular_velocity: geometry_msgs.Vector3 = field(default_factory=geometry_msgs.Vector3)
+    angular_velocity_covariance: NDArray[np.float64] = field(default_factory=lambda: zeros("float64", 9))
+    linear_acceleration: geometry_msgs.Vector3 = field(default_factory=geometry_msgs.Vector3)
+    linear_acceleration_covariance: NDArray[np.float64] = field(default_factory=lambda: zeros("float64", 9))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,3 +259,243 @@ class JointState(ArrayMessage):
     position: NDArray[np.float64] = field(default_factory=lambda: zeros("float64", 0))
     velocity: NDArray[np.float64] = field(default_factory=lambda: zeros("float64", 0))
     effort: NDArray[np.float64] = field(default_factory=lambda: zeros("float64", 0))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Joy(ArrayMessage):
+    """Axes from -1 to 1, and buttons, of a joystick."""
+
+    TYPE: ClassVar[str] = "sensor_msgs/msg/Joy"
+    HASH: ClassVar[str] = "RIHS01_0d356c79cad3401e35ffeb75a96a96e08be3ef896b8b83841d73e890989372c5"
+    FIELDS: ClassVar[Fields] = {
+        "header": "std_msgs/msg/Header",
+        "axes": "float32[]",
+        "buttons": "int32[]",
+    }
+
+    header: std_msgs.Header = field(default_factory=std_msgs.Header)
+    axes: NDArray[np.float32] = field(default_factory=lambda: zeros("float32", 0))
+    buttons: NDArray[np.int32] = field(default_factory=lambda: zeros("int32", 0))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LaserScan(ArrayMessage):
+    """One turn of a planar laser: angles [rad], times [s], ranges [m]; a range outside of its limits counts as none."""
+
+    TYPE: ClassVar[str] = "sensor_msgs/msg/LaserScan"
+    HASH: ClassVar[str] = "RIHS01_64c191398013af96509d518dac71d5164f9382553fce5c1f8cca5be7924bd828"
+    FIELDS: ClassVar[Fields] = {
+        "header": "std_msgs/msg/Header",
+        "angle_min": "float32",
+        "angle_max": "float32",
+        "angle_increment": "float32",
+        "time_increment": "float32",
+        "scan_time": "float32",
+        "range_min": "float32",
+        "range_max": "float32",
+        "ranges": "float32[]",
+        "intensities": "float32[]",
+    }
+
+    header: std_msgs.Header = field(default_factory=std_msgs.Header)
+    angle_min: float = 0.0
+    angle_max: float = 0.0
+    angle_increment: float = 0.0
+    time_increment: float = 0.0
+    scan_time: float = 0.0
+    range_min: float = 0.0
+    range_max: float = 0.0
+    ranges: NDArray[np.float32] = field(default_factory=lambda: zeros("float32", 0))
+    intensities: NDArray[np.float32] = field(default_factory=lambda: zeros("float32", 0))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MagneticField(ArrayMessage):
+    """A magnetic field [T] with a covariance."""
+
+    TYPE: ClassVar[str] = "sensor_msgs/msg/MagneticField"
+    HASH: ClassVar[str] = "RIHS01_e80f32f56a20486c9923008fc1a1db07bbb273cbbf6a5b3bfa00835ee00e4dff"
+    FIELDS: ClassVar[Fields] = {
+        "header": "std_msgs/msg/Header",
+        "magnetic_field": "geometry_msgs/msg/Vector3",
+        "magnetic_field_covariance": "float64[9]",
+    }
+
+    header: std_msgs.Header = field(default_factory=std_msgs.Header)
+    magnetic_field: geometry_msgs.Vector3 = field(default_factory=geometry_msgs.Vector3)
+    magnetic_field_covariance: NDArray[np.float64] = field(default_factory=lambda: zeros("float64", 9))
+
+
+@dataclass(frozen=True, slots=True)
+class NavSatStatus(Message):
+    """Whether a receiver of satellites knows its place, and from which."""
+
+    TYPE: ClassVar[str] = "sensor_msgs/msg/NavSatStatus"
+    HASH: ClassVar[str] = "RIHS01_d1ed3befa628e09571bd273b888ba1c1fd187c9a5e0006b385d7e5e9095a3204"
+    FIELDS: ClassVar[Fields] = {
+        "status": "int8",
+        "service": "uint16",
+    }
+
+    STATUS_UNKNOWN: ClassVar[int] = -2
+    STATUS_NO_FIX: ClassVar[int] = -1
+    STATUS_FIX: ClassVar[int] = 0
+    STATUS_SBAS_FIX: ClassVar[int] = 1
+    STATUS_GBAS_FIX: ClassVar[int] = 2
+    SERVICE_UNKNOWN: ClassVar[int] = 0
+    SERVICE_GPS: ClassVar[int] = 1
+    SERVICE_GLONASS: ClassVar[int] = 2
+    SERVICE_COMPASS: ClassVar[int] = 4
+    SERVICE_GALILEO: ClassVar[int] = 8
+
+    status: int = 0
+    service: int = 0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NavSatFix(ArrayMessage):
+    """A place on the earth: latitude and longitude [deg], altitude [m] above the ellipsoid of WGS 84."""
+
+    TYPE: ClassVar[str] = "sensor_msgs/msg/NavSatFix"
+    HASH: ClassVar[str] = "RIHS01_62223ab3fe210a15976021da7afddc9e200dc9ec75231c1b6a557fc598a65404"
+    FIELDS: ClassVar[Fields] = {
+        "header": "std_msgs/msg/Header",
+        "status": "sensor_msgs/msg/NavSatStatus",
+        "latitude": "float64",
+        "longitude": "float64",
+        "altitude": "float64",
+        "position_covariance": "float64[9]",
+        "position_covariance_type": "uint8",
+    }
+
+    COVARIANCE_TYPE_UNKNOWN: ClassVar[int] = 0
+    COVARIANCE_TYPE_APPROXIMATED: ClassVar[int] = 1
+    COVARIANCE_TYPE_DIAGONAL_KNOWN: ClassVar[int] = 2
+    COVARIANCE_TYPE_KNOWN: ClassVar[int] = 3
+
+    header: std_msgs.Header = field(default_factory=std_msgs.Header)
+    status: NavSatStatus = field(default_factory=NavSatStatus)
+    latitude: float = 0.0
+    longitude: float = 0.0
+    altitude: float = 0.0
+    position_covariance: NDArray[np.float64] = field(default_factory=lambda: zeros("float64", 9))
+    position_covariance_type: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class PointField(Message):
+    """One value of each point of a cloud."""
+
+    TYPE: ClassVar[str] = "sensor_msgs/msg/PointField"
+    HASH: ClassVar[str] = "RIHS01_5c6a4750728c2bcfbbf7037225b20b02d4429634732146b742dee1726637ef01"
+    FIELDS: ClassVar[Fields] = {
+        "name": "string",
+        "offset": "uint32",
+        "datatype": "uint8",
+        "count": "uint32",
+    }
+
+    INT8: ClassVar[int] = 1
+    UINT8: ClassVar[int] = 2
+    INT16: ClassVar[int] = 3
+    UINT16: ClassVar[int] = 4
+    INT32: ClassVar[int] = 5
+    UINT32: ClassVar[int] = 6
+    FLOAT32: ClassVar[int] = 7
+    FLOAT64: ClassVar[int] = 8
+
+    name: str = ""
+    offset: int = 0
+    datatype: int = 0
+    count: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class PointCloud2(Message):
+    """A cloud of points, as rows of bytes that `fields` describe."""
+
+    TYPE: ClassVar[str] = "sensor_msgs/msg/PointCloud2"
+    HASH: ClassVar[str] = "RIHS01_9198cabf7da3796ae6fe19c4cb3bdd3525492988c70522628af5daa124bae2b5"
+    FIELDS: ClassVar[Fields] = {
+        "header": "std_msgs/msg/Header",
+        "height": "uint32",
+        "width": "uint32",
+        "fields": "sensor_msgs/msg/PointField[]",
+        "is_bigendian": "bool",
+        "point_step": "uint32",
+        "row_step": "uint32",
+        "data": "uint8[]",
+        "is_dense": "bool",
+    }
+
+    header: std_msgs.Header = field(default_factory=std_msgs.Header)
+    height: int = 0
+    width: int = 0
+    fields: tuple[PointField, ...] = ()
+    is_bigendian: bool = False
+    point_step: int = 0
+    row_step: int = 0
+    data: bytes = b""
+    is_dense: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Range(Message):
+    """One distance [m] within a cone [rad]."""
+
+    TYPE: ClassVar[str] = "sensor_msgs/msg/Range"
+    HASH: ClassVar[str] = "RIHS01_b42b62562e93cbfe9d42b82fe5994dfa3d63d7d5c90a317981703f7388adff3a"
+    FIELDS: ClassVar[Fields] = {
+        "header": "std_msgs/msg/Header",
+        "radiation_type": "uint8",
+        "field_of_view": "float32",
+        "min_range": "float32",
+        "max_range": "float32",
+        "range": "float32",
+        "variance": "float32",
+    }
+
+    ULTRASOUND: ClassVar[int] = 0
+    INFRARED: ClassVar[int] = 1
+
+    header: std_msgs.Header = field(default_factory=std_msgs.Header)
+    radiation_type: int = 0
+    field_of_view: float = 0.0
+    min_range: float = 0.0
+    max_range: float = 0.0
+    range: float = 0.0
+    variance: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class RelativeHumidity(Message):
+    """A humidity from 0 to 1."""
+
+    TYPE: ClassVar[str] = "sensor_msgs/msg/RelativeHumidity"
+    HASH: ClassVar[str] = "RIHS01_8687c99b4fb393cb2e545e407b5ea7fd0b5d8960bcd849a0f86c544740138839"
+    FIELDS: ClassVar[Fields] = {
+        "header": "std_msgs/msg/Header",
+        "relative_humidity": "float64",
+        "variance": "float64",
+    }
+
+    header: std_msgs.Header = field(default_factory=std_msgs.Header)
+    relative_humidity: float = 0.0
+    variance: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Temperature(Message):
+    """A temperature [degC]."""
+
+    TYPE: ClassVar[str] = "sensor_msgs/msg/Temperature"
+    HASH: ClassVar[str] = "RIHS01_72514a14126ab9f8a9abec974c78e5610a367b59db5da355ff1fb982d5bad4b8"
+    FIELDS: ClassVar[Fields] = {
+        "header": "std_msgs/msg/Header",
+        "temperature": "float64",
+        "variance": "float64",
+    }
+
+    header: std_msgs.Header = field(default_factory=std_msgs.Header)
+    temperature: float = 0.0
+    variance: float = 0.0

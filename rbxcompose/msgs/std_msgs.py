@@ -129,6 +129,19 @@ class Header(Message):
 
 
 @dataclass(frozen=True, slots=True)
+class Int16(Message):
+    """A whole number."""
+
+    TYPE: ClassVar[str] = "std_msgs/msg/Int16"
+    HASH: ClassVar[str] = "RIHS01_1dcc3464e47c288a55f943a389d337cdb06804de3f5cd7a266b0de718eee17e5"
+    FIELDS: ClassVar[Fields] = {
+        "data": "int16",
+    }
+
+    data: int = 0
+
+
+@dataclass(frozen=True, slots=True)
 class Int32(Message):
     """The message `std_msgs/msg/Int32`."""
 
@@ -136,6 +149,32 @@ class Int32(Message):
     HASH: ClassVar[str] = "RIHS01_b6578ded3c58c626cfe8d1a6fb6e04f706f97e9f03d2727c9ff4e74b1cef0deb"
     FIELDS: ClassVar[Fields] = {
         "data": "int32",
+    }
+
+    data: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Int64(Message):
+    """A whole number."""
+
+    TYPE: ClassVar[str] = "std_msgs/msg/Int64"
+    HASH: ClassVar[str] = "RIHS01_8cd1048c2f186b6bd9a92472dc1ce51723c0833a221e2b7aecfff111774f4b49"
+    FIELDS: ClassVar[Fields] = {
+        "data": "int64",
+    }
+
+    data: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Int8(Message):
+    """A whole number."""
+
+    TYPE: ClassVar[str] = "std_msgs/msg/Int8"
+    HASH: ClassVar[str] = "RIHS01_26525065a403d972cb672f0777e333f0c799ad444ae5fcd79e43d1e73bd0f440"
+    FIELDS: ClassVar[Fields] = {
+        "data": "int8",
     }
 
     data: int = 0
@@ -152,3 +191,55 @@ class String(Message):
     }
 
     data: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class UInt16(Message):
+    """A whole number from 0."""
+
+    TYPE: ClassVar[str] = "std_msgs/msg/UInt16"
+    HASH: ClassVar[str] = "RIHS01_08a406e4b022bc22e907f985d6a9e9dd1d4fbecae573549cf49350113e7757b1"
+    FIELDS: ClassVar[Fields] = {
+        "data": "uint16",
+    }
+
+    data: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class UInt32(Message):
+    """A whole number from 0."""
+
+    TYPE: ClassVar[str] = "std_msgs/msg/UInt32"
+    HASH: ClassVar[str] = "RIHS01_a5c874829b752bc5fa190024b0ad76f578cc278271e855c7d02a818b3516fb4a"
+    FIELDS: ClassVar[Fields] = {
+        "data": "uint32",
+    }
+
+    data: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class UInt64(Message):
+    """A whole number from 0."""
+
+    TYPE: ClassVar[str] = "std_msgs/msg/UInt64"
+    HASH: ClassVar[str] = "RIHS01_fbdc52018fc13755dce18024d1a671c856aa8b4aaf63adfb095b608f98e8c943"
+    FIELDS: ClassVar[Fields] = {
+        "data": "uint64",
+    }
+
+    data: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class UInt8(Message):
+    """A whole number from 0."""
+
+    TYPE: ClassVar[str] = "std_msgs/msg/UInt8"
+    HASH: ClassVar[str] = "RIHS01_6138bd83d8c3569cb80a667db03cfc1629f529fee79d944c39c34e352e72f010"
+    FIELDS: ClassVar[Fields] = {
+        "data": "uint8",
+    }
+
+    data: int = 0

@@ -4,21 +4,18 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from rbxcompose.manifest.foreign_words import BELOW, CURES
+from rbxcompose.manifest.foreign_words import CURES
 from rbxcompose.manifest.slips import RefusedValue, value_slip
 from rbxcompose.manifest.slips.section_too_deep import section_too_deep
 from rbxcompose.manifest.tree import MappingNode, TreeNode
 from rbxcompose.slips import Repair
-
-_ENTRY = 3  # steps from the name of a map to a key of one of its entries
 
 
 @value_slip("extra_forbidden", before=(section_too_deep,))
 def no_counterpart(place: RefusedValue, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise it by its name; a map below the name of a section is that section, indented too far."""
     key = str(place.path[-1])
-    around = str(place.path[-_ENTRY]) if len(place.path) >= _ENTRY else ""
-    cure = BELOW.get((around, key)) or CURES.get(key)
+    cure = CURES.get(key)
     if cure is None or not isinstance(node, MappingNode) or key in place.keys:
         return None
     if key == "profiles" and isinstance(node.entries[key].value, MappingNode):
