@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbxcompose.body.description import Description
-from rbxcompose.body.model import BodyJoint
+from rbxcompose.body.model import Body, BodyJoint
 from rbxcompose.body.pinocchio_model import PinocchioModel
 from rbxcompose.dataclass import dataclass
 from rbxcompose.geometry import Transform3
@@ -42,6 +42,7 @@ class ArmKinematics:
         self._positions: Mapping[str, float] = {}
         self._base = self.whole.q({})
         self._tip = self.whole.frames[group.tip]
+        self._way = _way(self.body, group.tip)
         columns = np.zeros((self.whole.model.nv, len(group.joints)))
         for entry in self._entries:
             columns[entry.column, entry.index] = entry.multiplier
@@ -54,7 +55,12 @@ class ArmKinematics:
 
     def tip_pose(self, values: Array) -> Transform3:
         """Return the frame of the tip in that of the root, by our own kinematics."""
-        return self.poses(values)[self.group.tip]
+        positions = {**self._positions, **dict(zip(self.group.joints, values.tolist(), strict=True))}
+        found = Transform3()
+        for joint in self._way:
+            at = joint.at(self.body.position(joint, positions)) if joint.moves else joint.origin
+            found = found.compose(at)
+        return found
 
     def poses(self, values: Array) -> dict[str, Transform3]:
         """Return the frame of every link in that of the root, by our own kinematics."""
@@ -101,6 +107,15 @@ class ArmKinematics:
         index = self.group.joints.index(leader)
         column = self.whole.model.joints[self.whole.model.getJointId(name)].idx_v
         return _Entry(self.whole.places[name], column, index, multiplier, offset, joint.kind == "continuous")
+
+
+def _way(body: Body, link: str) -> list[BodyJoint]:
+    """Return the joints from the root to a link."""
+    found: list[BodyJoint] = []
+    while (above := body.joint_above.get(link)) is not None:
+        found.append(above)
+        link = above.parent
+    return found[::-1]
 
 
 def _leader(joint: BodyJoint, joints: Mapping[str, BodyJoint]) -> tuple[str, float, float]:

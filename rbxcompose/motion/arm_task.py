@@ -24,8 +24,8 @@ Array = NDArray[np.float64]
 T = TypeVar("T")
 Solving = Generator[None, None, PoseSolutions]
 
-MOVED = 0.02  # [rad or m] by which a joint may be elsewhere when a motion begins than when it was planned
-AT_REST = 0.05  # [rad/s or m/s]; no motion is planned for an arm that is faster
+MOVED = 0.035  # [rad or m] by which a joint may be elsewhere when a motion begins than when it was planned
+AT_REST, CALM = 0.05, 0.2  # [rad/s or m/s], [s]; a joint that is faster is at rest if it gets nowhere for this long
 SETTLING = 3.0  # [s] that an arm may take to report itself, and to come to rest
 REPLANS = 2  # times that a motion is planned again because the arm was elsewhere
 SLICES = 16  # of planning in one call, so that the same goal takes the same time on a stepped clock
@@ -89,6 +89,8 @@ class ArmTask:
         self._aims: list[Array] = []  # positions that would do, the next one to try first
         self._stage: Callable[[], None] = self._settle
         self._began, self._replans = site.now, 0
+        self._seen: Array | None = None  # where the arm was while it seemed to move, and since when it has been there
+        self._seen_at = 0.0
         self._start = np.zeros(len(self.space.joints))
 
     @property
@@ -131,7 +133,7 @@ class ArmTask:
             return
         unknown = [name for name in names if name not in measured]
         fast = [name for name in names if name in measured and abs(measured[name][1]) > AT_REST]
-        if not unknown and not fast:
+        if not unknown and (not fast or self._is_calm()):
             self._begin_planning()
         elif self._site.now - self._began >= SETTLING:
             words = ", ".join(f"'{name}'" for name in unknown or fast)
@@ -139,6 +141,13 @@ class ArmTask:
                 self._fail(MotionReason.UNKNOWN_START, f"nothing has reported where {words} is")
             else:
                 self._fail(MotionReason.START_MOVED, f"{words} did not come to rest within {SETTLING:g} s")
+
+    def _is_calm(self) -> bool:
+        """Return whether the arm gets nowhere, although velocities are measured: those of servos are noisy."""
+        here, now = self._where(), self._site.now
+        if self._seen is None or float(np.max(np.abs(here - self._seen))) > MOVED:
+            self._seen, self._seen_at = here, now
+        return now - self._seen_at >= CALM
 
     def _begin_planning(self) -> None:
         measured, names = self._site.measured, self.space.names

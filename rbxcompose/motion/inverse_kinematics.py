@@ -83,6 +83,7 @@ def solved(
     *,
     seed: int,
     restarts: int = RESTARTS,
+    enough: int = ENOUGH,
 ) -> Generator[None, None, PoseSolutions]:
     """Return solutions within the limits of joints; it yields after each attempt. The same seed gives the same."""
     free: list[Array] = []
@@ -98,7 +99,7 @@ def solved(
             and _is_verified(kinematics, target, values)
         ):
             (free if is_free(values) else colliding).append(values)
-        if len(free) >= ENOUGH:
+        if len(free) >= enough:
             break
         yield
     return PoseSolutions(_sorted(free, start), _sorted(colliding, start), nearest, attempts)

@@ -28,7 +28,7 @@ class Pushed(dict[str, tuple[float, float]]):
 
     def __getitem__(self, name: str) -> tuple[float, float]:
         position, velocity = super().__getitem__(name)
-        self[name] = position + 0.02, velocity
+        self[name] = position + 0.05, velocity
         return position, velocity
 
 
@@ -181,3 +181,17 @@ def test_a_motion_stops_for_an_object_that_comes_into_its_way() -> None:
     assert task.failure is not None
     assert task.failure.reason is MotionReason.PATH_IN_COLLISION
     assert "'block'" in task.failure.text
+
+
+def test_an_arm_whose_velocities_are_noise_is_at_rest_and_one_that_moves_is_not() -> None:
+    for speed, is_at_rest in ((0.0, True), (0.3, False)):
+        site = Site()
+        task = ArmTask(site, KINEMATICS, PLANNER, ArmGoal("aside"))
+        for cycle in range(100):
+            if task.is_over or site.sent:
+                break
+            site.now = cycle * 0.05
+            site.measured = {name: (value + speed * site.now, 0.6) for name, value in AT.items()}
+            task.advance()
+        assert bool(site.sent) is is_at_rest
+        assert (task.failure is None) is is_at_rest

@@ -14,6 +14,7 @@ from rbxcompose.bus.bus import Bus
 from rbxcompose.clock import MonotonicClock
 from rbxcompose.levels import Level
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray, DiagnosticStatus
+from rbxcompose.msgs.rbxcompose_msgs import Recharge
 from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.msgs.std_srvs import Trigger
 from rbxcompose.plan.model import Plan
@@ -25,7 +26,7 @@ from rbxcompose.runtime.process_group.inbox import CallbackInbox
 from rbxcompose.runtime.process_group.worker import LONGEST
 from rbxcompose.runtime.records import Record
 from rbxcompose.scheduler import Scheduler
-from rbxcompose.sdk import Calls, Component, Config, In, Out, Refused, Reply, Serves, component
+from rbxcompose.sdk import Calls, Component, Config, In, Out, Refused, Reply, Serves, ServesAction, component
 from rbxcompose.testing import Bench, instance
 
 PATIENCE = 10.0  # [s]
@@ -66,6 +67,11 @@ class Planner(Component[NoConfig]):
     done = Out(Float32, "done", qos=Qos.EVENT)
     plan = Serves(Trigger, "plan")
     helper = Calls(Trigger, "help")
+    trip = ServesAction(Recharge, "trip")
+    tour = ServesAction(Recharge, "tour")
+
+    def accept_tour(self, goal: Recharge.Goal) -> str:
+        return ""
 
     def configure(self) -> None:
         self.threads: set[str] = {threading.current_thread().name}
@@ -256,6 +262,13 @@ def test_orders_wait_for_it_and_commands_are_refused_meanwhile(process: Process)
     Planner.gate.opened.set()
     process.until(lambda: process.planner.stops == 1 and not process.host.hosted["planner"].is_busy)
     assert process.host.ask("planner", PlanRoute("dock")) == "route to dock"
+
+
+def test_goals_are_refused_meanwhile_only_where_it_has_a_say_in_them(process: Process) -> None:
+    process.send("work", 1.0)
+    refused = {one.name: process.host.hosted["planner"].refusal(one) for one in (Planner.trip, Planner.tour)}
+    assert refused == {"trip": "", "tour": "'planner' is busy"}
+    Planner.gate.opened.set()
 
 
 def test_a_fault_in_its_thread_restarts_it_alone(process: Process) -> None:
