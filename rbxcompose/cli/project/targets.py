@@ -28,7 +28,7 @@ Good: name the mission in a robot, or leave it out of the command.
 
 _USE = "name it in a robot ('missions:', 'include:')"
 _MANIFESTS = ("*.yaml", "*.yml")
-_ROBOTS = "robots"
+_ROBOTS, _SYSTEMS = "robots", "systems"
 
 
 @dataclass(slots=True)
@@ -68,7 +68,9 @@ def targets(paths: Iterable[str]) -> Targets:
             robots = [written] if (path / ROBOT_FILE).exists() else robots_below(path)
             tests = [] if robots else tests_below(path)
             out.tests += tests
-            out.robots += robots if robots or tests else [written]
+            systems = systems_of(path)
+            out.systems += systems
+            out.robots += robots if robots or tests or systems else [written]
         elif kind_of(path) in ("Robot", ""):
             out.robots.append(written)
         elif kind_of(path) == TEST:
@@ -88,6 +90,13 @@ def robots_below(folder: Path) -> list[str]:
     base = folder / _ROBOTS if (folder / _ROBOTS).is_dir() else folder
     files = (path for depth in ("", "*/", "*/*/") for pattern in _MANIFESTS for path in base.glob(depth + pattern))
     return sorted(shown_name(path.resolve()) for path in files if kind_of(path) == "Robot")
+
+
+def systems_of(folder: Path) -> list[str]:
+    """Return the systems of a project, or of a folder of systems."""
+    base = folder / _SYSTEMS if (folder / _SYSTEMS).is_dir() else folder
+    files = (path for pattern in _MANIFESTS for path in base.glob(pattern))
+    return sorted(shown_name(path.resolve()) for path in files if kind_of(path) == SYSTEM)
 
 
 def tests_below(folder: Path) -> list[str]:

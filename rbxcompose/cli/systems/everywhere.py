@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from types import FrameType
 
 from rbxcompose.cli.output.console import FINDINGS, refuse, tell, tell_report
-from rbxcompose.cli.systems.remote import Remote, Running, on_all, send_all
+from rbxcompose.cli.systems.remote import UNREACHED, Remote, Running, on_all, send_all
 from rbxcompose.systems.bundle import bundle_of
 from rbxcompose.systems.model import System
 from rbxcompose.systems.reader import compile_system
@@ -30,15 +30,26 @@ def shares_of(system: System, arguments: argparse.Namespace) -> Shares:
     return {(host, one.name): remotes[host] for one in system.robots.values() for host in hosts_of(system, one)}
 
 
+def is_reachable(system: System) -> bool:
+    """Return whether each host can be told from the others; if not, tell why."""
+    here = [name for name, host in system.hosts.items() if host.ssh is None]
+    if len(here) > 1:
+        message = f"'{here[0]}' and '{here[1]}' have no 'ssh', and only one of them can be this machine"
+        refuse(UNREACHED.at(None, message, help=f"give the others 'ssh', or use --host {here[0]} where a verb has it"))
+    return len(here) <= 1
+
+
 def compiled(path: str, *, real: bool = False) -> System | None:
     """Return a system without errors; None after telling them."""
     system = compile_system(path, environment=os.environ, real=real)
     tell_report(system.report, system.sources)
-    return None if system.report.has_errors else system
+    return None if system.report.has_errors or not is_reachable(system) else system
 
 
 def up_everywhere(path: str, system: System, arguments: argparse.Namespace) -> int:
     """Bring the files to all hosts, start all shares, and show what they tell until the robots are down."""
+    if not is_reachable(system):
+        return FINDINGS
     shares = shares_of(system, arguments)
     bundle = bundle_of(system)
     folders = send_all({one.name: one for one in shares.values()}.values(), bundle)
