@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BatteryState(ArrayMessage):
-    """A battery: voltage [V], current [A], charge and capacities [Ah], percentage from 0 to 1; NaN where it is unknown."""
+    """A battery: [V], [A], charge and capacities [Ah], percentage from 0 to 1; NaN where it is unknown."""
 
     TYPE: ClassVar[str] = "sensor_msgs/msg/BatteryState"
     HASH: ClassVar[str] = "RIHS01_4bee5dfce981c98faa6828b868307a0a73f992ed0789f374ee96c8f840e69741"
