@@ -11,7 +11,16 @@ from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.types import TYPES, Type, TypeKind, choice_of
 from rbxcompose.findings import Report
 from rbxcompose.manifest.scalars import describe
-from rbxcompose.manifest.tree import BROKEN, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode, key_span
+from rbxcompose.manifest.tree import (
+    BROKEN,
+    KeyPath,
+    MappingNode,
+    ScalarNode,
+    SequenceNode,
+    TreeNode,
+    key_span,
+    value_span,
+)
 from rbxcompose.manifest.validate import (
     MISSING_KEY,
     NOT_A_CHOICE,
@@ -81,6 +90,11 @@ def read_argument(name: str, node: TreeNode, path: KeyPath, report: Report) -> D
                 report.add(WRONG_TYPE.at(key_span(node, (key,)), f"'{key}' does not apply to {declared.phrase}"))
                 continue
             bounds[key] = read_value(bound, declared, key, report)
+    least, most = bounds.get("min"), bounds.get("max")
+    if BROKEN not in bounds.values() and None not in (least, most) and size_of(least) > size_of(most):
+        place = value_span(node, ("min",))
+        report.add(OUT_OF_RANGE.at(place, f"'min' is above 'max', {show(most)}", help="exchange them"))
+        bounds.clear()
     return DeclaredArgument(name, declared, node.get("default"), bounds.get("min"), bounds.get("max"))
 
 

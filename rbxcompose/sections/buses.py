@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Literal
 
-from pydantic import Field, WithJsonSchema
+from pydantic import AfterValidator, Field, WithJsonSchema
 
 from rbxcompose.actuation.bus_types import bus_type_names
 from rbxcompose.actuation.torques import share_of
@@ -41,12 +41,19 @@ class TwinModel(Config):
     """Another seed gives other noise, the same one gives the same."""
 
 
+def _port(text: str) -> str:
+    """Refuse a name without its folder: each program would look for it in another one."""
+    if text and not text.startswith(("/", "dev:", "${")) and "://" not in text:
+        raise ValueError("must be a path such as '/dev/ttyUSB0', or 'dev:NAME' of 'devices'")
+    return text
+
+
 class BusOfServosModel(Config):
     """A line of servos, driven by a process of its own."""
 
     type: BusTypeName
     """What speaks on it."""
-    port: Annotated[str, Refers(DEVICE_PORT)] = ""
+    port: Annotated[str, Refers(DEVICE_PORT), AfterValidator(_port)] = ""
     """The serial port, such as `/dev/ttyUSB0`, or `dev:NAME` of a device; simulated servos need none."""
     baud: BitRate = Field(1_000_000, gt=0)
     """Bits per second."""
