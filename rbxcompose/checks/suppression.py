@@ -10,7 +10,7 @@ from rbxcompose.findings import Finding
 from rbxcompose.model.robot import Robot
 from rbxcompose.references import ANALYZER
 
-Path = tuple[str, ...]
+GroupPath = tuple[str, ...]
 
 
 @check("RBX5013", is_fixable=True, closed=(ANALYZER,))
@@ -57,32 +57,32 @@ def suppression(robot: Robot) -> Iterator[Finding]:
             yield suppression.at(place, f"the level of '{path[-1]}' would depend on itself: {names}", help="omit it")
 
 
-def _groups(analyzers: Mapping[str, AnalyzerModel], above: Path) -> Iterator[tuple[Path, AnalyzerModel]]:
+def _groups(analyzers: Mapping[str, AnalyzerModel], above: GroupPath) -> Iterator[tuple[GroupPath, AnalyzerModel]]:
     for name, one in analyzers.items():
         if one.kind in SHOWN:
             yield (*above, name), one
             yield from _groups(one.analyzers, (*above, name))
 
 
-def _keys(path: Path) -> list[str]:
+def _keys(path: GroupPath) -> list[str]:
     return [key for name in path[:-1] for key in (name, "analyzers")] + [path[-1]]
 
 
-def _meant(groups: Mapping[Path, AnalyzerModel], path: Path, name: str) -> Path | None:
+def _meant(groups: Mapping[GroupPath, AnalyzerModel], path: GroupPath, name: str) -> GroupPath | None:
     """Return the group that a name means for another one: the nearest one beside it or beside what is above it."""
     places = ((*path[:length], name) for length in range(len(path) - 1, -1, -1))
     return next((one for one in places if one in groups), None)
 
 
-def _circle(groups: Mapping[Path, AnalyzerModel], start: Path, first: Path) -> list[Path]:
+def _circle(groups: Mapping[GroupPath, AnalyzerModel], start: GroupPath, first: GroupPath) -> list[GroupPath]:
     """Return the way on which the level of `first` depends on that of `start`; empty if it does not."""
-    way: dict[Path, Path | None] = {first: None}
+    way: dict[GroupPath, GroupPath | None] = {first: None}
     waiting = [first]
     while waiting:
         path = waiting.pop()
         if path == start:
-            found: list[Path] = []
-            last: Path | None = path
+            found: list[GroupPath] = []
+            last: GroupPath | None = path
             while last is not None:
                 found.insert(0, last)
                 last = way[last]

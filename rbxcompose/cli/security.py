@@ -20,10 +20,12 @@ from rbxcompose.cli.project.kinds import is_system
 from rbxcompose.cli.systems.options import add_system_options
 from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, kind
+from rbxcompose.regular_files import read_regular
 from rbxcompose.systems.certificates import (
     AUTHORITY,
     CERTIFICATE,
     KEY,
+    LARGEST,
     NO_SECURITY,
     OpensslError,
     folder_of,
@@ -113,7 +115,7 @@ def _bring(system: System, host: str, folder: Path, arguments: argparse.Namespac
 
     remote = Remote(host, system.hosts[host], arguments.ssh_config)
     script = _RECEIVE.replace("NAME", system.name).replace("HOST", host)
-    files = {name: (folder / name).read_bytes() for name in (AUTHORITY, CERTIFICATE, KEY)}
+    files = {name: read_regular(folder / name, LARGEST) for name in (AUTHORITY, CERTIFICATE, KEY)}
     done = subprocess.run(remote.ssh(script), input=archive_of(files, mode=0o600), capture_output=True, check=False)
     if done.returncode == 0:
         return None

@@ -690,9 +690,7 @@ class SceneObject(ArrayMessage):
 
     name: str = ""
     shape: str = ""  # box, cylinder or sphere
-    size: NDArray[np.float64] = field(
-        default_factory=lambda: zeros("float64", 0)
-    )  # [m]: of a box its lengths along x, y and z, of a cylinder its radius and length, of a sphere its radius
+    size: NDArray[np.float64] = field(default_factory=lambda: zeros("float64", 0))  # [m]: sides, or radius and length
     link: str = ""  # of the body, with which it moves
     pose: geometry_msgs.Pose = field(default_factory=geometry_msgs.Pose)  # in the frame of the link
     touches: tuple[str, ...] = ()  # links that it may touch

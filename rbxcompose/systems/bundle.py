@@ -11,7 +11,10 @@ from pathlib import Path
 from rbxcompose.dataclass import dataclass
 from rbxcompose.manifest.files import project_of
 from rbxcompose.manifest.library import PREFIX
+from rbxcompose.regular_files import read_regular
 from rbxcompose.systems.model import System
+
+LARGEST = 50_000_000  # [B] of a file
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +49,7 @@ def files_of(system: System) -> tuple[str, dict[str, bytes]]:
     root = project_of(system.path)
     shown = [Path(name).resolve() for name in system.sources if not name.startswith(PREFIX)]
     own = {path for path in (system.path, *shown) if path.is_file() and path.is_relative_to(root)}
-    return _within(system.path, root), {_within(path, root): path.read_bytes() for path in own}
+    return _within(system.path, root), {_within(path, root): read_regular(path, LARGEST) for path in own}
 
 
 def _within(path: Path, root: Path) -> str:

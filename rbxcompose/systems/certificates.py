@@ -12,9 +12,12 @@ import subprocess
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from rbxcompose.atomic_files import replace_file
 from rbxcompose.plan.model import LinkTls
+from rbxcompose.regular_files import read_regular
 
 NO_SECURITY, MUTUAL = "none", "mtls"
+LARGEST = 100_000  # [B] of a key or certificate
 AUTHORITY, AUTHORITY_KEY, CERTIFICATE, KEY = "ca.pem", "ca_key.pem", "cert.pem", "key.pem"
 DAYS_OF_AUTHORITY, DAYS = 3650, 825
 _NEW_KEY = ("-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes")
@@ -83,7 +86,7 @@ def make_certificate(folder: Path, system: str, host: str, address: str | None) 
         "-out",
         f"{host}/{CERTIFICATE}",
     )
-    (own / AUTHORITY).write_bytes((folder / AUTHORITY).read_bytes())
+    replace_file(own / AUTHORITY, read_regular(folder / AUTHORITY, LARGEST))
     for name in ("extensions", "request.pem"):
         (own / name).unlink()
 

@@ -54,6 +54,10 @@ def test_the_package_has_the_texts_as_they_are_and_names_all_of_them(tmp_path: P
     written = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
     own = {
         "action/Grip.action",
+        "action/MoveArm.action",
+        "action/ReachPose.action",
+        "msg/SceneObject.msg",
+        "msg/SceneObjects.msg",
         "action/MoveJoints.action",
         "action/Recharge.action",
         "srv/SetBatteryLevel.srv",

@@ -115,7 +115,7 @@ TABLE = {
     **{name: frozenset(row.split()) for name, row in GROUND.items()},
     **{name: frozenset(row.split()) | GROUND.keys() for name, row in ABOVE.items()},
 }
-TYPE_CHECKING_BLOCKS = 14
+TYPE_CHECKING_BLOCKS = 15
 
 
 def imports(path: Path) -> set[str]:

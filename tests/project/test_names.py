@@ -19,6 +19,7 @@ NAMED_BY_ROS = {  # the messages have the names that ROS gave them
     "Clock",  # ours tells the time of which this one is the message
     "Empty",  # a message and a service
     "Quaternion",  # ours is the plain tuple of its numbers
+    "Temperature",  # ours is the unit of a setting
     "Time",  # ours is the unit of a setting
     "Vector3",  # ours is the plain tuple of its numbers
 }

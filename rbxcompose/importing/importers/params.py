@@ -16,8 +16,8 @@ from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode
 from rbxcompose.printable import plain
 
-Path = tuple[str, ...]
-GivenValues = dict[Path, Given[ParameterData]]
+ParameterPath = tuple[str, ...]
+GivenValues = dict[ParameterPath, Given[ParameterData]]
 
 # What programs of ROS have by themselves, and what decides here.
 _OF_ROS = {
