@@ -68,7 +68,7 @@ def test_the_package_has_the_texts_as_they_are_and_names_all_of_them(tmp_path: P
     assert all(f'"{name}"' in cmake for name in own)
     root = ElementTree.fromstring((folder / "package.xml").read_text())
     assert root.findtext("name") == "rbxcompose_msgs"
-    assert [one.text for one in root.iter("depend")] == ["action_msgs", "builtin_interfaces"]
+    assert [one.text for one in root.iter("depend")] == ["action_msgs", "builtin_interfaces", "geometry_msgs"]
 
 
 def test_an_export_overwrites_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
