@@ -42,9 +42,9 @@ class TwinModel(Config):
 
 
 def _port(text: str) -> str:
-    """Refuse a name without its folder: each program would look for it in another one."""
-    if text and not text.startswith(("/", "dev:", "${")) and "://" not in text:
-        raise ValueError("must be a path such as '/dev/ttyUSB0', or 'dev:NAME' of 'devices'")
+    """Refuse a name of Linux without its folder."""
+    if text.startswith("tty") and text.isalnum():
+        raise ValueError(f"must be a path: write '/dev/{text}', or 'dev:NAME' for one of 'devices'")
     return text
 
 
