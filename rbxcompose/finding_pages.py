@@ -28,7 +28,7 @@ FAMILIES = {
     "50": "diagnostics",
     "60": "process groups",
     "61": "systems of several hosts",
-    "70": "overlays",
+    "70": "overlays and settings",
     "80": "simulated and real",
     "90": "commands and running robots",
     "91": "new manifests",
