@@ -7,7 +7,11 @@ PYTEST ?= -n auto
 
 .PHONY: up test lint types unit soak bench docs messages lock clean
 
+# What the robot needs beside rbxcompose, such as the planning libraries of an arm, in the versions of the lock file.
 up: $(VENV)/.up
+	@extras=$$($(BIN)/rbxcompose needs $(ROBOT) --missing --pip 2>/dev/null || true); [ -z "$$extras" ] || { \
+		sed -n 's/^\([a-zA-Z0-9._-]*==[^ ;\\]*\).*/\1/p' requirements-test.lock > $(VENV)/versions.txt && \
+		$(BIN)/python -m pip install -q --disable-pip-version-check -c $(VENV)/versions.txt "$$extras"; }
 	@trap : INT; $(BIN)/rbxcompose up $(ROBOT) || test $$? -eq 130  # Ctrl-C is how a run ends
 
 test: lint types unit
@@ -23,7 +27,7 @@ unit: $(VENV)/.test  ## On all cores; `make unit PYTEST="-n 0 tests/bus"` runs s
 	$(BIN)/python -m pytest -q $(PYTEST)
 
 soak: $(VENV)/.test  ## Try many more random manifests and expressions, and fuzz if atheris is installed
-	$(BIN)/python -m pytest -q --soak tests/body tests/mutate tests/properties tests/hostile tests/fuzz tests/simulated_faults tests/io tests/net tests/exposure tests/faults tests/importing tests/systems
+	$(BIN)/python -m pytest -q --soak -o faulthandler_timeout=0 tests/body tests/mutate tests/properties tests/hostile tests/fuzz tests/simulated_faults tests/exporting/test_systemd_for_real.py tests/components/test_picking.py tests/robots/test_porter.py tests/robots/test_real_picking.py tests/io tests/net tests/exposure tests/faults tests/importing tests/systems
 	$(BIN)/python docs/quality.py
 	$(BIN)/python docs/robots_tried.py
 

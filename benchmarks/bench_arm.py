@@ -1,16 +1,19 @@
-"""Arms: inverse kinematics of arms that many know, where their descriptions are installed, and planned motions."""
+"""Arms: kinematics of arms that many know, where their descriptions are installed, and planned motions."""
 
 from __future__ import annotations
 
+import json
+import os
+import subprocess
+import sys
 import time
-from collections.abc import Generator
-from importlib.metadata import PackageNotFoundError, files
-from itertools import pairwise
+from collections.abc import Sequence
+from importlib.util import find_spec
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 
+from benchmarks.arm_scenes import PANDA, ROOT_LINK, BoxProblem, described, panda, problems
 from benchmarks.measuring import ROOT, Row, Samples
 from rbxcompose.arm_config import ArmConfig, ArmWorks
 from rbxcompose.body.description import Description
@@ -18,53 +21,64 @@ from rbxcompose.body.urdf import read_body
 from rbxcompose.body.xml_reader import XmlElement, read_urdf
 from rbxcompose.compiler import compile_robot
 from rbxcompose.control.limits import MotionLimits
+from rbxcompose.motion.arm_figures import NO_TRIES, Tries, call_time, free_pairs, inverse_tries, motion_tries
 from rbxcompose.motion.arm_kinematics import ArmKinematics
 from rbxcompose.motion.groups import chain
-from rbxcompose.motion.inverse_kinematics import PoseTarget, solved
-from rbxcompose.motion.joint_space import ArmJoint, JointSpace
-from rbxcompose.motion.planner import MotionPlan, MotionRequest
+from rbxcompose.motion.inverse_kinematics import SolverSettings
+from rbxcompose.motion.joint_space import ArmJoint, JointSpace, interpolated
 
-TARGETS, MOTIONS, EXACT = 500, 40, 1e-4
+TARGETS, MOTIONS, PROBLEMS, EXACT, STEP = 1000, 40, 10, 1e-4, 0.005
+PEER = "RBXCOMPOSE_ROBOPLAN"  # names a Python that has RoboPlan, if this one has not
 ARMS = {
-    "Panda": ("panda_description/urdf/panda.urdf", "panda_link0", "panda_hand"),
+    "Panda": (PANDA, "panda_link0", "panda_hand"),
     "UR5": ("ur_description/urdf/ur5_robot.urdf", "base_link", "tool0"),
     "TIAGo": ("tiago_description/robots/tiago.urdf", "torso_fixed_link", "arm_tool_link"),
 }
 HOW = f"positions of joints for {TARGETS} poses that it can take, within 0.1 mm and 0.1 mrad, from its rest"
-T = TypeVar("T")
+OWN = f"{PROBLEMS} each of a table, a bookshelf, a box and a cage, made by seeds"
 
 
 def rows() -> list[Row]:
     """Return the figures of arms."""
-    return [*(row for name in ARMS for row in _kinematics(name)), *_plans()]
+    found = []
+    for name, (file, base, tip) in ARMS.items():
+        if (path := described(file)) is not None:
+            found += _kinematics(name, *_arm(path, base, tip))
+    works = _works("porter")
+    found += _kinematics("porter, as Fetch", works.kinematics, works.space)
+    return [*found, *_motions(), *_problems()]
 
 
-def _kinematics(name: str) -> list[Row]:
-    file, base, tip = ARMS[name]
-    path = _description(file)
-    if path is None:
-        return []
+def _kinematics(name: str, arm: ArmKinematics, space: JointSpace) -> list[Row]:
+    """Return the rows of an arm, by plain code and by that of numba."""
+    goals, rest = space.samples(TARGETS, 7), np.zeros(len(space.joints))
+    what, settings = f"{name}, {len(space.joints)} joints", SolverSettings(tolerance=EXACT, angle_tolerance=EXACT)
+    found = []
+    for how, is_wanted, most in (("", False, 1.5), (", compiled", True, 0.3)):
+        if arm.hasten(is_wanted=is_wanted) is is_wanted:
+            tries = inverse_tries(arm, space, settings, rest, goals, time.process_time)
+            line = f"inverse kinematics of {what}{how}"
+            p99 = Samples(tries.times).p99
+            found += [
+                Row(line, "ms", HOW, 1e3 * tries.median, p99=1e3 * p99, most=most),
+                Row(f"{line}: solved", "%", HOW, 100 * tries.solved / tries.count, least=99.5),
+            ]
+    for word, with_jacobian in (("forward kinematics", False), ("Jacobian", True)):
+        took = call_time(lambda at, wish=with_jacobian: arm.tip(at, with_jacobian=wish), goals, time.process_time)  # type: ignore[misc]
+        found.append(Row(f"{word} of {what}", "us", "of the tip", 1e6 * took))
+    return found
+
+
+def _arm(path: Path, base: str, tip: str) -> tuple[ArmKinematics, JointSpace]:
     text = path.read_text(encoding="utf-8")
-    root = read_urdf(text, file)
+    root = read_urdf(text, path.name)
     if not isinstance(root, XmlElement):
         raise ValueError(root.message)
     description = Description(text, read_body(root)[0])
     group = chain(description.body, base, tip)
     if group is None:
-        raise ValueError(f"{name} has no arm from {base} to {tip}")
-    arm, space = ArmKinematics(description, group), JointSpace(tuple(_joint(description, one) for one in group.joints))
-    times, found = [], 0
-    for seed, goal in enumerate(space.samples(TARGETS, 7)):
-        target = PoseTarget(arm.tip_pose(goal), tolerance=EXACT, angle_tolerance=EXACT)
-        start = time.process_time()
-        solutions = _done(solved(arm, space, target, np.zeros(len(goal)), lambda values: True, seed=seed, enough=1))
-        times.append(1000 * (time.process_time() - start))
-        found += bool(solutions.free)
-    took, what = Samples(tuple(times)), f"inverse kinematics of {name}, {len(space.joints)} joints"
-    return [
-        Row(what, "ms", HOW, took.median, p99=took.p99, most=1.5),
-        Row(f"{what}: solved", "%", HOW, 100 * found / TARGETS, least=99.5),
-    ]
+        raise ValueError(f"{path.name} has no arm from {base} to {tip}")
+    return ArmKinematics(description, group), JointSpace(tuple(_joint(description, one) for one in group.joints))
 
 
 def _joint(description: Description, name: str) -> ArmJoint:
@@ -74,40 +88,92 @@ def _joint(description: Description, name: str) -> ArmJoint:
     return ArmJoint(name, MotionLimits(joint.limits.lower, joint.limits.upper), slides=joint.slides)
 
 
-def _description(file: str) -> Path | None:
-    """Return a file of the package example-robot-data, None without it."""
-    try:
-        there = files("example-robot-data") or []
-    except PackageNotFoundError:
-        return None
-    return next((Path(str(one.locate())) for one in there if str(one).endswith(file)), None)
-
-
-def _plans() -> list[Row]:
-    robot = compile_robot(str(ROOT / "robots" / "pi_robot"), environment={}).robot
-    config = robot.components["right_arm"].config if robot is not None else None
+def _works(robot: str) -> ArmWorks:
+    made = compile_robot(str(ROOT / "robots" / robot), environment={}).robot
+    config = made.components["right_arm"].config if made is not None else None
     if not isinstance(config, ArmConfig):
-        raise ValueError("robots/pi_robot has no right arm")
-    works = ArmWorks(config, time.process_time)
-    free = [one for one in works.space.samples(10 * MOTIONS, 3) if works.planner.checker.is_free(one)]
-    times, solved_ = [], 0
-    for start, goal in pairwise(free[: MOTIONS + 1]):
-        begin = time.process_time()
-        found = _done(works.planner.plan(MotionRequest(start, goal)))
-        times.append(1000 * (time.process_time() - begin))
-        solved_ += isinstance(found, MotionPlan)
-    took, what = Samples(tuple(times)), "a motion of pi_robot's arm between random positions"
+        raise ValueError(f"robots/{robot} has no right arm")
+    return ArmWorks(config, time.process_time)
+
+
+def _motions() -> list[Row]:
+    works = _works("pi_robot")
+    second = works.second_checker(())
+    tries = motion_tries(works.planner, free_pairs(works.planner, MOTIONS, 3), second.is_free_along, time.process_time)
     how = "searched, timed and examined every 0.005 rad on the shapes of the whole body"
+    return _told("a motion of pi_robot's arm between random positions", how, tries, 150)
+
+
+def _problems() -> list[Row]:
+    """Return the rows of our own problems for the Panda, by us and by RoboPlan."""
+    if (path := described(PANDA)) is None:
+        return []
+    works, total = panda(path), NO_TRIES
+    given = list(problems(works, PROBLEMS))
+    for one in given:
+        works.place_objects(one.objects)
+        second = works.second_checker(one.objects)
+        total = total.with_(
+            motion_tries(works.planner, [(one.start, one.goal)], second.is_free_along, time.process_time)
+        )
+    peer = _roboplan(path, works, given)
+    return _told("a motion of the Panda into boxes", f"{OWN}; searched, timed and examined", total, None, peer)
+
+
+def _told(what: str, how: str, tries: Tries, most: float | None, peer: Tries | None = None) -> list[Row]:
+    name = "RoboPlan, path only" if peer is not None else ""
+    theirs = peer or NO_TRIES
+    share = 100 * theirs.solved / theirs.count if theirs.count else None
     return [
-        Row(what, "ms", how, took.median, p99=took.p99, most=150),
-        Row(f"{what}: planned", "%", how, 100 * solved_ / (len(free[: MOTIONS + 1]) - 1)),
+        Row(what, "ms", how, 1e3 * tries.median, 1e3 * tries.p95, 1e3 * theirs.median if peer else None, name, most),
+        Row(f"{what}: planned", "%", how, 100 * tries.solved / tries.count, None, share, name),
+        Row(f"{what}: length", "rad", how, tries.length, None, theirs.length if peer else None, name),
+        Row(
+            f"{what}: in collision",
+            "",
+            "of those that were planned, by Pinocchio's own geometry, every 0.005 rad",
+            tries.colliding,
+            peer=theirs.colliding if peer else None,
+            against=name,
+            most=0,
+        ),
     ]
 
 
-def _done(work: Generator[None, None, T]) -> T:
-    while True:
-        try:
-            next(work)
-        except StopIteration as ended:
-            result: T = ended.value
-            return result
+def _roboplan(path: Path, works: ArmWorks, given: Sequence[BoxProblem]) -> Tries | None:
+    """Return how RoboPlan does; None if it is not installed."""
+    python = os.environ.get(PEER) or (sys.executable if find_spec("roboplan") is not None else "")
+    if not python:
+        return None
+    asked = {
+        "urdf": str(path),
+        "srdf": (path.parents[1] / "srdf/panda.srdf").read_text(encoding="utf-8"),
+        "packages": str(path.parents[4]),
+        "group": "arm",
+        "root": ROOT_LINK,
+        "joints": works.space.names,
+        "step": 0.02,
+        "problems": [
+            {"scenario": one.scenario, "boxes": one.boxes, "start": one.start.tolist(), "goal": one.goal.tolist()}
+            for one in given
+        ],
+    }
+    done = subprocess.run(
+        [python, str(Path(__file__).with_name("roboplan_ends.py"))],
+        input=json.dumps(asked),
+        env={**os.environ, "PYTHONPATH": ""},
+        stdout=subprocess.PIPE,
+        text=True,
+        check=True,
+    )
+    total = NO_TRIES
+    for one, answer in zip(given, json.loads(done.stdout), strict=True):
+        path_found = np.array(answer["path"])
+        if not len(path_found):
+            total = total.with_(Tries(1, 0, (answer["time"],)))
+            continue
+        length = float(np.linalg.norm(np.diff(path_found, axis=0), axis=1).sum())
+        second = works.second_checker(one.objects)
+        is_free = all(map(second.is_free, interpolated(path_found, STEP)))
+        total = total.with_(Tries(1, 1, (answer["time"],), (length,), int(not is_free)))
+    return total

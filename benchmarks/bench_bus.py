@@ -24,7 +24,8 @@ ROUNDS = 5
 HOPS = 200  # per round
 FLOODED = 100_000  # messages per round
 PACE = 0.01  # [s] between two twists, as a control loop of 100 Hz sends them
-ZENOH = "Zenoh alone"
+ZENOH, CODED = "Zenoh alone", "Zenoh, CDR and attachment"
+HOP = "Twist to another process and back, at 100 Hz"
 
 
 class End:
@@ -78,14 +79,14 @@ def _ends(*roles: str) -> Iterator[list[End]]:
     router = open_router(tcp_endpoint(port))
     try:
         commands = [[sys.executable, "-m", "benchmarks.bus_ends", role, str(port)] for role in roles]
-        with _started(commands, {}) as ends:
+        with started_ends(commands, {}) as ends:
             yield ends
     finally:
         router.close()  # type: ignore[no-untyped-call]
 
 
 @contextmanager
-def _ros_ends() -> Iterator[list[End]]:
+def ros_ends() -> Iterator[list[End]]:
     """Give an echo and an asker, or none where ROS 1 is not installed."""
     if not Ros.is_here():
         yield []
@@ -93,12 +94,13 @@ def _ros_ends() -> Iterator[list[End]]:
     with TemporaryDirectory() as folder:
         ros = Ros(Path(folder), free_port())
         commands = [[ROS_PYTHON, str(Path(__file__).with_name("ros_ends.py")), role] for role in ("echo", "asker")]
-        with ros.master(), _started(commands, ros.environment) as ends:
+        with ros.master(), started_ends(commands, ros.environment) as ends:
             yield ends
 
 
 @contextmanager
-def _started(commands: Sequence[Sequence[str]], environment: Mapping[str, str]) -> Iterator[list[End]]:
+def started_ends(commands: Sequence[Sequence[str]], environment: Mapping[str, str]) -> Iterator[list[End]]:
+    """Start processes that take orders, and end them."""
     with ExitStack() as stack:  # those that have begun are ended if another one fails
         ends = []
         for command in commands:
@@ -120,22 +122,22 @@ class _Times:
 
 def rows() -> list[Row]:
     """Return the figures of the bus."""
-    ours, bare, ros = _Times(), _Times(), _Times()
-    roles = ("our_echo", "bare_echo", "our_asker", "bare_asker")
-    with _ends(*roles) as (_, flooder, our_asker, bare_asker), _ros_ends() as ros_ends:
+    ours, bare, coding, ros = _Times(), _Times(), _Times(), _Times()
+    roles = ("our_echo", "bare_echo", "coding_echo", "our_asker", "bare_asker", "coding_asker")
+    with _ends(*roles) as (_, flooder, _, our_asker, bare_asker, coding_asker), ros_ends() as of_ros:
         for _ in range(ROUNDS):
-            sides = [(ours, our_asker), (bare, bare_asker), *((ros, end) for end in ros_ends[1:])]
+            sides = [(ours, our_asker), (bare, bare_asker), *((ros, end) for end in of_ros[1:])]
             for times, end in sides:
                 times.hops += end.ask("hop", HOPS, PACE)
+            coding.hops += coding_asker.ask("hop", HOPS, PACE)
             for times, end in sides:
                 times.asked += end.ask("ask", HOPS)
             ours.set += our_asker.ask("set", HOPS)
             _flood(ours, flooder, our_asker, OUR_FLOOD)
             _flood(bare, flooder, bare_asker, FLOOD)
-            if ros_ends:
-                ros.set += ros_ends[1].ask("set", HOPS)
-                _flood(ros, ros_ends[0], ros_ends[1])
-    return [*_beside_zenoh(ours, bare), *(_beside_ros(ours, ros) if ros.hops else [])]
+            if of_ros:
+                _flood(ros, of_ros[0], of_ros[1])
+    return [*_beside_zenoh(ours, bare, coding), *(_beside_ros(ours, ros) if ros.hops else [])]
 
 
 def _flood(times: _Times, flooder: End, end: End, *key: str) -> None:
@@ -146,10 +148,18 @@ def _flood(times: _Times, flooder: End, end: End, *key: str) -> None:
         getattr(times, name).append(answer[name])
 
 
-def _beside_zenoh(ours: _Times, bare: _Times) -> list[Row]:
+def _beside_zenoh(ours: _Times, bare: _Times, coding: _Times) -> list[Row]:
     others = "" if Ros.is_here() else "; ROS 1 not installed here"
     return [
-        _times("Twist to another process and back, at 100 Hz", f"two hops{others}", ours.hops, bare.hops, ZENOH, 1.2),
+        _times(HOP, f"two hops{others}", ours.hops, bare.hops, ZENOH, 1.2),
+        _times(HOP, "two hops", ours.hops, coding.hops, CODED),
+        _times(
+            f"the same with nothing but {CODED}",
+            "the least that ROS 2's wire costs in Python",
+            coding.hops,
+            bare.hops,
+            ZENOH,
+        ),
         _times("service call to another process", "there and back", ours.asked, bare.asked, ZENOH),
         _times("parameter set in another process", "checked and taken; beside a request", ours.set, bare.asked, ZENOH),
         _flow("Twists received from another process", "a flood of 100,000", ours.received, bare.received, ZENOH, 0.5),
@@ -158,11 +168,10 @@ def _beside_zenoh(ours: _Times, bare: _Times) -> list[Row]:
 
 
 def _beside_ros(ours: _Times, ros: _Times) -> list[Row]:
-    rospy, reconfigure = "rospy", "dynamic_reconfigure"
+    rospy = "rospy"
     return [
-        _times("Twist to another process and back, at 100 Hz", "two hops", ours.hops, ros.hops, rospy, 1.5),
+        _times(HOP, "two hops", ours.hops, ros.hops, rospy, 1.5),
         _times("service call to another process", "theirs: a new connection each", ours.asked, ros.asked, rospy, 0.5),
-        _times("parameter set in another process", "checked and taken", ours.set, ros.set, reconfigure, 0.5),
         _flow("Twists received, decoded and handled", "theirs: with a queue", ours.handled, ros.handled, rospy, 8),
     ]
 

@@ -5,24 +5,27 @@ An order is a JSON list of a method's name and its arguments; the answer is one 
 
 from __future__ import annotations
 
+import itertools
 import json
 import selectors
 import sys
 import threading
 import time
 from collections.abc import Callable
+from itertools import count
 from typing import Any
 
 import zenoh
 from zenoh.handlers import Callback
 
-from rbxcompose.bus.attachment import Attachment
+from rbxcompose.bus.attachment import Attachment, decode_attachment
 from rbxcompose.bus.bus import Bus
 from rbxcompose.bus.names import data_key
+from rbxcompose.bus.services import Client
 from rbxcompose.bus.zenoh_session import open_peer
 from rbxcompose.bus.zenoh_transport import ZenohTransport
 from rbxcompose.clock import MonotonicClock
-from rbxcompose.msgs.cdr import encode
+from rbxcompose.msgs.cdr import decode, encode
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.msgs.rcl_interfaces import Parameter, ParameterValue, SetParameters
 from rbxcompose.msgs.std_srvs import SetBool
@@ -32,12 +35,13 @@ from rbxcompose.runtime.process_group.host import Host
 from rbxcompose.runtime.process_group.inbox import CallbackInbox
 from rbxcompose.runtime.process_group.turns import Turns
 from rbxcompose.scheduler import Scheduler
+from rbxcompose.sdk.bound import Reply
 from rbxcompose.testing.bench import instance
 
 TWIST = Twist(linear=Vector3(x=0.3), angular=Vector3(z=-1.0))
 PAYLOAD = encode(TWIST)
 SOURCE = Attachment(1, 0, bytes(16)).encode()
-PING, PONG, ASK, FLOOD = "bare/ping", "bare/pong", "bare/ask", "bare/flood"
+ASK, FLOOD = "bare/ask", "bare/flood"
 OUR_FLOOD = data_key(0, "/flood", Twist.TYPE, Twist.HASH)
 PATIENCE = 10.0  # [s] for anything to come
 QUIET = 0.3  # [s] without a message after which a flood is over
@@ -161,8 +165,43 @@ class OurAsker(Ours):
         return self._back[0] - started
 
 
+class OurSetter(Ours):
+    """Sets parameters of a robot that runs, as a tool of ROS 2 does that stays connected."""
+
+    def __init__(self, port: int) -> None:
+        super().__init__(port)
+        self._count = itertools.count(1)
+
+    def set(self, component: str, name: str, number: int) -> list[float]:
+        """Return the times of setting a parameter to a value that it has never had, `number` times [s]."""
+        client = self.bus.client("setter", f"{component}/set_parameters", SetParameters)
+        self.until(lambda: client.is_available)
+        times = [_set(self, client, name, 50.0 + next(self._count) / 100.0) for _ in range(number)]
+        client.close()
+        return times
+
+
+def _set(end: Ours, client: Client[SetParameters.Request, SetParameters.Response], name: str, value: float) -> float:
+    answers: list[tuple[float, Reply[SetParameters.Response]]] = []
+
+    def take(reply: Reply[SetParameters.Response]) -> None:
+        answers.append((time.perf_counter(), reply))
+        end.inbox.wake()  # this thread waits for it, which no component would
+
+    parameter = Parameter(name=name, value=ParameterValue(type=DOUBLE, double_value=value))
+    started = time.perf_counter()
+    client(SetParameters.Request(parameters=(parameter,)), take)
+    end.until(lambda: answers)
+    ((ended, reply),) = answers
+    if reply.response is None or not reply.response.results[0].successful:
+        raise ValueError(f"'{name}' was not set: {reply}")
+    return ended - started
+
+
 class Bare:
     """A process that has nothing but Zenoh, with callbacks that run in its threads."""
+
+    ping, pong = "bare/ping", "bare/pong"
 
     def __init__(self, port: int) -> None:
         self.session = open_peer(f"tcp/127.0.0.1:{port}")
@@ -183,11 +222,14 @@ class BareEcho(Bare):
 
     def __init__(self, port: int) -> None:
         super().__init__(port)
-        pong = self.publisher(PONG)
+        self._pong = self.publisher(self.pong)
         self._kept = (
-            self.session.declare_subscriber(PING, _direct(lambda sample: pong.put(sample.payload.to_bytes()))),
+            self.session.declare_subscriber(self.ping, _direct(self._send_back)),
             self.session.declare_queryable(ASK, _direct(self._answer)),
         )
+
+    def _send_back(self, sample: zenoh.Sample) -> None:
+        self._pong.put(sample.payload.to_bytes())
 
     def _answer(self, query: zenoh.Query) -> None:
         with query:
@@ -212,10 +254,10 @@ class BareAsker(Bare):
         self._back = threading.Event()
         self._at = 0.0
         self._received: list[float] = []
-        self._ping = self.publisher(PING)
+        self._ping = self.publisher(self.ping)
         self._querier = self.session.declare_querier(ASK, express=True, priority=zenoh.Priority.INTERACTIVE_LOW)
         self._kept = (
-            self.session.declare_subscriber(PONG, _direct(self._note)),
+            self.session.declare_subscriber(self.pong, _direct(self._note)),
             self.session.declare_subscriber(FLOOD, _direct(self._count)),
         )
         deadline = time.monotonic() + PATIENCE
@@ -227,7 +269,7 @@ class BareAsker(Bare):
 
     def hop(self, number: int, pause: float) -> list[float]:
         """Return the times of `number` messages there and back [s], with `pause` [s] between two."""
-        return [self._timed(lambda: self._ping.put(PAYLOAD), pause) for _ in range(number)]
+        return [self._timed(self._send, pause) for _ in range(number)]
 
     def ask(self, number: int) -> list[float]:
         """Return the times of `number` requests [s]."""
@@ -242,6 +284,9 @@ class BareAsker(Bare):
                 raise TimeoutError("there is no flood")
             time.sleep(0.01)
         return {"received": len(self._received) / (self._received[-1] - self._received[0])}
+
+    def _send(self) -> None:
+        self._ping.put(PAYLOAD)
 
     def _note(self, received: Any) -> None:
         self._at = time.perf_counter()
@@ -261,6 +306,43 @@ class BareAsker(Bare):
         return self._at - started
 
 
+class Coding(Bare):
+    """The same, with what ROS 2's wire asks of a message: CDR and an attachment. There is no bus around it."""
+
+    ping, pong = "coded/ping", "coded/pong"
+
+    def __init__(self, port: int) -> None:
+        self._number = count(1)
+        super().__init__(port)
+
+    def send(self, publisher: zenoh.Publisher, twist: Twist) -> None:
+        """Write a twist and send it."""
+        publisher.put(encode(twist), attachment=Attachment(next(self._number), time.time_ns(), bytes(16)).encode())
+
+    def read(self, sample: zenoh.Sample) -> Twist:
+        """Return the twist of a message."""
+        decode_attachment(sample.attachment.to_bytes() if sample.attachment else b"")
+        return decode(Twist, sample.payload.to_bytes())
+
+
+class CodingEcho(Coding, BareEcho):
+    """Reads what comes and writes it again."""
+
+    def _send_back(self, sample: zenoh.Sample) -> None:
+        self.send(self._pong, self.read(sample))
+
+
+class CodingAsker(Coding, BareAsker):
+    """Measures how long that takes there and back."""
+
+    def _send(self) -> None:
+        self.send(self._ping, TWIST)
+
+    def _note(self, received: Any) -> None:
+        self.read(received)
+        super()._note(received)
+
+
 def _direct(callback: Callable[[Any], None]) -> Callback[Any]:
     return Callback(callback, None, indirect=False)
 
@@ -268,8 +350,11 @@ def _direct(callback: Callable[[Any], None]) -> Callback[Any]:
 ROLES: dict[str, Callable[[int], Any]] = {
     "our_echo": OurEcho,
     "our_asker": OurAsker,
+    "our_setter": OurSetter,
     "bare_echo": BareEcho,
     "bare_asker": BareAsker,
+    "coding_echo": CodingEcho,
+    "coding_asker": CodingAsker,
 }
 
 

@@ -30,7 +30,7 @@ where times do not: times differ between machines by a factor of two or three.
 {table}
 
 Measured on {machine}; load of other work at the start: {load:.1f}. The rows of ROS 1 and dora appear only where these
-are installed.
+are installed, and the figures of RoboPlan where `RBXCOMPOSE_ROBOPLAN` names a Python that has it.
 """
 
 

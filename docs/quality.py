@@ -36,6 +36,8 @@ examples), `make soak` the numbers in the table. A failure becomes a file that e
   turn, in a random order. What can come back does, and the mission succeeds; otherwise everything ends in order. A
   process outside the robot listens: the base moves by live commands alone, and rests in time after the last one.
   `tests/faults/test_table.py` has a table of faults with the test of each.
+- **Two hosts** (`tests/systems`): the [faults](systems.md#faults) of hosts, links, disks and clocks of a robot that is
+  driven from another host.
 - **Floods** (`tests/faults`): one process sends the base as many messages as it can, none of them a command; others
   send goals, requests and queries. The patrol continues with the same processes. Liveliness tokens are
   the limit: a Zenoh session (1.4 to 1.10) keeps the key of every token that has ever crossed one of its links, 9 kB

@@ -2,24 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable, Mapping
+from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from rbxcompose.body.description import Description
+from rbxcompose.body.link_pairs import LinkPair
 from rbxcompose.body.urdf import read_body
 from rbxcompose.body.xml_reader import XmlElement, read_urdf
 from rbxcompose.config import Config
 from rbxcompose.control.limits import MotionLimits
+from rbxcompose.geometry import Vector3
+from rbxcompose.hand_config import HandConfig
 from rbxcompose.motion.arm_kinematics import ArmKinematics
-from rbxcompose.motion.collisions import LinkPair, MeshChecker
+from rbxcompose.motion.collisions import Checker, MeshChecker, SearchingChecker, Shapes
 from rbxcompose.motion.groups import ArmGroup
-from rbxcompose.motion.joint_space import ArmJoint, JointSpace
+from rbxcompose.motion.inverse_kinematics import ANGLE_TOLERANCE, RESTARTS, TOLERANCE, SolverSettings
+from rbxcompose.motion.joint_space import ArmJoint, JointSpace, interpolated
+from rbxcompose.motion.numba_cache import is_installed
 from rbxcompose.motion.planner import MotionPlanner, PlannerSettings
-from rbxcompose.motion.scene import PlacedObject
+from rbxcompose.motion.planner_types import AUTOMATIC, FAST
+from rbxcompose.motion.scene import PairDistance, PlacedObject
+from rbxcompose.motion.second_checker import SecondChecker
 from rbxcompose.motion.setting_up import always_colliding, load_libraries
 from rbxcompose.units import ANGLE, LENGTH, Dimension
+
+WAY_STEP, MOST_OF_WAY = 0.05, 200  # [rad or m] between points that are shown of a way, and how many there are
 
 
 class ArmJointConfig(Config):
@@ -42,14 +55,45 @@ class ArmJointConfig(Config):
 class ArmPlannerConfig(Config):
     """How motions are planned."""
 
-    type: str = "rrt_connect"
-    """The planner of OMPL."""
+    type: str = AUTOMATIC
+    """The planner."""
     time: float = 5.0
     """How long it may search [s]."""
     attempts: int = 5
     """How many paths it may find that collide when they are examined finely."""
     seed: int = 1
     """The same seed gives the same path."""
+    simplify: bool = True
+    """Whether a path that was found is shortened."""
+
+
+class ArmSolverConfig(Config):
+    """How positions of joints are searched that bring the tip to a pose."""
+
+    restarts: int = RESTARTS
+    """How many random positions the search begins from, after the present ones."""
+    time: float = 5.0
+    """How long it may take [s]."""
+    tolerance: float = TOLERANCE
+    """How far the tip may be off [m], if a goal does not say."""
+    angle_tolerance: float = ANGLE_TOLERANCE
+    """How far it may be turned [rad], if a goal does not say."""
+
+    @property
+    def settings(self) -> SolverSettings:
+        """Return them for the search."""
+        return SolverSettings(self.restarts, self.time, self.tolerance, self.angle_tolerance)
+
+
+class LinkPairsConfig(Config):
+    """Pairs of links that an arm need not watch, each in the order of the alphabet."""
+
+    adjacent: list[tuple[str, str]] = []
+    """A joint connects them: they are not watched."""
+    ignored: list[tuple[str, str]] = []
+    """They always collide, or somebody said so: they are not watched."""
+    unlikely: list[tuple[str, str]] = []
+    """They were never seen to collide: a search leaves them out, and the motion that it finds is examined with them."""
 
 
 class ArmConfig(Config):
@@ -73,8 +117,16 @@ class ArmConfig(Config):
     """The controller that leads its joints."""
     follow: str
     """The action of the controller."""
+    stream: str = ""
+    """The topic on which the controller takes trajectories one after the other; empty if it takes none."""
     planner: ArmPlannerConfig = ArmPlannerConfig()
     """How motions are planned."""
+    kinematics: ArmSolverConfig = ArmSolverConfig()
+    """How positions of joints are searched for a pose of the tip."""
+    pairs: LinkPairsConfig | None = None
+    """Pairs of links that it need not watch; without them, it looks for those that it cannot help."""
+    hand: HandConfig | None = None
+    """Its gripper, if it has one."""
 
 
 def dimensions_of(config: ArmConfig) -> dict[str, Dimension]:
@@ -105,26 +157,109 @@ def description_of(config: ArmConfig) -> Description:
 class ArmWorks:
     """What plans for an arm: its kinematics, and its planner among the objects of a scene."""
 
-    def __init__(self, config: ArmConfig, now: Callable[[], float], objects: Iterable[PlacedObject] = ()) -> None:
+    def __init__(
+        self,
+        config: ArmConfig,
+        now: Callable[[], float],
+        objects: Iterable[PlacedObject] = (),
+        paddings: Mapping[str, float] = MappingProxyType({}),
+        *,
+        is_fast: bool = True,
+    ) -> None:
         """Build it; `now` is a time [s] that passes while it plans.
 
+        With `is_fast`, code is compiled where numba is installed: that takes long for the first time on a machine, and
+        seconds to load, which pays for many motions.
+
         Raises:
-            ModuleNotFoundError: if the extra `arm` is not installed.
+            ModuleNotFoundError: if the extra `arm` is not installed, or `fast` for a planner that needs it.
             ValueError: if a mesh cannot be read.
         """
         load_libraries()
         self.space, self._description = space_of(config), description_of(config)
         self.kinematics = ArmKinematics(self._description, ArmGroup(self.space.names, config.base, config.tip))
-        adjacent, self.always = always_colliding(self.kinematics, self.space, self._description.meshes)
-        """Pairs that collide wherever the arm is, and are not watched."""
+        if is_fast:
+            self.kinematics.hasten()
+        if (pairs := config.pairs) is None:
+            adjacent, self.always = always_colliding(self.kinematics, self.space, self._description.meshes)
+            """Pairs that collide wherever the arm is, and are not watched."""
+        else:
+            adjacent, self.always = frozenset(pairs.adjacent), frozenset(pairs.ignored)
         self._allowed: frozenset[LinkPair] = adjacent | self.always
-        one = config.planner
-        settings = PlannerSettings(one.type, one.time, one.attempts, one.seed)
-        self.planner = MotionPlanner(self.space, self._checker(objects), settings, now)
+        self._shapes = Shapes(self._description.meshes)
+        self.objects = tuple(objects)
+        """Those that it plans among."""
+        self.paddings = paddings
+        """By which links keep away from them [m]."""
+        self._checker = self.checker(self.objects)
+        type_ = config.planner.type
+        is_compiled = type_ == FAST or (type_ == AUTOMATIC and is_fast and is_installed())
+        self._fast = _hastened() if is_compiled else _as_it_is
+        unlikely = frozenset(pairs.unlikely if pairs is not None else ())
+        self.solver, one = config.kinematics.settings, config.planner
+        settings = PlannerSettings(one.type, one.time, one.attempts, one.seed, one.simplify)
+        self.planner = MotionPlanner(self.space, self._fast(self._checker), settings, now, unlikely)
+        if isinstance(self.planner.checker, SearchingChecker):
+            self.planner.checker.prepare(self.space)
 
-    def place_objects(self, objects: Iterable[PlacedObject]) -> None:
-        """Plan among these objects from now on."""
-        self.planner.checker = self._checker(objects)
+    def place_objects(
+        self, objects: Iterable[PlacedObject], paddings: Mapping[str, float] = MappingProxyType({})
+    ) -> None:
+        """Plan among these objects from now on; links keep away from them by `paddings` [m].
 
-    def _checker(self, objects: Iterable[PlacedObject]) -> MeshChecker:
-        return MeshChecker(self.kinematics, self._description.meshes, self._allowed, objects)
+        Raises:
+            ValueError: if a mesh cannot be read.
+        """
+        self.objects, self.paddings = tuple(objects), paddings
+        own = (shape.geometry for link in self.kinematics.body.links.values() for shape in link.collisions)
+        self._shapes.keep((*own, *(piece.shape for one in self.objects for piece in one.own_pieces)))
+        self._checker = self.checker(self.objects)
+        self.planner.checker = self._fast(self._checker)
+
+    def checker(self, objects: Iterable[PlacedObject]) -> MeshChecker:
+        """Return what examines positions of the arm among some objects; raises as `place_objects` does."""
+        return MeshChecker(
+            self.kinematics, self._description.meshes, self._allowed, objects, self.paddings, shapes=self._shapes
+        )
+
+    def second_checker(
+        self, objects: Iterable[PlacedObject], positions: Mapping[str, float] = MappingProxyType({})
+    ) -> SecondChecker:
+        """Return what examines motions by other code; `positions` are those of joints that are not the arm's."""
+        return SecondChecker(self._description, self.space.names, self._allowed, objects, positions)
+
+    @property
+    def meshes(self) -> Mapping[str, Path]:
+        """Return the files of meshes by their names in the URDF."""
+        return self._description.meshes
+
+    @property
+    def watched(self) -> frozenset[str]:
+        """Return the links and objects that may collide."""
+        return self._checker.watched
+
+    def pairs(self, positions: Mapping[str, float], between: Collection[str]) -> tuple[PairDistance, ...]:
+        """Return the distances of pairs at positions of its joints, as `MeshChecker.pairs` does."""
+        return self._checker.pairs(np.array([positions[name] for name in self.space.names]), between)
+
+    def way(self, points: NDArray[np.float64]) -> tuple[Vector3, ...]:
+        """Return where its tip is in the root's frame [m] on straight lines between points of shape (m, n)."""
+        dense = interpolated(points, WAY_STEP)
+        some = dense[np.linspace(0, len(dense) - 1, min(len(dense), MOST_OF_WAY)).astype(int)]
+        return tuple(self.kinematics.tip_pose(values).translation for values in some)
+
+
+def _as_it_is(checker: MeshChecker) -> Checker:
+    return checker
+
+
+def _hastened() -> Callable[[MeshChecker], Checker]:
+    """Return what makes a checker that gives the same answers, and searches fast.
+
+    Raises:
+        ModuleNotFoundError: without numba, which is imported here and not before.
+    """
+    from rbxcompose.motion.sphere_checker import SphereChecker
+    from rbxcompose.motion.sphere_model import Trees
+
+    return partial(SphereChecker, trees=Trees())

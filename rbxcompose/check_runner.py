@@ -86,6 +86,7 @@ def run_checks(robot: Robot, report: Report) -> None:
     halves = {one.span.file for one in report if one.code == TWICE.code and one.span}
     programs = (mission.program for mission in robot.missions.values())
     missions = [Examined(program, robot.names) for program in programs if program.file not in halves]
+    checks = all_checks()
     for turn in range(_TURNS):
         doubts = doubts_of(robot.manifest, report)
 
@@ -95,7 +96,7 @@ def run_checks(robot: Robot, report: Report) -> None:
         found: list[tuple[Rule[Any], Finding]] = []
         for mission in missions:
             found += rule_findings(mission, tells)
-        found += [(one, finding) for one in all_checks() if tells(one) for finding in _found(one, robot)]
+        found += [(one, finding) for one in checks if tells(one) for finding in _found(one, robot)]
         report.extend(finding for one, finding in found if not doubts.touch(finding, one.relies_on))
     report.extend(broken_checks())
 

@@ -17,9 +17,12 @@ from rbxcompose.composition.robot_file import load_robot
 from rbxcompose.config import Config
 from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Related, Report, Severity, Span, kind
+from rbxcompose.manifest.files import PROFILE
 from rbxcompose.manifest.limits import LEAST_STEPS, PROFILE_STEPS, STEP_BYTES, STEP_VALUES
 from rbxcompose.manifest.reader import ParsedText, Texts
 from rbxcompose.model.build import build_robot, with_missions
+from rbxcompose.model.outside import NOTHING, Outside
+from rbxcompose.model.removals import blamed
 from rbxcompose.model.robot import Robot
 from rbxcompose.per_compile import one_compile
 from rbxcompose.plan.build import build_plan
@@ -63,11 +66,13 @@ def compile_robot(
     real: bool = False,
     environment: Mapping[str, str],
     unsaved: Mapping[Path, str] = MappingProxyType({}),
+    outside: Outside = NOTHING,
 ) -> Compilation:
     """Compile a robot's file (a path, a folder with a `robot.yaml`, or `rbx:...`) and report all its mistakes.
 
     `overlays` are files that change it. `unsaved` are texts from an editor, by the real path of the file that each
-    replaces. If no profile was chosen, each profile is tried as well, so that a broken one is found before it is used.
+    replaces. `outside` is what it has of other robots. If no profile was chosen, each profile is tried as
+    well, so that a broken one is found before it is used.
     """
 
     parsed: dict[tuple[str, str], ParsedText] = {}  # a profile changes no text
@@ -86,7 +91,9 @@ def compile_robot(
         )
         if manifest is None:
             return out
-        out.robot = build_robot(manifest, environment=environment, report=out.report, sources=out.sources)
+        out.robot = build_robot(
+            manifest, environment=environment, report=out.report, sources=out.sources, outside=outside
+        )
         run_checks(out.robot, out.report)
         out.report.findings = manifest.inclusions.told(out.report.findings)
         return out
@@ -154,12 +161,22 @@ def _tell_profile(profile: Span, tried: Compilation, out: Compilation, above: Se
     `above` names the layers that override profiles: their values were chosen without this profile.
     """
     known = {(finding.code, finding.span) for finding in out.report}
-    for finding in tried.report:
+    new = [one for one in tried.report if (one.code, one.span) not in known]
+    found = blamed(new, out.robot, tried.robot, profile) if out.robot and tried.robot else new
+    more = tried.sources.keys() - out.sources.keys() - {PROFILE, SET}  # a mission that only this profile has
+    out.sources.update({file: tried.sources[file] for file in sorted(more)})
+    for finding in found:
         span = finding.span
-        if span is None or (finding.code, span) in known or span.file not in out.sources or span.file in above:
+        if span is None or span.file not in out.sources or span.file in above:
             continue
+        inside = next((one for one in finding.related if profile.contains(one.span)), None)
         if profile.contains(span):
             out.report.add(finding)
+        elif inside is not None:
+            fine = [] if span.file in more else [Related(span, "without the profile, this is fine")]
+            others = [*fine, *finding.related]
+            related = tuple(one for one in others if one is not inside)
+            out.report.add(replace(finding, span=inside.span, label="", related=related, fix=None))
         else:
             related = (*finding.related, Related(profile, "with this profile"))
             out.report.add(replace(finding, related=related, fix=None))

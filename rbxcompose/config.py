@@ -5,7 +5,9 @@ Inside, all is SI and ratios are 0 to 1. A field's docstring becomes its descrip
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from collections.abc import Iterator, Mapping
+from operator import attrgetter
+from typing import Annotated, Any, TypeVar, get_args
 
 from pydantic import (
     BaseModel,
@@ -42,6 +44,9 @@ class Config(BaseModel):
         return made
 
 
+C = TypeVar("C", bound=Config)
+
+
 @dataclass(frozen=True, slots=True)
 class Dimensioned:
     """Marks a field as a quantity, for findings and schemas."""
@@ -66,6 +71,46 @@ class Live:
 def is_live(field: FieldInfo) -> bool:
     """Return whether a field may change while the robot runs."""
     return any(isinstance(mark, Live) for mark in field.metadata)
+
+
+def leaves(config: Config) -> Iterator[tuple[str, FieldInfo]]:
+    """Yield the fields that are no groups of fields themselves, each by its dotted name: `pid.p`."""
+    for name, one in type(config).model_fields.items():
+        if isinstance(value := getattr(config, name), Config):
+            yield from ((f"{name}.{below}", field) for below, field in leaves(value))
+        else:
+            yield name, one
+
+
+def value_at(config: Config, name: str) -> Any:
+    """Return the value of a field by its dotted name."""
+    return attrgetter(name)(config)
+
+
+def key_of(config: Config, name: str) -> str:
+    """Return what a manifest calls a field, by its dotted name."""
+    head, _, below = name.partition(".")
+    key = type(config).model_fields[head].alias or head
+    return f"{key}.{key_of(getattr(config, head), below)}" if below else key
+
+
+def with_values(config: C, values: Mapping[str, object]) -> C:
+    """Return a configuration with other values of fields by their dotted names; they are not validated."""
+    for name, value in values.items():
+        head, _, below = name.partition(".")
+        inner = with_values(getattr(config, head), {below: value}) if below else value
+        config = config.model_copy(update={head: inner})
+    return config
+
+
+def live_names(model: type[Config], above: str = "") -> Iterator[str]:
+    """Yield the dotted names of the fields of a model that may change while the robot runs, also within groups."""
+    for name, one in model.model_fields.items():
+        if is_live(one):
+            yield f"{above}{name}"
+        for hint in (one.annotation, *get_args(one.annotation)):
+            if isinstance(hint, type) and issubclass(hint, Config):
+                yield from live_names(hint, f"{above}{name}.")
 
 
 def _reads(dimension: Dimension) -> BeforeValidator:

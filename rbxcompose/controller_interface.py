@@ -182,6 +182,11 @@ class Controller(ABC, Generic[C]):
         raise TypeError(f"{cls.__qualname__} does not name its configuration: Controller[...]")
 
     @classmethod
+    def kinds_for(cls, config: C) -> frozenset[str]:
+        """Return the kinds of joints that it can lead with a configuration, as `kinds` does for any."""
+        return cls.kinds
+
+    @classmethod
     def ports(cls, name: str, config: C) -> dict[str, Port[Any]]:
         """Return its ports."""
         return {}
@@ -228,6 +233,10 @@ class Controller(ABC, Generic[C]):
     def let_go(self, joint: str, now: float, reason: str) -> None:
         """Leave a joint alone, which has lost its torque; the others come to rest."""
         self.halt(now, reason)
+
+    def set_pace(self, share: float) -> str:
+        """Move at a share from 0 to 1 of the speed that goals ask for, also at once; return why it cannot."""
+        return f"a controller of the type '{self.type_name}' has no speed to change while it moves"
 
     @property
     def leads(self) -> bool:

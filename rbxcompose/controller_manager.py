@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Protocol
 
 from rbxcompose.controller_interface import ControlledJoint, Controller, ControllerConfig, ItemOfServo
+from rbxcompose.requests import Refused
 from rbxcompose.sdk.bound import ActionServer, ServedGoal
 
 
@@ -66,8 +67,14 @@ class ControllerManager:
     def switch(self, on: Iterable[str], off: Iterable[str], now: float) -> Iterator[str]:
         """Switch controllers on and off; yield a sentence for each that changes.
 
-        What those that are switched off do ends, and their joints come to rest. There must be no `objection`.
+        What those that are switched off do ends, and their joints come to rest.
+
+        Raises:
+            Refused: if there is an `objection`.
         """
+        on, off = list(on), list(off)
+        if objection := self.objection(on, off):
+            raise Refused(objection)
         for name in off:
             if name in self._active:
                 self.controllers[name].halt(now, f"controller '{name}' was switched off")
@@ -79,6 +86,18 @@ class ControllerManager:
                 self._active.add(name)
                 self._leaving.discard(name)
                 yield f"controller '{name}' is active"
+
+    def set_pace(self, name: str, share: float) -> str:
+        """Let a controller follow its goals at a share of their speed, from 0 to 1; return that in words.
+
+        Raises:
+            Refused: if it cannot.
+        """
+        if name not in self.controllers:
+            raise Refused(f"there is no controller '{name}'; there are {', '.join(self.controllers)}")
+        if problem := self.controllers[name].set_pace(share):
+            raise Refused(problem)
+        return f"'{name}' follows goals at {share:.0%} of the speed" if share else f"'{name}' holds: the speed is 0 %"
 
 
 class ControllerHost(Protocol):

@@ -42,3 +42,18 @@ class SwitchControllers(Command):
     def words(self) -> str:
         """Return it as written on the command line."""
         return shlex.join(["controller", "switch", *self.on, *(word for one in self.off for word in ("--off", one))])
+
+
+@dataclass(frozen=True, slots=True)
+class ScaleMotion(Command):
+    """Let a controller follow its goals at a share of their speed from now on, also the one on its way; 0 holds it."""
+
+    about = BUS
+    component: str
+    controller: str
+    share: float
+
+    @property
+    def words(self) -> str:
+        """Return it as written on the command line."""
+        return shlex.join(["controller", "speed", self.controller, f"{self.share:.4g}"])

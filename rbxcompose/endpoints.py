@@ -7,7 +7,8 @@ import os
 import re
 from pathlib import Path
 
-_LOOPBACK, _UNIX = "tcp/127.0.0.1", "unixsock-stream/"
+LINK_LEASE = 2.0  # [s] of silence after which a link counts as lost
+LOOPBACK, _UNIX = "127.0.0.1", "unixsock-stream/"
 _LONGEST_PATH, _LONGEST_NAME = 107, 16  # [bytes] of a Unix socket, which the kernel limits, and of ours in a folder
 _LONGEST = 1000
 _NETWORK = re.compile(
@@ -18,7 +19,7 @@ _SOCKET = re.compile(r"unixsock-stream//[^\s#?]+")
 
 def tcp_endpoint(port: int) -> str:
     """Return the endpoint of a port on the loopback interface, which every user of the machine can reach."""
-    return f"{_LOOPBACK}:{port}"
+    return f"tcp/{LOOPBACK}:{port}"
 
 
 def unix_endpoint(folder: Path, name: str) -> str:

@@ -21,6 +21,8 @@ SIMILAR = 0.6  # difflib ratio above which a name is offered as "did you mean"
 LEAST_WORD = 2  # characters of a word that makes two names alike
 SOMEWHAT = 0.4  # difflib ratio above which a name comes first in a list of valid names
 MOST_NAMES = 8  # valid names listed when none is similar
+_CHANCE = 0.7  # difflib ratio below which names without a common word are alike by chance
+_LONG, _ALIKE = 6, 0.65  # names of as many characters have more in common by chance: `camera` and `charger`
 SURE = 0.8  # difflib ratio above which a similar name may replace a misspelt one,
 LEAD = 0.1  # if it leads every other name by this much
 VALID = "valid names"
@@ -216,12 +218,33 @@ def suggest(name: str, valid: Iterable[str], what: str = VALID) -> str:
         return ""
     names = _ordered(valid)
     near = _completed(name, names) or nearest(name, names)
-    if near:
+    if near and not _is_chance(name, near[0]) and not _is_one_of_many(name, near[0], names):
         return f"{DID_YOU_MEAN} '{near[0]}'?"
     if not names:
         return ""
     rest = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
     return f"{what}: {', '.join(_by_likeness(name, names)[:MOST_NAMES])}{rest}"
+
+
+def _is_chance(name: str, near: str) -> bool:
+    """Return whether two names are only somewhat alike, in no word: `wheel_separation` and `acceleration`."""
+    words, others = _words(name), _words(near)
+    if min(len(name), len(near)) >= _LONG and _similarity(name, near) < _ALIKE and not _shared(words, others):
+        return not any(_is_slip(one, other) for one in words for other in others)
+    if _is_slip(name, near) or _shared(words, others) or _similarity(name, near) >= _CHANCE:
+        return False
+    return not any(_similarity(one, other) >= SURE for one in words for other in others)
+
+
+def _is_one_of_many(name: str, near: str, names: list[str]) -> bool:
+    """Return whether a name is like another only in a word that several have: `ram_monitor` and `cpu_monitor`."""
+    words = _words(name)
+    if _is_slip(name, near) or len(names) > MOST_COMPARED or not may_guess(_PER_NAME * len(names)):
+        return False
+    both = words & _words(near)
+    others = [one for one in words - both if one.isalpha()]
+    differs = [one for one in others if all(_similarity(one, other) < SIMILAR for other in _words(near))]
+    return bool(both and differs) and sum(bool(both & _words(one)) for one in names) > 2
 
 
 def _completed(name: str, names: list[str]) -> list[str]:

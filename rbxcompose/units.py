@@ -13,6 +13,7 @@ from types import MappingProxyType
 
 from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import suggest
+from rbxcompose.foreign_units import OTHER_NAMES, torque_factor
 
 MOST = 1e15  # magnitudes from here on are refused: they are slips, and floats soon stop being exact for whole numbers
 LONGEST_NUMBER = 40  # characters of a number's text
@@ -174,26 +175,6 @@ UNITS: Mapping[str, Unit] = MappingProxyType(
 _SHOWN_IN = {dimension: UNITS[text.split()[1]] for dimension, (text, _) in _TABLE.items() if " " in text}
 _SHOWN_IN |= {DATA: UNITS["B"], BIT_RATE: UNITS["bit/s"]}
 
-# What people write for a unit whose symbol looks quite different.
-_OTHER_NAMES: Mapping[str, str] = {
-    name: unit
-    for unit, names in {
-        "m": "meter meters metre metres",
-        "in": 'inch inches "',
-        "m/s": "mps",
-        "s": "sec secs second seconds",
-        "min": "minute minutes mins",
-        "h": "hour hours hr hrs",
-        "km/h": "kmh kph kmph",
-        "deg": "degree degrees °",
-        "deg/s": "dps",
-        "rad": "radian radians",
-        "degC": "c °c celsius",
-        "%": "percent pct",
-        "us": "µs μs",
-    }.items()
-    for name in names.split()
-}
 _QUANTITY = re.compile(rf"([+-]?{NUMBER_TEXT})\s*(.*)", re.DOTALL)
 _FACTOR = re.compile(r"([^\d^/²³]+?)(?:\^?([23²³]))?")
 _POWERS = {"²": "2", "³": "3"}
@@ -218,6 +199,8 @@ def unit_help(written: str, number: str = "", wanted: Dimension | None = None) -
     `number` stands before the unit. A unit of another dimension than the wanted one is never proposed, and where the
     number would be another one, the help says the whole quantity.
     """
+    if number and wanted in (None, TORQUE) and (factor := torque_factor(written)):
+        return f"write '{float(number) * factor:.4g} Nm': 1 {written} is {factor:g} Nm"
     made = _made_of_units(written)
     if made and wanted in (None, made.dimension) and (shown := _SHOWN_IN.get(made.dimension)):
         if same := next((unit for unit in units_of(made.dimension) if UNITS[unit].to_si(1) == made.to_si(1)), ""):
@@ -237,23 +220,23 @@ def units_of(dimension: Dimension) -> list[str]:
     return [name for name, unit in UNITS.items() if unit.dimension == dimension]
 
 
-def _named(word: str) -> Unit | None:
+def unit_named(word: str) -> Unit | None:
     """Return the unit of a name that people write; letters of another case will do."""
     if known := UNITS.get(word):
         return known
     folded = word.casefold()
-    meant = _OTHER_NAMES.get(folded) or next((unit for unit in UNITS if unit.casefold() == folded), "")
+    meant = OTHER_NAMES.get(folded) or next((unit for unit in UNITS if unit.casefold() == folded), "")
     return UNITS.get(meant)
 
 
 def _made_of_units(written: str) -> Unit | None:
     """Return the unit that a text means: one by another name, or one made of known units, such as `mm/s^2`."""
-    if (known := _named(written)) or not written:
+    if (known := unit_named(written)) or not written:
         return known
     made = Unit(written, NUMBER, 1.0, 1.0)
     for index, part in enumerate(written.split("/")):
         found = _FACTOR.fullmatch(part.strip())
-        unit = _named(found[1]) if found else None
+        unit = unit_named(found[1]) if found else None
         if unit and found:
             for _ in range(int(_POWERS.get(found[2], found[2]) or 1)):
                 made = _times(made, Unit("", unit.dimension, unit.per, unit.times) if index else unit, index > 0)
@@ -313,7 +296,7 @@ def parse_quantity(text: str, wanted: Dimension | None = None) -> Quantity:
     """
     match = _QUANTITY.fullmatch(text.strip())
     if not match:
-        alone = _named(text.strip())
+        alone = unit_named(text.strip())
         is_meant = alone is not None and wanted in (None, alone.dimension)
         help_text = f"write a number before '{alone.name}'" if alone and is_meant else ""
         raise UnitError("not a number with a unit, such as '0.3 m/s'", help=help_text)

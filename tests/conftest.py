@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import os
 import shutil
+import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -25,9 +26,19 @@ CACHES = "RBXCOMPOSE_TEST_CACHES"
 
 def pytest_configure() -> None:
     """Give all workers of this run a folder of caches that goes with it."""
+    os.environ.setdefault("NUMBA_CACHE_DIR", str(ROOT / ".numba_cache"))  # compiling takes longer than most tests may
     if CACHES not in os.environ:
         os.environ[CACHES] = os.environ["XDG_CACHE_HOME"] = tempfile.mkdtemp()
         atexit.register(shutil.rmtree, os.environ[CACHES], ignore_errors=True)
+
+
+def pytest_collection_finish() -> None:
+    """Compile what arms need before any test: on a busy machine, that takes longer than a test may."""
+    if "rbxcompose.motion.arm_kinematics" in sys.modules:
+        from tests.motion.toy_arm import fast_planner, kinematics
+
+        kinematics().hasten()
+        fast_planner()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

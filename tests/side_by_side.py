@@ -11,11 +11,18 @@ REAL_TIME = (
     "tests/exposure/",
     "tests/faults/",
     "tests/net/",
+    "tests/robots/test_real_picking",
     "tests/robots/test_three_levels",
     "tests/runtime/test_apply_for_real",
+    "tests/runtime/test_changes_for_real",
     "tests/runtime/test_external_clock",
     "tests/runtime/test_lifeline",
     "tests/runtime/test_real_processes",
+    "tests/systems/test_faults",
+    "tests/systems/test_shared_calls",
+    "tests/systems/test_three_hosts",
+    "tests/systems/test_two_hosts",
+    "tests/systems/test_two_robots",
 )
 """Tests of real processes with deadlines. One worker runs them all, so that they leave each other the processors."""
 

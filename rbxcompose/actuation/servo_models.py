@@ -65,6 +65,11 @@ class ServoModel:
         return self.family.protocol
 
     @property
+    def volts(self) -> tuple[float, float]:
+        """Return the least and the greatest supply that it works with [V]."""
+        return next(volts for begin, volts in _VOLTS.items() if self.name.startswith(begin))
+
+    @property
     def per_tick(self) -> float:
         """Return the angle of one tick of its position [rad]."""
         return self.family.span / self.family.ticks
@@ -140,6 +145,18 @@ _MODELS: tuple[tuple[ServoFamily, Mapping[str, int]], ...] = (
     (_PH42, {"PH42-020": 2000}),
     (_PH54, {"PH54-100": 2010, "PH54-200": 2020}),
 )
+
+_VOLTS: Mapping[str, tuple[float, float]] = {
+    **dict.fromkeys(("AX-", "RX-24"), (9.0, 12.0)),
+    **dict.fromkeys(("RX-", "EX-"), (12.0, 18.5)),
+    "XL-320": (6.0, 8.4),
+    **dict.fromkeys(("XL330", "XC330-M"), (3.7, 6.0)),
+    "XL430": (6.5, 12.0),
+    **dict.fromkeys(("XC330-T", "XC430"), (6.5, 14.8)),
+    **dict.fromkeys(("MX-", "XM", "XH"), (10.0, 14.8)),
+    **dict.fromkeys(("PM", "PH"), (24.0, 24.0)),
+}
+"""By how the names of models begin; the first that fits counts."""
 
 
 def _made() -> Iterator[ServoModel]:

@@ -9,7 +9,8 @@ from pathlib import Path
 
 from rbxcompose.body.attachment import PieceAttachment
 from rbxcompose.body.files import PACKAGE, BodyFile, ReadFile, read_files
-from rbxcompose.body.lint import lint
+from rbxcompose.body.link_pairs import CollisionMatrix
+from rbxcompose.body.lint import lint, orientations
 from rbxcompose.body.mesh_files import mesh_mistakes
 from rbxcompose.body.model import Body
 from rbxcompose.body.pieces import PieceOfBody, assembled, to_xml, with_meshes
@@ -26,6 +27,7 @@ class Description:
     text: str
     body: Body
     meshes: Mapping[str, Path] = field(default_factory=dict)  # the files that exist, by their names in the URDF
+    matrix: CollisionMatrix | None = None  # which pairs of links need not be watched, if that is known for this body
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,4 +73,9 @@ def _checked(
     body, findings = read_body(root)
     if findings:
         return None, [*notes, *findings]
-    return Description(text, body, meshes), [*notes, *lint(body, meshes), *mesh_mistakes(body, meshes)]
+    return Description(text, body, meshes), [
+        *notes,
+        *lint(body, meshes),
+        *orientations(root),
+        *mesh_mistakes(body, meshes),
+    ]

@@ -8,6 +8,8 @@ from collections.abc import Collection, Iterator
 
 from rbxcompose.body.masses import mass_mistakes
 from rbxcompose.body.model import Body, BodyJoint, BodyLink, JointLimits, Shape
+from rbxcompose.body.urdf import rpy_of
+from rbxcompose.body.xml_reader import XmlElement
 from rbxcompose.findings import Finding, Severity, kind
 from rbxcompose.printable import plain
 
@@ -65,7 +67,7 @@ MILLIMETRES = kind(
     "RBX2013",
     """A part of the body is larger than a house
 
-URDF counts in metres. A size of hundreds often comes from a drawing in millimetres.
+URDF counts in metres. A size of hundreds often comes from a drawing in millimetres. So does a distance between links.
 
 Bad:
 ```xml
@@ -82,10 +84,67 @@ Good:
 """,
     Severity.WARNING,
 )
+DEGREES = kind(
+    "RBX2021",
+    """The limits of a joint look like degrees
+
+URDF counts angles in radians. A joint that turns from -90 rad to 90 rad would make 28 turns.
+
+Bad:
+```xml
+<link name="base"/>
+<link name="head"/>
+<joint name="pan" type="revolute">
+  <parent link="base"/>
+  <child link="head"/>
+  <limit lower="-90" upper="90" effort="1" velocity="1.5"/>
+</joint>
+```
+Good:
+```xml
+<link name="base"/>
+<link name="head"/>
+<joint name="pan" type="revolute">
+  <parent link="base"/>
+  <child link="head"/>
+  <limit lower="-1.5708" upper="1.5708" effort="1" velocity="1.5"/>
+</joint>
+```
+""",
+    Severity.WARNING,
+)
+TURNED_IN_DEGREES = kind(
+    "RBX2023",
+    """An orientation looks like degrees
+
+URDF counts angles in radians. `rpy="0 90 0"` would be fourteen turns and a bit.
+
+Bad:
+```xml
+<joint name="mount" type="fixed">
+  <origin xyz="0 0 0.1" rpy="0 90 0"/>
+  <parent link="base"/>
+  <child link="camera"/>
+</joint>
+```
+Good:
+```xml
+<joint name="mount" type="fixed">
+  <origin xyz="0 0 0.1" rpy="0 1.5708 0"/>
+  <parent link="base"/>
+  <child link="camera"/>
+</joint>
+```
+""",
+    Severity.WARNING,
+)
 LARGEST = 20.0  # [m]
 _WRITE = "write what the motor can do"
 _UNWRITTEN = "a limit that is not written is 0; joints without limits are 'continuous', those that never move 'fixed'"
+_LACKS_UNIT = "are these millimetres, or does a size lack its unit?"
 _SHOWN = 60
+_TURN = math.tau + 0.01  # [rad]
+_WITH_ORIGINS = ("link", "joint", "visual", "collision", "inertial")
 
 
 def lint(body: Body, meshes: Collection[str]) -> Iterator[Finding]:
@@ -94,8 +153,23 @@ def lint(body: Body, meshes: Collection[str]) -> Iterator[Finding]:
     for link in body.links.values():
         yield from _shapes(link, meshes)
     for joint in body.joints.values():
+        if (away := math.hypot(*joint.origin.translation)) > LARGEST:
+            message = f"joint '{plain(joint.name, _SHOWN)}' is {away:g} m away from the link that carries it"
+            yield MILLIMETRES.at(joint.span, message, help=_LACKS_UNIT)
         if joint.limits is not None and joint.moves:
             yield from _limits(joint, joint.limits)
+
+
+def orientations(root: XmlElement) -> Iterator[Finding]:
+    """Yield the orientations in a URDF that are more than a turn."""
+    for child in root.children:
+        if child.name == "origin" and any(abs(one) > _TURN for one in rpy_of(child)):
+            right = " ".join(f"{math.radians(one):.4g}" for one in rpy_of(child))
+            message = f"'rpy=\"{plain(child.attributes['rpy'], _SHOWN)}\"' is more than a turn: are these degrees?"
+            help_text = f"angles in a URDF are in radians: for degrees, write 'rpy=\"{right}\"'"
+            yield TURNED_IN_DEGREES.at(child.span, message, help=help_text)
+        elif child.name in _WITH_ORIGINS:
+            yield from orientations(child)
 
 
 def _limits(joint: BodyJoint, limits: JointLimits) -> Iterator[Finding]:
@@ -106,6 +180,13 @@ def _limits(joint: BodyJoint, limits: JointLimits) -> Iterator[Finding]:
     elif stuck := list(_stuck(joint, limits)):
         message = f"the {' and the '.join(stuck)} of joint '{name}' {_be(stuck)} zero"
         yield NO_MOTION.at(limits.span, message, help=_UNWRITTEN if stuck == ["range"] else _WRITE)
+    elif joint.kind == "revolute" and limits.may_be_degrees:
+        lower, upper = (math.radians(one or 0.0) for one in (limits.lower, limits.upper))
+        message = (
+            f"joint '{name}' may turn from {limits.lower or 0:g} rad to {limits.upper or 0:g} rad: are these degrees?"
+        )
+        help_text = f'limits in a URDF are in radians: for degrees, write \'lower="{lower:.4g}" upper="{upper:.4g}"\''
+        yield DEGREES.at(limits.span, message, help=help_text)
 
 
 def _stuck(joint: BodyJoint, limits: JointLimits) -> Iterator[str]:
@@ -130,7 +211,7 @@ def _shapes(link: BodyLink, meshes: Collection[str]) -> Iterator[Finding]:
             yield NO_MESH.at(shape.span, message, help=_where_meshes_are(geometry.file))
         if largest := _extent(shape):
             message = f"a {geometry.kind} of link '{plain(link.name, _SHOWN)}' is {largest:g} m long"
-            yield MILLIMETRES.at(shape.span, message, help="are these millimetres, or does a size lack its unit?")
+            yield MILLIMETRES.at(shape.span, message, help=_LACKS_UNIT)
 
 
 def _where_meshes_are(file: str) -> str:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
 from rbxcompose.body.inertia import Tensor, about, added, principal_moments
-from rbxcompose.body.model import Body, BodyLink, Inertial
+from rbxcompose.body.model import Body, BodyLink, Geometry, Inertial
 from rbxcompose.findings import Finding, Severity, kind
 from rbxcompose.printable import plain
 
@@ -73,6 +74,36 @@ Good:
 """,
     Severity.WARNING,
 )
+TOO_DENSE = kind(
+    "RBX2022",
+    """A link is denser than any material
+
+Its mass is many times that of a piece of lead with its shapes. URDF counts masses in kilograms, and lengths in metres.
+
+Bad:
+```xml
+<link name="base">
+  <collision><geometry><box size="0.1 0.1 0.05"/></geometry></collision>
+  <inertial>
+    <mass value="350"/>
+    <inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/>
+  </inertial>
+</link>
+```
+Good:
+```xml
+<link name="base">
+  <collision><geometry><box size="0.1 0.1 0.05"/></geometry></collision>
+  <inertial>
+    <mass value="0.35"/>
+    <inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/>
+  </inertial>
+</link>
+```
+""",
+    Severity.WARNING,
+)
+_DENSEST = 100_000.0  # [kg/m^3]: four times osmium, since shapes may leave something out
 _TOLERANCE = 1e-6  # relative, of moments that were rounded when they were written
 _THIN = 1e-6  # [m]: a mass that is nearer than this to an axis has no moment about it
 _SHOWN = 60
@@ -83,9 +114,14 @@ def mass_mistakes(body: Body) -> Iterator[Finding]:
     for link in body.links.values():
         if link.inertial is not None and (problem := _impossible(link.inertial)):
             one, is_mass = link.inertial, link.inertial.mass < 0.0
-            span = one.mass_span if is_mass and one.mass_span else one.span
+            span = (one.mass_span if is_mass else one.inertia_span) or one.span
             help_text = "a mass is above 0 kg" if is_mass else ""
             yield NO_INERTIA.at(span, f"link '{plain(link.name, _SHOWN)}' {problem}", help=help_text)
+        elif link.inertial is not None and (volume := _volume(link)) and link.inertial.mass > _DENSEST * volume:
+            one = link.inertial
+            size = f"{1000.0 * volume:.2g} litres"
+            message = f"link '{plain(link.name, _SHOWN)}' has a mass of {one.mass:g} kg in {size}"
+            yield TOO_DENSE.at(one.mass_span or one.span, message, help="masses in a URDF are in kilograms")
     for links in _rigid_bodies(body):
         yield from _mistakes_of_one(body, links)
 
@@ -126,8 +162,42 @@ def _impossible(inertial: Inertial) -> str:
     if least < -slack:
         return "has a negative moment of inertia"
     if most > least + middle + slack:
-        return "has a moment of inertia larger than the two others together"
+        return _too_large(inertial, most, least + middle)
     return ""
+
+
+def _too_large(inertial: Inertial, most: float, others: float) -> str:
+    """Return which moment is larger than the two others together: by its name if the inertia has that one."""
+    ixx, _, _, iyy, _, izz = inertial.inertia
+    moments = {"ixx": ixx, "iyy": iyy, "izz": izz}
+    name = max(moments, key=lambda one: moments[one])
+    rest = [one for one in moments if one != name]
+    sum_of_rest = sum(moments[one] for one in rest)
+    if moments[name] > sum_of_rest:
+        together = f"{' + '.join(rest)} = {sum_of_rest:.4g}"
+        return f"has a moment of inertia larger than the two others together: {name} = {moments[name]:.4g}, {together}"
+    return f"has a moment of inertia larger than the two others together, about its own axes: {most:.4g}, {others:.4g}"
+
+
+def _volume(link: BodyLink) -> float:
+    """Return the volume of the shapes of a link [m^3], those that are seen or those that collide; 0 with meshes."""
+    shapes = [[one.geometry for one in own] for own in (link.visuals, link.collisions)]
+    return (
+        0.0
+        if any(one.kind == "mesh" for own in shapes for one in own)
+        else max(sum(map(_of_shape, own)) for own in shapes)
+    )
+
+
+def _of_shape(geometry: Geometry) -> float:
+    match geometry.kind, geometry.size:
+        case "box", (x, y, z):
+            return x * y * z
+        case "sphere", (radius,):
+            return math.pi * radius**3 * 4.0 / 3.0
+        case "cylinder" | "capsule", (radius, length):
+            return math.pi * radius**2 * (length + (radius * 4.0 / 3.0 if geometry.kind == "capsule" else 0.0))
+    return 0.0
 
 
 def _tensor(inertial: Inertial) -> Tensor:

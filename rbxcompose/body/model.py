@@ -24,11 +24,16 @@ KINDS = (*MOVING, "fixed", *FLOATING)
 
 @dataclass(frozen=True, slots=True)
 class Geometry:
-    """A shape: `box` with three lengths, `cylinder` and `capsule` with radius and length, `sphere`, or `mesh`."""
+    """A shape: `box` with three lengths, `cylinder` and `capsule` with radius and length, `sphere`, or `mesh`.
+
+    Beside these, the planning scene has `cone`, `plane` and `octree`. A mesh is in a file, or has its triangles here.
+    """
 
     kind: str
     size: tuple[float, ...] = ()  # of a mesh: its scale
     file: str = ""
+    points: tuple[float, ...] = ()  # x, y, z of each corner of a mesh, or of the middle of each cell of an octree
+    triangles: tuple[int, ...] = ()  # three of the corners each
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +56,8 @@ class Inertial:
     span: Span
     mass_span: Span | None = None
     """The place of the mass, if it is known."""
+    inertia_span: Span | None = None
+    """The place of the inertia, if it is known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +80,12 @@ class JointLimits:
     effort: float | None
     velocity: float | None
     span: Span
+
+    @property
+    def may_be_degrees(self) -> bool:
+        """Return whether these are angles that only degrees have: round ones, of many turns if they were radians."""
+        written = [abs(one) for one in (self.lower, self.upper) if one]
+        return bool(written) and all(30 <= one <= 360 and one % 5 == 0 for one in written)
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,6 +113,8 @@ class BodyJoint:
     mimic: Mimic | None = None
     link_spans: tuple[Span, ...] = ()
     """The places of its parent and its child, if they are known."""
+    axis_span: Span | None = None
+    """The place of its axis, if it is written."""
 
     @property
     def moves(self) -> bool:

@@ -18,6 +18,7 @@ from rbxcompose.body.solids import solid_of
 
 SIZE = 800  # [pixels] of each side
 _FINER = 2  # rays per pixel and direction
+_LETTERS = 15  # [pixels] of a line of text
 _VIEW = (1.0, -1.3, 0.75)  # direction from which it is seen: from the right front, and above
 _LIGHT = (0.4, -0.75, 1.0)
 _AMBIENT = 0.35
@@ -36,28 +37,50 @@ def draw(body: Body, positions: Mapping[str, float], meshes: Mapping[str, Path])
         MissingLibraryError: if a library is missing.
         ValueError: if there is nothing to draw, or a mesh cannot be read.
     """
-    need("pictures", *_NEEDED)
-    from PIL import Image
-
+    need_for_pictures()
     solid = solid_of(body, positions, meshes)
     if solid is None:
         raise ValueError("the body has no shapes")
+    return png_of(rendered(solid, bounds_of(solid)))
+
+
+def need_for_pictures() -> None:
+    """Require the libraries that pictures need; raises as `draw` does."""
+    need("pictures", *_NEEDED)
+
+
+def bounds_of(solid: Solid) -> Array:
+    """Return its least and greatest coordinates [m], shape (2, 3).
+
+    Raises:
+        ValueError: if it is too far away to be drawn.
+    """
     if not np.abs(solid.vertices).max() <= _FARTHEST:  # also if it is not a number
         raise ValueError(f"a part of the body is further than {_FARTHEST:g} m away")
-    pixels = _rendered(solid, SIZE * _FINER)
+    return np.stack((solid.vertices.min(0), solid.vertices.max(0)))
+
+
+def png_of(pixels: Array, *lines: tuple[str, str]) -> bytes:
+    """Return pixels as a PNG, with lines of text at the top, each with its colour."""
+    from PIL import Image, ImageDraw, ImageFont
+
     picture = Image.fromarray((pixels * 255).round().astype(np.uint8)).resize((SIZE, SIZE), Image.Resampling.BOX)
+    for number, (text, colour) in enumerate(lines):
+        font = ImageFont.load_default(_LETTERS)
+        ImageDraw.Draw(picture).text((_LETTERS, _LETTERS * (1 + 1.4 * number)), text, fill=colour, font=font)
     out = io.BytesIO()
     picture.save(out, "PNG")
     return out.getvalue()
 
 
-def _rendered(solid: Solid, side: int) -> Array:
-    """Return red, green and blue from 0 to 1, shape (side, side, 3), seen from `_VIEW`."""
+def rendered(solid: Solid, bounds: Array) -> Array:
+    """Return red, green and blue from 0 to 1, shape (side, side, 3), from a camera that sees all within `bounds`."""
     from trimesh import Trimesh
     from trimesh.ray.ray_pyembree import RayMeshIntersector
 
     whole: Any = Trimesh(solid.vertices, solid.faces, process=False)
-    eye, rays = _camera(np.asarray(whole.bounds), side)
+    side = SIZE * _FINER
+    eye, rays = _camera(bounds, side)
     faces = RayMeshIntersector(whole).intersects_first(np.broadcast_to(eye, rays.shape), rays)
     light = np.array(_LIGHT) / np.linalg.norm(_LIGHT)
     normals = np.asarray(whole.face_normals)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rbxcompose.body.model import Body, BodyJoint
-from rbxcompose.findings import Finding, Related, Span, kind
+from rbxcompose.body.model import Body, BodyJoint, BodyLink
+from rbxcompose.findings import MOST_COMPARED, Finding, Related, Span, kind
 from rbxcompose.printable import plain
 
 NO_LINK = kind(
@@ -76,7 +76,21 @@ def _unknown_links(body: Body) -> Iterator[Finding]:
         for role, link, span in zip(("parent", "child"), (joint.parent, joint.child), spans, strict=True):
             if link not in body.links:
                 message = f"the {role} of joint '{plain(joint.name, _SHOWN)}' does not exist: '{plain(link, _SHOWN)}'"
-                yield NO_LINK.misspelt(span, message, link, body.links, "links")
+                yield NO_LINK.misspelt(span, message, link, _that_may_be(body, joint, role), "links")
+
+
+def _that_may_be(body: Body, joint: BodyJoint, role: str) -> dict[str, BodyLink]:
+    """Return the links that a joint may name: none of those below it as its parent, none with a parent as its child."""
+    if len(body.joints) > MOST_COMPARED:
+        return dict(body.links)
+    if role == "child":
+        taken = {joint.parent, *(one.child for one in body.joints.values() if one is not joint)}
+    else:
+        taken, below = set(), [joint.child]
+        while below:
+            taken.add(link := below.pop())
+            below += [one.child for one in body.joints.values() if one.parent == link and one.child not in taken]
+    return {name: link for name, link in body.links.items() if name not in taken} or dict(body.links)
 
 
 def _wrong_mimics(body: Body) -> Iterator[Finding]:

@@ -170,13 +170,14 @@ class _BodyReader:
             _limits(limit, name) if limit is not None else None,
             _mimic(mimic) if mimic is not None else None,
             (parent.span, child.span),
+            axis.span if axis is not None else None,
         )
 
 
 def _inertial(element: XmlElement) -> Inertial:
     mass, inertia = needed(element, "mass"), needed(element, "inertia")
     moments = tuple(number(inertia, name) for name in _INERTIA)
-    return Inertial(number(mass, "value"), _origin(element), moments, element.span, mass.span)
+    return Inertial(number(mass, "value"), _origin(element), moments, element.span, mass.span, inertia.span)
 
 
 def _geometry(element: XmlElement) -> Geometry:
@@ -201,8 +202,13 @@ def _origin(element: XmlElement) -> Transform3:
     if origin is None:
         return Transform3()
     x, y, z = numbers(origin, "xyz", 3) if "xyz" in origin.attributes else (0.0, 0.0, 0.0)
+    return Transform3((x, y, z), quaternion_from_rpy(*rpy_of(origin)))
+
+
+def rpy_of(origin: XmlElement) -> tuple[float, float, float]:
+    """Return roll, pitch and yaw of an origin [rad]."""
     roll, pitch, yaw = numbers(origin, "rpy", 3) if "rpy" in origin.attributes else (0.0, 0.0, 0.0)
-    return Transform3((x, y, z), quaternion_from_rpy(roll, pitch, yaw))
+    return roll, pitch, yaw
 
 
 def _unit(element: XmlElement) -> tuple[float, float, float]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from rbxcompose.bus.names import ADMIN, topic_pattern
+from rbxcompose.bus.names import ADMIN, DENIED, EXCHANGE_DOMAIN, topic_pattern
 from rbxcompose.dataclass import dataclass
 
 _TOKENS = ("liveliness_token", "liveliness_query", "declare_liveliness_subscriber")
@@ -33,6 +33,7 @@ def access_control(robot: str, domain: int, hosts: Sequence[AllowedHost]) -> dic
     rules = [_rule("all", _ALL, ("ingress", "egress"), ["**", "**/@adv/**", "@ros2_lv/**"])]
     policies = [{"rules": ["all"], "subjects": ["this host"]}]
     subjects: list[Mapping[str, object]] = [{"id": "this host", "link_protocols": list(_LOCAL)}]
+    tried = [f"{DENIED}{robot}/*"]
     tokens = [f"@ros2_lv/{domain}/**"]
     for one in hosts:
         gives, takes, both = (_patterns(domain, names) for names in (one.gives, one.takes, one.both))
@@ -45,13 +46,55 @@ def access_control(robot: str, domain: int, hosts: Sequence[AllowedHost]) -> dic
             "tokens": _rule(
                 f"{one.certificate} tokens", _TOKENS, ("ingress", "egress"), [*tokens, *_caches(everything)]
             ),
+            # A message at these keys is asked for and sent, so that it is known to be stopped where it comes in.
+            "asked": _rule(f"{one.certificate} asked", ["declare_subscriber"], ("ingress", "egress"), tried),
+            "tried": _rule(f"{one.certificate} tried", ["put"], ("egress",), tried),
             "caches": _rule(f"{one.certificate} caches", _ALL, ("ingress", "egress"), _caches([*gives, *takes, *both])),
         }
         kept = [rule for rule in own.values() if rule["key_exprs"]]
         rules += kept
         policies.append({"rules": [str(rule["id"]) for rule in kept], "subjects": [one.certificate]})
-        subjects.append({"id": one.certificate, "cert_common_names": [one.certificate], "link_protocols": ["tls"]})
+        subjects.append(_proven(one.certificate))
     return {"enabled": True, "default_permission": "deny", "rules": rules, "subjects": subjects, "policies": policies}
+
+
+def exchange_access(gives: Iterable[str], takes: Iterable[str], hosts: Sequence[AllowedHost] = ()) -> dict[str, object]:
+    """Return the access control of a robot's exchange: only these names leave it, and only those come in.
+
+    With `hosts`, robots on each of them `take` and `give` what is theirs, and all those on this host.
+    """
+    here: Mapping[str, object] = {"id": "this host", "link_protocols": list(_LOCAL)} if hosts else {"id": "others"}
+    ends = [(here, gives, takes), *((_proven(one.certificate), one.takes, one.gives) for one in hosts)]
+    rules, policies = list[dict[str, object]](), list[dict[str, object]]()
+    for subject, out, back in ends:
+        name = subject["id"]
+        given, taken = _patterns(EXCHANGE_DOMAIN, out), _patterns(EXCHANGE_DOMAIN, back)
+        own = [
+            _rule(f"{name} tokens", _TOKENS, ("ingress", "egress"), ["@ros2_lv/**", *_caches([*given, *taken])]),
+            *_one_way(f"{name} takes", given, "egress", "ingress"),
+            *_one_way(f"{name} gives", taken, "ingress", "egress"),
+        ]
+        kept = [rule for rule in own if rule["key_exprs"]]
+        rules += kept
+        policies.append({"rules": [rule["id"] for rule in kept], "subjects": [name]})
+    return {
+        "enabled": True,
+        "default_permission": "deny",
+        "rules": rules,
+        "subjects": [subject for subject, _, _ in ends],
+        "policies": policies,
+    }
+
+
+def _proven(certificate: str) -> Mapping[str, object]:
+    """Return the subject that is a host with a certificate."""
+    return {"id": certificate, "cert_common_names": [certificate], "link_protocols": ["tls", "quic"]}
+
+
+def _one_way(name: str, keys: Sequence[str], data: str, wishes: str) -> list[dict[str, object]]:
+    """Return rules for topics whose data flow one way, and the wishes for them the other."""
+    everything = [*keys, *_caches(keys)]
+    return [_rule(f"{name} data", _GIVE, (data,), everything), _rule(f"{name} wishes", _TAKE, (wishes,), everything)]
 
 
 def _rule(name: str, messages: Iterable[str], flows: Iterable[str], keys: Sequence[str]) -> dict[str, object]:

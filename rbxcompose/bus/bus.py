@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 from rbxcompose.bus.action_client import ActionClient
 from rbxcompose.bus.action_server import ActionServer
+from rbxcompose.bus.gate import REQUESTS
 from rbxcompose.bus.inbox import Inbox
 from rbxcompose.bus.local import BusProcess, Participant, Refusing
 from rbxcompose.bus.orders import OrderPublisher
@@ -86,15 +87,17 @@ class Bus:
         waits: bool = False,
         is_patient: bool = False,
         is_light: bool = True,
+        may_be_silent: bool = False,
     ) -> Subscription[M]:
         """Call `handler` with each message of a topic; with `waits`, not before `open`.
 
         Takes at most `max_rate` [Hz] from each publisher of another process (all messages if infinite); None means the
         limit of the QoS class. Refuses their messages of more than `max_size` [B]. A patient subscription is for topics
-        that are published often and read rarely. A light handler may run in the thread that brings a message.
+        that are published often and read rarely. A light handler may run in the thread that brings a message. Whoever
+        `may_be_silent` is not missed.
         """
         node = self._node(owner)
-        kinds = {"waits": waits, "is_patient": is_patient, "is_light": is_light}
+        kinds = {"waits": waits, "is_patient": is_patient, "is_light": is_light, "may_be_silent": may_be_silent}
         made = Subscription(self._topics, node, topic, message, qos, handler, max_rate, max_size=max_size, **kinds)
         return _kept(node, made)
 
@@ -113,11 +116,16 @@ class Bus:
         service: type[Service[Q, R]],
         handle: Callable[[ServedRequest[Q, R]], None],
         *,
+        client_left: Callable[[bytes], None] | None = None,
         waits: bool = False,
-    ) -> None:
-        """Call `handle` with each request, to be answered now or later; with `waits`, none before `open`."""
+        rate: float = REQUESTS,
+    ) -> Server[Q, R]:
+        """Call `handle` with each request, to be answered now or later; with `waits`, none before `open`.
+
+        Takes at most `rate` [Hz] from each client elsewhere. `client_left` gets the GID of each client that is gone.
+        """
         node = self._node(owner)
-        _kept(node, Server(self._services, node, name, service, handle, waits=waits))
+        return _kept(node, Server(self._services, node, name, service, handle, client_left, waits=waits, rate=rate))
 
     def client(self, owner: str, name: str, service: type[Service[Q, R]]) -> Client[Q, R]:
         """Declare a client of a service; call it with a request."""

@@ -8,6 +8,8 @@ from rbxcompose.dataclass import dataclass
 
 LONGEST_NAME = 247  # rmw's limit: 255 bytes less the prefixes that some middleware adds
 ADMIN = "rbx/"  # prefix of the keys that are not part of ROS 2
+EXCHANGE_DOMAIN = 0  # of what robots share
+DENIED = "rbx_denied/"  # prefix of keys at which messages of other hosts are denied
 
 _NAME = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 _DDS = re.compile(r"(\w+)::(\w+)::dds_::(\w+)_")
@@ -52,6 +54,11 @@ def ros_type(dds: str) -> str:
 def admin_key(robot: str, path: str) -> str:
     """Return the Zenoh key of something that a robot shows to tools, apart from the topics of ROS 2."""
     return f"{ADMIN}{robot}/{path}"
+
+
+def denied_key(robot: str, host: str) -> str:
+    """Return the Zenoh key that no other host may let pass: by it, access control is tried."""
+    return f"{DENIED}{robot}/{host}"
 
 
 def data_key(domain: int, full_name: str, ros_type: str, type_hash: str) -> str:

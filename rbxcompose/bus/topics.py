@@ -120,6 +120,7 @@ class Subscription(Generic[M]):
         listens: bool = True,
         is_patient: bool = False,
         is_light: bool = True,
+        may_be_silent: bool = False,
     ) -> None:
         """With `waits`, hold messages until the node is open; unless it `listens`, ignore other processes.
 
@@ -134,6 +135,7 @@ class Subscription(Generic[M]):
         self.is_wanted: Callable[[], bool] = lambda: True  # if false, arrivals from other processes are ignored
         self._topics, self._process, self._qos = topics, node.process, qos
         self._message, self._handler, self._max_size = message, handler, max_size
+        self._may_be_silent = may_be_silent
         rate = max_rate or most_per_second(qos)
         self._allowances = None if rate is None or math.isinf(rate) else Allowances(rate)
         self._arrived = -math.inf  # [s] of robot time
@@ -176,7 +178,7 @@ class Subscription(Generic[M]):
         self.catch_up()
         type_hash = self._process.wire.hash_of(self._message)
         is_part_of_an_action = "/_" in self.route[0]  # nothing is published there until there is a goal
-        speaks = expects_speech(self._qos) and not is_part_of_an_action
+        speaks = expects_speech(self._qos) and not (is_part_of_an_action or self._may_be_silent)
         return TopicReader(self.owner, self.route, type_hash, self._arrived, speaks, self._qos is Qos.LATCHED)
 
     def listen(self) -> None:

@@ -16,10 +16,10 @@ import zenoh
 
 from rbxcompose.bus import shared_memory
 from rbxcompose.dataclass import dataclass
-from rbxcompose.endpoints import is_private, socket_of, tcp_endpoint, unix_endpoint
+from rbxcompose.endpoints import LINK_LEASE, is_private, socket_of, tcp_endpoint, unix_endpoint
 
-LEASE = 2000  # [ms] until a silent link counts as lost
-PATIENCE = 1000  # [ms] that a visitor waits for a router
+LEASE = round(1000 * LINK_LEASE)  # [ms] until a silent link counts as lost
+PATIENCE, LONGER = 1000, 5000  # [ms] that a visitor waits for a router, and a process that cannot do without it
 THREADS = "(rx: (worker_threads: 2), acc: (handover: rx), net: (handover: rx), app: (handover: rx))"
 """Which threads Zenoh has: two that receive and do all else, and one that sends.
 
@@ -27,6 +27,7 @@ By default there are six, and a message passes three of them: one sees it, one r
 that send must not be those that receive, or Zenoh waits for itself.
 """
 _RETRY = {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 2}
+_PRIORITIES = {"high": "interactive_high", "medium": "data", "low": "background"}
 _TAKEN = ("os error 98", "Unable to acquire lock")  # what Zenoh says of an endpoint in use
 _session_numbers = itertools.count()
 
@@ -40,6 +41,9 @@ class RouterLink:
     tls: Mapping[str, object] = field(default_factory=dict)  # settings of `transport/link/tls`
     access: Mapping[str, object] = field(default_factory=dict)  # `access_control`
     downsample: Mapping[str, float] = field(default_factory=dict)  # key -> most messages per second that leave [Hz]
+    priorities: Mapping[str, str] = field(default_factory=dict)  # key -> high, medium or low, as it leaves
+    largest: Mapping[str, int] = field(default_factory=dict)  # key -> largest message that leaves [bytes]
+    lease: float = LINK_LEASE  # [s] of silence after which the others count us as gone, as we do them
 
 
 def tls_settings(authority: str, certificate: str, key: str, *, mutual: bool) -> dict[str, object]:
@@ -58,7 +62,7 @@ def tls_settings(authority: str, certificate: str, key: str, *, mutual: bool) ->
 NO_LINK = RouterLink()
 
 
-def _common() -> dict[str, object]:
+def _common(lease: float = LINK_LEASE) -> dict[str, object]:
     return {
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": True,  # without it, two peers of one router never exchange data
@@ -66,7 +70,7 @@ def _common() -> dict[str, object]:
         "scouting/gossip/autoconnect_strategy": {"peer": {"to_router": "always", "to_peer": "greater-zid"}},
         "scouting/delay": 0,  # a router would wait this long before it opens
         "timestamping/enabled": True,  # needed by the caches of latched topics
-        "transport/link/tx/lease": LEASE,
+        "transport/link/tx/lease": round(1000 * lease),
         "transport/shared_memory/enabled": not shared_memory.problem(),  # else no session opens without room for it
         "transport/shared_memory/transport_optimization/pool_size": shared_memory.POOL,
     }
@@ -85,6 +89,17 @@ def peer_settings(router: str) -> dict[str, object]:
     }
 
 
+def lone_settings(router: str) -> dict[str, object]:
+    """Return the configuration of a process that is linked with `router` only; all that it sends takes that way."""
+    return {
+        **client_settings(router),
+        "scouting/gossip/enabled": False,
+        "connect/retry": _RETRY,
+        "connect/timeout_ms": LONGER,
+        "transport/unicast/open_timeout": LONGER,
+    }
+
+
 def _endpoint_beside(router: str) -> str:
     if not is_private(router):
         return tcp_endpoint(0)
@@ -98,7 +113,7 @@ def router_settings(endpoint: str, link: RouterLink = NO_LINK) -> dict[str, obje
     Gossip goes one hop far, so peers of different hosts do not learn of each other and only routers are linked.
     """
     return {
-        **_common(),
+        **_common(link.lease),
         "mode": "router",
         "listen/endpoints": [endpoint, *link.listen],
         "listen/timeout_ms": 0,
@@ -107,17 +122,47 @@ def router_settings(endpoint: str, link: RouterLink = NO_LINK) -> dict[str, obje
         "connect/endpoints": list(link.connect),
         "connect/retry": _RETRY,
         "connect/timeout_ms": -1,  # forever: the other host may come later
+        "transport/unicast/open_timeout": LEASE,  # QUIC waits that long for a host that is not there, and closing waits
         "connect/exit_on_failure": False,
         **{f"transport/link/tls/{name}": value for name, value in link.tls.items()},
         **({"access_control": link.access} if link.access else {}),
-        **_downsampling(link.downsample),
+        **_leaving(link),
     }
 
 
-def _downsampling(rates: Mapping[str, float]) -> dict[str, object]:
-    """Return the limits for what leaves; peers of this host get it from each other, past the router."""
-    rules = [{"key_expr": key, "freq": rate} for key, rate in rates.items()]
-    return {"downsampling": [{"messages": ["put"], "flows": ["egress"], "rules": rules}]} if rules else {}
+def _leaving(link: RouterLink) -> dict[str, object]:
+    """Return what is done with messages that leave; peers of this host get them from each other, past the router."""
+    puts = {"messages": ["put"], "flows": ["egress"]}
+    rates = [{"key_expr": key, "freq": rate} for key, rate in link.downsample.items()]
+    sizes = [{**puts, "key_exprs": [key], "size_limit": size} for key, size in link.largest.items()]
+    order = [
+        {**puts, "key_exprs": [key], "overwrite": {"priority": _PRIORITIES[word]}}
+        for key, word in link.priorities.items()
+    ]
+    found = {
+        "downsampling": [{**puts, "rules": rates}] if rates else [],
+        "low_pass_filter": sizes,
+        "qos/network": order,
+    }
+    return {name: rules for name, rules in found.items() if rules}
+
+
+def exchange_settings(link: RouterLink) -> dict[str, object]:
+    """Return the configuration of a session that only talks to those that it dials, or that dial it."""
+    return {
+        **_common(link.lease),
+        "scouting/gossip/enabled": False,
+        "mode": "peer",
+        "listen/endpoints": list(link.listen),
+        "listen/timeout_ms": 0,
+        "listen/exit_on_failure": True,
+        "connect/endpoints": list(link.connect),
+        "connect/retry": _RETRY,
+        "connect/timeout_ms": -1,  # forever: the other robot may come later
+        "connect/exit_on_failure": False,
+        **{f"transport/link/tls/{name}": value for name, value in link.tls.items()},
+        "access_control": link.access,
+    }
 
 
 def client_settings(router: str) -> dict[str, object]:
@@ -135,6 +180,18 @@ def client_settings(router: str) -> dict[str, object]:
 def open_peer(router: str) -> zenoh.Session:
     """Open the session of a process; the router need not be there yet."""
     return _opened(peer_settings(router))
+
+
+def open_lone(router: str) -> zenoh.Session:
+    """Open the session of a process that is linked with the router only.
+
+    Raises:
+        OSError: if the router does not answer; once it has, the session waits for it.
+    """
+    try:
+        return _opened(lone_settings(router))
+    except zenoh.ZError as error:
+        raise OSError(errno.ECONNREFUSED, f"no router answers at {router}") from error
 
 
 def open_client(router: str) -> zenoh.Session:
@@ -161,6 +218,18 @@ def open_router(endpoint: str, link: RouterLink = NO_LINK) -> zenoh.Session:
         if not any(cause in str(error) for cause in _TAKEN):
             raise
         raise OSError(errno.EADDRINUSE, f"{endpoint} is taken") from error
+
+
+def open_exchange(link: RouterLink) -> zenoh.Session:
+    """Open the session by which a robot gives to others what is shared, and takes what they share.
+
+    Raises:
+        OSError: if an endpoint is taken.
+    """
+    try:
+        return _opened(exchange_settings(link))
+    except zenoh.ZError as error:
+        raise OSError(errno.EADDRINUSE, f"{' and '.join(link.listen)} cannot be opened: {error}") from error
 
 
 def _opened(settings: Mapping[str, object]) -> zenoh.Session:

@@ -11,6 +11,8 @@ from rbxcompose.model.robot import Robot
 from rbxcompose.sdk.capabilities import Charges, Navigates
 from rbxcompose.units import LENGTH, format_quantity
 
+_ABSURD = 1.0  # [m] of a tolerance, which is then what is wrong
+
 
 @check("RBX3505", Severity.WARNING, closed=())
 def charger_reach(robot: Robot) -> Iterator[Finding]:
@@ -45,8 +47,9 @@ def charger_reach(robot: Robot) -> Iterator[Finding]:
         if reach and charges.place and reach.value < tolerance.value:
             here, there = (component, reach.field), (driver, tolerance.field)
             changes = [f"'{name}' {how}" for name, how in ((here[1], "larger"), (there[1], "smaller")) if name]
+            both = (there, here) if tolerance.value > _ABSURD else (here, there)
             yield charger_reach.at(
-                setting_span(robot, here, there),
+                setting_span(robot, *both),
                 f"'{component.name}' charges within {format_quantity(reach.value, LENGTH)} of the dock, "
                 f"but '{driver.name}' may end {format_quantity(tolerance.value, LENGTH)} away from it",
                 help=f"make {', or '.join(changes)}" if changes else OTHER_TYPE,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from rbxcompose.check_runner import check
+from rbxcompose.checks.far_place import far_places
 from rbxcompose.findings import Finding, Related, Severity
 from rbxcompose.missions.analysis.facts import goal_place
 from rbxcompose.missions.analysis.travel_times import too_short
@@ -14,6 +15,8 @@ from rbxcompose.model.flow import setting_span
 from rbxcompose.model.robot import Robot, RobotComponent
 from rbxcompose.sdk.capabilities import Setting
 from rbxcompose.units import RATIO, TIME, format_quantity
+
+_LASTS = "how long a full battery lasts"
 
 
 @check("RBX4124", Severity.WARNING)
@@ -50,6 +53,7 @@ def empty_on_the_way(robot: Robot) -> Iterator[Finding]:
         ways, known = ways_of(robot, mission), constants(mission)
         if ways is None:
             continue
+        lost = {one.name for one in far_places(robot)}  # told as RBX3512
         list(too_short(ways, known))  # consumed for its side effect: it walks the whole mission
         for call in calls(robot, mission):
             goals = (
@@ -59,9 +63,10 @@ def empty_on_the_way(robot: Robot) -> Iterator[Finding]:
             )
             dock = next((place for place in goals if place), None)
             runtime = call.drains.runtime
-            if dock is None or runtime is None or not ways.visited:
+            visited = [place for name, place in ways.visited.items() if name not in lost]
+            if dock is None or runtime is None or not visited or dock.name in lost:
                 continue
-            far = max(ways.visited.values(), key=lambda place: ways.between(place, dock))
+            far = max(visited, key=lambda place: ways.between(place, dock))
             lasts, needs = call.level * runtime.value, ways.between(far, dock)
             if runtime.value < needs:
                 yield _never_there(robot, call.battery, runtime, f"from '{far.name}' to '{dock.name}'", needs)
@@ -72,10 +77,7 @@ def empty_on_the_way(robot: Robot) -> Iterator[Finding]:
                     f"{format_quantity(call.level, RATIO)} last for {format_quantity(round(lasts, 1), TIME)}, but the "
                     f"way from '{far.name}' to '{dock.name}' takes {format_quantity(round(needs, 1), TIME)}",
                     help="interrupt earlier",
-                    related=[
-                        *related,
-                        Related(setting_span(robot, (call.battery, runtime.field)), "how long a full battery lasts"),
-                    ],
+                    related=[*related, Related(setting_span(robot, (call.battery, runtime.field)), _LASTS)],
                 )
 
 

@@ -20,6 +20,7 @@ from rbxcompose.model.flow import setting_span
 from rbxcompose.model.robot import Robot, RobotMission
 from rbxcompose.rules import WIRING
 from rbxcompose.sdk.capabilities import BoundsGoals
+from rbxcompose.units import LENGTH, UNITS
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,8 +91,7 @@ def _beyond(
     known: Constants,
 ) -> Iterator[Finding]:
     """Yield the finding about a goal whose value is known and that is refused."""
-    expression = _expression(argument)
-    value = _value(expression, known) if expression else None
+    expression, value = _expression(argument), known_value(argument, known)
     if expression is None or value is None or not isinstance(argument.value, ScalarNode):
         return
     if (nearest := allowed.nearest(value)) != value:
@@ -101,9 +101,23 @@ def _beyond(
         yield goal_beyond_limits.at(
             declared or argument.value.span,
             f"'{skill}' cannot bring '{name}' to {show(wanted, value)}: {allowed.whose} is from {least} to {greatest}",
-            help=f"the nearest that it reaches is {show(wanted, nearest)}",
+            help=_meant(argument.value.text, wanted, allowed)
+            or f"the nearest that it reaches is {show(wanted, nearest)}",
             related=[*used, Related(allowed.place, "its limits")],
         )
+
+
+def _meant(text: str, wanted: Type, allowed: GoalRange) -> str:
+    """Return the unit that a bare length probably lacks; nothing if none would help."""
+    try:
+        number = float(text)
+    except ValueError:
+        return ""
+    for unit in ("cm", "mm") if number and wanted.dimension == LENGTH else ():
+        value = UNITS[unit].to_si(number)
+        if allowed.nearest(value) == value:
+            return f"did you mean '{text} {unit}'? A number without a unit counts in metres"
+    return ""
 
 
 def _expression(argument: WrittenArgument) -> Expression | None:
@@ -120,8 +134,10 @@ def _unsigned(tree: ExpressionNode) -> tuple[ExpressionNode, float]:
     return tree, sign
 
 
-def _value(expression: Expression, known: Constants) -> float | None:
+def known_value(argument: WrittenArgument, known: Constants) -> float | None:
     """Return the number that an argument always is, if it is simple enough."""
+    if (expression := _expression(argument)) is None:
+        return None
     tree, sign = _unsigned(expression.tree)
     found = number_in(tree, known)
     return None if found is None else sign * found

@@ -65,7 +65,7 @@ def _idle(analyzer: AnalyzerModel, is_ros1: bool) -> Iterator[tuple[str, str, st
             cure = "omit 'type'" if key == "analyzers" else cure
             yield key, f"it is of type '{analyzer.kind}'", cure
         elif is_ros1 and key in _OF_LEVELS:
-            yield key, "the profile is 'ros1'", "omit it, or 'profile: ros1'"
+            yield key, "the profile is 'ros1'", "remove it, or remove 'profile: ros1'"
         elif key == "discard_stale" and analyzer.discard_stale and not analyzer.timeout:
             yield key, "with 'timeout: 0' nothing is ever stale", "give it a timeout"
         elif key == "latch" and analyzer.latch and analyzer.path == "":

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from rbxcompose.check_runner import check
 from rbxcompose.checks.two_writers import is_command
 from rbxcompose.findings import Finding, Related
+from rbxcompose.model.instances import answers, shared_names
 from rbxcompose.model.robot import Robot
 from rbxcompose.rules import WIRING
 from rbxcompose.sdk.ports import Out
@@ -49,7 +50,10 @@ def instance_topics(robot: Robot) -> Iterator[Finding]:
         }
         for topic, short in sorted(told.items()):
             other = robot.manifest.parts[first.setdefault((part.file, topic), part.name)]
-            if other is not part and not short.startswith("/"):
+            if other is part or short.startswith("/"):
+                continue
+            shared = shared_names(robot, part, other)
+            if not any(end.topic in shared for end in robot.ends if answers(end)):  # else it is told with those
                 yield instance_topics.at(
                     part.span,
                     f"the instances '{part.name}' and '{other.name}' of one part both publish on '{topic}'",

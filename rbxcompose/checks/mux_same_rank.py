@@ -11,16 +11,16 @@ from rbxcompose.model.robot import Robot
 
 @check("RBX3137", Severity.WARNING)
 def mux_same_rank(robot: Robot) -> Iterator[Finding]:
-    """Two inputs of a mux have the same priority, and their order decides
+    """Two inputs of a mux have the same priority, and the one that holds it keeps it
 
-    In the profile `twist_mux` the first one in the list wins, always. In the profile `yocs` the one that holds the
-    output keeps it until its timeout. Neither can be seen from the priorities.
+    In the profile `yocs`, among inputs of one priority the one that holds the output keeps it until its timeout: who
+    that is depends on who came first.
 
     Bad:
     ```yaml
     muxes:
       cmd_vel:
-        profile: twist_mux
+        profile: yocs
         inputs:
           teleop:
             priority: 10
@@ -34,7 +34,7 @@ def mux_same_rank(robot: Robot) -> Iterator[Finding]:
     ```yaml
     muxes:
       cmd_vel:
-        profile: twist_mux
+        profile: yocs
         inputs:
           teleop:
             priority: 100
@@ -47,13 +47,12 @@ def mux_same_rank(robot: Robot) -> Iterator[Finding]:
     """
     for mux, entry in robot.manifest.muxes.items():
         first: dict[int, str] = {}
-        for name, rank in entry.ranks.items() if entry.profile != "default" else ():
+        for name, rank in entry.ranks.items() if entry.profile == "yocs" else ():
             other = first.setdefault(rank, name)
             if other != name:
-                who = f"'{other}' always wins" if entry.profile == "twist_mux" else "the one that holds keeps it"
                 yield mux_same_rank.at(
                     robot.value("muxes", mux, "inputs", name, "priority"),
-                    f"inputs '{other}' and '{name}' of mux '{mux}' have the same priority {rank}: {who}",
+                    f"inputs '{other}' and '{name}' of mux '{mux}' have the same priority {rank}: who holds keeps it",
                     help="give each input its own priority",
                     related=[Related(robot.value("muxes", mux, "inputs", other, "priority"), f"input '{other}'")],
                 )

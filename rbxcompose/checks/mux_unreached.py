@@ -8,6 +8,8 @@ from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Related, Severity
 from rbxcompose.model.robot import Robot
 
+_MOST_SHOWN = 8  # inputs that are pointed at
+
 
 @check("RBX3133", Severity.WARNING)
 def mux_unreached(robot: Robot) -> Iterator[Finding]:
@@ -49,12 +51,17 @@ def mux_unreached(robot: Robot) -> Iterator[Finding]:
         ranks = entry.ranks if entry.profile == "twist_mux" else {}
         endless = [name for name, rank in ranks.items() if rank > 0 and not entry.inputs[name].timeout]
         top = max(endless, key=lambda name: ranks[name], default="")
-        for place, (name, rank) in enumerate(ranks.items()):
-            is_below = bool(top) and (rank, -place) < (ranks[top], -list(ranks).index(top))
-            if is_below:
-                yield mux_unreached.at(
-                    robot.key("muxes", mux, "inputs", name),
-                    f"input '{name}' of mux '{mux}' never gets through: '{top}' never expires",
-                    help=f"give '{top}' a timeout such as '0.5 s'",
-                    related=[Related(robot.value("muxes", mux, "inputs", top), "it holds back what is below")],
-                )
+        places = list(ranks)
+        below = [
+            name
+            for place, (name, rank) in enumerate(ranks.items())
+            if top and (rank, -place) < (ranks[top], -places.index(top))
+        ]
+        if below:
+            shown = ", ".join(f"'{name}'" for name in below)
+            yield mux_unreached.at(
+                robot.value("muxes", mux, "inputs", top, "timeout"),
+                f"input '{top}' of mux '{mux}' never expires, so what is below it never gets through: {shown}",
+                help="give it a timeout such as '0.5 s'",
+                related=[Related(robot.key("muxes", mux, "inputs", name), "held back") for name in below[:_MOST_SHOWN]],
+            )

@@ -12,6 +12,7 @@ from rbxcompose.qos import Qos
 from rbxcompose.rules import NAMES, WIRING
 from rbxcompose.sdk.capabilities import RunsMissions
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Out, Serves, ServesAction
+from rbxcompose.sdk.registry import types_with
 
 SERVED_BY = {Calls: Serves, CallsAction: ServesAction, In: Out}
 
@@ -51,6 +52,7 @@ def needed_port(robot: Robot) -> Iterator[Finding]:
             end for end in component.ends if type(end.port) in SERVED_BY and not getattr(end.port, "is_open", False)
         ]
         missing = [end for end in needed if (SERVED_BY[type(end.port)], end.topic) not in given]
+        missing = [end for end in missing if end.topic not in robot.outside.names]
         # A command without a subscriber is reported at its publisher.
         ends = [end for end in missing if not (_is_command(end) and end.type_name in lost)]
         if ends:
@@ -73,9 +75,16 @@ def _finding(robot: Robot, component: RobotComponent, ends: list[PortEnd]) -> Fi
     return needed_port.at(
         robot.end_span(ends[0]),
         f"'{component.name}' needs {names}, which nothing in the robot provides",
-        help=f"connect it: {fix}" if fix else "add the component that provides it",
+        help=f"connect it: {fix}" if fix else f"add the component that provides it{_such_as(ends)}",
         related=[Related(robot.end_span(other), f"'{other.topic}' is of this type") for _, other in near],
     )
+
+
+def _such_as(ends: list[PortEnd]) -> str:
+    """Return the types of components that could provide all of this, as words that follow; empty without any."""
+    found = [types_with(SERVED_BY[type(end.port)], end.topic.rpartition("/")[-1], end.type_name) for end in ends]
+    both = [name for name in found[0] if all(name in names for names in found)]
+    return f", such as one of the type {' or '.join(map(repr, both))}" if both else ""
 
 
 def _fits(end: PortEnd, other: PortEnd) -> bool:

@@ -11,7 +11,7 @@ from rbxcompose.model.flow import is_written, setting_span
 from rbxcompose.model.robot import Robot, RobotComponent
 from rbxcompose.model.wires import PortEnd
 from rbxcompose.rules import NAMES, WIRING
-from rbxcompose.sdk.capabilities import WritesFrame
+from rbxcompose.sdk.capabilities import Setting, WritesFrame
 
 STATIC = "_static"  # suffix of the topic of static transforms; both topics describe one tree
 
@@ -65,9 +65,19 @@ def one_frame_two_writers(robot: Robot) -> Iterator[Finding]:
             yield one_frame_two_writers.at(
                 one.span(robot),
                 f"'{name}' and '{other.component.name}' both write the pose of the frame '{one.frame.child.value}'",
-                help=f"remove one of them{remedy}",
+                help=_of_body(robot, one.frame.child) or f"remove one of them{remedy}",
                 related=[Related(other.span(robot), "the other one")] if other.component.name in robot.written else [],
             )
+
+
+def _of_body(robot: Robot, child: Setting[str]) -> str:
+    """Return what helps if a frame hangs on another one in the body: the root of the body is what moves."""
+    body = robot.manifest.body.body if robot.manifest.body else None
+    if body is None or child.value not in body.joint_above or not child.field:
+        return ""
+    above = body.joint_above[child.value].parent
+    key = child.field.rpartition(".")[-1]
+    return f"it hangs on '{above}' in the body: write '{key}: {body.root}', the root of the body"
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,10 +7,13 @@ from itertools import groupby
 
 from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Related
+from rbxcompose.model.flow import is_written
 from rbxcompose.model.robot import Robot
-from rbxcompose.model.wires import resolve
+from rbxcompose.model.wires import PortEnd, resolve
 from rbxcompose.rules import WIRING
 from rbxcompose.sdk.ports import Looks
+
+TYPE = "message"  # the setting of those whose type is chosen
 
 
 @check("RBX3002", closed=(WIRING,))
@@ -56,9 +59,17 @@ def one_topic_two_types(robot: Robot) -> Iterator[Finding]:
                     f"'{topic}' is {first.type_name} for '{first.instance}', "
                     f"but {other.type_name} for '{other.instance}'",
                     label=f"its port '{other.name}'",
-                    help="give one of them another topic with 'connect:'",
+                    help=_cure(robot, first, other),
                     related=[Related(robot.end_span(first), f"its port '{first.name}'")],
                 )
+
+
+def _cure(robot: Robot, *ends: PortEnd) -> str:
+    """Return what helps: another type for the one whose type is a setting, else another topic."""
+    for end, wanted in zip(ends, (ends[1], ends[0]), strict=True):
+        if is_written(robot, robot.components[end.instance], TYPE):
+            return f"write '{TYPE}: {wanted.type_name.replace('/msg/', '/')}' in '{end.instance}', or another topic"
+    return "give one of them another topic with 'connect:'"
 
 
 def _name_used_twice(robot: Robot, mux: str, name: str) -> Finding:

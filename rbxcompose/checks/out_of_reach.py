@@ -46,11 +46,13 @@ def _told(one: DrivenJoint) -> Iterator[Finding]:
     servo = "its servo reaches" if len(joint.servos) == 1 else "its servos reach"
     body = one.body.limits if one.body else None
     message = f"'{one.name}' {wanted}, but {servo} {one.position(first)} to {one.position(last)}"
+    if body and not one.slides and body.may_be_degrees:
+        return  # told as RBX2021
     if body and not is_free and (meant := _in_degrees(one)):
         yield out_of_reach.at(body.span, message, help=f"limits in a URDF are in radians: for degrees, write {meant}")
         return
     yield out_of_reach.at(
-        _place(one),
+        _place(one, is_shifted=limits.least > last or limits.greatest < first),
         message,
         help=_remedy(one, max(first, limits.least), min(last, limits.greatest)),
         related=[Related(body.span, "its limits in the body")] if body else [],
@@ -67,11 +69,12 @@ def _in_degrees(one: DrivenJoint) -> str:
     return f'\'lower="{lower:.4g}" upper="{upper:.4g}"\''
 
 
-def _place(one: DrivenJoint) -> Span:
-    """Return where the range is written, else what shifts or scales it."""
+def _place(one: DrivenJoint, *, is_shifted: bool) -> Span:
+    """Return where the range is written, else what shifts or scales it; if it `is_shifted` whole, what shifts it."""
     own = (("joints", one.name, *path) for path in (("limits", "position"), *((key,) for key in _SCALES)))
     neutral = (("actuators", name, "neutral") for name in one.written.servos)
-    paths = [path for path in (*own, *neutral) if at(one.robot.manifest.root, path) is not None]
+    every = (*neutral, *own) if is_shifted else (*own, *neutral)
+    paths = [path for path in every if at(one.robot.manifest.root, path) is not None]
     return one.robot.key(*paths[0]) if paths else one.key()
 
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from rbxcompose.check_runner import check
+from rbxcompose.config import Config
 from rbxcompose.expressions.evaluate import evaluate
+from rbxcompose.expressions.tree import ExpressionError
 from rbxcompose.expressions.types import Type, TypeKind
 from rbxcompose.expressions.values import EvaluationError, Value
 from rbxcompose.findings import Finding
@@ -78,19 +80,31 @@ def _beyond(
     component: RobotComponent, name: str, value: ScalarNode, wanted: Type, known: Constants
 ) -> Iterator[Finding]:
     """Yield the finding on a value that is known and that the component would refuse."""
-    if wanted.kind in (TypeKind.TEXT, TypeKind.CHOICE):
-        return  # its words are checked as its type
-    try:
-        given = evaluate(expression_of(value), _Constants(known))
-    except (EvaluationError, KeyError):
-        return
-    from rbxcompose.msgs.rcl_interfaces import Parameter  # messages that few robots need for a check
-    from rbxcompose.params.core import UnsettableError, changed
-    from rbxcompose.params.values import to_message
+    from rbxcompose.params.core import UnsettableError  # with messages that few robots need for a check
 
-    if (message := to_message(given)) is None:
-        return
     try:
-        changed(component.config, [Parameter(name, message)], component.bounds)
+        config_with(component, name, value, wanted, known)
     except UnsettableError as error:
         yield parameter_value.at(value.span, f"'{component.name}' would refuse this: {error}")
+
+
+def config_with(
+    component: RobotComponent, name: str, value: ScalarNode, wanted: Type, known: Constants
+) -> Config | None:
+    """Return the configuration of a component with a setting as a mission writes it; None if that is not known.
+
+    Raises:
+        UnsettableError: if the component refuses the value.
+    """
+    if wanted.kind in (TypeKind.TEXT, TypeKind.CHOICE):
+        return None  # its words are checked as its type
+    try:
+        given = evaluate(expression_of(value), _Constants(known))
+    except (EvaluationError, ExpressionError, KeyError):
+        return None
+    from rbxcompose.msgs.rcl_interfaces import Parameter  # messages that few robots need for a check
+    from rbxcompose.params.core import changed
+    from rbxcompose.params.values import to_message
+
+    message = to_message(given)
+    return None if message is None else changed(component.config, [Parameter(name, message)], component.bounds)

@@ -9,7 +9,7 @@ from rbxcompose.findings import Finding, Related
 from rbxcompose.model.robot import Robot, RobotComponent
 from rbxcompose.qos import Qos
 from rbxcompose.sdk.capabilities import Forwards
-from rbxcompose.sdk.ports import In
+from rbxcompose.sdk.ports import In, Out
 
 
 @check("RBX3102")
@@ -40,6 +40,8 @@ def past_the_mux(robot: Robot) -> Iterator[Finding]:
         for end in ends:
             if muxes and end.instance not in muxes and isinstance(end.port, In) and end.port.qos is Qos.COMMAND:
                 mux, own = robot.components[inputs[0].instance], inputs[0]
+                if own.topic in {one.topic for one in mux.ends if isinstance(one.port, Out)}:
+                    continue  # the mux takes what it writes itself, which is told there
                 yield past_the_mux.at(
                     robot.end_span(end),
                     f"'{end.instance}' subscribes to '{topic}', bypassing the mux '{mux.name}'",

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from rbxcompose.check_runner import check
 from rbxcompose.checks.idle_overlay import changes
+from rbxcompose.composition.history import HistoryStep
 from rbxcompose.findings import Finding, Related, Severity
 from rbxcompose.manifest.tree import ScalarNode, SequenceNode, TreeNode
 from rbxcompose.manifest.walk import REPLACE
@@ -53,6 +54,16 @@ def shortened_list(robot: Robot) -> Iterator[Finding]:
 def dropped(robot: Robot) -> set[str]:
     """Return all words that lists lose in this way."""
     return {word for before, after, _ in changes(robot) for word in lost(before.node, after.node)}
+
+
+def taken_out(robot: Robot) -> dict[str, HistoryStep]:
+    """Return all words that lists lose, each with the list that lacks it."""
+    found: dict[str, HistoryStep] = {}
+    for before, after, _ in changes(robot):
+        if isinstance(after.node, SequenceNode):
+            new = _words(after.node)
+            found |= {word: after for word in _words(before.node) if word not in new}
+    return found
 
 
 def lost(before: TreeNode | None, after: TreeNode | None) -> list[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from rbxcompose.check_runner import check
+from rbxcompose.checks.far_place import far_places
 from rbxcompose.findings import Finding, Related, Severity
 from rbxcompose.missions.analysis.facts import place_in_text
 from rbxcompose.missions.analysis.travel_times import distance, too_short
@@ -36,9 +37,12 @@ def timeout_and_way(robot: Robot) -> Iterator[Finding]:
         timeout: 20 s
     ```
     """
+    far = far_places(robot)  # told as RBX3512
     for mission in robot.missions.values():
         ways = ways_of(robot, mission)
         for one in too_short(ways, constants(mission)) if ways else ():
+            if one.leg and any(place in far for place in one.leg):
+                continue
             what, related = "this step", []
             if one.leg:
                 here, there = one.leg

@@ -11,6 +11,9 @@ from rbxcompose.manifest.tree import at
 from rbxcompose.model.robot import Robot
 from rbxcompose.model.wires import PortEnd
 from rbxcompose.rules import NAMES, WIRING
+from rbxcompose.sdk.capabilities import Drives
+from rbxcompose.sdk.ports import In
+from rbxcompose.sdk.registry import types_with
 
 WAITING = "topics that wait for such commands"
 _MOST_SHOWN = 8  # subscribers that are pointed at
@@ -48,18 +51,31 @@ def unheard_command(robot: Robot) -> Iterator[Finding]:
             yield unheard_command.at(
                 robot.end_span(end),
                 f"nothing subscribes to the commands of '{end.instance}' on '{end.topic}'",
-                help=_cure(robot, end, starving) or suggest(end.topic.strip("/"), topics, WAITING),
+                help=_cure(robot, end, starving) or suggest(end.topic.strip("/"), topics, WAITING) or _such_as(end),
                 related=[Related(robot.end_span(one), f"listens to '{one.topic}'") for one in starving[:_MOST_SHOWN]],
             )
 
 
+def _such_as(end: PortEnd) -> str:
+    found = types_with(In, end.topic.rpartition("/")[-1], end.type_name)
+    return (
+        f"add the component that follows them, such as one of the type {' or '.join(map(repr, found))}" if found else ""
+    )
+
+
 def _cure(robot: Robot, end: PortEnd, starving: list[PortEnd]) -> str:
     """Return what to do if the only one that waits was connected to another topic than its own."""
-    if len(starving) != 1:
+    bases = [base.end(drives.commands) for base, drives in robot.declared(Drives)]
+    elsewhere = [one for one in bases if one and one.type_name == end.type_name and one.topic != end.topic]
+    if len(starving or elsewhere) != 1:
         return ""
-    [one] = starving
+    [one] = starving or elsewhere
     connect = (*robot.components[one.instance].path, "connect", one.name)
     if at(robot.manifest.root, connect) is None:
         return ""
     topic = end.topic.strip("/")
-    return f"let '{one.instance}' listen to '{topic}': write '{one.name}: {topic}' below its 'connect', or remove that"
+    cure = f"let '{one.instance}' listen to '{topic}': write '{one.name}: {topic}' below its 'connect', or remove that"
+    past = [writer.instance for writer in robot.writers.get(one.topic, ()) if writer.instance != end.instance]
+    if end.instance in robot.manifest.muxes and past:
+        cure += f"; and let '{end.instance}' have an input with 'from: {past[0]}', which commands past it now"
+    return cure

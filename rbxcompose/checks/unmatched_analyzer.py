@@ -39,7 +39,9 @@ def unmatched_analyzer(robot: Robot) -> Iterator[Finding]:
     """
     there = {*robot.components, *robot.written, *robot.brought}
     known = {name for name in there if name.isidentifier()}
-    meant = {re.sub(r"\W", "", name) for name in there - known}  # names that are told where they stand
+    meant = {
+        re.sub(r"\W+", by, name) for name in there - known for by in ("", "_")
+    }  # names that are told where they stand
     compared = 0
     for path, analyzer in each_analyzer(robot.manifest.diagnostics.analyzers):
         patterns = [(index, one) for index, one in enumerate(analyzer.conditions) if isinstance(one, str)]

@@ -43,6 +43,9 @@ def _missing(robot: Robot, name: str, source: str) -> Wrong | None:
         if component in robot.written:
             return None  # it exists, but has mistakes, which are reported at their own place
         message = f"comes from a component that the robot does not have: '{component}'"
+        outputs = [f"{end.instance}.{end.name}" for end in robot.ends if end.name == component and not port]
+        if outputs:
+            return Wrong(message, f"{DID_YOU_MEAN} '{outputs[0]}'? It is an output, and needs its component")
         having = [end.instance for end in robot.ends if port and end.name == port and isinstance(end.port, Out)]
         if len(having) == 1:  # the only one with such an output
             return Wrong(message, f"{DID_YOU_MEAN} '{having[0]}.{port}'?", component, having)

@@ -38,5 +38,5 @@ def wheel_sides(robot: Robot) -> Iterator[Finding]:
                     setting_span(robot, (component, wheel.setting.field)),
                     f"the axis of '{wheel.joint.name}' points to the right: its positive direction is backwards",
                     help="turn the axis round in the URDF, and change 'invert' of its actuator",
-                    related=[Related(wheel.joint.span, "the wheel")],
+                    related=[Related(wheel.joint.axis_span or wheel.joint.span, "the axis")],
                 )

@@ -10,7 +10,9 @@ import argparse
 
 from rbxcompose.cli.bus.entities import add_server_verbs, tell_list, visit
 from rbxcompose.cli.bus.guest import Guest
+from rbxcompose.cli.systems.options import BUS
 
+ON_SYSTEM = BUS
 _VERB = ("send", "send a goal, print feedback and result")
 
 

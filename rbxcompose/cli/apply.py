@@ -2,26 +2,38 @@
 
 It first shows the differences, component by component with the reason, and on a terminal asks for confirmation. A
 manifest with errors changes nothing. Changes that are unsafe while the robot moves or a mission runs are refused with
-the reason.
+the reason. Of a system, all hosts are asked first: if one refuses, none is changed.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import sys
 
-from rbxcompose.cli.output.console import FINDINGS, misused, refuse, tell, tell_report
+from rbxcompose.cli.output.console import FINDINGS, refuse, tell, tell_report
+from rbxcompose.cli.project.kinds import is_system
 from rbxcompose.cli.project.robot_choice import add_path_argument, robot_path
 from rbxcompose.cli.project.robot_options import add_layer_options, chosen_layers, compiled
-from rbxcompose.cli.robots.lookup import REFUSED, NotDoneError
-from rbxcompose.cli.robots.proposal import Proposal
+from rbxcompose.cli.robots.change_outcome import carry_out, unsure
+from rbxcompose.cli.robots.commands import show_answer
+from rbxcompose.cli.robots.lookup import NotDoneError, answer_of, find_robot
+from rbxcompose.cli.robots.proposal import LONGEST_CHANGE, Proposal
+from rbxcompose.cli.systems.options import add_system_options
+from rbxcompose.runtime.plan_requests import RevertPlan
+
+_LAST = -1  # generation of the last change
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_path_argument(parser)
     add_layer_options(parser)
+    add_system_options(parser, has_profile=True)
+    parser.add_argument("--host", metavar="NAME", help="of a system: only what this host runs, which is this machine")
+    parser.add_argument("--robot", metavar="NAME", help="of a system: only this robot")
+    parser.add_argument("--partial", action="store_true", help="of a system: change the hosts that can, without others")
+    undo = "take back the last change, or that of this generation, as --json tells it"
+    parser.add_argument("--undo", nargs="?", type=int, const=_LAST, metavar="N", help=undo)
     parser.add_argument("-y", "--yes", action="store_true", help="do not ask")
     parser.add_argument("--dry-run", action="store_true", help="show the difference and what prevents it")
     parser.add_argument("--json", action="store_true", help="write the difference as JSON")
@@ -32,6 +44,12 @@ def run(arguments: argparse.Namespace) -> int:
     path = robot_path(arguments.path)
     if path is None:
         return FINDINGS
+    if is_system(path):
+        from rbxcompose.cli.systems.apply_system import apply_system  # only needed for systems
+
+        return apply_system(path, arguments)
+    if arguments.undo is not None:
+        return _undo(path, arguments)
     compilation = compiled(path, arguments)
     tell_report(compilation.report, compilation.sources)
     if compilation.plan is None or compilation.robot is None:
@@ -39,30 +57,20 @@ def run(arguments: argparse.Namespace) -> int:
     try:
         proposal = Proposal.of(compilation.plan, compilation.robot, chosen_layers(arguments))
         tell(json.dumps(proposal.data) if arguments.json else proposal.text())
-        return _carry_out(proposal, arguments)
+        return carry_out(proposal, arguments)
     except NotDoneError as error:
         return refuse(error.finding)
 
 
-def _carry_out(proposal: Proposal, arguments: argparse.Namespace) -> int:
-    name = proposal.folder.path.name
-    if proposal.why_not:
-        return refuse(REFUSED.at(None, f"'{name}' refuses: {proposal.why_not}"))
-    if arguments.dry_run or proposal.is_empty:
-        return 0
-    if not arguments.yes:
-        if arguments.json or not sys.stdin.isatty():
-            return misused("apply", "there is no terminal to ask: give --yes, or --dry-run to only look")
-        if not _is_wanted(name):
-            tell("nothing was changed")
-            return 0
-    answer = proposal.apply()
-    if not arguments.json:
-        tell(f"{name} is changed: {answer}")
+def _undo(path: str, arguments: argparse.Namespace) -> int:
+    """Take back the last change of a running robot."""
+    try:
+        folder = find_robot(path)
+        if (problem := unsure(folder.path.name, arguments)) is not None:
+            return problem
+        generation = None if arguments.undo == _LAST else arguments.undo
+        answer = answer_of(folder, RevertPlan(generation), timeout=LONGEST_CHANGE)
+    except NotDoneError as error:
+        return refuse(error.finding)
+    show_answer(arguments, folder, f"{folder.path.name} is as before: {answer}")
     return 0
-
-
-def _is_wanted(name: str) -> bool:
-    sys.stdout.write(f"change '{name}'? [y/N] ")
-    sys.stdout.flush()
-    return sys.stdin.readline().strip().lower() in ("y", "yes")

@@ -99,10 +99,14 @@ def _check_system(path: str, arguments: argparse.Namespace, checked: CheckedRobo
     from rbxcompose.inspection.system_text import system_extent  # only needed for systems
     from rbxcompose.systems.reader import compile_system
 
-    system = compile_system(path, environment=os.environ, real=arguments.real)
-    checked.report.extend(system.report)
-    checked.sources.update(system.sources)
-    if not system.report.has_errors:
+    system = compile_system(path, environment=os.environ, real=arguments.real, profiles=arguments.profile)
+    tried = [] if arguments.profile else [(name,) for name in system.known_profiles]
+    all_ = [system, *(compile_system(path, environment=os.environ, real=arguments.real, profiles=one) for one in tried)]
+    for one in all_:
+        known = {(each.code, each.span, each.message) for each in checked.report}
+        checked.report.extend(each for each in one.report if (each.code, each.span, each.message) not in known)
+        checked.sources.update(one.sources)
+    if not any(one.report.has_errors for one in all_):
         checked.systems.append(f"{system.name} is fine: {system_extent(system)}")
 
 

@@ -1,4 +1,4 @@
-"""List and switch the controllers that lead the joints of a running robot."""
+"""List, switch, slow down and hold the controllers that lead the joints of a running robot."""
 
 from __future__ import annotations
 
@@ -10,15 +10,18 @@ from rbxcompose.cli.bus.entities import table
 from rbxcompose.cli.output.console import refuse, tell
 from rbxcompose.cli.robots.commands import add_asking_options, show_answer
 from rbxcompose.cli.robots.lookup import REFUSED, NotDoneError, answer_of, find_robot, known_state
-from rbxcompose.controller_requests import BUS, ControllerState, ListControllers, SwitchControllers
+from rbxcompose.controller_requests import BUS, ControllerState, ListControllers, ScaleMotion, SwitchControllers
 from rbxcompose.findings import suggest
 from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.typed_json import to_data
+from rbxcompose.units import RATIO, UnitError, to_si
+
+ON_SYSTEM = BUS
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    actions = parser.add_subparsers(dest="action", metavar="ls|switch", required=True)
+    actions = parser.add_subparsers(dest="action", metavar="ls|switch|speed", required=True)
     ls = actions.add_parser("ls", help="list controllers, whether they are active, and their joints")
     ls.set_defaults(do=_ls)
     switch = actions.add_parser(
@@ -29,7 +32,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     switch.add_argument("on", metavar="NAME", nargs="*", help="a controller that becomes active")
     switch.add_argument("--off", metavar="NAME", action="append", default=[], help="one that becomes inactive")
     switch.set_defaults(do=_switch)
-    for one in (ls, switch):
+    speed = actions.add_parser(
+        "speed",
+        help="let a controller follow its goals at a share of their speed",
+        description="The goal on its way stays on its path, and is slowed down, too. 0 % holds it where it is, 100 % "
+        "lets it go on. Motions led by hand keep their speed.",
+    )
+    speed.add_argument("name", metavar="NAME", help="the controller")
+    speed.add_argument("share", metavar="SHARE", help="from 0 %% to 100 %%")
+    speed.set_defaults(do=_speed)
+    for one in (ls, switch, speed):
         add_asking_options(one)
 
 
@@ -81,4 +93,18 @@ def _switch(arguments: argparse.Namespace) -> int:
         raise NotDoneError(REFUSED.at(None, "these controllers are on different buses: switch those of one at a time"))
     request = SwitchControllers(buses[names[0]], tuple(arguments.on), tuple(arguments.off))
     show_answer(arguments, folder, answer_of(folder, request))
+    return 0
+
+
+def _speed(arguments: argparse.Namespace) -> int:
+    folder = find_robot(arguments.robot)
+    buses = {one.name: bus for bus, one in _listed(folder)}
+    if arguments.name not in buses:
+        message = f"there is no controller '{arguments.name}'; {suggest(arguments.name, buses, 'controllers')}"
+        raise NotDoneError(REFUSED.at(None, message))
+    try:
+        share = to_si(arguments.share, RATIO)
+    except UnitError as error:
+        raise NotDoneError(REFUSED.at(None, f"'{arguments.share}' {error}", help="write '30 %'")) from error
+    show_answer(arguments, folder, answer_of(folder, ScaleMotion(buses[arguments.name], arguments.name, share)))
     return 0

@@ -20,9 +20,17 @@ from rbxcompose.cli.output.terminal import full_screen, raw, show
 from rbxcompose.cli.robots.commands import add_asking_options, pass_on
 from rbxcompose.cli.robots.health import change_line, told_change, told_tree, tree_lines
 from rbxcompose.cli.robots.lookup import NotDoneError, answer_of, find_robot
-from rbxcompose.diagnostics.requests import Acknowledge, DiagnosticsTree, LevelChange, ListChanges, ShowDiagnostics
+from rbxcompose.diagnostics.requests import (
+    TYPE,
+    Acknowledge,
+    DiagnosticsTree,
+    LevelChange,
+    ListChanges,
+    ShowDiagnostics,
+)
 from rbxcompose.runtime.folder import RobotFolder
 
+ON_SYSTEM = TYPE
 _PERIOD = 0.2  # [s] between two requests to a robot that is followed
 
 

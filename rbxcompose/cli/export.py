@@ -1,6 +1,10 @@
-"""Write what keeps a system's robots alive: units of systemd, a Compose file, manifests of Kubernetes.
+"""Write a system for what keeps it alive, or a robot for ROS 2 or MoveIt.
 
-The files go to a new or empty folder. Exit codes: 0 fine, 1 errors found, 2 wrong usage.
+`systemd`, `compose` and `k8s` write units, a Compose file and manifests of Kubernetes; `srdf` is for MoveIt.
+`ros2` writes packages for a workspace: messages, and for each robot a launch file for RViz or Foxglove.
+
+The files go to a new or empty folder; `srdf` writes a URDF and an SRDF.
+Exit codes: 0 fine, 1 errors found, 2 wrong usage.
 """
 
 from __future__ import annotations
@@ -15,7 +19,8 @@ from pathlib import Path
 from rbxcompose import __version__
 from rbxcompose.cli.output.console import FINDINGS, refuse, tell, tell_report
 from rbxcompose.cli.project.kinds import is_system
-from rbxcompose.exporting import compose, kubernetes, systemd
+from rbxcompose.compiler import Compilation, compile_robot
+from rbxcompose.exporting import compose, kubernetes, ros2, systemd
 from rbxcompose.exporting.exported_share import shares
 from rbxcompose.findings import Finding, kind
 from rbxcompose.systems.bundle import files_of
@@ -33,15 +38,17 @@ Bad: `rbxcompose export systemd systems/two_hosts.yaml --out robots`
 Good: `rbxcompose export systemd systems/two_hosts.yaml --out units`
 """,
 )
-PROGRAMS = ("systemd", "compose", "k8s")
+SRDF, ROS2 = "srdf", "ros2"
+PROGRAMS = ("systemd", "compose", "k8s", ROS2, SRDF)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("program", choices=PROGRAMS, help="for which program")
-    parser.add_argument("path", metavar="SYSTEM", help="the file of the system")
+    parser.add_argument("path", metavar="SYSTEM", help="the file of the system; for srdf a robot, for ros2 either")
     parser.add_argument("--out", metavar="FOLDER", required=True, help="a new or empty folder")
     parser.add_argument("--host", metavar="NAME", help="only what this host runs")
+    parser.add_argument("--profile", action="append", default=[], metavar="P", help="apply this profile of the system")
     parser.add_argument("--real", action="store_true", help="use the real devices; without it, they are simulated")
     parser.add_argument("--user", metavar="NAME", help="systemd: the user that runs it (default: you)")
     parser.add_argument("--file", metavar="PATH", help="systemd: the system's file on the host (default: as here)")
@@ -51,9 +58,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Compile the system and write the files."""
+    if arguments.program == SRDF:
+        return _export_robot(arguments)
+    if arguments.program == ROS2:
+        return _ros2(arguments)
     if not is_system(arguments.path):
         return refuse(NOT_EXPORTED.at(None, f"'{arguments.path}' is not the file of a system"))
-    system = compile_system(arguments.path, environment=os.environ, real=arguments.real)
+    system = compile_system(arguments.path, environment=os.environ, real=arguments.real, profiles=arguments.profile)
     tell_report(system.report, system.sources)
     if system.report.has_errors:
         return FINDINGS
@@ -64,7 +75,45 @@ def run(arguments: argparse.Namespace) -> int:
         made = _made(system, arguments)
     except ValueError as error:
         return refuse(NOT_EXPORTED.at(None, f"'{system.name}' cannot be exported: {error}"))
+    return _finish(arguments, made)
+
+
+def _ros2(arguments: argparse.Namespace) -> int:
+    """Write packages for the robots of a system, or for a single robot."""
+    compiled: System | Compilation
+    if is_system(arguments.path):
+        compiled = compile_system(arguments.path, environment=os.environ, real=arguments.real)
+        plans = [one.plan for one in compiled.robots.values()]
+    else:
+        compiled = compile_robot(arguments.path, real=arguments.real, environment=os.environ)
+        plans = [compiled.plan] if compiled.plan else []
+    tell_report(compiled.report, compiled.sources)
+    if compiled.report.has_errors:
+        return FINDINGS
+    return _finish(arguments, _encoded(ros2.packages(plans, __version__)))
+
+
+def _finish(arguments: argparse.Namespace, made: Mapping[str, bytes]) -> int:
     if (problem := _write(Path(arguments.out), made)) is not None:
+        return refuse(problem)
+    for name in made:
+        tell(str(Path(arguments.out, name)))
+    return 0
+
+
+def _export_robot(arguments: argparse.Namespace) -> int:
+    from rbxcompose.compiler import compile_robot
+    from rbxcompose.exporting.srdf import exported  # imports the sections of robots
+
+    compilation = compile_robot(arguments.path, environment=os.environ, real=arguments.real)
+    tell_report(compilation.report, compilation.sources)
+    if compilation.robot is None or compilation.report.has_errors:
+        return FINDINGS
+    manifest = compilation.robot.manifest
+    made = exported(manifest.contents, manifest.name)
+    if not made:
+        return refuse(NOT_EXPORTED.at(None, f"'{manifest.name}' has no body"))
+    if (problem := _write(Path(arguments.out), _encoded(made))) is not None:
         return refuse(problem)
     for name in made:
         tell(str(Path(arguments.out, name)))

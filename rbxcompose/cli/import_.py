@@ -16,7 +16,7 @@ from rbxcompose.cli.bus.entities import add_json_option
 from rbxcompose.cli.output.console import FINDINGS, refuse, tell, tell_report
 from rbxcompose.findings import Finding, Report, Sources
 from rbxcompose.importing.foreign_files import read_files
-from rbxcompose.importing.importer import broken_importers, imported, importers
+from rbxcompose.importing.importer import ImportedFiles, broken_importers, imported, importers
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.rendering.json_ import as_data
 from rbxcompose.scaffold.answers import AnswerError, name_like, read_name
@@ -44,12 +44,12 @@ def run(arguments: argparse.Namespace) -> int:
     except AnswerError as error:
         return refuse(error.finding)
     files = read_files(map(Path, arguments.files), report, sources)
-    text = imported(arguments.program, files, name, report)
+    made = imported(arguments.program, files, name, report)
     told = Report([replace(one, fix=None) for one in report])  # fixes are for manifests, which `check --fix` corrects
-    if text and arguments.out is not None and (finding := _write(Path(arguments.out), text)) is not None:
+    if made.text and arguments.out is not None and (finding := _write(Path(arguments.out), made)) is not None:
         told.add(finding)
-        text = ""
-    return _answer(text, told, sources, arguments)
+        made = ImportedFiles("")
+    return _answer(made, told, sources, arguments)
 
 
 def _name(arguments: argparse.Namespace) -> str:
@@ -58,15 +58,16 @@ def _name(arguments: argparse.Namespace) -> str:
     return name_like(Path(arguments.files[0]).stem) or OTHERWISE
 
 
-def _write(path: Path, text: str) -> Finding | None:
-    finding = write_new(path.parent, {path.name: text})
+def _write(path: Path, made: ImportedFiles) -> Finding | None:
+    finding = write_new(path.parent, {path.name: made.text, **made.beside})
     if finding is not None and finding.code == EXISTS.code:
         return replace(finding, help="choose another file with '--out', or move this one away")
     return finding
 
 
-def _answer(text: str, report: Report, sources: Sources, arguments: argparse.Namespace) -> int:
+def _answer(made: ImportedFiles, report: Report, sources: Sources, arguments: argparse.Namespace) -> int:
     """Write the findings, and the manifest if there is one; return the exit code."""
+    text = made.text
     if not text or not arguments.json:
         tell_report(report, sources)
     if not text:
@@ -74,7 +75,12 @@ def _answer(text: str, report: Report, sources: Sources, arguments: argparse.Nam
     shown = shown_name(Path(arguments.out)) if arguments.out is not None else None
     if arguments.json:
         findings = [as_data(one, sources) for one in report]
-        tell(json.dumps({"manifest": text, "file": shown, "findings": findings}, ensure_ascii=False))
+        data = {"manifest": text, "file": shown, "beside": dict(made.beside), "findings": findings}
+        tell(json.dumps(data, ensure_ascii=False))
+    elif shown is None:
+        tell("\n".join([text, *(f"--- # {name}\n{each}" for name, each in made.beside.items())]).rstrip("\n"))
     else:
-        tell(text.rstrip("\n") if shown is None else f"wrote {shown}")
+        folder = Path(shown).parent
+        for each in (Path(shown), *(folder / name for name in made.beside)):
+            tell(f"wrote {each}")
     return FINDINGS if report.has_errors else 0

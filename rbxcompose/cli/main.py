@@ -17,6 +17,7 @@ from rbxcompose.cli.verbs import load, module_of, parser_of, verbs
 from rbxcompose.manifest.garbage_collection import collect_rarely
 
 if TYPE_CHECKING:
+    import argparse
     from collections.abc import Sequence
     from types import FrameType
 
@@ -61,10 +62,25 @@ def _run(name: str, words: Sequence[str]) -> int:
     try:
         verb = load(name)
         with answered(in_json="--json" in words):
-            return verb.run(parser_of(name, verb).parse_args(words))
+            arguments = parser_of(name, verb).parse_args(words)
+            if (where := getattr(verb, "ON_SYSTEM", "")) and (system := _system_of(arguments, where)):
+                from rbxcompose.cli.systems.forward import forward  # only needed for systems
+
+                return forward(system, where, [name, *words], arguments)
+            return verb.run(arguments)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # so that the flush at exit has somewhere to go
         return 1
+
+
+def _system_of(arguments: argparse.Namespace, where: str) -> str:
+    """Return the argument that names a system, or a robot of one; empty if there is none."""
+    from rbxcompose.cli.project.kinds import system_and_robot
+    from rbxcompose.cli.systems.options import EACH
+
+    written = arguments.robot if "robot" in arguments else None
+    written = written or (arguments.path if where == EACH and "path" in arguments else None)
+    return written if written and system_and_robot(written) else ""
 
 
 def _help() -> str:

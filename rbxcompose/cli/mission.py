@@ -15,6 +15,7 @@ from rbxcompose.cli.output.console import refuse, tell
 from rbxcompose.cli.robots.commands import add_asking_options, pass_on
 from rbxcompose.cli.robots.lookup import REFUSED, WHICH, NotDoneError, answer_of, find_robot
 from rbxcompose.executive.requests import (
+    MISSION,
     CancelMission,
     ListedMission,
     ListMissions,
@@ -32,6 +33,7 @@ from rbxcompose.typed_json import to_data
 
 A = TypeVar("A")
 
+ON_SYSTEM = MISSION
 _PERIOD = 0.2  # [s] between two requests to a robot that is followed
 _FORMATS = "text", "mermaid", "dot", "html"
 

@@ -32,6 +32,7 @@ from rbxcompose.requests import Command
 from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.typed_json import to_data
 
+ON_SYSTEM = MUX
 _LOOK = 0.2  # [s] between two looks of `watch`; no change is missed between them
 
 

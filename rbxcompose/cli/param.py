@@ -15,7 +15,9 @@ from pathlib import Path
 from rbxcompose.cli.bus.entities import add_count_options, add_json_option, add_timeout_option, visit
 from rbxcompose.cli.bus.parameter_nodes import ParameterNodes
 from rbxcompose.cli.bus.place import add_bus_options
+from rbxcompose.cli.systems.options import BUS, add_system_options
 
+ON_SYSTEM = BUS
 _MODULES = {  # where each is carried out; some import the compiler, which others do not need
     "listed_values": ("ls", "get", "describe"),
     "set_verbs": ("set", "load", "reset", "undo"),
@@ -52,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     describe.add_argument("name", metavar="PARAMETER", nargs="?", help="the parameter, such as runtime; else all")
     words = "COMPONENT PARAMETER VALUE, or several COMPONENT.PARAMETER=VALUE; values as in a manifest: '30 s', [1, 2]"
     set_.add_argument("words", metavar="COMPONENT|SETTING|PARAMETER", nargs="+", help=words)
-    load.add_argument("file", metavar="FILE", type=Path, help="as `dump` writes it, or `ros2 param dump`")
+    load.add_argument("file", metavar="FILE", type=Path, help="as `dump` writes it, or `ros2 param dump`; - is stdin")
     for one in (reset, save):
         one.add_argument("names", metavar="COMPONENT|SETTING", nargs="*", help="only these: battery, battery.runtime")
     undo.add_argument("--change", metavar="CHANGE", default="", help="this one, as `history` calls it: battery:3")
@@ -63,6 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         add_timeout_option(actions.choices[verb], "5s")
         add_json_option(actions.choices[verb])
         add_bus_options(actions.choices[verb])
+        add_system_options(actions.choices[verb])
 
 
 def run(arguments: argparse.Namespace) -> int:

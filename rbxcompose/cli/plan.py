@@ -73,10 +73,10 @@ def _show_system(path: str, arguments: argparse.Namespace) -> int:
     from rbxcompose.inspection.system_text import system_data, system_text  # only needed for systems
     from rbxcompose.systems.reader import compile_system
 
-    if arguments.diff is not None or arguments.profile or arguments.overlays or arguments.sets:
-        sys.stderr.write("rbxcompose plan: --diff, --profile, -f and --set are for robots, not for systems\n")
+    if arguments.diff is not None or arguments.overlays or arguments.sets:
+        sys.stderr.write("rbxcompose plan: --diff, -f and --set are for robots, not for systems\n")
         return USAGE
-    system = compile_system(path, environment=os.environ, real=arguments.real)
+    system = compile_system(path, environment=os.environ, real=arguments.real, profiles=arguments.profile)
     tell_report(system.report, system.sources)
     if system.report.has_errors:
         return FINDINGS

@@ -9,14 +9,15 @@ from dataclasses import replace
 from typing import Any
 
 from rbxcompose.cli.output.console import refuse, tell
-from rbxcompose.cli.project.kinds import is_system
 from rbxcompose.cli.robots.lookup import NotDoneError, add_robot_option, answer_of, find_robot, known_state, robots_up
-from rbxcompose.cli.systems.options import add_system_options
+from rbxcompose.cli.systems.options import EACH, add_system_options
+from rbxcompose.runtime.clock_offset import ClockOffset
 from rbxcompose.runtime.folder import SUSPENDED, ComponentState, RobotFolder, RobotState
 from rbxcompose.runtime.processes import Process
 from rbxcompose.runtime.requests import RobotStatus
 from rbxcompose.typed_json import to_data
 
+ON_SYSTEM = EACH
 _COLUMNS = ("name", "type", "state", "process", "pid", "restarts")
 _ANSWER = 0.4  # [s] for a supervisor to answer; its state file is as recent, except for what died since
 _NO_SUPERVISOR = "its supervisor has died, so it brakes and ends; 'rbxcompose down {}', or the next 'up', cleans up"
@@ -34,10 +35,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Show the supervisor's answer or, if it does not answer, the last state that it wrote."""
     wanted = arguments.robot or arguments.path
-    if wanted is not None and is_system(wanted):
-        from rbxcompose.cli.systems.everywhere import ask_everywhere  # only needed for systems
-
-        return ask_everywhere(wanted, arguments, lambda robot: ["ps", robot, *(["--json"] if arguments.json else [])])
     try:
         several = robots_up() if wanted is None else []
         if len(several) > 1:
@@ -82,6 +79,7 @@ def _data(state: RobotState, supervisor: int | None) -> dict[str, Any]:
         "supervisor": {"pid": supervisor},
         "router": {"endpoint": state.router},
         "stop": None if state.stop is None else to_data(state.stop),
+        "clocks": {host: to_data(one) for host, one in state.clocks.items()},
         "components": [_component(one) for one in state.components],
     }
 
@@ -119,8 +117,9 @@ def _table(shown: Mapping[str, Any]) -> str:
     blocked = [one for one in shown["components"] if "waits_for" in one]
     waiting = [f"{one['name']} waits for {one['waits_for']}, which failed" for one in blocked]
     notes = [f"{one['name']}: {one['note']}" for one in shown["components"] if "note" in one]
+    clocks = [f"clock of {host}: {ClockOffset(**one).words}" for host, one in shown["clocks"].items()]
     left = [] if pid else [_NO_SUPERVISOR.format(shown["robot"])]
-    return "\n".join([head, *_stop_lines(shown["stop"]), *lines, *waiting, *notes, *left])
+    return "\n".join([head, *_stop_lines(shown["stop"]), *lines, *waiting, *notes, *clocks, *left])
 
 
 def _stop_lines(stop: Mapping[str, Any] | None) -> Iterator[str]:

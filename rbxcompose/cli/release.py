@@ -8,7 +8,10 @@ from __future__ import annotations
 import argparse
 
 from rbxcompose.cli.robots.commands import add_asking_options, pass_on
+from rbxcompose.cli.systems.options import BUS
 from rbxcompose.runtime.requests import ReleaseRobot
+
+ON_SYSTEM = BUS
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

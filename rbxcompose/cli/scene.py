@@ -1,6 +1,7 @@
 """Show and change what arms must not hit, and what they hold, while the robot runs.
 
-Changes last until the robot goes down; write objects in the manifest under `scene:` to keep them.
+Changes last until the robot goes down; write objects in the manifest under `scene:` to keep them, or `save` them in a
+file `.scene` that `scene: {file: ...}` names.
 """
 
 from __future__ import annotations
@@ -8,65 +9,114 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
 
+from rbxcompose.atomic_files import replace_file
+from rbxcompose.body.extra import MissingLibraryError
+from rbxcompose.body.model import Body, Geometry
+from rbxcompose.body.urdf import read_body
+from rbxcompose.body.xml_reader import read_urdf
+from rbxcompose.cli.bodies.arm_picture import write_picture
 from rbxcompose.cli.bus.entities import table
-from rbxcompose.cli.output.console import refuse, tell, tell_report
+from rbxcompose.cli.output.console import misused, refuse, tell, tell_report
 from rbxcompose.cli.robots.commands import add_asking_options, pass_on
 from rbxcompose.cli.robots.lookup import NotDoneError, answer_of, find_robot
-from rbxcompose.findings import Report
+from rbxcompose.findings import Finding, Report, kind, suggest
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.validate import validate
+from rbxcompose.motion.scene import PairDistance, PlacedObject
+from rbxcompose.motion.scene_text import written_scene
+from rbxcompose.printable import plain
 from rbxcompose.scene_requests import (
+    SCENE,
     AddToScene,
+    ArmView,
     AttachInScene,
     DetachInScene,
     ListScene,
+    LoadScene,
     RemoveFromScene,
-    SceneEntry,
+    StandingObjects,
+    ViewOfArm,
 )
-from rbxcompose.sections.scene import ObjectModel
+from rbxcompose.sections.scene import NO_MESH, ObjectModel, mesh_mistake, scene_of
 from rbxcompose.typed_json import to_data
 
+NO_PAIR = kind(
+    "RBX9426",
+    """An arm does not watch this
+
+Only what an arm moves relative to something else is watched: links that a joint connects are not, nor are things that
+stand beside each other.
+
+Bad: `rbxcompose scene distance table floor`
+Good: `rbxcompose scene distance right_arm_tip table`
+""",
+)
+ON_SYSTEM = SCENE
 _SHOWN = "OBJECT"  # name of the object's text in findings
+Actions = Callable[[argparse.Namespace], int]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    actions = parser.add_subparsers(dest="action", metavar="ls|add|remove|attach|detach", required=True)
-    ls = actions.add_parser("ls", help="list the objects")
-    ls.set_defaults(do=_ls)
-    add = actions.add_parser("add", help="put an object into the scene")
-    add.set_defaults(do=_add)
-    remove = actions.add_parser("remove", help="take an object out of the scene")
-    remove.set_defaults(do=lambda arguments: pass_on(arguments, RemoveFromScene(arguments.name)))
-    attach = actions.add_parser(
-        "attach",
-        help="let an object move with a link, as when a gripper holds it",
-        description="It stays where it is, and may touch the link and all that this carries, or the links of --touch.",
+    actions = parser.add_subparsers(
+        dest="action", metavar="ls|add|remove|attach|detach|load|save|watch|check|distance|picture", required=True
     )
-    attach.set_defaults(do=_attach)
-    detach = actions.add_parser("detach", help="let an object stay where it is")
-    detach.set_defaults(do=lambda arguments: pass_on(arguments, DetachInScene(arguments.name)))
-    for one in (add, remove, attach, detach):
-        one.add_argument("name", metavar="NAME", help="the object")
-    add.add_argument("object", metavar="OBJECT", help="as in a manifest: '{box: [60 cm, 40 cm, 2 cm], at: {x: 50 cm}}'")
-    attach.add_argument("link", metavar="LINK", help="a link of the body, such as right_gripper_link")
+
+    def action(name: str, do: Actions, about: str, *words: tuple[str, str], more: str = "") -> argparse.ArgumentParser:
+        made = actions.add_parser(name, help=about, description=more or about)
+        for metavar, text in words:
+            made.add_argument(metavar.lower(), metavar=metavar, help=text)
+        made.set_defaults(do=do)
+        add_asking_options(made)
+        return made
+
+    named = ("NAME", "the object")
+    written = "as in a manifest: '{box: [60 cm, 40 cm, 2 cm], at: {x: 50 cm}}'"
+    stays = "It stays where it is, and may touch the link and all that this carries, or the links of --touch."
+    action("ls", _ls, "list the objects")
+    action("add", _add, "put an object into the scene", named, ("OBJECT", written))
+    action("remove", _remove, "take an object out of the scene", named)
+    carrier = ("LINK", "a link of the body, such as right_gripper_link")
+    about = "let an object move with a link, as when a gripper holds it"
+    attach = action("attach", _attach, about, named, carrier, more=stays)
     attach.add_argument("--touch", metavar="LINK", action="append", default=[], help="a link that it may touch")
-    for one in (ls, add, remove, attach, detach):
-        add_asking_options(one)
+    action("detach", _detach, "let an object stay where it is", named)
+    file = ("FILE", "a scene file of MoveIt, such as table.scene")
+    load = action("load", _load, "put the objects of a file into the scene", file)
+    load.add_argument("--link", metavar="LINK", default="", help="the link in whose frame they are (default: the root)")
+    action("save", _save, "write the objects around the robot into a file, in the frame of the body's root", file)
+    action("watch", _watch, "tell the goals and plans of arms, and the scene, as they change, until Ctrl-C")
+    for name, do, about in (
+        ("check", _check, "tell what collides now: links and objects that are nearer than they may be"),
+        ("distance", _distance, "tell which two links or objects are the nearest to each other, or those of A [and B]"),
+        ("picture", _picture, "draw the robot as it stands now, with what is around it, and the way that is planned"),
+    ):
+        made = action(name, do, about)
+        made.add_argument("--arm", metavar="NAME", default="", help="the arm that watches (default: the first one)")
+        if name == "distance":
+            made.add_argument("pair", metavar="NAME", nargs="*", help="one or two links or objects")
+        if name == "picture":
+            made.add_argument("--out", metavar="FILE", default="scene.png", help="the picture (default: scene.png)")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the chosen subcommand."""
-    do: Callable[[argparse.Namespace], int] = arguments.do
-    return do(arguments)
+    do: Actions = arguments.do
+    try:
+        return do(arguments)
+    except NotDoneError as error:
+        return refuse(error.finding)
+
+
+def _objects(arguments: argparse.Namespace) -> tuple[PlacedObject, ...]:
+    return answer_of(find_robot(arguments.robot), ListScene())
 
 
 def _ls(arguments: argparse.Namespace) -> int:
-    try:
-        found = answer_of(find_robot(arguments.robot), ListScene())
-    except NotDoneError as error:
-        return refuse(error.finding)
+    found = _objects(arguments)
     if arguments.json:
         tell(json.dumps([to_data(one) for one in found]))
     elif not found:
@@ -76,8 +126,11 @@ def _ls(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _row(one: SceneEntry) -> tuple[str, ...]:
-    return one.name, one.shape, _lengths(one.size), one.link, _lengths(one.position), ", ".join(one.touches)
+def _row(one: PlacedObject) -> tuple[str, ...]:
+    kinds = ", ".join(piece.shape.kind for piece in one.all_pieces)
+    size = "" if one.shape.kind in ("plane", "mesh") else _lengths(one.shape.size)
+    touches = ", ".join((*one.touches, *one.touches_objects))
+    return one.name, kinds, size, one.link, _lengths(one.pose.translation), touches
 
 
 def _lengths(values: tuple[float, ...]) -> str:
@@ -89,15 +142,134 @@ def _add(arguments: argparse.Namespace) -> int:
     report = Report()
     report.extend(findings)
     read = validate(ObjectModel, root, (), report) if root is not None and not findings else None
+    file = Path(read.file).absolute() if read is not None and read.file else None
+    if read is not None and file is not None and (problem := mesh_mistake(file) if read.mesh else ""):
+        report.add(NO_MESH.at(None, f"the mesh '{plain(read.file)}' {problem}"))
+        read = None
     if read is None:
         tell_report(report, {_SHOWN: arguments.object})
         return 1
-    shape, pose = read.shape, read.at.to_transform()
-    entry = SceneEntry(
-        arguments.name, shape.kind, shape.size, read.link or "", pose.translation, pose.rotation, tuple(read.touches)
-    )
-    return pass_on(arguments, AddToScene(entry))
+    return pass_on(arguments, AddToScene(read.placed(arguments.name, "", file)))
+
+
+def _remove(arguments: argparse.Namespace) -> int:
+    return pass_on(arguments, RemoveFromScene(arguments.name))
 
 
 def _attach(arguments: argparse.Namespace) -> int:
     return pass_on(arguments, AttachInScene(arguments.name, arguments.link, tuple(arguments.touch)))
+
+
+def _detach(arguments: argparse.Namespace) -> int:
+    return pass_on(arguments, DetachInScene(arguments.name))
+
+
+def _load(arguments: argparse.Namespace) -> int:
+    found = scene_of(Path(arguments.file))
+    if isinstance(found, Finding):
+        return refuse(found)
+    return pass_on(arguments, LoadScene(written_scene(found.name, found.objects), arguments.file, arguments.link))
+
+
+def _save(arguments: argparse.Namespace) -> int:
+    """Write what stands around the robot; what it holds, and octrees, are left out and told."""
+    folder = find_robot(arguments.robot)
+    stands = answer_of(folder, StandingObjects())
+    kept = [one for one in stands if all(piece.shape.kind != "octree" for piece in one.all_pieces)]
+    names = [one.name for one in kept]
+    try:
+        text = written_scene(folder.path.name, [_with_triangles(one) for one in kept])
+        replace_file(Path(arguments.file).resolve(), text.encode())
+    except MissingLibraryError as error:
+        return refuse(error.finding)
+    except ValueError as error:
+        return misused("scene", str(error))
+    except OSError as error:
+        return misused("scene", f"'{arguments.file}' cannot be written: {error.strerror}")
+    left = [one.name for one in _objects(arguments) if one.name not in names]
+    words = f"wrote {arguments.file}: {len(kept)} object{'s' if len(kept) != 1 else ''}"
+    told = f"{words}; left out: {', '.join(left)}" if left else words
+    tell(json.dumps({"file": arguments.file, "objects": len(kept), "left_out": left}) if arguments.json else told)
+    return 0
+
+
+def _with_triangles(one: PlacedObject) -> PlacedObject:
+    """Return an object whose meshes are no files.
+
+    Raises:
+        MissingLibraryError: if a library is missing.
+        ValueError: if a mesh cannot be read.
+    """
+    pieces = tuple(replace(each, shape=_read(each.shape)) for each in one.pieces)
+    return replace(one, shape=_read(one.shape), pieces=pieces)
+
+
+def _read(shape: Geometry) -> Geometry:
+    if not shape.file:
+        return shape
+    from rbxcompose.body.meshes import read_mesh  # numpy, which other actions do not need
+
+    solid = read_mesh(Path(shape.file), shape.file)
+    points, triangles = solid.vertices.flatten().tolist(), solid.faces.flatten().tolist()
+    return replace(shape, file="", points=tuple(points), triangles=tuple(triangles))
+
+
+def _view(arguments: argparse.Namespace, *between: str) -> ArmView:
+    return answer_of(find_robot(arguments.robot), ViewOfArm(arguments.arm, between))
+
+
+def _watch(arguments: argparse.Namespace) -> int:
+    from rbxcompose.cli.robots.scene_watch import watch  # a visitor on the bus, which other actions are not
+
+    return watch(find_robot(arguments.robot), as_json=arguments.json)
+
+
+def _check(arguments: argparse.Namespace) -> int:
+    found = [one for one in _view(arguments).pairs if one.collides]
+    if arguments.json:
+        tell(json.dumps([to_data(one) for one in found]))
+    elif not found:
+        tell("nothing collides")
+    else:
+        tell(table([("first", "second", "distance"), *map(_distance_row, found)]))
+    return 1 if found else 0
+
+
+def _distance(arguments: argparse.Namespace) -> int:
+    view = _view(arguments, *arguments.pair)
+    for name in arguments.pair:
+        if name not in view.watched:
+            raise NotDoneError(NO_PAIR.at(None, f"no arm watches '{name}'; {suggest(name, view.watched, 'watched')}"))
+    if not view.pairs:
+        words = " and ".join(f"'{name}'" for name in arguments.pair)
+        why = f"no arm watches {words}" if len(arguments.pair) > 1 else "there are too many pairs: name one or two"
+        raise NotDoneError(NO_PAIR.at(None, why))
+    nearest = min(view.pairs, key=lambda one: one.distance)
+    if arguments.json:
+        tell(json.dumps(to_data(nearest)))
+    else:
+        tell(table([("first", "second", "distance"), _distance_row(nearest)]))
+    return 0
+
+
+def _distance_row(one: PairDistance) -> tuple[str, str, str]:
+    return one.first, one.second, f"{round(one.distance * 1000, 1) + 0.0:.1f} mm"
+
+
+def _picture(arguments: argparse.Namespace) -> int:
+    from rbxcompose.motion.picture import ArmPicture, draw_arm  # numpy, which other actions do not need
+
+    view = _view(arguments)
+    hit = [one for one in view.pairs if one.collides]
+    names = {name for one in hit for name in (one.first, one.second)}
+    root = read_urdf(view.urdf, "urdf")
+    body = Body("") if isinstance(root, Finding) or root is None else read_body(root)[0]
+    meshes = {name: Path(path) for name, path in view.meshes.items()}
+    problem = "; ".join(f"{one.first} and {one.second} collide" for one in hit)
+    shown = ArmPicture(
+        body, meshes, view.positions, view.objects, way=view.way, colliding=names, told=view.arm, problem=problem
+    )
+    failed = write_picture("scene", Path(arguments.out), lambda: draw_arm(shown))
+    if not failed:
+        tell(json.dumps({"file": arguments.out}) if arguments.json else f"wrote {arguments.out}")
+    return failed

@@ -1,7 +1,8 @@
 """Make the certificates of a system's hosts, or list what listens where and who may reach it.
 
 `init` makes an authority, once, and new certificates for all hosts, and brings them to those with `ssh`; repeat it
-before they expire. `audit` exits with 1 if anything off loopback takes strangers.
+before they expire. `audit` exits with 1 if anything off loopback takes strangers, or if other hosts will refuse a
+certificate that is on this machine.
 Exit codes: 0 fine, 1 errors found, 2 wrong usage.
 """
 
@@ -12,15 +13,16 @@ import json
 import os
 import subprocess
 from collections.abc import Iterator
-from dataclasses import replace
+from itertools import groupby
 from pathlib import Path
 
 from rbxcompose.cli.output.console import FINDINGS, refuse, tell, tell_report
 from rbxcompose.cli.project.kinds import is_system
 from rbxcompose.cli.systems.options import add_system_options
-from rbxcompose.dataclass import dataclass
-from rbxcompose.findings import Finding, kind
+from rbxcompose.cli.systems.own_certificate import certificate_findings
+from rbxcompose.findings import Finding, Report, kind
 from rbxcompose.regular_files import read_regular
+from rbxcompose.systems.audit import listeners, reachable_keys
 from rbxcompose.systems.certificates import (
     AUTHORITY,
     CERTIFICATE,
@@ -28,13 +30,14 @@ from rbxcompose.systems.certificates import (
     LARGEST,
     NO_SECURITY,
     OpensslError,
+    common_name,
     folder_of,
     make_authority,
     make_certificate,
+    tls_of,
 )
 from rbxcompose.systems.model import System
 from rbxcompose.systems.reader import compile_system
-from rbxcompose.systems.share import hosts_of, listens
 from rbxcompose.typed_json import to_data
 
 NOT_MADE = kind(
@@ -54,18 +57,6 @@ mkdir -p "$d"; tar -xf - -C "$d"
 """
 
 
-@dataclass(frozen=True, slots=True)
-class ListeningEndpoint:
-    """An endpoint that takes connections on a host: who may reach it, and how they prove who they are."""
-
-    host: str
-    robot: str
-    endpoint: str
-    reached_by: str
-    proof: str
-    is_open: bool  # to strangers
-
-
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     actions = parser.add_subparsers(dest="action", metavar="init|audit", required=True)
@@ -75,9 +66,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     ):
         action = actions.add_parser(name, help=about)
         action.add_argument("path", metavar="SYSTEM", help="the file of the system")
-        if name == "init":
-            add_system_options(action)
-        else:
+        add_system_options(action)
+        if name == "audit":
             action.add_argument("--json", action="store_true", help="answer in JSON")
 
 
@@ -85,11 +75,15 @@ def run(arguments: argparse.Namespace) -> int:
     """Run the chosen subcommand."""
     if not is_system(arguments.path):
         return refuse(NOT_MADE.at(None, f"'{arguments.path}' is not the file of a system"))
-    system = compile_system(arguments.path, environment=os.environ)
+    system = compile_system(arguments.path, environment=os.environ, profiles=arguments.profile)
     tell_report(system.report, system.sources)
     if system.report.has_errors:
         return FINDINGS
-    return _init(system, arguments) if arguments.action == "init" else _audit(system, in_json=arguments.json)
+    return (
+        _init(system, arguments)
+        if arguments.action == "init"
+        else _audit(system, arguments.path, in_json=arguments.json)
+    )
 
 
 def _init(system: System, arguments: argparse.Namespace) -> int:
@@ -123,31 +117,26 @@ def _bring(system: System, host: str, folder: Path, arguments: argparse.Namespac
     return NOT_MADE.at(None, f"'{host}' cannot be given its certificate: {reason[0]}")
 
 
-def _audit(system: System, *, in_json: bool) -> int:
-    found = list(listeners(system))
+def _audit(system: System, path: str, *, in_json: bool) -> int:
+    endpoints, keys = list(listeners(system)), list(reachable_keys(system))
+    report = Report()
+    report.extend(_certificates(system, path))
     if in_json:
-        tell(json.dumps({"listeners": [to_data(one) for one in found]}))
+        tell(json.dumps({"listeners": [to_data(one) for one in endpoints], "keys": [to_data(one) for one in keys]}))
     else:
-        for one in found:
-            warning = "  OPEN TO STRANGERS" if one.is_open else ""
-            tell(f"{one.host}  {one.robot}  {one.endpoint}  {one.reached_by}, {one.proof}{warning}")
-    return FINDINGS if any(one.is_open for one in found) else 0
+        for end in endpoints:
+            warning = "  OPEN TO STRANGERS" if end.is_open else ""
+            tell(f"{end.host}  {end.robot}  {end.endpoint}  {end.reached_by}, {end.proof}{warning}")
+        for (host, robot, whom), same in groupby(keys, key=lambda one: (one.host, one.robot, one.written_by)):
+            who = " and ".join((*whom, "programs there"))
+            tell(f"{host}  {robot}  written, called or answered by {who}: {', '.join(one.name for one in same)}")
+    tell_report(report, {})
+    return FINDINGS if report.has_errors or any(one.is_open for one in endpoints) else 0
 
 
-def listeners(system: System) -> Iterator[ListeningEndpoint]:
-    """Yield what listens on each host of a system, as far as other machines or users can reach it."""
-    proofs = {
-        NO_SECURITY: ("no proof asked", True),
-        "tls": ("encrypted, but no proof asked of who dials", True),
-        "mtls": ("a certificate of this system", False),
-    }
-    for robot in system.robots.values():
-        for host in hosts_of(system, robot):
-            bus = robot.plan.bus
-            if bus.router is None and bus.access == "machine":
-                local = ListeningEndpoint(
-                    host, robot.name, f"tcp/127.0.0.1:{bus.port}", "programs of this machine", "", False
-                )
-                yield replace(local, proof="no proof asked")
-            for endpoint in listens(system, robot, host):
-                yield ListeningEndpoint(host, robot.name, endpoint, "machines of the network", *proofs[system.security])
+def _certificates(system: System, path: str) -> Iterator[Finding]:
+    """Yield what is wrong with the certificates that are on this machine."""
+    folder = folder_of(system.name, os.environ)
+    for host in system.hosts if system.security != NO_SECURITY else ():
+        if (folder / host).is_dir():
+            yield from certificate_findings(tls_of(folder, host, system.security), common_name(system.name, host), path)

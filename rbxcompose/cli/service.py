@@ -9,7 +9,9 @@ import argparse
 
 from rbxcompose.cli.bus.entities import add_server_verbs, tell_list, visit
 from rbxcompose.cli.bus.guest import Guest
+from rbxcompose.cli.systems.options import BUS
 
+ON_SYSTEM = BUS
 _VERB = ("call", "send a request and print the response")
 
 

@@ -9,27 +9,22 @@ from __future__ import annotations
 import argparse
 
 from rbxcompose.cli.output.console import refuse
-from rbxcompose.cli.project.kinds import is_system
 from rbxcompose.cli.robots.commands import add_asking_options, show_answer
 from rbxcompose.cli.robots.lookup import NO_ANSWER, NotDoneError, answer_of, find_robot, known_state
-from rbxcompose.cli.systems.options import add_system_options
+from rbxcompose.cli.systems.options import EACH
 from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.runtime.requests import StopRobot
+
+ON_SYSTEM = EACH
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_asking_options(parser)
-    add_system_options(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Stop the robot, over the bus if its supervisor does not answer."""
-    if arguments.robot is not None and is_system(arguments.robot):
-        from rbxcompose.cli.systems.everywhere import ask_everywhere  # only needed for systems
-
-        options = ["--json"] if arguments.json else []
-        return ask_everywhere(arguments.robot, arguments, lambda robot: ["stop", "--robot", robot, *options])
     try:
         folder = find_robot(arguments.robot)
         answer = _stopped(folder)

@@ -51,9 +51,8 @@ def run(arguments: argparse.Namespace) -> int:
     reading, coverage, teller = TrialReader(os.environ), Coverage(), Teller(has_colour(sys.stdout))
     outcomes: list[FileOutcome] = []
     unreadable = Report()
-    for file in files:
+    for written in (one for file in files for one in reading.every(file)):
         began = time.perf_counter()
-        written = reading.open(file)
         if arguments.filter not in written.name:
             unreadable.extend(() if written.root else written.report)
             continue

@@ -28,12 +28,14 @@ from rbxcompose.cli.bus.messages import shown, to_json
 from rbxcompose.cli.bus.place import add_bus_options
 from rbxcompose.cli.bus.tf_static import add_static_arguments, publish_static
 from rbxcompose.cli.output.console import refuse, tell
+from rbxcompose.cli.systems.options import BUS, add_system_options
 from rbxcompose.clock import NANOSECONDS
 from rbxcompose.findings import Finding
 from rbxcompose.geometry import Transform3, yaw_of
 from rbxcompose.printable import plain
 from rbxcompose.units import TIME
 
+ON_SYSTEM = BUS
 _DIGITS = 4  # decimal places of metres and degrees
 
 
@@ -57,6 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     for one in (tree, echo, static):
         add_timeout_option(one, "2s")
         add_bus_options(one)
+        add_system_options(one)
     for one in (tree, echo):
         add_json_option(one)
 

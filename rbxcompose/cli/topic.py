@@ -26,7 +26,9 @@ from rbxcompose.cli.bus.entities import (
 from rbxcompose.cli.bus.guest import Guest
 from rbxcompose.cli.bus.place import add_bus_options
 from rbxcompose.cli.output.console import tell
+from rbxcompose.cli.systems.options import BUS, add_system_options
 
+ON_SYSTEM = BUS
 _ENDS = ("publishers", "subscriptions")
 _WINDOW = 100  # messages
 
@@ -61,6 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     pub.set_defaults(do=_pub)
     for one in (ls, show, echo, hz, pub):
         add_bus_options(one)
+        add_system_options(one)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -16,6 +16,7 @@ from rbxcompose.cli.project.kinds import is_system
 from rbxcompose.cli.project.robot_choice import add_path_argument, robot_path
 from rbxcompose.cli.project.robot_options import add_layer_options, chosen_layers, compiled, layers_of
 from rbxcompose.cli.robots.live_reload import LiveReload
+from rbxcompose.cli.robots.live_rules import LiveRules
 from rbxcompose.cli.robots.run_view import run_plan
 from rbxcompose.cli.robots.this_machine import is_fit
 from rbxcompose.cli.systems.options import add_system_options
@@ -40,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--watch", action="store_true", help="apply changes to its files as you edit them")
     parser.add_argument("--host", metavar="NAME", help="of a system: run what this host runs")
-    add_system_options(parser)
+    add_system_options(parser, has_profile=True)
     parser.add_argument("--robot", metavar="NAME", help="with --host: only this robot")
     parser.add_argument("--for", type=_duration, dest="duration", metavar="30s", help="end after this robot time")
 
@@ -64,7 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
         return USAGE
     compilation = compile_robot(path, **layers_of(arguments))
     tell_report(compilation.report, compilation.sources)
-    if compilation.plan is None or compilation.report.has_errors:
+    if compilation.plan is None or compilation.robot is None or compilation.report.has_errors:
         return 1
     if compilation.plan.follows_clock and arguments.rate.is_stepped:
         sys.stderr.write("rbxcompose up: the robot follows /clock ('bus.clock'), so --rate cannot be given with it\n")
@@ -80,12 +81,12 @@ def run(arguments: argparse.Namespace) -> int:
     if options.is_stepped and options.rate is None and options.duration is None and compilation.plan.start is None:
         sys.stderr.write("rbxcompose up: without 'start:' nothing ends a run at --rate max: give --for\n")
         return USAGE
-    if compilation.robot is not None and not is_fit(compilation.robot, compilation.sources):
+    if not is_fit(compilation.robot, compilation.sources):
         return FINDINGS
     reload = None
     if arguments.watch:
         reload = LiveReload(lambda: compiled(path, arguments), compilation, options.layers)
-    return run_plan(compilation.plan, options, reload)
+    return run_plan(compilation.plan, options, LiveRules(compilation.robot), reload)
 
 
 def _options(arguments: argparse.Namespace) -> RunOptions:

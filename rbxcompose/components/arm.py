@@ -2,24 +2,54 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
+import numpy as np
+
 from rbxcompose.arm_config import ArmConfig, ArmWorks, dimensions_of
-from rbxcompose.body.model import Geometry
-from rbxcompose.geometry import Transform3, quaternion_from_rpy
-from rbxcompose.motion.arm_task import ArmGoal, ArmTask
+from rbxcompose.arm_goals import (
+    MOVE_MEASURES,
+    REACH_MEASURES,
+    TRACE_MEASURES,
+    action_of,
+    feedback_of,
+    follow_goal,
+    goal_of,
+)
+from rbxcompose.arm_hand import PICK, PLACE, PicksAndPlaces, hand_ports, hand_task, result_of
+from rbxcompose.arm_moveit import GIVEN, MOTION, around, forward, inverse, is_turned_away, moveit_ports, moveit_task
+from rbxcompose.arm_servo import PERIOD, ArmServo, servo_ports
+from rbxcompose.geometry import Vector3
+from rbxcompose.key_feed import KeyFeed, whole
+from rbxcompose.motion.arm_task import ArmTask
 from rbxcompose.motion.collisions import told
-from rbxcompose.motion.inverse_kinematics import ANGLE_TOLERANCE, TOLERANCE, PoseTarget
+from rbxcompose.motion.hand_task import HandTask
+from rbxcompose.motion.moveit_task import MoveItTask
 from rbxcompose.motion.parametrisation import Trajectory
+from rbxcompose.motion.planner_types import FAST
 from rbxcompose.motion.reasons import REASONS
 from rbxcompose.motion.scene import PlacedObject, mistake_in
+from rbxcompose.motion.scene_markers import path_of
+from rbxcompose.motion.scene_messages import placed_object
 from rbxcompose.msgs.control_msgs import FollowJointTrajectory
 from rbxcompose.msgs.entries import ArrayEntries
-from rbxcompose.msgs.rbxcompose_msgs import MoveArm, ReachPose, SceneObject, SceneObjects
+from rbxcompose.msgs.geometry_msgs import PoseStamped, TwistStamped
+from rbxcompose.msgs.moveit_msgs import (
+    DisplayTrajectory,
+    ExecuteTrajectory,
+    GetPositionFK,
+    GetPositionIK,
+    MoveGroup,
+    RobotState,
+    RobotTrajectory,
+)
+from rbxcompose.msgs.nav_msgs import Path
+from rbxcompose.msgs.rbxcompose_msgs import MoveArm, PickObject, PlaceObject, ReachPose, SceneObjects, TraceArm
 from rbxcompose.msgs.sensor_msgs import JointState
-from rbxcompose.msgs.stamps import to_duration
-from rbxcompose.msgs.trajectory_msgs import JointTrajectory, JointTrajectoryPoint
+from rbxcompose.scene_requests import ArmView, LookAtArm, ViewOfArm
+from rbxcompose.scene_view import ARM_WINDOW, arm_parts, ended_words, goal_words
 from rbxcompose.sdk import (
     CallsAction,
     Capability,
@@ -27,33 +57,34 @@ from rbxcompose.sdk import (
     Ended,
     In,
     NeedsExtra,
+    Out,
     Outcome,
     Port,
+    Refused,
     SentGoal,
     ServedGoal,
     ServesAction,
     Setting,
+    answers,
     component,
 )
-from rbxcompose.units import ANGLE, LENGTH, RATIO
 
-MOVE, REACH, FOLLOW = "move", "reach", "follow"  # its ports
+MOVE, REACH, TRACE, FOLLOW = "move", "reach", "trace", "follow"  # its ports
+WAY, DISPLAY = "way", "display"
+MOST_PAIRS = 200  # that a view tells
 AnyGoal = ServedGoal[Any, Any, Any]
-REACH_MEASURES = {
-    **dict.fromkeys(("x", "y", "z", "tolerance"), LENGTH),
-    **dict.fromkeys(("roll", "pitch", "yaw", "angle_tolerance"), ANGLE),
-    **dict.fromkeys(("speed", "acceleration"), RATIO),
-}
+AnyTask = ArmTask | HandTask | MoveItTask
 
 
 @component("arm")
-class Arm(Component[ArmConfig]):
+class Arm(PicksAndPlaces, Component[ArmConfig]):
     """Moves an arm to poses by name, to positions of its joints, or its tip to a pose, on ways without collisions.
 
-    The actions are `NAME/move` and `NAME/reach`, the skills of missions `move_NAME` and `reach_NAME`. A way is searched
-    on the shapes of the whole body, timed within the limits of the joints, examined finely as the controller will
-    follow it, and only then carried out. A failure names one reason of a closed list. If the goal is cancelled or the
-    robot stops, the arm comes to rest.
+    The actions are `NAME/move`, `NAME/reach` and `NAME/trace`, with a gripper also `NAME/pick` and `NAME/place`; the
+    skills of missions have such names as `move_NAME`. A way is searched on the shapes of the whole body, or leads the
+    tip along straight lines and arcs. It is timed within the limits of the joints, examined finely as the controller
+    will follow it, and only then carried out. A failure names one reason of a closed list. If the goal is cancelled or
+    the robot stops, the arm comes to rest.
 
     Example:
         neck: {type: arm, name: neck, base: base, tip: head, controller: look, follow: look/follow_joint_trajectory,
@@ -82,7 +113,7 @@ class Arm(Component[ArmConfig]):
                 skill=f"move_{config.name}",
                 outcomes=outcomes,
                 entries=ArrayEntries("joints", "positions", dimensions_of(config)),
-                measures={"speed": RATIO, "acceleration": RATIO},
+                measures=MOVE_MEASURES,
                 choices={"pose": tuple(config.poses)} if config.poses else {},
             ).named(MOVE),
             REACH: ServesAction(
@@ -93,13 +124,28 @@ class Arm(Component[ArmConfig]):
                 outcomes=outcomes,
                 measures=REACH_MEASURES,
             ).named(REACH),
+            WAY: Out(Path, f"{config.name}/plan", qos="latched").named(WAY),
+            DISPLAY: Out(DisplayTrajectory, f"{config.name}/display_planned_path", qos="latched").named(DISPLAY),
+            TRACE: ServesAction(
+                TraceArm,
+                f"{config.name}/trace",
+                claims=config.controller,
+                skill=f"trace_{config.name}",
+                outcomes=outcomes,
+                measures=TRACE_MEASURES,
+            ).named(TRACE),
+            **servo_ports(config),
+            **moveit_ports(config),
             FOLLOW: CallsAction(FollowJointTrajectory, config.follow).named(FOLLOW),
+            **hand_ports(config),
         }
 
     @classmethod
     def capabilities(cls, config: ArmConfig) -> tuple[Capability, ...]:
         """Declare what it imports."""
-        return tuple(NeedsExtra(Setting(module), Setting("arm")) for module in ("pinocchio", "ompl", "toppra"))
+        needed = [(module, "arm") for module in ("pinocchio", "ompl", "toppra")]
+        needed += [("numba", FAST)] if config.planner.type == FAST else []
+        return tuple(NeedsExtra(Setting(module), Setting(extra)) for module, extra in needed)
 
     def configure(self) -> None:
         """Build the model of the body, its shapes and the planner."""
@@ -107,10 +153,30 @@ class Arm(Component[ArmConfig]):
         if self.works.always:
             words = told(self.works.always, len(self.works.always))
             self.info(f"links that always collide are not watched: {words}")
-        self.objects: tuple[PlacedObject, ...] | None = None  # of the scene; None while it is unknown
+        self.problem = "nothing has told what is around the robot"  # with the scene, or nothing
+        self.way: tuple[Vector3, ...] = ()  # of the tip, as last planned [m]
         self.measured: dict[str, tuple[float, float]] = {}  # position and velocity of all joints of the body
-        self.task: ArmTask | None = None
+        self.uprights = {}
+        self.task: AnyTask | None = None
         self.goal: AnyGoal | None = None  # that of the task
+        self.servo = ArmServo(self.works, self.bound) if self.config.stream else None
+        self.is_stopped = False
+        self.stage, self.ended, self.duration = "", dict[str, str](), 0.0  # for viewers
+        self.due = -math.inf  # [s], when it goes on with what is commanded by hand
+
+    def activate(self) -> None:
+        """Let viewers see it."""
+        self.feed = KeyFeed(self.context.window(f"{ARM_WINDOW}/{self.config.name}", LookAtArm()))
+
+    @answers(LookAtArm)
+    def look(self, request: LookAtArm) -> Mapping[str, Any]:
+        """Return what viewers see."""
+        return whole(self.parts())
+
+    def parts(self) -> Mapping[str, Any]:
+        """Return what viewers see, by name."""
+        goal = goal_words(self.goal.request) if self.goal is not None else ""
+        return arm_parts(self.config.name, self.stage, goal, self.ended, self.way, self.duration, self.problem)
 
     @property
     def occupation(self) -> str:
@@ -124,37 +190,101 @@ class Arm(Component[ArmConfig]):
             self.measured[name] = position, velocity
 
     def on_scene(self, message: SceneObjects) -> None:
-        """Plan among other objects from now on; an object that cannot be is left out and told."""
-        found = []
-        for one in map(placed, message.objects):
-            if mistake := mistake_in(one, self.works.kinematics.body):
-                self.warn(f"the object '{one.name}' is left out: {mistake}")
-            else:
-                found.append(one)
-        self.objects = tuple(found)
-        self.works.place_objects(found)
+        """Plan among other objects from now on; while one of them cannot be, nothing is planned."""
+        found, body = tuple(map(placed_object, message.objects)), self.works.kinematics.body
+        wrong = ((one.name, mistake_in(one, body)) for one in found)
+        self.problem = message.problem or next((f"object '{name}': {words}" for name, words in wrong if words), "")
+        if not self.problem:
+            paddings = dict(zip(message.padded_links, message.paddings.tolist(), strict=False))
+            try:
+                self.works.place_objects(*around(self, self.task, found, paddings))
+            except ValueError as error:
+                self.problem = str(error)
+        if self.problem:
+            self.warn(f"nothing is planned: {self.problem}")
         if self.task is not None:
             self.task.look_again()
+        self.wake()
+
+    def received(self, port: str, message: TwistStamped | PoseStamped) -> None:
+        """Lead the tip as somebody commands it now."""
+        if self.servo is not None:
+            refusal = self.why_not_led() or self.servo.take(message, self.now, self.stamp)
+            self.servo.refuse(refusal) if refusal else self.wake()
+
+    def why_not_led(self) -> str:
+        """Return why nobody can lead the tip by hand now, nothing if one can."""
+        if self.is_stopped or self.task is not None:
+            return "the robot is stopped" if self.is_stopped else "a goal moves the arm"
+        unknown = [name for name in self.works.space.names if name not in self.measured]
+        if unknown:
+            return f"nothing has reported where '{unknown[0]}' is"
+        return "" if self.is_ready else "nothing has told what is around the robot"
+
+    def wake(self) -> None:
+        """Go on with what is commanded now."""
+        if self.servo is None or not self.servo.is_wanted or self.task is not None:
+            return
+        at = {name: position for name, (position, _) in self.measured.items()}
+        if self.servo.go_on(self.now, self.stamp, at) and self.due <= self.now:
+            self.due = self.now + PERIOD
+            self.context.wake_at(self.due)
+
+    def start(self) -> None:
+        """Tell that nobody leads the tip."""
+        if self.servo is not None:
+            self.servo.tell()
+
+    def stop(self) -> None:
+        """Command nothing any more: controllers bring their joints to rest by themselves."""
+        self.is_stopped = True
+        if self.servo is not None:
+            self.servo.end("halted: the robot was stopped")
+
+    def release(self) -> None:
+        """Take commands again."""
+        self.is_stopped = False
 
     @property
     def is_ready(self) -> bool:
         """Return whether the scene is known."""
-        return self.objects is not None
+        return not self.problem
+
+    @property
+    def objects(self) -> tuple[PlacedObject, ...] | None:
+        """Return the objects of the scene; None while they are unknown."""
+        return None if self.problem else self.works.objects
 
     def step(self, dt: float) -> None:
         """Continue the goal; a newer one waits until the arm has come to rest from the last one."""
-        there: list[AnyGoal] = [one for port in (MOVE, REACH) if (one := self.bound[port].current) is not None]
-        newer = [one for one in there if one is not self.goal]
+        there: list[AnyGoal] = [one for port in self.goals if (one := self.bound[port].current) is not None]
+        newer = [one for one in there if one is not self.goal and not (self.goal in there and is_turned_away(one))]
         is_wanted = self.goal in there and not newer
         if self.task is not None and (not is_wanted or (self.goal is not None and self.goal.cancel_requested)):
             self.task.cancel()
             self.end()
         if self.task is None and newer:
-            self.goal = newer[0]
-            self.task = ArmTask(self, self.works.kinematics, self.works.planner, goal_of(self.goal.request))
+            if self.servo is not None:
+                self.servo.end("idle")
+            self.goal, self.ended, self.stage = newer[0], {}, "planning"
+            self.task = self.task_of(self.goal.request)
         if self.task is not None:
             self.task.advance()
             self.end()
+
+    @property
+    def goals(self) -> tuple[str, ...]:
+        """Return the ports for goals."""
+        return (MOVE, REACH, TRACE, MOTION, GIVEN, *((PICK, PLACE) if self.config.hand is not None else ()))
+
+    def task_of(self, message: Any) -> AnyTask:
+        """Return the task of a goal."""
+        if isinstance(message, MoveGroup.Goal | ExecuteTrajectory.Goal):
+            return moveit_task(self, message)
+        if self.config.hand is not None and isinstance(message, PickObject.Goal | PlaceObject.Goal):
+            return hand_task(self, self.works, self.config.hand, message)
+        solver = self.config.kinematics.settings
+        return ArmTask(self, self.works.kinematics, self.works.planner, goal_of(message, solver), solver)
 
     def end(self) -> None:
         """End the goal with its task."""
@@ -162,13 +292,46 @@ class Arm(Component[ArmConfig]):
         if task is None or goal is None or not task.is_over:
             return
         self.task = self.goal = None
-        failure, result = task.failure, (MoveArm if isinstance(goal.request, MoveArm.Goal) else ReachPose).Result
+        failure = task.failure
+        result = self.pictured(self.config.name, self.config.hand, failure, ended_as(goal.request, task))
+        if isinstance(task, MoveItTask):
+            task.end()
+            if task.difference is not None and self.scene.value is not None:
+                self.on_scene(self.scene.value)
+        self.stage, self.ended = "", ended_words(failure)
+        self.feed.tell(self.parts())
         if failure is None:
-            goal.succeeded()
+            goal.succeeded(result)
         elif goal.cancel_requested:
-            goal.canceled(result(outcome=failure.reason, message=failure.text))
+            goal.canceled(result)
         else:
-            goal.aborted(f"{failure.reason}: {failure.text}", result(outcome=failure.reason, message=failure.text))
+            words = failure.text if isinstance(task, MoveItTask) else result.message
+            goal.aborted(f"{failure.reason}: {words}", result)
+
+    @answers(ViewOfArm)
+    def view(self, request: ViewOfArm) -> ArmView:
+        """Return what it knows now."""
+        names, measured = self.works.space.names, self.measured
+        if self.problem:
+            raise Refused(self.problem)
+        if unknown := [name for name in names if name not in measured]:
+            raise Refused(f"nothing has reported where '{unknown[0]}' is")
+        positions = {name: position for name, (position, _) in measured.items()}
+        if self.task is None:  # it plans with the rest of the body where that was
+            self.works.kinematics.place({name: one for name, one in positions.items() if name not in names})
+        pairs = self.works.pairs(positions, request.between)[:MOST_PAIRS]
+        config, watched = self.config, tuple(sorted(self.works.watched))
+        return ArmView(config.name, config.urdf, config.meshes, positions, self.works.objects, pairs, watched, self.way)
+
+    # What programs for MoveIt ask
+
+    def on_forward(self, request: GetPositionFK.Request) -> GetPositionFK.Response:
+        """Tell where links are."""
+        return forward(self, request)
+
+    def on_inverse(self, request: GetPositionIK.Request) -> GetPositionIK.Response:
+        """Tell positions of joints that bring the tip to a pose."""
+        return inverse(self, request)
 
     # What a task needs
 
@@ -179,12 +342,27 @@ class Arm(Component[ArmConfig]):
 
     def follow(self, names: tuple[str, ...], trajectory: Trajectory, ended: Callable[[str, bool], None]) -> None:
         """Send a trajectory to the controller."""
+        self.show(names, trajectory)
 
         def told(end: Ended[FollowJointTrajectory.Result]) -> None:
             ended(problem_of(end), end.outcome is Outcome.CANCELED)
             self.end()
 
         self.sent: SentGoal = self.bound[FOLLOW](follow_goal(names, trajectory), told)
+
+    def show(self, names: tuple[str, ...], trajectory: Trajectory) -> None:
+        """Tell viewers the way."""
+        self.way, self.duration = self.works.way(trajectory.positions), trajectory.duration
+        self.bound[WAY](path_of(self.way, self.works.kinematics.body.root))
+        state = JointState(name=tuple(self.measured), position=np.array([at for at, _ in self.measured.values()]))
+        motion = RobotTrajectory(joint_trajectory=follow_goal(names, trajectory).trajectory)
+        self.bound[DISPLAY](
+            DisplayTrajectory(
+                model_id=self.works.kinematics.body.name,
+                trajectory=(motion,),
+                trajectory_start=RobotState(joint_state=state),
+            )
+        )
 
     def stop_following(self) -> None:
         """Ask the controller to end the trajectory."""
@@ -193,34 +371,23 @@ class Arm(Component[ArmConfig]):
     def told(self, stage: str) -> None:
         """Tell the client in which stage its goal is."""
         if self.goal is not None:
-            kind = MoveArm if isinstance(self.goal.request, MoveArm.Goal) else ReachPose
-            self.goal.feedback(kind.Feedback(stage=stage))
+            within = self.task.stage if isinstance(self.task, HandTask) else stage
+            self.stage = words = stage if stage == within else f"{within}: {stage}"
+            self.feed.tell(self.parts())
+            self.goal.feedback(feedback_of(self.goal.request, words))
 
 
-def goal_of(message: MoveArm.Goal | ReachPose.Goal) -> ArmGoal:
-    """Return a goal as the task takes it: a share of 0 is all."""
-    speed, acceleration = message.speed or 1.0, message.acceleration or 1.0
-    if isinstance(message, MoveArm.Goal):
-        positions = dict(zip(message.joints, message.positions.tolist(), strict=False))
-        return ArmGoal(message.pose, positions, speed=speed, acceleration=acceleration)
-    turn = quaternion_from_rpy(message.roll, message.pitch, message.yaw)
-    target = PoseTarget(
-        Transform3((message.x, message.y, message.z), turn),
-        message.any_orientation,
-        message.tolerance or TOLERANCE,
-        message.angle_tolerance or ANGLE_TOLERANCE,
-    )
-    return ArmGoal(target=target, frame=message.frame, speed=speed, acceleration=acceleration)
-
-
-def follow_goal(names: tuple[str, ...], trajectory: Trajectory) -> FollowJointTrajectory.Goal:
-    """Return a trajectory as its controller takes it; where the arm is now is not among its points."""
-    rows = zip(trajectory.times[1:].tolist(), trajectory.positions[1:], trajectory.velocities[1:], strict=True)
-    points = tuple(
-        JointTrajectoryPoint(positions=positions, velocities=velocities, time_from_start=to_duration(time))
-        for time, positions, velocities in rows
-    )
-    return FollowJointTrajectory.Goal(trajectory=JointTrajectory(joint_names=names, points=points))
+def ended_as(message: Any, task: AnyTask) -> Any:
+    """Return how a goal has ended."""
+    if isinstance(task, MoveItTask):
+        return task.result(action_of(message))
+    if isinstance(task, HandTask):
+        return result_of(message, task)
+    failed = task.failure
+    words: dict[str, Any] = {"outcome": failed.reason, "message": failed.text} if failed is not None else {}
+    if isinstance(message, TraceArm.Goal):
+        words["fraction"] = task.share
+    return action_of(message).Result(**words)
 
 
 def problem_of(end: Ended[FollowJointTrajectory.Result]) -> str:
@@ -229,12 +396,3 @@ def problem_of(end: Ended[FollowJointTrajectory.Result]) -> str:
         return ""
     told = end.result.error_string if end.result is not None else ""
     return told or end.message or f"its trajectory was {end.outcome}"
-
-
-def placed(message: SceneObject) -> PlacedObject:
-    """Return an object of the scene."""
-    at, turn = message.pose.position, message.pose.orientation
-    pose = Transform3((at.x, at.y, at.z), (turn.x, turn.y, turn.z, turn.w))
-    return PlacedObject(
-        message.name, Geometry(message.shape, tuple(message.size.tolist())), message.link, pose, message.touches
-    )

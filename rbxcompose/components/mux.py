@@ -14,7 +14,7 @@ from rbxcompose.msgs.std_msgs import Bool, Empty, String
 from rbxcompose.msgs.topic_tools_interfaces import MuxAdd, MuxDelete, MuxList, MuxSelect
 from rbxcompose.msgs.types import Message
 from rbxcompose.mux.account import lock_states, states_of, why
-from rbxcompose.mux.config import NOBODY, MuxConfig, MuxInputConfig, core_of, source_of
+from rbxcompose.mux.config import NOBODY, MuxConfig, MuxInputConfig, core_of, handover_limits, source_of
 from rbxcompose.mux.orders import MuxOrders, input_at, noted
 from rbxcompose.mux.requests import (
     NONE,
@@ -106,6 +106,10 @@ class Mux(Component[MuxConfig]):
             self.context.wake_at(self.now + max(beats))
         self.send(self.core.tick(self.now))
         self.announce()
+
+    def reconfigure(self, old: MuxConfig) -> None:
+        """Follow other limits of a hand-over."""
+        self.core.bound(*handover_limits(self.config.handover))
 
     def take_over(self, old: Mux) -> None:
         """Take over who was sending, what was selected, and what people have locked and added."""

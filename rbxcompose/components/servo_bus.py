@@ -22,14 +22,14 @@ from rbxcompose.clock import MonotonicClock
 from rbxcompose.control.joint_states import Enable, Hold, JointMode, MoveTo
 from rbxcompose.controller_interface import controller_type
 from rbxcompose.controller_manager import ControllerManager, ControllerSeat
-from rbxcompose.controller_requests import ControllerState, ListControllers, SwitchControllers
+from rbxcompose.controller_requests import ControllerState, ListControllers, ScaleMotion, SwitchControllers
 from rbxcompose.devices.port_errors import PortError
 from rbxcompose.msgs.rbxcompose_msgs import SetSpeed
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.std_srvs import SetBool, Trigger
 from rbxcompose.requests import Refused, answers
 from rbxcompose.sdk import Component, Later, Out, Port, Serves, ServesAction, component
-from rbxcompose.sdk.capabilities import Capability, NeedsExtra, OpensPort, Setting, within
+from rbxcompose.sdk.capabilities import Capability, ConnectedBy, NeedsExtra, OpensPort, Setting, within
 from rbxcompose.sdk.component import Context
 from rbxcompose.servo_bus_config import ServoBusConfig, drives_of, item_of, joint_ports, mimics_of
 from rbxcompose.servo_bus_line import open_bus
@@ -84,17 +84,17 @@ class ServoBusDriver(Component[ServoBusConfig]):
         )
         kind, has_bytes = bus_type(config.kind), config.twin in ("", "pty")
         packages = (NeedsExtra(Setting(kind.package), Setting(kind.extra)),) if kind.package and has_bytes else ()
-        ports = () if config.twin else (OpensPort(Setting(config.port, "port")),)
-        return (*led, *packages, *ports)
+        port = Setting(config.port, "port")
+        ports = () if config.twin else (OpensPort(port),)
+        return (*led, *packages, *((ConnectedBy(port),) if config.port else ()), *ports)
 
     def __init__(self, name: str, config: ServoBusConfig, context: Context) -> None:
         """Give the ports of joints and controllers their methods."""
         super().__init__(name, config, context)
+        orders = ("relax", self.relax), ("enable", self.enable), ("reboot", self.reboot), ("set_speed", self.set_speed)
         for joint in config.joints:
-            setattr(self, f"on_{joint}_relax", partial(self.relax, joint))
-            setattr(self, f"on_{joint}_enable", partial(self.enable, joint))
-            setattr(self, f"on_{joint}_reboot", partial(self.reboot, joint))
-            setattr(self, f"on_{joint}_set_speed", partial(self.set_speed, joint))
+            for word, method in orders:
+                setattr(self, f"on_{joint}_{word}", partial(method, joint))
         self.owners: dict[str, tuple[str, str]] = {}  # the controller of a port, and the port's name there
         for controller, setup in config.controllers.items():
             for short, port in controller_type(setup.type).ports(controller, setup.config).items():
@@ -221,12 +221,14 @@ class ServoBusDriver(Component[ServoBusConfig]):
     @answers(SwitchControllers)
     def switch(self, request: SwitchControllers) -> str:
         """Switch controllers, all at once or not at all."""
-        if objection := self.controllers.objection(request.on, request.off):
-            raise Refused(objection)
-        told = list(self.controllers.switch(request.on, request.off, self.now))
-        for text in told:
+        for text in (told := list(self.controllers.switch(request.on, request.off, self.now))):
             self.info(text)
         return "; ".join(told) or "nothing changes"
+
+    @answers(ScaleMotion)
+    def scale(self, request: ScaleMotion) -> str:
+        """Let a controller follow its goals slower, or as fast as they ask for."""
+        return self.controllers.set_pace(request.controller, request.share)
 
     # Joints
 

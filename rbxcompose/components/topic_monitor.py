@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from pydantic import Field
+from pydantic import Field, ValidationInfo, field_validator
 
-from rbxcompose.diagnostics.updater import OLDEST, CompositeTask, FrequencyTask, StampTask
+from rbxcompose.diagnostics.updater import OLDEST, TOLERANCE, CompositeTask, FrequencyTask, StampTask
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.stamps import NANOSECONDS, to_nanoseconds
 from rbxcompose.sdk import Component, Config, Frequency, In, MessageName, Port, Time, component
+from rbxcompose.sdk.capabilities import Capability, ExpectsRate, Setting
 
 
 class TopicMonitorConfig(Config):
@@ -26,6 +27,13 @@ class TopicMonitorConfig(Config):
     """More messages than this a second are a warning, too."""
     oldest: Time = Field(OLDEST, gt=0)
     """A message with an older stamp is an error."""
+
+    @field_validator("most")
+    @classmethod
+    def _above_rate(cls, most: float | None, info: ValidationInfo) -> float | None:
+        if most is not None and most < info.data.get("rate", 0.0):
+            raise ValueError(f"must be at least 'rate', {info.data['rate']:g} Hz, or every rate would be a warning")
+        return most
 
 
 @component("topic_monitor")
@@ -44,6 +52,12 @@ class TopicMonitor(Component[TopicMonitorConfig]):
     def ports(cls, config: TopicMonitorConfig) -> dict[str, Port[Any]]:
         """Return the topic that it listens to."""
         return {"messages": In(registry.message(config.message), config.topic, is_open=True).named("messages")}
+
+    @classmethod
+    def capabilities(cls, config: TopicMonitorConfig) -> tuple[Capability, ...]:
+        """Declare which rates are fine."""
+        most = None if config.most is None else Setting(config.most, "most")
+        return (ExpectsRate("messages", Setting(config.rate, "rate"), most, TOLERANCE),)
 
     def configure(self) -> None:
         """Count from now on."""

@@ -22,6 +22,7 @@ from rbxcompose.manifest.unit_choice import rounder_unit
 from rbxcompose.manifest.validate import to_plain
 from rbxcompose.printable import FORBIDDEN, escaped
 from rbxcompose.references import FILE
+from rbxcompose.sections.args import args
 from rbxcompose.units import UNITS, Dimension, Quantity, UnitError, format_quantity, to_si
 
 Note = Callable[[KeyPath, TreeNode], str]
@@ -55,6 +56,7 @@ def _in_one_file(manifest: RobotManifest) -> MappingNode:
         return ScalarNode(_path_from(manifest.path, file), node.span) if isinstance(file, Path) else node
 
     entries = dict(manifest.root.entries)
+    entries.pop(args.name, None)  # their values have been filled in: nothing reads them any more
     for section in sections(ROBOT):
         if section.name in entries:
             key, value = entries[section.name].key, entries[section.name].value

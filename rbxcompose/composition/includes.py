@@ -114,6 +114,11 @@ class Parts:
     _count: int = 0
     _size: int = 0
 
+    @property
+    def roots(self) -> Iterator[MappingNode]:
+        """Yield the trees of the parts that could be read, each once."""
+        return (file.root for file in self._files.values() if file)
+
     def instances(self, root: MappingNode, path: str = "", above: tuple[_Open, ...] = ()) -> Iterator[PartInstance]:
         """Yield the instances from the `include:` of a file, each after those that it includes itself."""
         for name, entry, read in Contents(root, self.robot, self.documents).of(include):

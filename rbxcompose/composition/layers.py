@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field, replace
 from itertools import islice
 from pathlib import Path
@@ -15,17 +15,16 @@ from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Report, Span
 from rbxcompose.manifest.documents import Documents
 from rbxcompose.manifest.file_models import file_model
-from rbxcompose.manifest.files import find, shown_name
+from rbxcompose.manifest.files import PROFILE, find, shown_name
 from rbxcompose.manifest.header import ManifestHeader
 from rbxcompose.manifest.limits import KEYS
 from rbxcompose.manifest.section import OVERLAY, Contents
-from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode, with_children
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode, with_children
 from rbxcompose.manifest.yaml_nodes import TOO_LARGE
 from rbxcompose.printable import plain
 from rbxcompose.sections.include import include
 from rbxcompose.sections.profiles import profiles
 
-PROFILE = "--profile"
 INCLUDE = include.name
 
 
@@ -118,16 +117,25 @@ def _profiles(
 ) -> Iterator[tuple[MappingNode, str]]:
     """Yield the chosen profiles, in the order of the command."""
     named = Contents(root, file, documents).of(profiles)
+    if named is not None:
+        for name, overlay in chosen_profiles(chosen, named, "robot", documents):
+            yield overlay, f"profile '{name}'"
+
+
+def chosen_profiles(
+    chosen: Sequence[str], named: Mapping[str, Entry], what: str, documents: Documents
+) -> Iterator[tuple[str, MappingNode]]:
+    """Yield the chosen ones of the profiles that `what` has, a robot or a system; report those that it has not."""
     if chosen:
         documents.sources[PROFILE] = "\n".join(map(plain, chosen))
-    for line, name in enumerate(chosen if named is not None else (), 1):
-        overlay = named[name].value if named and name in named else None
+    for line, name in enumerate(chosen, 1):
+        overlay = named[name].value if name in named else None
         if isinstance(overlay, MappingNode):
-            yield overlay, f"profile '{name}'"
+            yield name, overlay
         else:
             span = Span(PROFILE, line, 1, line, len(name) + 1)
-            message = f"the robot has no profile '{name}'"
-            documents.report.add(NOTHING_TO_CHANGE.misspelt(span, message, name, named or (), "profiles"))
+            message = f"the {what} has no profile '{name}'"
+            documents.report.add(NOTHING_TO_CHANGE.misspelt(span, message, name, named, "profiles"))
 
 
 def profile_spans(root: MappingNode) -> dict[str, Span]:

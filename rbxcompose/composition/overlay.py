@@ -12,7 +12,9 @@ from operator import is_
 from rbxcompose.composition.history import History, HistoryStep
 from rbxcompose.findings import Related, Report, Span, correction, kind, suggest
 from rbxcompose.manifest.registry import section_named
+from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.tree import BROKEN, Entry, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode
+from rbxcompose.manifest.validate import WRONG_TYPE, label_of
 from rbxcompose.manifest.walk import REMOVE
 
 NOTHING_TO_CHANGE = kind(
@@ -91,6 +93,7 @@ include:
 )
 
 SET = "--set"
+ENTRY = 2  # keys of the path of an entry of a section
 
 
 def compose(
@@ -162,6 +165,10 @@ class _Merge:
         is_gone = is_removal(entry.value)
         if below is None:
             (self._nothing_to_remove if is_gone else self._add)(entries, entry, path)
+        elif len(path) == ENTRY and _is_emptied(below.value, entry.value):
+            help_text = f"to remove it, write '{name}: !remove'"
+            message = f"{self.overlay} leaves '{name}' of '{path[0]}' empty"
+            self.report.add(WRONG_TYPE.at(entry.value.span, message, label=label_of(entry.value), help=help_text))
         elif isinstance(below.value, MappingNode) and isinstance(entry.value, MappingNode) and not entry.value.tag:
             if self.may_merge(path):
                 entries[name] = replace(below, value=self.mapping(below.value, entry.value, path))
@@ -200,8 +207,9 @@ class _Merge:
         one, needed = (section.entry, section.needs) if section else ("", "")
         if needed and isinstance(entry.value, MappingNode) and needed not in entry.value:
             message = f"{self.overlay} changes the {one} '{name}', which the robot does not have"
-            help_text = suggest(name, entries, str(path[0])) or f"a new {one} needs a '{needed}:'"
-            fix = correction(name, entries, entry.key.span)
+            own = [key for key in entries if key.endswith(f"_{name}")]
+            help_text = suggest(name, own or entries, str(path[0])) or f"a new {one} needs a '{needed}:'"
+            fix = correction(name, own or entries, entry.key.span)
             self.report.add(NOTHING_TO_CHANGE.at(entry.key.span, message, help=help_text, fix=fix))
         else:
             self._enter(entries, entry, path)
@@ -235,6 +243,12 @@ class _Join(_Merge):
         message = f"{self.overlay} and {other} both bring {what}"
         related = [Related(below.key.span, f"from {other}"), Related(entry.key.span, f"from {self.overlay}")]
         self.report.add(TWO_PARTS.at(self.span, message, label="the second", help=help_text, related=related))
+
+
+def _is_emptied(value: TreeNode, over: TreeNode) -> bool:
+    """Return whether nothing is written where there was a map: `charger: null`."""
+    is_map = isinstance(value, MappingNode) and bool(value.entries)
+    return is_map and isinstance(over, ScalarNode) and over.filled is None and plain_value(over) is None
 
 
 def _is_shared(path: KeyPath) -> bool:

@@ -12,6 +12,8 @@ from rbxcompose.composition.overlay import NOTHING_TO_CHANGE
 from rbxcompose.composition.robot_manifest import RobotManifest
 from rbxcompose.composition.scopes import fill_scopes
 from rbxcompose.composition.section_reader import read_sections
+from rbxcompose.composition.strayed_entries import without_strayed
+from rbxcompose.composition.unread_arguments import unread_arguments
 from rbxcompose.findings import Finding, Report, Span
 from rbxcompose.manifest.documents import Documents
 from rbxcompose.manifest.file_models import file_model
@@ -63,6 +65,9 @@ def load_robot(
         named = (find(one) for one in overlays)
         shown = tuple(shown_name(one) for one in named if not isinstance(one, Finding))
         manifest = replace(manifest, profiles=profile_spans(root), overlays=shown)
+    if not (report.has_errors or profiles):  # a misspelt name may be the one that is not read; a profile may replace it
+        for one in (root, *composed.parts.roots):
+            report.extend(unread_arguments(one))
     report.findings = composed.parts.inclusions.told(report.findings)
     return manifest
 
@@ -70,7 +75,8 @@ def load_robot(
 def _manifest(
     composed: Composed, file: Path, sim: bool, environment: Mapping[str, str], documents: Documents
 ) -> RobotManifest | None:
-    documents.check(file_model(ROBOT), composed.root)
+    keys = file_model(ROBOT)
+    documents.check(keys, without_strayed(composed.root, keys.model_fields, documents.report))
     names = names_of(_name(composed.root), sim, environment, Secrets(project_of(file), environment))
     filled = fill_scopes(composed, names)
     read_so_far = len(documents.report.findings)

@@ -11,7 +11,7 @@ from rbxcompose.composition.includes import PartInstance
 from rbxcompose.composition.layers import Composed, only
 from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.types import UNKNOWN
-from rbxcompose.findings import Related, Report, Span, kind
+from rbxcompose.findings import Related, Report, Span, kind, nearest
 from rbxcompose.manifest.arguments import DeclaredArgument
 from rbxcompose.manifest.fill import fill
 from rbxcompose.manifest.fill_names import Names, Typed, with_arguments
@@ -113,13 +113,14 @@ def _given_values(
                 entry.key.span, message, name, declared, "its arguments", taken=given.entries
             )
             report.add(finding)
-    is_misspelt = not given.entries.keys() <= declared.keys()  # then any other argument may be what was meant
+    unknown = given.entries.keys() - declared.keys()  # then any other argument may be what was meant
+    meant = {near for name in unknown for near in nearest(name, declared)}
     values: dict[str, Typed] = {}
     for name, (argument, span) in declared.items():
         node = given.get(name) or (argument.default if argument else None)
         if argument is None:
             values[name] = Typed(UNKNOWN, BROKEN)
-        elif node is not None and is_misspelt and name not in given:
+        elif (node is not None and unknown and name not in given) or (node is None and name in meant):
             values[name] = Typed(argument.type, BROKEN)
         elif node is None:
             message = f"part '{instance.name}' needs a value for its argument '{name}'"

@@ -7,11 +7,12 @@ an argument is written where that argument gets its value. One that no file writ
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from enum import Enum
 
 from rbxcompose.composition.argument_bounds import argument_of
+from rbxcompose.composition.history import HistoryStep
 from rbxcompose.composition.overlay import SET
 from rbxcompose.composition.robot_manifest import RobotManifest
 from rbxcompose.findings import Edit, Fix, Sources, Span
@@ -66,10 +67,19 @@ def merged(edits: Iterable[Edit]) -> Fix:
         if there is None:
             found[edit.span] = edit
         elif not edit.old:
-            found[edit.span] = replace(there, text=there.text + edit.text)
+            found[edit.span] = replace(there, text=_joined(there.text, edit.text))
         elif there.text != edit.text:
             raise UnsavableError(f"one place would need both '{there.text}' and '{edit.text}'", span=edit.span)
     return Fix(tuple(found.values()), is_safe=True, title="live values")
+
+
+def _joined(there: str, text: str) -> str:
+    """Return what is added at one place: two lines, or one group of settings with those of both."""
+    head, brace, inner = text.partition(": {")
+    if not brace or f"{head}{brace}" not in there:
+        return there + text
+    before, _, end = there.rpartition("}")
+    return f"{before}, {inner[: inner.rindex('}')]}}}{end}"
 
 
 def _argument_edit(
@@ -111,12 +121,15 @@ def _replaced(
 def _added(
     manifest: RobotManifest, sources: Sources, path: KeyPath, value: object, dimension: Dimension | None
 ) -> Edit:
-    steps = manifest.history.of(path[:-1]) if len(path) > _SECTION_AND_NAME else ()
+    there, text = path, value_text(value, dimension)
+    steps: Sequence[HistoryStep] = ()
+    while len(there) > _SECTION_AND_NAME and not (steps := manifest.history.of(there[:-1])):
+        there, text = there[:-1], f"{{{there[-1]}: {text}}}"  # a group of settings that no file has yet
     above = steps[-1].node if steps else None
     if not isinstance(above, MappingNode):
         raise UnsavableError(f"no file has '{'.'.join(map(str, path[:-1]))}:' as a map to which it could be added")
     lines = _lines_to_edit(manifest, sources, path, above.span)
-    key, text = str(path[-1]), value_text(value, dimension)
+    key = str(there[-1])
     if _slice(lines, above.span).startswith("{"):
         return _added_to_flow(above, f"{key}: {text}")
     return _added_to_block(above, lines, f"{key}: {text}")

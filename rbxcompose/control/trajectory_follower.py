@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import field, replace
 
 from rbxcompose.control.curves import Curve, JointSample, braking
+from rbxcompose.control.pace import TrajectoryPace
 from rbxcompose.control.trajectory import (
     TrajectoryCode,
     TrajectoryGoal,
@@ -19,6 +20,7 @@ from rbxcompose.dataclass import dataclass
 from rbxcompose.geometry import wrap_angle
 
 Samples = Mapping[str, JointSample]
+AT_REST = 0.01  # [rad/s or m/s] at the beginning of a trajectory, below which it may begin at any pace
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +70,8 @@ class _Run:
 
     goal: TrajectoryGoal
     plan: TrajectoryPlan
+    is_live: bool = False
+    """Whether it passes at its own speed, whatever people want of others."""
 
 
 class TrajectoryFollower:
@@ -80,6 +84,8 @@ class TrajectoryFollower:
     def __init__(self, joints: Mapping[str, JointRules], policy: TrajectoryPolicy) -> None:
         self.joints = dict(joints)
         self.policy = policy
+        self.pace = TrajectoryPace()
+        """At which share of its own speed a trajectory passes."""
         self._motions: dict[str, _Motion] = {}  # of joints that are led
         self._run: _Run | None = None
         self._next: _Run | None = None  # replaces the other at its beginning
@@ -95,13 +101,13 @@ class TrajectoryFollower:
         return bool(self._motions)
 
     def accept(
-        self, goal: TrajectoryGoal, now: float, measured: Samples, commanded: Samples
+        self, goal: TrajectoryGoal, now: float, measured: Samples, commanded: Samples, *, is_live: bool = False
     ) -> TrajectoryPlan | TrajectoryRefusal:
         """Take over a goal, from now on or from its start on; return its plan, or why it is refused.
 
         It replaces what runs, whose joints it continues with position, velocity and acceleration; outcomes are its own
         from now on. Joints which it leaves out come to rest when it begins. A refusal changes nothing. `measured` and
-        `commanded` have all joints of the goal that are known.
+        `commanded` have all joints of the goal that are known. What `is_live` passes at its own speed.
         """
         begin = begin_of(goal, now)
         idle = commanded if self.policy.start_from == "commanded" else measured
@@ -111,18 +117,20 @@ class TrajectoryFollower:
             return TrajectoryRefusal(TrajectoryCode.INVALID_GOAL, f"it is not known where joint '{lost}' is", lost)
         waiting = {name: self._motions.get(name) or self._resting(name, idle[name], now) for name in names}
         is_led = {name: name in self._motions or begin > now for name in names}
-        start = {name: waiting[name].at(begin) if is_led[name] else idle[name] for name in names}
+        there = {name: self._sample(name, begin) for name in names if name in self._motions}
+        start = {name: there.get(name) or (waiting[name].at(begin) if is_led[name] else idle[name]) for name in names}
         plan = plan_trajectory(goal, now, start, self.joints, self.policy)
         if isinstance(plan, TrajectoryPlan):
             self._motions |= waiting
-            self._next = _Run(goal, plan)
+            self._next = _Run(goal, plan, is_live)
             self._switch(now)
         return plan
 
     def step(self, now: float, measured: Samples, commanded: Samples) -> FollowStep:
         """Return what is desired at `now`. `measured` and `commanded` have all joints of the trajectory."""
         self._switch(now)
-        desired = {name: motion.at(now) for name, motion in self._motions.items()}
+        self._pass(now)
+        desired = {name: self._sample(name, now) for name in self._motions}
         outcome = self._judged(now, desired, measured, commanded) if self._run is not None else None
         if outcome is not None:
             self._end(now)
@@ -153,8 +161,29 @@ class TrajectoryFollower:
         return replace(outcome, time=max(0.0, now - run.plan.begin))
 
     def _end(self, now: float) -> None:
-        self._run = self._next = None
         self._motions = {name: self._brake(name, now) for name in self._motions}
+        self._run = self._next = None
+
+    def _is_paced(self, name: str) -> bool:
+        """Return whether a joint is on a trajectory that people may slow down."""
+        return self._run is not None and not self._run.is_live and name in self._run.plan.curves
+
+    def _sample(self, name: str, now: float) -> JointSample:
+        if not self._is_paced(name):
+            return self._motions[name].at(now)
+        return self.pace.scaled(self._motions[name].at(self.pace.time(now)))
+
+    def _pass(self, now: float) -> None:
+        """Let time pass for the trajectory; its pace stays while another one waits to continue it."""
+        run = self._run
+        if run is None or run.is_live or self._next is not None:
+            return
+        time = self.pace.time(now)
+        if time >= run.plan.end:
+            self.pace.arrive(now, max(run.plan.end, time))
+            return
+        curves = {name: one.at(time) for name, one in self._motions.items() if self._is_paced(name)}
+        self.pace.advance(now, [(one, self.joints[name].limits.acceleration) for name, one in curves.items()])
 
     def _switch(self, now: float) -> None:
         """Let the waiting trajectory begin when its time has come."""
@@ -163,11 +192,13 @@ class TrajectoryFollower:
             return
         begin, curves = run.plan.begin, run.plan.curves
         left = {name: self._brake(name, begin) for name in self._motions if name not in curves}
+        is_at_rest = all(abs(curve.sample(0.0).velocity) < AT_REST for curve in curves.values())
         self._motions = left | {name: _Motion(begin, curve) for name, curve in curves.items()}
         self._run, self._next = run, None
+        self.pace.begin(begin, is_at_rest=is_at_rest)
 
     def _brake(self, name: str, now: float) -> _Motion:
-        return self._resting(name, self._motions[name].at(now), now)
+        return self._resting(name, self._sample(name, now), now)
 
     def _resting(self, name: str, sample: JointSample, now: float) -> _Motion:
         limits = self.joints[name].limits
@@ -177,14 +208,14 @@ class TrajectoryFollower:
         run = self._run
         if run is None:
             return None
-        time = now - run.plan.begin
-        if now < run.plan.end or self._next is not None:
+        time, end = now - run.plan.begin, run.plan.end if run.is_live else run.plan.end + now - self.pace.time(now)
+        if now < end or self._next is not None:
             return self._path_violation(run, time, desired, measured)
         open_ = self._not_arrived(run, time, desired, measured, commanded)
         allowed = self.policy.goal_time if run.goal.goal_time is None else run.goal.goal_time
         if open_ is None:
             return TrajectoryOutcome(TrajectoryCode.SUCCESSFUL, "arrived", time=time)
-        return open_ if now > run.plan.end + allowed else None
+        return open_ if now > end + allowed else None
 
     def _path_violation(self, run: _Run, time: float, desired: Samples, measured: Samples) -> TrajectoryOutcome | None:
         for name in run.plan.curves:

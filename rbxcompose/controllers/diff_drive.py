@@ -135,7 +135,7 @@ class DiffDriveController(Controller[DiffDriveConfig]):
             max_speed=Setting(config.max_speed, "max_speed"),
             max_turn_rate=Setting(config.max_turn_rate, "max_turn_rate"),
             drops_above=Setting(ABSURD),
-            stops_after=Setting(timeout, "command_timeout") if timeout else None,
+            stops_after=Setting(timeout or math.inf, "command_timeout"),
             acceleration=Setting(config.acceleration, "acceleration"),
             turn_acceleration=Setting(config.turn_acceleration, "turn_acceleration"),
         )

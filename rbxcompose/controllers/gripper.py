@@ -35,6 +35,7 @@ NEEDED: Mapping[str, tuple[str, ...]] = {
     "one_sided": ("joint", *_FINGERS),
     "dual": ("left", "right", *_FINGERS),
     "parallel": ("joint", "travel", "opening"),
+    "sliding": ("joint", "opening"),
     "calibrated": ("joint", "calibration"),
 }
 """The keys of each model."""
@@ -42,6 +43,7 @@ OPTIONAL: Mapping[str, tuple[str, ...]] = {
     "one_sided": ("center", "invert"),
     "dual": ("center_left", "center_right", "invert_left", "invert_right"),
     "parallel": ("center", "invert"),
+    "sliding": (),
     "calibrated": (),
 }
 
@@ -69,10 +71,10 @@ class GripperConfig(ControllerConfig):
 
     type: Literal["gripper"] = "gripper"
     """How it leads its joints."""
-    model: Literal["one_sided", "dual", "parallel", "calibrated"]
-    """One finger turns, two fingers turn, both pads move in parallel, or the opening was measured."""
+    model: Literal["one_sided", "dual", "parallel", "sliding", "calibrated"]
+    """One finger turns, two fingers turn, both pads move in parallel, two fingers slide, or openings were measured."""
     joint: JointName | None = None
-    """The joint that opens it."""
+    """The joint that opens it; if fingers slide, that of one of them, which goes half of the opening."""
     left: JointName | None = None
     """The joint of the left finger of a `dual` gripper; positive opens."""
     right: JointName | None = None
@@ -178,6 +180,11 @@ class GripperController(Controller[GripperConfig]):
         if config.speed is not None and config.speed * config.stall.window <= config.stall.progress:
             return "speed", "it would be so slow that it seems to have stalled"
         return None
+
+    @classmethod
+    def kinds_for(cls, config: GripperConfig) -> frozenset[str]:
+        """Return that fingers that slide have a joint that slides."""
+        return frozenset({"prismatic"}) if config.model == "sliding" else cls.kinds
 
     @classmethod
     def asks(cls, config: GripperConfig) -> dict[str, tuple[float, float]]:
@@ -328,6 +335,8 @@ def model_of(config: GripperConfig) -> GripperModel:
     center, invert = config.center or 0.0, bool(config.invert)
     if config.travel is not None:
         return ParallelGripper((-1.0 if invert else 1.0) * math.tau / config.travel, center, least, greatest)
+    if config.model == "sliding":
+        return ParallelGripper(0.5, 0.0, least, greatest)  # each finger goes half of the way
     fingers = FingerGeometry(config.pad_width or 0.0, config.finger_length or 0.0, least, greatest)
     if config.model == "one_sided":
         return OneSidedGripper(fingers, center, invert)

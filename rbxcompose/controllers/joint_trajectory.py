@@ -8,11 +8,13 @@ from pydantic import Field
 
 from rbxcompose.config import Angle, Config, JointName, Time
 from rbxcompose.control.curves import JointSample
+from rbxcompose.control.pace import share_mistake
 from rbxcompose.control.trajectory import (
     TrajectoryCode,
     TrajectoryGoal,
     TrajectoryPoint,
     TrajectoryPolicy,
+    TrajectoryRefusal,
     TrajectoryTolerance,
 )
 from rbxcompose.control.trajectory_follower import TrajectoryFollower, TrajectoryOutcome
@@ -23,10 +25,11 @@ from rbxcompose.msgs.control_msgs import FollowJointTrajectory
 from rbxcompose.msgs.entries import ArrayEntries
 from rbxcompose.msgs.rbxcompose_msgs import MoveJoints
 from rbxcompose.msgs.stamps import to_nanoseconds
-from rbxcompose.sdk import BoundsGoals, Capability, Port, ServesAction, Setting
+from rbxcompose.msgs.trajectory_msgs import JointTrajectory
+from rbxcompose.sdk import BoundsGoals, Capability, In, Port, ServesAction, Setting
 
 Follow = FollowJointTrajectory
-FOLLOW, MOVE = "follow_joint_trajectory", "move"  # its ports
+FOLLOW, MOVE, STREAM = "follow_joint_trajectory", "move", "joint_trajectory"  # its ports
 NANOSECONDS = 1_000_000_000
 
 
@@ -67,6 +70,9 @@ class JointTrajectoryConfig(ControllerConfig):
 class JointTrajectoryController(Controller[JointTrajectoryConfig]):
     """Follows trajectories, by the action `NAME/follow_joint_trajectory` of ROS; `NAME/move` is the skill of missions.
 
+    Trajectories on the topic `NAME/joint_trajectory` need no goal, as in ROS 2: each replaces what leads the joints,
+    and nobody is told how it ends. One without points brings them to rest.
+
     Trajectories are linear, cubic or quintic by what their points hold; one at 0 s is reached as fast as the limits
     allow. A new goal replaces the old one. However a trajectory ends, its joints come to rest within their limits.
 
@@ -81,13 +87,15 @@ class JointTrajectoryController(Controller[JointTrajectoryConfig]):
         return {
             FOLLOW: ServesAction(Follow, f"{name}/{FOLLOW}", claims=name, skill=None),
             MOVE: ServesAction(MoveJoints, f"{name}/{MOVE}", claims=name, skill=name, entries=entries),
+            STREAM: In(JointTrajectory, f"{name}/{STREAM}", is_open=True, may_be_silent=True),
         }
 
     @classmethod
     def capabilities(cls, name: str, config: JointTrajectoryConfig) -> tuple[Capability, ...]:
         """Return that it refuses what its joints cannot reach, unless it goes to the nearest position."""
         led = Setting({joint: joint for joint in config.joints}, "joints")
-        return (BoundsGoals(MOVE, joints=led),) if config.outside == "refuse" else ()
+        duration = Setting("duration") if config.too_fast == "refuse" else None
+        return (BoundsGoals(MOVE, joints=led, duration=duration),) if config.outside == "refuse" else ()
 
     def prepare(self) -> None:
         """Set up the follower."""
@@ -99,6 +107,7 @@ class JointTrajectoryController(Controller[JointTrajectoryConfig]):
             tolerance=TrajectoryTolerance(config.tolerance.path, config.tolerance.goal),
             goal_time=config.tolerance.goal_time,
         )
+        self.told = ""
         self.follower = TrajectoryFollower({name: one.rules for name, one in site.joints.items()}, policy)
         follow = TrajectoryWay(site.action(FOLLOW), self._trajectory, result_of)
         self.goals = TrajectoryGoals(self.follower, {FOLLOW: follow, MOVE: move_way(site.action(MOVE))})
@@ -132,6 +141,33 @@ class JointTrajectoryController(Controller[JointTrajectoryConfig]):
     def let_go(self, joint: str, now: float, reason: str) -> None:
         """End the trajectory; the joint is not led to rest."""
         self._end(self.follower.lose(joint, now, reason))
+
+    def received(self, port: str, message: JointTrajectory) -> None:
+        """Follow a trajectory that is no goal, or tell what is wrong with it."""
+        self.told = ""
+        if not message.points:
+            self.halt(self.site.now, "a trajectory without points")
+            return
+        wanted = self._trajectory(Follow.Goal(trajectory=message))
+        answer = self.follower.accept(wanted, self.site.now, self._measured(), self._commanded(), is_live=True)
+        if isinstance(answer, TrajectoryRefusal):
+            self.told = f"a trajectory was refused: {answer.message}"
+        else:
+            self.goals.replace(STREAM)
+
+    @property
+    def note(self) -> str:
+        """Return at which speed goals are followed, and what was wrong with the last trajectory that was no goal."""
+        share = self.follower.pace.share
+        slow = [] if share == 1.0 else [f"at {share:.0%} of the speed" if share else "held: the speed is 0 %"]
+        return "; ".join([*slow, *([self.told] if self.told else [])])
+
+    def set_pace(self, share: float) -> str:
+        """Follow goals at a share of their speed, from now on."""
+        if problem := share_mistake(share):
+            return problem
+        self.follower.pace.share = share
+        return ""
 
     def _trajectory(self, goal: Follow.Goal) -> TrajectoryGoal:
         return trajectory_of(goal, self.site.now, self.site.stamp)

@@ -76,7 +76,8 @@ class LinearController(Controller[LinearConfig]):
     @classmethod
     def capabilities(cls, name: str, config: LinearConfig) -> tuple[Capability, ...]:
         """Return that it refuses what its joint cannot reach."""
-        return (BoundsGoals("move", joints=Setting({"position": config.joint}, "joint")),)
+        led, speed = Setting({"position": config.joint}, "joint"), Setting(config.speed, "speed")
+        return (BoundsGoals("move", joints=led, speed=speed),)
 
     def prepare(self) -> None:
         """Set up how it moves."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Literal
 
@@ -19,12 +20,18 @@ SHOWN = ("generic", "group", "other")  # types of analyzers that have a header i
 Pattern = Annotated[str, Refers(RUNNING, is_told=True)]
 
 
+_GLOB = re.compile(r"\*+([\w /-]+)\**")  # of a shell: `*camera*`
+
+
 def _shape(value: object) -> str:
     return "map" if isinstance(value, Mapping | BaseModel) else "word"
 
 
 def _regex(text: str) -> str:
     if trouble := trouble_of(text):
+        if glob := _GLOB.fullmatch(text):
+            cure = f"'*' repeats what is before it: write '.*{glob[1]}.*', or 'contains: {glob[1]}' instead of 'regex'"
+            raise PydanticCustomError("regex", "this is a pattern of a shell, not a regular expression", {"help": cure})
         raise PydanticCustomError("regex", "not a regular expression for names: {trouble}", {"trouble": trouble})
     return text
 

@@ -1,13 +1,25 @@
-"""A Dockerfile and a Compose file: one service for each share, in a profile with the name of its host."""
+"""A Dockerfile and a Compose file: one service for each share, in a profile with the name of its host.
+
+Certificates and other secrets are in neither: they come from the host, as Compose's secrets and its environment.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import yaml
 
-from rbxcompose.exporting.exported_share import FILE, GRACE, ExportedShare
+from rbxcompose.exporting.exported_share import (
+    CERTIFICATES,
+    CONFIGURATION,
+    FILE,
+    GRACE,
+    MEMORY,
+    PROCESSES,
+    ExportedShare,
+)
+from rbxcompose.manifest.secrets import VARIABLE
 
 PROJECT = "/robot"  # the folder of the manifests in the image
 _DOCKERFILE = """FROM python:3.11-slim
@@ -15,21 +27,34 @@ RUN pip install --no-cache-dir rbxcompose=={version} && useradd --create-home ro
 COPY project {project}
 USER robot
 WORKDIR {project}
-ENV XDG_RUNTIME_DIR=/run/robot NO_COLOR=1
+ENV XDG_RUNTIME_DIR=/run/robot XDG_CONFIG_HOME={configuration} NO_COLOR=1
 ENTRYPOINT ["rbxcompose"]
 """
 
 
 def dockerfile(version: str) -> str:
     """Return the Dockerfile; the system's files are in the folder `project` beside it."""
-    return _DOCKERFILE.format(version=version, project=PROJECT)
+    return _DOCKERFILE.format(version=version, project=PROJECT, configuration=CONFIGURATION)
 
 
 def compose_file(shares: Iterable[ExportedShare], *, system: str, file: str) -> str:
     """Return the Compose file; `file` is that of the system in the project. Routers need the network of the host."""
-    services = {share.name: _service(share, f"{PROJECT}/{file}") for share in shares}
-    text = yaml.safe_dump({"name": system.replace("_", "-"), "services": services}, sort_keys=False, width=120)
+    given = list(shares)
+    made: dict[str, Any] = {
+        "name": system.replace("_", "-"),
+        "services": {share.name: _service(share, f"{PROJECT}/{file}") for share in given},
+    }
+    if secrets := {name: {"file": path} for share in given for name, path, _ in _certificates(share)}:
+        made["secrets"] = secrets
+    text = yaml.safe_dump(made, sort_keys=False, width=120)
     return f"# On each host: docker compose --profile HOST up -d\n{text}"
+
+
+def _certificates(share: ExportedShare) -> Iterator[tuple[str, str, str]]:
+    """Yield name of a secret, file on the host, and file in the container."""
+    for name in CERTIFICATES if share.has_certificates else ():
+        path = f"{share.certificates}/{name}"
+        yield f"{share.name}-{name.partition('.')[0]}", f"${{HOME}}/.config/{path}", f"{CONFIGURATION}/{path}"
 
 
 def _service(share: ExportedShare, file: str) -> dict[str, Any]:
@@ -42,6 +67,8 @@ def _service(share: ExportedShare, file: str) -> dict[str, Any]:
         "read_only": True,
         "tmpfs": ["/run/robot:mode=0700,uid=1000", "/tmp"],  # noqa: S108 - of the container
         "shm_size": "256mb",
+        "mem_limit": MEMORY.lower(),
+        "pids_limit": PROCESSES,
         "cap_drop": ["ALL"],
         "security_opt": ["no-new-privileges:true"],
         "restart": "on-failure:5",
@@ -56,4 +83,8 @@ def _service(share: ExportedShare, file: str) -> dict[str, Any]:
     }
     if share.devices:
         service |= {"devices": [f"{device}:{device}" for device in share.devices], "group_add": ["dialout"]}
+    if share.has_certificates:
+        service["secrets"] = [{"source": name, "target": target} for name, _, target in _certificates(share)]
+    if share.secrets:
+        service["environment"] = [f"{VARIABLE}{name.upper()}" for name in share.secrets]  # as the host has them
     return service

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
+from rbxcompose.config import Config, Secret
 from rbxcompose.dataclass import dataclass
 from rbxcompose.plan.model import Plan
 from rbxcompose.sdk.capabilities import OpensPort
 from rbxcompose.sdk.registry import component_type
+from rbxcompose.systems.certificates import AUTHORITY, CERTIFICATE, KEY, NO_SECURITY
+from rbxcompose.systems.exchange import exchange_of
 from rbxcompose.systems.model import System
 from rbxcompose.systems.share import hosts_of, share_of
 
 GRACE = 5.0  # [s] to go down beside the time to come to rest
 REFUSED = (1, 2)  # exit codes that another try does not change: findings, wrong usage
 MISSION_FAILED = 3
+MEMORY, PROCESSES = "1G", 500  # of a share at most; a robot with an arm needs a fifth of it
+CERTIFICATES = (AUTHORITY, CERTIFICATE, KEY)
+CONFIGURATION = "/run/config"  # in a container: where `CERTIFICATES` are, as in `~/.config`
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,11 +32,18 @@ class ExportedShare:
     command: tuple[str, ...]  # after the program's name; `{file}` stands for the path of the system's file
     devices: tuple[str, ...]
     rest_time: float
+    has_certificates: bool = False
+    secrets: tuple[str, ...] = ()  # that its manifest refers to
 
     @property
     def name(self) -> str:
         """Return a name that no other share of the system has."""
         return f"{self.robot}-{self.host}".replace("_", "-")
+
+    @property
+    def certificates(self) -> str:
+        """Return the folder of its certificates below that of configurations."""
+        return f"rbxcompose/systems/{self.system}/{self.host}"
 
 
 FILE = "{file}"
@@ -43,14 +56,38 @@ def shares(system: System, host: str | None = None) -> Iterator[ExportedShare]:
             if host in (None, one):
                 plan = share_of(system, robot, one)
                 real = () if plan.is_simulated else ("--real",)
-                words = ("up", FILE, "--host", one, "--robot", robot.name, *real)
-                yield ExportedShare(system.name, robot.name, one, words, tuple(_devices(plan)), _rest_time(plan))
+                profiles = tuple(word for name in system.profiles for word in ("--profile", name))
+                words = ("up", FILE, "--host", one, "--robot", robot.name, *profiles, *real)
+                is_linked = plan.share is not None or exchange_of(system, robot, one) is not None
+                yield ExportedShare(
+                    system.name,
+                    robot.name,
+                    one,
+                    words,
+                    tuple(_devices(plan)),
+                    _rest_time(plan),
+                    is_linked and system.security != NO_SECURITY,
+                    tuple(sorted({name for each in plan.instances for name in _secrets(each.config)})),
+                )
 
 
 def _devices(plan: Plan) -> list[str]:
     opened = (component_type(one.type).capabilities(one.config) for one in plan.instances)
     paths = {each.port.value for capabilities in opened for each in capabilities if isinstance(each, OpensPort)}
     return sorted(path for path in paths if path.startswith("/dev/"))
+
+
+def _secrets(value: object) -> Iterator[str]:
+    """Yield the names of all secrets in a configuration."""
+    match value:
+        case Secret():
+            yield value.name
+        case Config():
+            yield from (name for _, one in value for name in _secrets(one))
+        case Mapping():
+            yield from (name for one in value.values() for name in _secrets(one))
+        case tuple():
+            yield from (name for one in value for name in _secrets(one))
 
 
 def _rest_time(plan: Plan) -> float:

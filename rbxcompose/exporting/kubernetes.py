@@ -1,24 +1,27 @@
 """Manifests of Kubernetes: one pod for each share, on the node with the label `rbxcompose/host: NAME`, and the files.
 
-A Kustomize base, so that a fleet can overlay names, images and labels.
+A Kustomize base, so that each robot of a fleet is an overlay with a name, an image and nodes of its own. Certificates
+and other secrets are objects of the kind Secret, which the manifests name and do not contain.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import yaml
 
 from rbxcompose.exporting.compose import PROJECT
-from rbxcompose.exporting.exported_share import FILE, GRACE, ExportedShare
+from rbxcompose.exporting.exported_share import CERTIFICATES, CONFIGURATION, FILE, GRACE, MEMORY, ExportedShare
+from rbxcompose.manifest.secrets import VARIABLE
 
 LARGEST = 1_000_000  # [bytes] of a ConfigMap, which etcd limits
 KUSTOMIZATION = "kustomization.yaml"
+USER, DIALOUT = 1000, 20  # numbers of the image's user, and of the group that opens serial ports
 
 
 def manifests(
-    shares: Iterable[ExportedShare], *, system: str, file: str, files: Mapping[str, bytes], image: str
+    shares: Sequence[ExportedShare], *, system: str, file: str, files: Mapping[str, bytes], image: str
 ) -> dict[str, str]:
     """Return the manifests by file name; `files` are those of the system by their paths, `file` is its own.
 
@@ -36,7 +39,28 @@ def manifests(
         "resources": sorted(found),
         "labels": [{"pairs": {"app.kubernetes.io/part-of": name}}],
     }
-    return {path: yaml.safe_dump(one, sort_keys=False, width=120) for path, one in found.items()}
+    texts = {path: yaml.safe_dump(one, sort_keys=False, width=120) for path, one in found.items()}
+    for share in shares:
+        texts[f"{share.name}.yaml"] = "".join(f"# {line}\n" for line in _needed(share)) + texts[f"{share.name}.yaml"]
+    return texts
+
+
+def _needed(share: ExportedShare) -> Iterator[str]:
+    """Yield what to type so that its secrets exist; they are never written to a file of ours."""
+    if share.has_certificates:
+        files = " ".join(f"--from-file=$HOME/.config/{share.certificates}/{name}" for name in CERTIFICATES)
+        yield f"kubectl create secret generic {share.name}-certificates {files}"
+    for name in share.secrets:
+        yield f"kubectl create secret generic {_secret(share, name)} --from-file=value=secrets/{name}"
+
+
+def _secret(share: ExportedShare, name: str) -> str:
+    return f"{share.name}-{name}".replace("_", "-").lower()
+
+
+def _variable(share: ExportedShare, name: str) -> dict[str, Any]:
+    reference = {"name": _secret(share, name), "key": "value"}
+    return {"name": f"{VARIABLE}{name.upper()}", "valueFrom": {"secretKeyRef": reference}}
 
 
 def _key(path: str) -> str:
@@ -72,6 +96,9 @@ def _pod(share: ExportedShare, system: str, file: str, files: list[str], image: 
         {"name": "tmp", "emptyDir": {}},
         {"name": "shm", "emptyDir": {"medium": "Memory", "sizeLimit": "256Mi"}},
     ]
+    if share.has_certificates:
+        secret = {"secretName": f"{share.name}-certificates", "defaultMode": 0o440}
+        volumes.append({"name": "certificates", "secret": secret})
     volumes += [{"name": f"device-{n}", "hostPath": {"path": path}} for n, path in enumerate(share.devices)]
     return {
         "nodeSelector": {"rbxcompose/host": share.host},
@@ -79,6 +106,13 @@ def _pod(share: ExportedShare, system: str, file: str, files: list[str], image: 
         "dnsPolicy": "ClusterFirstWithHostNet",
         "automountServiceAccountToken": False,
         "terminationGracePeriodSeconds": round(share.rest_time + GRACE),
+        "securityContext": {
+            "runAsNonRoot": True,
+            "runAsUser": USER,
+            "fsGroup": USER,  # may read its secrets
+            "supplementalGroups": [DIALOUT] if share.devices else [],
+            "seccompProfile": {"type": "RuntimeDefault"},
+        },
         "containers": [_container(share, file, image)],
         "volumes": volumes,
     }
@@ -87,19 +121,26 @@ def _pod(share: ExportedShare, system: str, file: str, files: list[str], image: 
 def _container(share: ExportedShare, file: str, image: str) -> dict[str, Any]:
     probe = {"exec": {"command": ["rbxcompose", "ps", share.robot]}, "timeoutSeconds": 5}
     mounts = [("files", PROJECT), ("run", "/run/robot"), ("tmp", "/tmp"), ("shm", "/dev/shm")]  # noqa: S108 - of the pod
+    if share.has_certificates:
+        mounts.append(("certificates", f"{CONFIGURATION}/{share.certificates}"))
     mounts += [(f"device-{n}", path) for n, path in enumerate(share.devices)]
     return {
         "name": "share",
         "image": image,
         "args": [f"{PROJECT}/{file}" if word == FILE else word for word in share.command],
-        "env": [{"name": "XDG_RUNTIME_DIR", "value": "/run/robot"}],
+        "env": [
+            {"name": "XDG_RUNTIME_DIR", "value": "/run/robot"},
+            {"name": "XDG_CONFIG_HOME", "value": CONFIGURATION},
+            *(_variable(share, name) for name in share.secrets),
+        ],
         "startupProbe": {**probe, "periodSeconds": 2, "failureThreshold": 60},
         "livenessProbe": {**probe, "periodSeconds": 10, "failureThreshold": 3},
-        "resources": {"requests": {"cpu": "100m", "memory": "128Mi"}, "limits": {"memory": "1Gi"}},
+        "resources": {"requests": {"cpu": "100m", "memory": "128Mi"}, "limits": {"memory": f"{MEMORY}i"}},
         "securityContext": {
             "privileged": bool(share.devices),  # devices of the host are open to nobody else
             "allowPrivilegeEscalation": bool(share.devices),
             "readOnlyRootFilesystem": True,
+            **({} if share.devices else {"capabilities": {"drop": ["ALL"]}}),
         },
         "volumeMounts": [{"name": name, "mountPath": path} for name, path in mounts],
     }

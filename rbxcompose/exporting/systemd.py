@@ -52,7 +52,7 @@ def _lines(share: ExportedShare, program: str, file: str, user: str) -> Iterator
     yield "[Unit]"
     yield f"Description=Robot {share.robot}, share of host {share.host}"
     yield "Wants=network-online.target"
-    yield "After=network-online.target"
+    yield f"After=network-online.target{' time-sync.target' if share.has_certificates else ''}"  # they have dates
     yield "StartLimitIntervalSec=60"
     yield "StartLimitBurst=5"
     yield ""

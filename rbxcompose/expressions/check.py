@@ -43,6 +43,8 @@ from rbxcompose.expressions.written import is_bare, missing_unit, other_unit, qu
 from rbxcompose.findings import DID_YOU_MEAN, suggest, surely_meant
 from rbxcompose.units import LENGTH, NUMBER, QUOTIENT, TIME
 
+_DECLARED = "'inputs' or 'data' of the mission, as 'save' of a step, or as 'values' of the robot"
+
 
 class StaticScope(Protocol):
     """The names that exist, and their types."""
@@ -174,6 +176,8 @@ class _Checker:
         names = [f"${name}" for name in self.scope.variables()]
         meant = surely_meant(node.name, self.scope.variables())
         fix = suggest(f"${node.name}", names, "names")
+        if not fix.startswith(DID_YOU_MEAN):
+            fix = f"{fix}; new ones are declared as {_DECLARED}".removeprefix("; ")
         return self.wrong(node, f"unknown name '${node.name}'", fix, f"${meant}" if meant else "")
 
     def word(self, node: Word, expected: Type) -> Type:

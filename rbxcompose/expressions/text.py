@@ -19,6 +19,9 @@ Show: TypeAlias = Callable[[str, Value], str]
 
 _SLOT = re.compile(rf"\$(?:(?P<dollar>\$)|(?P<path>{NAME}(?:\.{NAME})*))")
 
+_FOREIGN = re.compile(r"\{\{-?\s*[A-Za-z_$][^{}]*\}\}")  # of Jinja, as Home Assistant and Ansible have it
+_SHOWN = 60
+
 
 @dataclass(frozen=True, slots=True)
 class TextSlot:
@@ -60,6 +63,13 @@ def parse_template(text: str) -> Template:
         parts.append(_slot(path, match.start(), end) if path else "$")
     parts.append(text[end:])
     return Template(text, tuple(part for part in parts if part))
+
+
+def refuse_foreign(text: str) -> None:
+    """Raise ExpressionError for a text with slots of another language: they would be read out as they are."""
+    if found := _FOREIGN.search(text):
+        help_text = "write '$name' or '$name.field' where its value belongs"
+        raise ExpressionError(f"'{found[0][:_SHOWN]}' is not filled in", found.start(), found.end(), help_text)
 
 
 def _slot(path: str, start: int, end: int) -> TextSlot:

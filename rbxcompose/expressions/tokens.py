@@ -53,6 +53,7 @@ _NO_UNIT = re.compile(r"\s*(?!(?:and|or|in|not)\b)((?:[^\W\d]|°)[\w/^]*)")
 # `3 in $list` is a membership test, while `3 in` is a length: only in the first does a value follow the word.
 _VALUE = re.compile(r"""\s*(?!(?:and|or|in|not)\b)[$\w'"(\[]""")
 
+CURLY_QUOTES = "\u201c\u201d\u201e\u2018\u2019\u201a\u00ab\u00bb"  # those of books, which are letters to YAML
 # Symbols that other languages have and this one lacks; longer ones first.
 _FOREIGN = {
     "${": "'${...}' is filled in earlier; here write '$name', which is looked up while the robot runs",
@@ -65,6 +66,9 @@ _FOREIGN = {
     "=": "write '==' to compare",
     "!": "write 'not'",
     "%": "a percentage is written with its number, such as '30 %'; there is no remainder operator",
+    ":": "a time is a number with a unit, such as '5 s' or '2 min'",
+    **dict.fromkeys(CURLY_QUOTES, "quotes are straight: write \" or '"),
+    "{{": "no braces are needed here: '$name' is a value of the robot or the mission, such as '$battery < 30 %'",
     "{": "a map cannot be written here",
     "_": "names start with a letter",
     "'": "the quote is not closed",

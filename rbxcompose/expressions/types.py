@@ -36,6 +36,8 @@ class Type:
     of: Type | None = None
     names: tuple[str, ...] = field(default=(), compare=False)
     """The only entries that a map can have, if they are known."""
+    parts: Mapping[str, Type] = field(default_factory=dict, compare=False)
+    """The types of its entries, if each has its own."""
 
     @property
     def phrase(self) -> str:
@@ -88,6 +90,11 @@ def list_of(entry: Type) -> Type:
 def map_of(entry: Type, names: tuple[str, ...] = ()) -> Type:
     """Return the type of maps from names to `entry`; `names` are the only ones, if they are known."""
     return Type(TypeKind.MAP, of=entry, names=names)
+
+
+def record_of(parts: Mapping[str, Type]) -> Type:
+    """Return the type of maps whose entries have types of their own; each may be left out."""
+    return Type(TypeKind.MAP, of=UNKNOWN, names=tuple(parts), parts=parts)
 
 
 TYPES: Mapping[str, Type] = MappingProxyType(

@@ -43,6 +43,7 @@ Good: `level: 3`
     Severity.WARNING,
 )
 
+_XML = (".srdf", ".urdf")
 _PYTHON = "!!python/"
 _OF_YAML = ("str", "int", "float", "bool", "null", "seq", "map")
 _OF_PYTHON = ("unicode", "str", "bytes", "int", "long", "float", "bool", "none", "tuple", "list", "dict")
@@ -71,10 +72,12 @@ class Given(Generic[T]):
 
 @dataclass(frozen=True, slots=True)
 class ForeignFile:
-    """A file of another program: its name in findings, and its tree."""
+    """A file of another program: its name in findings, its tree, which is empty for XML, its text, and its path."""
 
     name: str
     root: TreeNode
+    text: str = ""
+    path: Path | None = None
 
 
 def read_files(paths: Iterable[Path], report: Report, sources: MutableMapping[str, str]) -> list[ForeignFile]:
@@ -85,11 +88,13 @@ def read_files(paths: Iterable[Path], report: Report, sources: MutableMapping[st
 def _read(path: Path, report: Report, sources: MutableMapping[str, str]) -> ForeignFile | None:
     shown = shown_name(path)
     text, findings = read_source(path, shown, sources, what="an imported file")
-    root = None
+    root: TreeNode | None = None
+    if text is not None and path.suffix in _XML:
+        return ForeignFile(shown, MappingNode(), text, path.absolute())
     if text is not None:
         root, findings = read_text(text, shown, _PLAIN_TAGS)
     report.extend(_without_objects(one, shown) for one in findings)
-    return None if root is None else ForeignFile(shown, root)
+    return None if root is None else ForeignFile(shown, root, text or "", path.absolute())
 
 
 def _without_objects(finding: Finding, shown: str) -> Finding:

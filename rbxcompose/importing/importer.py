@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import field
 
 from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Report, Severity, kind
@@ -54,8 +55,18 @@ Good: one with `joints:`
 )
 
 PLUGINS = Plugins("importer", "rbxcompose.importing.importers")
-Import = Callable[[Sequence[ForeignFile], str, Report], str]
-"""Files, the robot's name, where findings go -> the text of a manifest; empty if nothing could be read."""
+
+
+@dataclass(frozen=True, slots=True)
+class ImportedFiles:
+    """The text of a manifest, empty if nothing could be read, and the files beside it by name."""
+
+    text: str
+    beside: Mapping[str, str] = field(default_factory=dict)
+
+
+Import = Callable[[Sequence[ForeignFile], str, Report], str | ImportedFiles]
+"""Files, the robot's name, where findings go -> the text of a manifest, or it with files beside it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,12 +96,13 @@ def importers() -> dict[str, Importer]:
     return {name: _IMPORTERS[name] for name in PLUGINS.names() if not _problem(name) and name in _IMPORTERS}
 
 
-def imported(program: str, files: Sequence[ForeignFile], name: str, report: Report) -> str:
-    """Return the text of a manifest with what files of a program have; empty, after a finding, if it is nothing."""
-    text = importers()[program].run(files, name, report) if files else ""
-    if not text and not report.has_errors:
+def imported(program: str, files: Sequence[ForeignFile], name: str, report: Report) -> ImportedFiles:
+    """Return a manifest with what files of a program have; empty, after a finding, if it is nothing."""
+    run = importers()[program].run(files, name, report) if files else ""
+    made = run if isinstance(run, ImportedFiles) else ImportedFiles(run)
+    if not made.text and not report.has_errors:
         report.add(NOTHING_LEFT.at(None, "nothing of these files could be imported, so no manifest is written"))
-    return text
+    return made
 
 
 def broken_importers() -> list[Finding]:

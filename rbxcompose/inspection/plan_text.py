@@ -37,9 +37,10 @@ def _facts(plan: Plan) -> Iterator[tuple[str, str]]:
     bus = plan.bus
     own = "by sockets of this user only" if bus.access == "user" else f"at port {bus.port}, or the next free one"
     router = bus.router or f"its own {own}"
+    through = ", through which all messages go" if bus.links == "router" else ""
     namespace = f"namespace {bus.namespace}" if bus.namespace else "no namespace"
     yield "bus", f"domain {bus.domain}, {namespace}, wire format {bus.wire}"
-    yield "router", router
+    yield "router", f"{router}{through}"
     if plan.follows_clock:
         yield "time", "follows /clock, which is published from outside"
     yield "mission", f"{plan.start}, as soon as everything is active" if plan.start else "none starts by itself"

@@ -9,7 +9,8 @@ from pydantic import Field
 from rbxcompose.config import Config, Secret
 from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.types import TYPES, Type, TypeKind, choice_of
-from rbxcompose.findings import Report
+from rbxcompose.findings import DID_YOU_MEAN, Finding, FindingKind, Report, Span, replacement
+from rbxcompose.manifest.foreign_words import TYPES as FOREIGN_TYPES
 from rbxcompose.manifest.scalars import describe
 from rbxcompose.manifest.tree import (
     BROKEN,
@@ -32,7 +33,18 @@ from rbxcompose.manifest.validate import (
     validate,
     where,
 )
-from rbxcompose.units import NUMBER, Dimension, Quantity, UnitError, format_number, format_quantity, to_si
+from rbxcompose.printable import plain
+from rbxcompose.units import (
+    NUMBER,
+    UNITS,
+    Dimension,
+    Quantity,
+    UnitError,
+    format_number,
+    format_quantity,
+    to_si,
+    written_unit,
+)
 
 CHOICE = "choice"
 
@@ -90,6 +102,10 @@ def read_argument(name: str, node: TreeNode, path: KeyPath, report: Report) -> D
                 report.add(WRONG_TYPE.at(key_span(node, (key,)), f"'{key}' does not apply to {declared.phrase}"))
                 continue
             bounds[key] = read_value(bound, declared, key, report)
+    if model.choices and model.type != CHOICE:
+        message = f"'choices' does not apply to {declared.phrase}"
+        help_text = "use 'min' and 'max'" if declared.measure else f"write 'type: {CHOICE}'"
+        report.add(WRONG_TYPE.at(key_span(node, ("choices",)), message, help=help_text))
     least, most = bounds.get("min"), bounds.get("max")
     if BROKEN not in bounds.values() and None not in (least, most) and size_of(least) > size_of(most):
         place = value_span(node, ("min",))
@@ -107,9 +123,28 @@ def _type(model: ArgumentModel, node: MappingNode, path: KeyPath, report: Report
     elif found := TYPES.get(model.type):
         return found
     elif written:
-        message = f"there is no type '{model.type}'"
-        report.add(NOT_A_CHOICE.misspelt(written.span, message, model.type, [*TYPES, CHOICE], "types"))
+        report.add(_unknown_type(written, model, node.get("default")))
     return None
+
+
+def _unknown_type(written: TreeNode, model: ArgumentModel, default: TreeNode | None) -> Finding:
+    """Return the finding for a type that does not exist; a default with a unit tells which one is meant."""
+    finding = unknown_type(NOT_A_CHOICE, written.span, model.type)
+    unit = written_unit(default.text) if isinstance(default, ScalarNode) else None
+    if unit is None or (meant := UNITS[unit].dimension.name) not in TYPES:
+        return finding
+    fix = replacement(written.span, model.type, meant, is_safe=False)
+    return NOT_A_CHOICE.at(written.span, finding.message, help=f"{DID_YOU_MEAN} '{meant}'?", fix=fix)
+
+
+def unknown_type(kind: FindingKind, span: Span, name: str) -> Finding:
+    """Return the finding for a type of an argument or input that does not exist."""
+    message = f"there is no type '{plain(name, 60)}'"
+    if ours := FOREIGN_TYPES.get(name.lower()):
+        return kind.at(
+            span, message, help=f"{DID_YOU_MEAN} '{ours}'?", fix=replacement(span, name, ours, is_safe=False)
+        )
+    return kind.misspelt(span, message, name, (*TYPES, CHOICE), "types")
 
 
 def read_value(node: TreeNode, expected: Type, name: str, report: Report) -> object:

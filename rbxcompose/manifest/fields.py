@@ -13,6 +13,7 @@ TopicPattern = StringConstraints(pattern=r"^/?[a-z][a-z0-9_]*(/[a-z][a-z0-9_]*)*
 TopicName = Annotated[str, TopicPattern, Refers(TOPIC, is_told=True)]
 InterfaceName = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]*(/(msg|srv|action))?/[A-Z][A-Za-z0-9]*$")]
 DottedName = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)?$", max_length=121)]
+FieldPath = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)*$", max_length=255)]
 PortName = Annotated[DottedName, Refers(PORT, is_told=True)]
 ComponentName = Annotated[Name, Refers(COMPONENT, is_told=True)]
 FileName = Annotated[str, Refers(FILE, is_told=True)]

@@ -13,6 +13,8 @@ from rbxcompose.manifest.reader import UNREADABLE
 from rbxcompose.per_compile import once
 from rbxcompose.printable import plain
 
+PROFILE = "--profile"
+"""What stands for a file in findings about profiles that a command chooses."""
 OUTSIDE = kind(
     "RBX1306",
     """A path outside the project
@@ -68,6 +70,8 @@ def resolve(written: str, writer: Path, span: Span) -> Path | Finding:
     if path is None or not is_inside or _DRIVE.match(written):
         message, folder = f"'{plain(written)}' is outside the project", plain(shown_name(project_of(writer)))
         where = f"'{folder}'" if folder != "." else "this folder"
+        if namesakes := files_named(Path(written).name, writer):
+            return OUTSIDE.at(span, message, help="did you mean " + " or ".join(f"'{one}'" for one in namesakes) + "?")
         return OUTSIDE.at(span, message, help=f"the project is {where}: move the file there, or use what 'rbx:' has")
     return path if path.is_file() else _missing(written, path, span, writer)
 
@@ -123,6 +127,10 @@ def _missing(written: str, path: Path, span: Span | None, writer: Path | None = 
     if writer is not None and (namesakes := files_named(path.name, writer)):
         message, help_text = f"'{plain(written)}' does not exist", " or ".join(f"'{one}'" for one in namesakes)
         return UNREADABLE.at(span, message, help=f"did you mean {help_text}?")
+    if (library_root() / written).is_file() and written.startswith(f"{PARTS}/"):
+        fix = replacement(span, written, f"{PREFIX}{written}") if span else None
+        message, meant = f"'{plain(written)}' does not exist", f"{PREFIX}{plain(written)}"
+        return UNREADABLE.at(span, message, help=f"did you mean '{meant}'? Our parts are in the library", fix=fix)
     if (neighbours := _names_in(path.parent)) is None:
         return UNREADABLE.at(span, f"'{plain(written)}' does not exist", help=_nearest_folder(path))
     message, there = f"'{plain(written)}' does not exist", f"in '{plain(shown_name(path.parent))}'"

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 _USUAL = gc.get_threshold()
-_NEW_OBJECTS = 50_000  # some 10 MB
+_NEW_OBJECTS = 150_000  # some 30 MB
 
 
 def collect_rarely() -> None:

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 from rbxcompose.findings import Finding, Related, Span
+from rbxcompose.manifest.tree import KeyPath, TreeNode, at, children
 
 
 class GivenSpan(Span):
@@ -22,6 +23,18 @@ def given_span(given: Span, use: Span) -> GivenSpan:
     made = GivenSpan(*given)
     made.uses = (*(given.uses if isinstance(given, GivenSpan) else ()), use)
     return made
+
+
+def decided_at(root: TreeNode, path: KeyPath, otherwise: Span) -> Span:
+    """Return the place of the one value that was given for something at `path` or below it; else another place."""
+    node = at(root, path)
+    given, waiting = {}, [node] if node is not None else []
+    while waiting:
+        one = waiting.pop()
+        waiting += (child for _, child in children(one))
+        if isinstance(one.span, GivenSpan):
+            given[Span(*one.span)] = one.span
+    return next(iter(given.values())) if len(given) == 1 else otherwise
 
 
 def told_where_given(finding: Finding) -> Finding:

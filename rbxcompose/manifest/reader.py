@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 from collections.abc import Collection, Iterator, Mapping, MutableMapping
 from pathlib import Path
 
@@ -48,6 +49,9 @@ missions:
     is_fixable=True,
 )
 
+_ODD_INDENT = re.compile(
+    r"^ *([\u00a0\u2000-\u200a\u202f\u205f\u3000])[ \u00a0\u2000-\u200a\u202f\u205f\u3000]*", re.MULTILINE
+)
 INDENT = "  "  # of one level
 ParsedText = tuple[TreeNode | None, list[Finding]]
 
@@ -187,12 +191,24 @@ def _trouble_in_characters(text: str, file: str) -> Iterator[Finding]:
         help_text = r'use spaces (in text with double quotes a tab is written "\t")'
         message, fix = "there is a tab here; manifests have no tabs", _spaces_for_tabs(text, file)
         yield CHARACTER.at(span, message, label=label, help=help_text, fix=fix)
+    if found := _ODD_INDENT.search(text):
+        message, fix = "this line is indented by other characters than spaces", _plain_spaces(text, file)
+        help_text = f"write spaces for {code_point(found[1])}, as web pages and word processors have"
+        yield CHARACTER.at(_character_span(text, found.start(1), file), message, help=help_text, fix=fix)
     for number, line in enumerate(text.split("\n"), 1):
         if line.startswith("%"):
             span = Span(file, number, 1, number, len(line) + 1)
             yield NOT_YAML.at(span, "a manifest has no lines that start with '%'", help="remove this line")
         if line.strip() and not line.lstrip().startswith("#"):
             return  # directives precede everything else
+
+
+def _plain_spaces(text: str, file: str) -> Fix:
+    """Return the fix for indentation of spaces with other widths: each becomes one space."""
+    found = ((number, _ODD_INDENT.match(line)) for number, line in enumerate(text.split("\n"), 1))
+    lines = [(number, one[0]) for number, one in found if one]
+    edits = [Edit(Span(file, number, 1, number, len(old) + 1), old, " " * len(old)) for number, old in lines]
+    return Fix(tuple(edits), True, f"spaces in {len(edits)} {'line' if len(edits) == 1 else 'lines'}")
 
 
 def _spaces_for_tabs(text: str, file: str) -> Fix | None:

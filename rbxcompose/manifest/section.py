@@ -6,6 +6,7 @@ none of them refers to a section by name.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, replace
 from enum import Enum
@@ -241,10 +242,12 @@ class Contents:
 
     @cached_property
     def stray(self) -> frozenset[str]:
-        """Return the names below keys that are no sections: they may belong to any."""
+        """Return the names below keys that are no sections, which may belong to any, and those that were misspelt."""
         known = {*ManifestHeader.model_fields, *(one.name for one in self._sections)}
         others = (entry.value for name, entry in self.root.entries.items() if name not in known)
-        return frozenset(name for node in others if isinstance(node, MappingNode) for name in node.entries)
+        below = [name for node in others if isinstance(node, MappingNode) for name in node.entries]
+        named = (name for one in self._sections for name in one.names_in(self.root) if not name.isidentifier())
+        return frozenset((*below, *(re.sub(r"\W+", "_", name) for name in named)))
 
     def is_misplaced(self, section: Section[Any, Any], entry: Entry) -> bool:
         """Return whether an entry of a section is another section of the file, indented too far."""

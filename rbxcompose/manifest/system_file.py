@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
-from rbxcompose.config import BitRate, Config, Frequency, Name
+from rbxcompose.config import BitRate, Config, Frequency, Name, Time
 from rbxcompose.manifest.header import ManifestHeader
 
 _SSH = re.compile(r"(ssh://)?([A-Za-z0-9_][A-Za-z0-9_.-]*@)?[A-Za-z0-9\[][A-Za-z0-9.:\]_-]*")
@@ -49,6 +49,8 @@ class SystemFile(ManifestHeader):
     """The robots that run on them, by name; this is the name that `ps` and other verbs know."""
     links: Any = None
     """What is known of the ways between hosts, by name."""
+    profiles: Any = None
+    """Changes to the system by name, applied with `--profile NAME`: a site, a shift, another host."""
     security: Literal["none", "tls", "mtls"] = "none"
     """How routers of different hosts trust each other: not at all; by `tls`, the one that dials knows that the other
     is of this system, and what crosses is encrypted; by `mtls`, both know. `security init` makes the certificates."""
@@ -83,8 +85,26 @@ class SystemRobotModel(Config):
     their devices, and the rest goes to the host that has most of the robot by then."""
     place: dict[str, Name] = {}
     """The host, or a label of hosts, for single components, or for parts with all that they bring."""
+    stop_within: Annotated[Time, Field(gt=0)] = 1.5
+    """The longest time from a cut link until a base stands still that is commanded across it. `plan` shows the time
+    that it takes, from the base's settings; `check` refuses a base that takes longer."""
+    instances: Annotated[int, Field(ge=1, le=1000)] = 1
+    """How many of it there are, as NAME_1, NAME_2 and so on; `on` and `place` with a label take its hosts in turn."""
+    labels: tuple[Name, ...] = ()
+    """What `fleet` may call it by, with others."""
+    share: tuple[str, ...] = ()
+    """Topics that other robots of the system may see, below the name of this one: `map` as `/NAME/map`; services and
+    actions that its `callers` may use, in the same way."""
+    callers: tuple[Name, ...] = ()
+    """Robots of the system that may call the services in `share` and send goals to the actions in it: their names, or
+    labels. Whoever may do that may move this robot."""
+    share_port: int | None = Field(None, ge=1, le=65535)
+    """The TCP port at which other robots fetch what is shared; without it, that of the links plus 1000."""
     link_port: int | None = Field(None, ge=1, le=65535)
     """The TCP port at which the robot's routers reach each other; without it, that of `bus.port` of the robot."""
+
+
+PRIORITIES = ("high", "medium", "low")
 
 
 class LinkModel(Config):
@@ -93,7 +113,14 @@ class LinkModel(Config):
     between: tuple[Name, Name]
     """The two hosts."""
     limit: Annotated[BitRate, Field(gt=0)] | None = None
-    """What it carries; `check` warns if what is known to cross needs more."""
+    """What it carries; `check` warns if what is known to cross needs more. Messages of states and of bulk that would
+    take it for longer than a second are left out."""
+    protocol: Literal["tcp", "quic"] = "tcp"
+    """By which the routers talk. QUIC recovers faster from loss and from a new address of a host; it needs `security`,
+    and UDP at the port of the link."""
+    priorities: dict[str, Literal["high", "medium", "low"]] = {}
+    """Which topics go first when the link is full: `high` is that of states, `medium` of latched messages, `low` waits
+    for all others. Commands are above all of them. Of several links of a host, the highest counts."""
     downsample: dict[str, Annotated[Frequency, Field(gt=0)]] = {}
     """Topics of which no more messages than these cross; the others are left out. Commands cannot be left out. A host
     with several links sends a topic on all of them as often as the fastest of them asks for."""
@@ -103,4 +130,5 @@ ShortHost = Annotated[HostModel, BeforeValidator(_in_full, json_schema_input_typ
 SECURITY = "security"
 SECTIONS = {"hosts": dict[Name, ShortHost], "robots": dict[Name, SystemRobotModel]}
 LINKS = {"links": dict[Name, LinkModel]}
-"""Content of each section; a system need not have links."""
+PROFILES = {"profiles": dict[Name, dict[str, Any]]}
+"""Content of each section; a system need not have links or profiles."""

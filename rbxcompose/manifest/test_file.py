@@ -29,6 +29,10 @@ class TrialFile(ManifestHeader):
 
     robot: Any = None
     """The robot's file, relative to this one, or `rbx:robots/NAME`."""
+    also: Any = None
+    """Further robots with which it runs, with the same profile: each has the same mission."""
+    profile: Any = None
+    """The profile of the robot with which it runs."""
     mission: Any = None
     """The mission that is tested, by the name that it has in the robot."""
     with_: Any = Field(None, alias="with")

@@ -15,8 +15,10 @@ from pydantic_core import ErrorDetails
 
 from rbxcompose.findings import DID_YOU_MEAN, SIMILAR, Finding, Report, Span, correction, kind
 from rbxcompose.manifest.conversions import changed, place_of, repaired
+from rbxcompose.manifest.foreign_words import CHOICES as FOREIGN_CHOICES
 from rbxcompose.manifest.foreign_words import FOREIGN
 from rbxcompose.manifest.forms import help_of_form
+from rbxcompose.manifest.key_help import about_key, in_straight_quotes, with_cure, written_deeper
 from rbxcompose.manifest.requirements import BOUNDS, EXPECTED
 from rbxcompose.manifest.scalars import describe, number_trouble, plain_value
 from rbxcompose.manifest.shapes import dimension_at, keys_at
@@ -230,12 +232,16 @@ def _findings(
         if error["type"] == "extra_forbidden":
             known = [*keys_at(model, loc[:-1]), *(() if len(loc) > 1 else also)]
             finding, meant = _unknown_key(known, node, path, loc, lacking)
-            said |= {loc, (*loc[:-1], meant)}  # a misspelt key is not missing as well
-            yield _slip(model, node, path, loc, error, finding, known) or finding
+            slip = _slip(model, node, path, loc, error, finding, known)
+            if not slip and not meant:
+                absent = [str(one[-1]) for one in lacking - said if one[:-1] == loc[:-1]]
+                finding, meant = with_cure(finding, model, loc, at(node, loc), absent)
+            said |= {loc, (*loc[:-1], meant), *(written_deeper(node, loc) & lacking)}  # these are not missing as well
+            yield slip or finding
     for loc, error in located:
         if loc not in said and not is_broken(at(node, loc)):
             said.add(loc)
-            finding = _finding(model, node, path, loc, error)
+            finding = in_straight_quotes(_finding(model, node, path, loc, error), at(node, loc))
             keys = keys_at(model, loc) if error["type"].startswith("model") else ()
             yield _slip(model, node, path, loc, error, finding, keys) or finding
 
@@ -281,9 +287,11 @@ def _finding(model: Any, node: TreeNode, path: KeyPath, loc: KeyPath, error: Err
         help_text += f", such as '{near}'" if re.fullmatch(r"[a-z][a-z0-9_]{0,59}", near) else ""
         return BAD_NAME.at(place, f"'{text}' is not a valid name", help=help_text)
     match error["type"]:
+        case "missing" if loc and isinstance(loc[-1], int):
+            return WRONG_TYPE.at(value_span(node, loc[:-1]), f"{where((*path, *loc[:-1]))} needs another item")
         case "missing":
-            message = f"{where((*path, *loc[:-1]))} needs the key '{name}'"
-            return MISSING_KEY.at(key_span(node, loc[:-1]), message)
+            message, about = f"{where((*path, *loc[:-1]))} needs the key '{name}'", about_key(model, loc)
+            return MISSING_KEY.at(key_span(node, loc[:-1]), message, help=f"add '{name}: ...'{about}")
         case "literal_error" | "enum":
             choices = re.findall(r"'([^']*)'|(\d+)", str(context.get("expected", "")))
             return not_a_choice(span, name, value, ["".join(choice) for choice in choices])
@@ -318,6 +326,9 @@ def _finding(model: Any, node: TreeNode, path: KeyPath, loc: KeyPath, error: Err
 def not_a_choice(span: Span, name: str, value: TreeNode | None, choices: list[str]) -> Finding:
     """Return the finding for a value that is not one of the few words that its key accepts."""
     written = str(value.text if value.filled is None else value.filled) if isinstance(value, ScalarNode) else ""
+    if (ours := FOREIGN_CHOICES.get(written)) in choices:
+        message = f"'{name}' must be one of {', '.join(choices)}"
+        return NOT_A_CHOICE.at(span, message, help=f"{DID_YOU_MEAN} '{ours}'?")
     if len(choices) == 1:
         label = "" if written else label_of(value)
         fix = correction(written, choices, span)

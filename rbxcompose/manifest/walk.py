@@ -323,13 +323,18 @@ class Walk:
             key = self._key(key_node)
             if key is None:
                 continue
-            if node.flow_style and not is_cut and self._is_missing(value):
+            if node.flow_style and not is_cut and self._is_missing(value) and not self._has_colon(key_node):
                 message = f"'{plain(key.text, 60)}' has no value"
-                help_text = "inside {}, each key needs a value: 'key: value'"
+                alone = f"; for the value of a name in a mission, write '${key.text}'" if len(node.value) == 1 else ""
+                help_text = f"inside {{}}, each key needs a value: 'key: value'{plain(alone, 120)}"
                 self.add(NOT_A_KEY.at(key.span, message, help=help_text))
             self._check_comment(value)
             self._enter(own, Entry(key, value))
         return MappingNode({**merged, **own}, span_of(node, self.file), tag), size + len(merged), height + 1
+
+    def _has_colon(self, key: yaml.Node) -> bool:
+        """Return whether a colon follows a key, so that its value was left out on purpose."""
+        return self.text[key.end_mark.index : key.end_mark.index + 80].lstrip().startswith(":")
 
     def _is_missing(self, value: TreeNode) -> bool:
         return isinstance(value, ScalarNode) and value.plain and not value.text

@@ -8,11 +8,13 @@ from collections.abc import Callable
 import yaml
 
 from rbxcompose.findings import Finding, Related, Span
-from rbxcompose.manifest.parser_error import NOT_YAML, QUOTE_HELP, QUOTES_NEEDED, Trouble, indent
+from rbxcompose.manifest.parser_error import NOT_YAML, QUOTE_HELP, QUOTES_NEEDED, Trouble, indent, is_written
 from rbxcompose.manifest.slips import ANY, COLON, NO_COLON, NO_DASH, NO_KEY, text_slip
 from rbxcompose.printable import plain
 
 _NO_SIGIL = "@`%>|"  # at the beginning of a text; `&`, `*` and `!` may have been meant as such
+_TWO_KEYS = re.compile(r"[\w.$-]+ +([a-z_]+: [^:]+)")  # the value of one key, and another key
+_HEADER = ("rbx:", "kind:")  # keys that each manifest has
 _CLOSES = {"sequence": ("list", "[", "]"), "mapping": ("map", "{", "}")}
 
 
@@ -33,6 +35,9 @@ def _colon(trouble: Trouble) -> Finding:
     if column := trouble.value_column:
         span = trouble.to_line_end(column)
         message = "text with a colon and a space needs quotes"
+        if two := _TWO_KEYS.fullmatch(trouble.line_text[column:].rstrip()):
+            message, help_text = "two keys are on one line", f"write '{plain(two[1], 60)}' on a line of its own"
+            return QUOTES_NEEDED.at(span, message, help=f"{help_text}; text with a colon and a space needs quotes")
         return QUOTES_NEEDED.at(span, message, label=QUOTE_HELP, fix=trouble.quoting(span))
     message = "this key cannot be here: the line above already holds a value"
     begin = indent(trouble.line_text)
@@ -125,6 +130,16 @@ def _unclosed_quote(trouble: Trouble) -> Finding:
     return NOT_YAML.at(trouble.opening, "this quote is never closed", help="put the same quote at the end of the text")
 
 
+def _second_document(trouble: Trouble) -> Finding:
+    help_text = "a file holds one manifest: remove the '---'"
+    before, rest = trouble.lines[: trouble.line], trouble.lines[trouble.line + 1 :]
+    if any(all(any(line.startswith(key) for line in lines) for lines in (before, rest)) for key in _HEADER):
+        help_text = "a file holds one manifest: move what follows, without the '---', to a file of its own"
+    elif not any(map(is_written, rest)):
+        help_text = "nothing follows: remove the '---'"
+    return NOT_YAML.at(trouble.here, "a second document starts here", help=help_text)
+
+
 _ESCAPE = _plainly(
     "a backslash in double quotes starts an escape, but this is not one",
     "a path is written with '/'; elsewhere write the backslash twice, or use single quotes",
@@ -154,7 +169,5 @@ _ANSWERS: dict[str, Callable[[Trouble], Finding]] = {
     "unknown escape character": _ESCAPE,
     "did not find expected hexdecimal number": _ESCAPE,
     "found duplicate anchor": _anchor_twice,
-    "but found another document": _plainly(
-        "a second document starts here", "a file holds one manifest: remove the '---'"
-    ),
+    "but found another document": _second_document,
 }

@@ -13,6 +13,7 @@ from rbxcompose.manifest.test_file import STEP_KEYS
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode, at, key_span, value_span
 from rbxcompose.manifest.validate import validate
 from rbxcompose.mission_tests import codes
+from rbxcompose.mission_tests.contradictions import contradictions
 from rbxcompose.mission_tests.model import (
     FAILS,
     HALTED,
@@ -52,6 +53,7 @@ def read_expect(context: TrialContext, node: TreeNode | None, model: trials.Expe
     for step in expect.steps:
         if model.for_ is not None and step.at is not None and step.at > model.for_:
             context.report.add(codes.NEVER.at(step.span, "this is after the end of the test ('for')"))
+    context.report.extend(contradictions(expect))
     return expect
 
 

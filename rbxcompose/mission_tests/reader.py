@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import field, replace
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from rbxcompose.compiler import Compilation, compile_robot, robot_for_mission
 from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Report
 from rbxcompose.manifest.documents import Documents
-from rbxcompose.manifest.files import resolve, shown_name
+from rbxcompose.manifest.files import PROFILE, resolve, shown_name
 from rbxcompose.manifest.header import ManifestHeader
 from rbxcompose.manifest.library import PREFIX
 from rbxcompose.manifest.section import TEST
 from rbxcompose.manifest.test_file import SECTIONS, TrialFile
-from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.manifest.validate import MISSING_KEY, WRONG_TYPE, label_of, validate
 from rbxcompose.mission_tests import codes
 from rbxcompose.mission_tests.event_reader import PUBLISH, read_events
@@ -32,6 +32,8 @@ from rbxcompose.missions.program.program import Program
 from rbxcompose.model.robot import Robot
 from rbxcompose.plan.model import Plan
 
+ROBOT_FILE = "robot.yaml"
+
 
 @dataclass(frozen=True, slots=True)
 class WrittenTrial:
@@ -45,7 +47,7 @@ class WrittenTrial:
 
 @dataclass(slots=True)
 class TrialReader:
-    """Reads the tests of one run; each robot is compiled once, and its findings are reported once.
+    """Reads the tests of one run; each robot is compiled once with each profile, and its findings are reported once.
 
     `sources` are the texts of all files, `report` has the findings on robots.
     """
@@ -53,16 +55,34 @@ class TrialReader:
     environment: Mapping[str, str]
     sources: dict[str, str] = field(default_factory=dict)
     report: Report = field(default_factory=Report)
-    _robots: dict[str, Compilation] = field(default_factory=dict)
+    _robots: dict[tuple[str, str], Compilation] = field(default_factory=dict)
     _kept_back: dict[Finding, str] = field(default_factory=dict)  # the finding in a test of a robot with errors
 
     def read(self, path: Path) -> tuple[Trial | None, Report]:
-        """Return the test of a file, None if the test or its robot has errors; and its findings."""
-        written = self.open(path)
-        return self.understand(written), written.report
+        """Return the test of a file, None if the test or its robot has errors; and the findings for all its robots."""
+        every = self.every(path)
+        trials = [self.understand(one) for one in every]
+        told = dict.fromkeys(finding for one in every for finding in one.report)
+        return trials[0], Report([*told])
+
+    def every(self, path: Path) -> list[WrittenTrial]:
+        """Return the contents of a file for each robot with which it runs; the names of further ones are told."""
+        first = self.open(path)
+        node = first.root.get("also") if first.root is not None else None
+        if first.root is None or node is None:
+            return [first]
+        robots = node.items if isinstance(node, SequenceNode) else ()
+        if not robots or not all(isinstance(one, ScalarNode) and one.text for one in robots):
+            first.report.add(WRONG_TYPE.at(node.span, "'also' must be a list of robots", label=label_of(node)))
+            return [first]
+        names = first.root.entries
+        own = names["robot"].key if "robot" in names else names["also"].key
+        roots = [replace(first.root, entries={**names, "robot": Entry(own, one)}) for one in robots]
+        told = [f"{first.name} ({_name_of(one)})" for one in robots if isinstance(one, ScalarNode)]
+        return [first, *(WrittenTrial(path, name, root, Report()) for name, root in zip(told, roots, strict=True))]
 
     def open(self, path: Path) -> WrittenTrial:
-        """Return the contents of a file; a test without a name gets that of its file."""
+        """Return the contents of a file for its first robot; a test without a name gets that of its file."""
         report = Report()
         root = Documents(report, self.sources).read(path, TEST)
         name = root.get("name") if root else None
@@ -78,7 +98,7 @@ class TrialReader:
         if found is None:
             return None
         trial = _read(root, *found, report)
-        return None if report.has_errors else trial
+        return None if report.has_errors or trial is None else replace(trial, name=written.name)
 
     def summed_up(self, findings: Iterable[Finding]) -> Iterator[Finding]:
         """Yield the findings, but merge those of all tests that the same robot with errors keeps from running."""
@@ -103,17 +123,35 @@ class TrialReader:
             return None
         name = str(file)
         shown = name if isinstance(file, str) else shown_name(file)
-        if name not in self._robots:
-            self._robots[name] = compile_robot(shown, environment=self.environment)
-            self.report.extend(self._robots[name].report)
-            self.sources.update(self._robots[name].sources)
+        chosen = _text(root, "profile", "the name of a profile", report) if "profile" in root else None
+        key = name, chosen.text if chosen is not None else ""
+        if key not in self._robots:
+            profiles = [chosen.text] if chosen is not None else []
+            self._robots[key] = compile_robot(shown, profiles=profiles, environment=self.environment)
+            self.report.extend(one for one in self._robots[key].report if not _is_of_profile(one))
+            self.sources.update(self._robots[key].sources)
+        if chosen is not None and (lost := [one for one in self._robots[key].report if _is_of_profile(one)]):
+            help_text = "remove it: the robot has no profiles"
+            report.extend(replace(one, span=chosen.span, help=one.help or help_text, fix=None) for one in lost)
+            return None
         mission = root.get("mission")
-        found = robot_for_mission(self._robots[name], mission.text if isinstance(mission, ScalarNode) else "")
+        found = robot_for_mission(self._robots[key], mission.text if isinstance(mission, ScalarNode) else "")
         if found is None:
             why = codes.NEVER.at(written.span, _no_robot(shown, "the test"), help="see the findings of the robot")
             self._kept_back[why] = shown
             report.add(why)
         return found
+
+
+def _name_of(robot: ScalarNode) -> str:
+    """Return what a robot's file is called: its folder, if the file is called as those of all robots are."""
+    path = PurePosixPath(robot.text.removeprefix(PREFIX))
+    return path.parent.name if path.name == ROBOT_FILE else path.stem
+
+
+def _is_of_profile(one: Finding) -> bool:
+    """Return whether a finding is about the profile that was chosen, and in no file of the robot."""
+    return one.span is not None and one.span.file == PROFILE
 
 
 def _no_robot(robot: str, which: str) -> str:

@@ -10,16 +10,18 @@ from collections.abc import Collection, Mapping
 from dataclasses import field, replace
 
 from rbxcompose.composition.robot_manifest import RobotManifest
-from rbxcompose.config import Config, is_live
+from rbxcompose.config import Config, is_live, key_of, leaves
 from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Report
 from rbxcompose.levels import LOG_LEVELS
 from rbxcompose.manifest.registry import sections
 from rbxcompose.manifest.section import ROBOT, Contents
+from rbxcompose.manifest.tree import at
 from rbxcompose.manifest.wanted_components import WantedComponent
 from rbxcompose.missions.analysis.effects import sent_by, settings_of
 from rbxcompose.missions.program.sources import ValueSource
 from rbxcompose.model.missions import read_missions
+from rbxcompose.model.outside import NOTHING, Outside
 from rbxcompose.model.robot import Robot, RobotComponent
 from rbxcompose.model.skills import names_of_skills, services_of, skills_of, topics_of
 from rbxcompose.model.values import value_of
@@ -34,9 +36,14 @@ ALWAYS = ("transforms", "diagnostics")  # the components of every robot
 
 
 def build_robot(
-    manifest: RobotManifest, *, environment: Mapping[str, str], report: Report, sources: dict[str, str]
+    manifest: RobotManifest,
+    *,
+    environment: Mapping[str, str],
+    report: Report,
+    sources: dict[str, str],
+    outside: Outside = NOTHING,
 ) -> Robot:
-    """Return the whole robot; errors in its mission files go into `report`."""
+    """Return the whole robot, with what it has of others; errors in its mission files go into `report`."""
     written = written_components(manifest)
     components = {**written, **own_components(manifest, written)}
     values, topics, services = (
@@ -44,11 +51,11 @@ def build_robot(
         topics_of(manifest, components),
         services_of(manifest, components),
     )
-    missions = read_missions(manifest, environment, report, sources, names_of_skills(components))
-    skills = skills_of(components, [one.program for one in missions.read.values()])
+    missions = read_missions(manifest, environment, report, sources, names_of_skills(components, outside))
+    skills = skills_of(components, [one.program for one in missions.read.values()], outside)
     changed = settings_of(node for one in missions.read.values() for node in one.program.nodes)
-    services |= {one.service: CHANGE for one in changed if one.component.text in components}
-    robot = Robot(manifest, components, values, skills, missions.read, missions.unread, topics, services)
+    services |= {one.service: CHANGE for one in changed if one.component.text in components} | {**outside.services}
+    robot = Robot(manifest, components, values, skills, missions.read, missions.unread, topics, services, outside)
     if manifest.missions:
         components[MISSION] = mission_component(robot)
     return robot
@@ -178,8 +185,8 @@ def _component(manifest: RobotManifest, wanted: WantedComponent, given: Mapping[
         wanted.places,
         wanted.is_sound,
     )
-    live = (name for name, one in type(config).model_fields.items() if is_live(one))
-    bounds = {name: manifest.bounds_at(made.place(name)) for name in live}
+    live = (name for name, one in leaves(config) if is_live(one))
+    bounds = {name: manifest.bounds_at(made.place(key_of(config, name))) for name in live}
     return replace(made, bounds={name: each for name, each in bounds.items() if each})
 
 
@@ -189,5 +196,10 @@ def values_of(manifest: RobotManifest, components: Mapping[str, RobotComponent])
     for end in (end for component in components.values() for end in component.ends if end.type_name):
         types.setdefault(end.topic, end.type_name)
     namespace, groups = manifest.bus.namespace or "", manifest.diagnostics.headers
-    found = {name: value_of(entry, components, types, namespace, groups) for name, entry in manifest.values.items()}
+    entries = {  # not those whose type is a mistake, which is told
+        name: entry
+        for name, entry in manifest.values.items()
+        if entry.type is not None or at(manifest.root, ("values", name, "type")) is None
+    }
+    found = {name: value_of(entry, components, types, namespace, groups) for name, entry in entries.items()}
     return {name: value for name, value in found.items() if value is not None}

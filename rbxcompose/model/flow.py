@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Span
+from rbxcompose.manifest.given_values import decided_at
 from rbxcompose.manifest.tree import at
 from rbxcompose.model.robot import Robot, RobotComponent
 from rbxcompose.model.wires import PortEnd
@@ -31,16 +32,18 @@ class MessageFlow:
 
     robot: Robot
 
-    def sources(self, end: PortEnd, passed: tuple[PortEnd, ...] = ()) -> Iterator[PortEnd]:
-        """Yield the outputs whose messages reach an input; for a mux, those it may let through."""
+    def upstream(self, end: PortEnd, passed: tuple[PortEnd, ...] = ()) -> Iterator[PortEnd]:
+        """Yield all outputs on the way to an input: those of muxes, and those whose messages these may let through."""
         for writer in self.robot.writers.get(end.topic, ()):
             if writer in passed or writer.type_name != end.type_name:
                 continue
-            inputs = self._let_through(writer)
-            if inputs is None:
-                yield writer
-            for one in inputs or ():
-                yield from self.sources(one, (*passed, writer))
+            yield writer
+            for one in self._let_through(writer) or ():
+                yield from self.upstream(one, (*passed, writer))
+
+    def sources(self, end: PortEnd) -> Iterator[PortEnd]:
+        """Yield the outputs whose messages reach an input; for a mux, those it may let through."""
+        return (one for one in self.upstream(end) if self._let_through(one) is None)
 
     def _let_through(self, output: PortEnd) -> list[PortEnd] | None:
         """Return the inputs that a mux lets through to an output; None if it is not an output of a mux."""
@@ -82,7 +85,8 @@ def setting_span(robot: Robot, *settings: tuple[RobotComponent, str]) -> Span:
     """
     for component, name in settings:
         if is_written(robot, component, name):
-            return robot.value(*component.place(name))
+            place = component.place(name)
+            return decided_at(robot.manifest.root, place, robot.value(*place))
     component, name = settings[0]
     return robot.component_span(component.name) if name else robot.value(*component.path, "type")
 

@@ -20,6 +20,7 @@ from rbxcompose.missions.analysis.effects import settings_of
 from rbxcompose.missions.program.program import Program, RobotNames
 from rbxcompose.missions.program.sources import SkillSource, TopicSource, ValueSource, events_of
 from rbxcompose.model.doubts import doubts_of
+from rbxcompose.model.outside import NOTHING, Outside
 from rbxcompose.model.wires import PortEnd
 from rbxcompose.references import COMPONENT, PLACE
 from rbxcompose.restarts import DEFAULT, Restart
@@ -98,6 +99,7 @@ class Robot:
     unread: frozenset[str] = frozenset()  # missions that no other can use: unread, or in a cycle
     topics: Mapping[str, TopicSource] = field(default_factory=dict)  # that missions may publish on
     services: Mapping[str, str] = field(default_factory=dict)  # that missions may call, with their ROS types
+    outside: Outside = NOTHING
 
     @cached_property
     def settings(self) -> Mapping[str, Mapping[str, Type]]:

@@ -9,6 +9,7 @@ from rbxcompose.composition.robot_manifest import RobotManifest
 from rbxcompose.missions.program.goals import service_skill, skill_of, topic_skill
 from rbxcompose.missions.program.program import Program, Skill
 from rbxcompose.missions.program.sources import Orders, OrderTopic, SkillSource, SkillWay, TopicSource
+from rbxcompose.model.outside import NOTHING, Outside
 from rbxcompose.model.robot import RobotComponent
 from rbxcompose.model.wires import PortEnd
 from rbxcompose.plugins import BrokenPluginError
@@ -17,21 +18,26 @@ from rbxcompose.sdk.ports import In, Out, Serves, ServesAction, ServesTopic
 from rbxcompose.sdk.skills import SkillType, skill_names, skill_type
 
 
-def skills_of(components: Mapping[str, RobotComponent], programs: Iterable[Program]) -> dict[str, SkillSource]:
-    """Return the skills of the robot: actions, services, topics, and those in Python that a mission names."""
+def skills_of(
+    components: Mapping[str, RobotComponent], programs: Iterable[Program], outside: Outside = NOTHING
+) -> dict[str, SkillSource]:
+    """Return the skills of the robot: actions, services, topics, and those in Python or of others that it uses."""
     asked = {node.skill for program in programs for node in program.nodes if node.skill}
+    others = [one for one in outside.skills if one.skill.name in asked]
     found: dict[str, SkillSource] = {}
-    for source in [*_served(components), *python_skills(asked)]:
+    for source in [*served_skills(components), *python_skills(asked), *others]:
         found.setdefault(source.skill.name, source)
     return found
 
 
-def names_of_skills(components: Mapping[str, RobotComponent]) -> frozenset[str]:
+def names_of_skills(components: Mapping[str, RobotComponent], outside: Outside = NOTHING) -> frozenset[str]:
     """Return the names of all skills that a mission of the robot may use."""
-    return frozenset((*(source.skill.name for source in _served(components)), *skill_names()))
+    served = (source.skill.name for source in (*served_skills(components), *outside.skills))
+    return frozenset((*served, *skill_names()))
 
 
-def _served(components: Mapping[str, RobotComponent]) -> Iterable[SkillSource]:
+def served_skills(components: Mapping[str, RobotComponent]) -> Iterable[SkillSource]:
+    """Return the skills that components serve."""
     return (*_actions(components), *_services(components), *_topics(components))
 
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +13,8 @@ from rbxcompose.body.model import Body, BodyJoint
 from rbxcompose.body.pinocchio_model import PinocchioModel
 from rbxcompose.dataclass import dataclass
 from rbxcompose.geometry import Transform3
-from rbxcompose.motion.groups import ArmGroup
+from rbxcompose.motion.groups import ArmGroup, leader_of
+from rbxcompose.motion.numba_cache import is_installed
 
 Array = NDArray[np.float64]
 
@@ -31,27 +31,77 @@ class _Entry:
     turns: bool
 
 
+@dataclass(frozen=True, slots=True)
+class _Entries:
+    """Several of them as arrays."""
+
+    places: NDArray[np.int64]
+    indices: NDArray[np.int64]
+    multipliers: Array
+    offsets: Array
+
+    @classmethod
+    def of(cls, each: Sequence[_Entry]) -> Self:
+        return cls(
+            np.array([one.place for one in each], dtype=np.int64),
+            np.array([one.index for one in each], dtype=np.int64),
+            np.array([one.multiplier for one in each], dtype=float),
+            np.array([one.offset for one in each], dtype=float),
+        )
+
+
 class ArmKinematics:
     """A body of which an arm moves, while its other joints stay where `place` puts them."""
 
     def __init__(self, description: Description, group: ArmGroup) -> None:
         """Build it; raises as `PinocchioModel` does."""
+        import pinocchio
+
+        self._pinocchio: Any = pinocchio
         self.whole = PinocchioModel(description)
         self.body, self.group = description.body, group
-        self._entries = [entry for name in self.whole.places if (entry := self._entry(name)) is not None]
         self._positions: Mapping[str, float] = {}
         self._base = self.whole.q({})
         self._tip = self.whole.frames[group.tip]
         self._way = _way(self.body, group.tip)
+        entries = [entry for name in self.whole.places if (entry := self._entry(name)) is not None]
+        self._entries = _Entries.of([one for one in entries if not one.turns])
+        self._turning = _Entries.of([one for one in entries if one.turns])
         columns = np.zeros((self.whole.model.nv, len(group.joints)))
-        for entry in self._entries:
+        for entry in entries:
             columns[entry.column, entry.index] = entry.multiplier
         self._columns = columns
         """From velocities of the arm's joints to those of Pinocchio."""
+        self._is_hastened = False
+        self._compiled: Any = None  # a `CompiledTip`, whose module imports an extra
+
+    def hasten(self, *, is_wanted: bool = True) -> bool:
+        """Search by compiled code from now on, if that is wanted and numba is installed; return whether it does.
+
+        The first time on a machine, this takes some seconds of compiling.
+        """
+        self._is_hastened, self._compiled = is_wanted and is_installed(), None
+        if (tip := self.compiled) is not None:
+            tip.warm_up()
+        return self._is_hastened
+
+    @property
+    def compiled(self) -> Any:
+        """Return the compiled way to the tip, a `CompiledTip`; None before `hasten`."""
+        if self._is_hastened and self._compiled is None:
+            from rbxcompose.motion.compiled_descent import CompiledTip
+
+            self._compiled = CompiledTip(self.body, self.group, self._positions)
+        return self._compiled
 
     def place(self, positions: Mapping[str, float]) -> None:
         """Set where all other joints are [rad or m]; one that is not in `positions` is at rest."""
-        self._positions, self._base = dict(positions), self.whole.q(positions)
+        self._positions, self._base, self._compiled = dict(positions), self.whole.q(positions), None
+
+    @property
+    def positions(self) -> Mapping[str, float]:
+        """Return where the other joints were set to be [rad or m]."""
+        return self._positions
 
     def tip_pose(self, values: Array) -> Transform3:
         """Return the frame of the tip in that of the root, by our own kinematics."""
@@ -69,39 +119,49 @@ class ArmKinematics:
 
     def placement(self, pose: Transform3) -> Any:
         """Return a pose as Pinocchio takes it."""
-        import pinocchio
-
-        return pinocchio.XYZQUATToSE3(np.array((*pose.translation, *pose.rotation), dtype=float))
+        return self._pinocchio.XYZQUATToSE3(np.array((*pose.translation, *pose.rotation), dtype=float))
 
     def error(self, values: Array, wanted: Any) -> tuple[Array, Array]:
         """Return how far the tip is from where it is wanted, of shape (6,), and its Jacobian, of shape (6, n).
 
         Both are in the frame of the tip: three lengths [m], then three angles [rad].
         """
-        import pinocchio
+        pinocchio, data = self._pinocchio, self.whole.data
+        jacobian = pinocchio.computeFrameJacobian(self.whole.model, data, self.q(values), self._tip, pinocchio.LOCAL)
+        # It leaves the frame in the root's as the first of `iMf`, and the frame's own placement as it was.
+        away, error = data.iMf[0].actInv(wanted), np.empty(6)
+        error[:3], error[3:] = away.translation, pinocchio.log3(away.rotation)
+        return error, jacobian @ self._columns
 
-        model, data = self.whole.model, self.whole.data
-        pinocchio.computeJointJacobians(model, data, self.q(values))  # which also refreshes where all joints are
+    def tip(self, values: Array, *, with_jacobian: bool) -> tuple[Array, Array, Array]:
+        """Return where the tip is [m], its rotation as a matrix, and its Jacobian of shape (6, n), all in the root.
+
+        Without the Jacobian, that has the shape (0, n).
+        """
+        pinocchio, model, data, q = self._pinocchio, self.whole.model, self.whole.data, self.q(values)
+        if with_jacobian:
+            pinocchio.computeJointJacobians(model, data, q)
+        else:
+            pinocchio.forwardKinematics(model, data, q)
         here = pinocchio.updateFramePlacement(model, data, self._tip)
-        away = here.actInv(wanted)
-        error = np.concatenate((away.translation, pinocchio.log3(away.rotation)))
-        jacobian = pinocchio.getFrameJacobian(model, data, self._tip, pinocchio.LOCAL)
-        return error, np.asarray(jacobian @ self._columns)
+        jacobian = np.zeros((0, len(self.group.joints)))
+        if with_jacobian:
+            found = pinocchio.getFrameJacobian(model, data, self._tip, pinocchio.LOCAL_WORLD_ALIGNED)
+            jacobian = np.asarray(found @ self._columns)
+        return np.array(here.translation), np.array(here.rotation), jacobian
 
     def q(self, values: Array) -> Array:
         """Return the configuration for positions of the arm's joints, of shape (n,)."""
-        found = self._base.copy()
-        for entry in self._entries:
-            position = entry.multiplier * values[entry.index] + entry.offset
-            if entry.turns:
-                found[entry.place], found[entry.place + 1] = math.cos(position), math.sin(position)
-            else:
-                found[entry.place] = position
+        found, entries = self._base.copy(), self._entries
+        found[entries.places] = entries.multipliers * values[entries.indices] + entries.offsets
+        if len((turning := self._turning).places):
+            angles = turning.multipliers * values[turning.indices] + turning.offsets
+            found[turning.places], found[turning.places + 1] = np.cos(angles), np.sin(angles)
         return found
 
     def _entry(self, name: str) -> _Entry | None:
         joint = self.body.joints[name]
-        leader, multiplier, offset = _leader(joint, self.body.joints)
+        leader, multiplier, offset = leader_of(joint, self.body.joints)
         if leader not in self.group.joints:
             return None
         index = self.group.joints.index(leader)
@@ -116,12 +176,3 @@ def _way(body: Body, link: str) -> list[BodyJoint]:
         found.append(above)
         link = above.parent
     return found[::-1]
-
-
-def _leader(joint: BodyJoint, joints: Mapping[str, BodyJoint]) -> tuple[str, float, float]:
-    """Return the joint that a joint mimics at last, itself if none, with the multiplier and the offset of all."""
-    multiplier, offset = 1.0, 0.0
-    while (mimic := joint.mimic) is not None:
-        multiplier, offset = multiplier * mimic.multiplier, multiplier * mimic.offset + offset
-        joint = joints[mimic.joint]
-    return joint.name, multiplier, offset

@@ -12,13 +12,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbxcompose.dataclass import dataclass
+from rbxcompose.geometry import Transform3
 from rbxcompose.motion.arm_kinematics import ArmKinematics
 from rbxcompose.motion.collisions import told
-from rbxcompose.motion.inverse_kinematics import PoseSolutions, PoseTarget, solved
+from rbxcompose.motion.inverse_kinematics import (
+    ENOUGH,
+    SOLVER,
+    PoseSolutions,
+    PoseTarget,
+    SolverSettings,
+    solved,
+)
 from rbxcompose.motion.joint_space import JointSpace
+from rbxcompose.motion.kept import Keep, KeptTip
+from rbxcompose.motion.kept_goals import kept_solutions
 from rbxcompose.motion.parametrisation import Trajectory
 from rbxcompose.motion.planner import FINE, MotionPlan, MotionPlanner, MotionRequest, Planning
 from rbxcompose.motion.reasons import MotionFailure, MotionReason
+from rbxcompose.motion.trace_planner import TraceWish, planned_trace
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
@@ -28,6 +39,8 @@ MOVED = 0.035  # [rad or m] by which a joint may be elsewhere when a motion begi
 AT_REST, CALM = 0.05, 0.2  # [rad/s or m/s], [s]; a joint that is faster is at rest if it gets nowhere for this long
 SETTLING = 3.0  # [s] that an arm may take to report itself, and to come to rest
 REPLANS = 2  # times that a motion is planned again because the arm was elsewhere
+NEARBY = 200  # positions that are tried for a goal with a tolerance
+OTHER_AIMS = (MotionReason.NO_PATH_IN_TIME, MotionReason.PATH_IN_COLLISION, MotionReason.NOT_KEPT)  # may help
 SLICES = 16  # of planning in one call, so that the same goal takes the same time on a stepped clock
 LONGEST_CALL = 0.2  # [s] of planning in one call, after which others may run
 
@@ -43,6 +56,14 @@ class ArmGoal:
     """The link in whose frame the target is; without it, the root."""
     speed: float = 1.0
     acceleration: float = 1.0
+    trace: TraceWish | None = None
+    """A way of the tip, instead of the others."""
+    tolerance: float = 0.0
+    """By which joints may be elsewhere at the end if they cannot be there [rad or m]."""
+    keep: Keep = Keep()
+    """On the whole way."""
+    replans: int = 0
+    """How often it is planned again because the scene has changed on the way."""
 
 
 class ArmSite(Protocol):
@@ -64,6 +85,10 @@ class ArmSite(Protocol):
     def is_ready(self) -> bool:
         """Return whether it is known what is around the robot."""
 
+    @property
+    def problem(self) -> str:
+        """Return why that is not known."""
+
     def follow(self, names: tuple[str, ...], trajectory: Trajectory, ended: Callable[[str, bool], None]) -> None:
         """Send a trajectory to the controller; `ended` gets the reason if it failed, and whether it was cancelled."""
 
@@ -80,23 +105,44 @@ class ArmSite(Protocol):
 class ArmTask:
     """Plans and carries out one goal. Call `advance` until `is_over`; then `failure` is why it failed, if it did."""
 
-    def __init__(self, site: ArmSite, kinematics: ArmKinematics, planner: MotionPlanner, goal: ArmGoal) -> None:
+    def __init__(
+        self,
+        site: ArmSite,
+        kinematics: ArmKinematics,
+        planner: MotionPlanner,
+        goal: ArmGoal,
+        solver: SolverSettings = SOLVER,
+    ) -> None:
         self.failure: MotionFailure | None = None
         self.is_over = self.is_canceled = False
+        self.share = 0.0  # of the way that was asked for, for which there was a plan
         self._site, self._kinematics, self._planner, self._goal = site, kinematics, planner, goal
+        self._solver = solver
         self._trajectory: Trajectory | None = None
         self._obstacle = ""  # what the motion would hit, since the scene has changed
         self._aims: list[Array] = []  # positions that would do, the next one to try first
         self._stage: Callable[[], None] = self._settle
-        self._began, self._replans = site.now, 0
+        self._began, self._replans, self._scene_replans = site.now, 0, 0
         self._seen: Array | None = None  # where the arm was while it seemed to move, and since when it has been there
         self._seen_at = 0.0
         self._start = np.zeros(len(self.space.joints))
+        self._first: Array | None = None  # the first start, which a motion that is planned again does not have
 
     @property
     def space(self) -> JointSpace:
         """Return the joints of the arm."""
         return self._planner.space
+
+    @property
+    def _narrow(self) -> JointSpace:
+        """Return the joints within what the goal keeps."""
+        return self._goal.keep.narrowed(self.space)
+
+    @property
+    def _kept(self) -> KeptTip | None:
+        """Return what the tip keeps, from where it was when all began; None if that is nothing."""
+        keep, first = self._goal.keep, self._start if self._first is None else self._first
+        return KeptTip(self._kinematics, keep, first, self._planner.checker) if keep.is_about_tip else None
 
     def advance(self) -> None:
         """Continue."""
@@ -129,7 +175,7 @@ class ArmTask:
         measured, names = self._site.measured, self.space.names
         if not self._site.is_ready:
             if self._site.now - self._began >= SETTLING:
-                self._fail(MotionReason.UNKNOWN_SCENE, "nothing has told what is around the robot")
+                self._fail(MotionReason.UNKNOWN_SCENE, self._site.problem)
             return
         unknown = [name for name in names if name not in measured]
         fast = [name for name in names if name in measured and abs(measured[name][1]) > AT_REST]
@@ -152,12 +198,19 @@ class ArmTask:
     def _begin_planning(self) -> None:
         measured, names = self._site.measured, self.space.names
         self._start = self._where()
+        self._first = self._start if self._first is None else self._first
+        self._obstacle = ""
         self._kinematics.place({name: one for name, (one, _) in measured.items() if name not in names})
         self._site.told("planning")
         if problem := self._mistake():
             self._fail(MotionReason.UNKNOWN_GOAL, problem)
+        elif self._goal.trace is not None:
+            frame = self._frame()
+            planning = planned_trace(self._kinematics, self._planner, self._goal.trace, self._start, frame)
+            self._stage = partial(self._continue_planning, planning)
+            self._stage()
         elif self._goal.target is None:
-            self._aims = [self._aim()]
+            self._aims = self._nearby(self._aim())
             self._plan_next()
         else:
             self._stage = partial(self._solve, self._solutions(self._goal.target))
@@ -172,12 +225,16 @@ class ArmTask:
         for word, share in (("speed", goal.speed), ("acceleration", goal.acceleration)):
             if not (math.isfinite(share) and 0.0 < share <= 1.0):
                 return f"a {word} of {share:.0%} is none"
-        if goal.target is not None:
-            there = self._kinematics.body.links
-            is_known = not goal.frame or goal.frame in there
-            return goal.target.mistake if is_known else f"there is no link '{goal.frame}'"
+        if problem := goal.keep.mistake(self._kinematics):
+            return problem
+        aim = goal.trace or goal.target
+        if aim is not None:
+            is_known = not goal.frame or goal.frame in self._kinematics.body.links
+            return aim.mistake if is_known else f"there is no link '{goal.frame}'"
         if goal.pose and goal.pose not in poses:
             return f"there is no pose '{goal.pose}'; the poses of this arm: {', '.join(poses) or 'none'}"
+        if not goal.tolerance >= 0.0:
+            return "a tolerance is below 0"
         if not (goal.pose or goal.positions):
             return "the goal has neither a pose nor positions of joints"
         unknown = [name for name in goal.positions if name not in self.space.names]
@@ -190,13 +247,40 @@ class ArmTask:
         stays = self.space.clamped(self._start).tolist()
         return np.array([wanted.get(name, at) for name, at in zip(self.space.names, stays, strict=True)])
 
+    def _nearby(self, aim: Array) -> list[Array]:
+        """Return positions to try, within the tolerance: the wanted ones alone, if they are free."""
+        off, space, is_free = self._goal.tolerance, self._narrow, self._planner.checker.is_free
+        if not off or (not space.outside(aim) and is_free(aim)):
+            return [aim]
+        shifts = np.random.default_rng(self._planner.settings.seed).uniform(-off, off, (NEARBY, len(aim)))
+        near = space.clamped(np.concatenate(([aim], aim + shifts)))
+        free = [one for one in near if np.max(np.abs(one - aim)) <= off and is_free(one)]
+        return sorted(free, key=lambda one: float(np.max(np.abs(one - aim))))[:ENOUGH] or [aim]
+
+    def _frame(self) -> Transform3:
+        """Return the frame of the goal."""
+        return self._kinematics.poses(self._start)[self._goal.frame] if self._goal.frame else Transform3()
+
     def _solutions(self, target: PoseTarget) -> Solving:
         """Return the search for positions that bring the tip to the target."""
-        if self._goal.frame:
-            frame = self._kinematics.poses(self._start)[self._goal.frame]
-            target = replace(target, pose=frame.compose(target.pose))
-        is_free, seed = self._planner.checker.is_free, self._planner.settings.seed
-        return solved(self._kinematics, self.space, target, self._start, is_free, seed=seed)
+        target = replace(target, pose=self._frame().compose(target.pose))
+        is_free, seed, kept = self._planner.checker.is_free, self._planner.settings.seed, self._kept
+        if kept is not None and target.any_orientation:
+            first = self._start if self._first is None else self._first
+            keep, narrow = self._goal.keep, self._narrow
+            checker = self._planner.checker
+            return kept_solutions(self._kinematics, narrow, target, keep, self._start, first, checker, seed=seed)
+        ends, restarts = self._site.now + self._solver.time, self._solver.restarts
+        return solved(
+            self._kinematics,
+            self._narrow,
+            target,
+            self._start,
+            is_free,
+            seed=seed,
+            restarts=restarts,
+            is_late=lambda: self._site.now >= ends,
+        )
 
     def _solve(self, solving: Solving) -> None:
         found = self._worked(solving)
@@ -216,7 +300,8 @@ class ArmTask:
     def _plan_next(self) -> None:
         """Plan to the next of the positions that would do."""
         goal = self._goal
-        request = MotionRequest(self._start, self._aims.pop(0), goal.speed, goal.acceleration)
+        aim = self._aims.pop(0)
+        request = MotionRequest(self._start, aim, goal.speed, goal.acceleration, self._narrow, self._kept)
         self._stage = partial(self._continue_planning, self._planner.plan(request))
         self._stage()
 
@@ -239,8 +324,9 @@ class ArmTask:
         return None
 
     def _planned(self, found: MotionPlan | MotionFailure) -> None:
+        self.share = found.share
         if isinstance(found, MotionFailure):
-            if self._aims and found.reason in (MotionReason.NO_PATH_IN_TIME, MotionReason.PATH_IN_COLLISION):
+            if self._aims and found.reason in OTHER_AIMS:
                 self._plan_next()
             else:
                 self._end(found)
@@ -272,6 +358,10 @@ class ArmTask:
     def _followed(self, problem: str, is_canceled: bool) -> None:
         if self.is_canceled:
             self._end(MotionFailure(MotionReason.INTERRUPTED, "it was cancelled on its way"))
+        elif self._obstacle and (is_canceled or problem) and self._scene_replans < self._goal.replans:
+            self._scene_replans += 1
+            self._site.info(f"{self._obstacle}, since the scene has changed: planned again")
+            self._began, self._stage = self._site.now, self._settle
         elif self._obstacle and (is_canceled or problem):
             self._fail(MotionReason.PATH_IN_COLLISION, f"{self._obstacle}, since the scene has changed")
         elif is_canceled:

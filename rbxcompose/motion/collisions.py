@@ -2,28 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
-from itertools import combinations
+from collections.abc import Collection, Generator, Iterable, Mapping
+from copy import copy
+from itertools import chain, combinations, product
 from pathlib import Path
-from typing import Any, Protocol
+from types import MappingProxyType
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rbxcompose.body.link_pairs import LinkPair, pair_of
 from rbxcompose.body.model import Body, Geometry
+from rbxcompose.dataclass import dataclass
 from rbxcompose.geometry import Transform3
 from rbxcompose.motion.arm_kinematics import ArmKinematics
 from rbxcompose.motion.groups import moved_links
-from rbxcompose.motion.scene import PlacedObject
+from rbxcompose.motion.joint_space import JointSpace
+from rbxcompose.motion.octree_files import read_cells
+from rbxcompose.motion.scene import PairDistance, PlacedObject
 
 Array = NDArray[np.float64]
-LinkPair = tuple[str, str]
-"""Two links or objects, in the order of the alphabet."""
 Coal = Any  # of an extra, without types
 
 TOUCH = 1e-4
 """[m] by which shapes of the body may be within each other: those of a servo and its bracket touch, and whether faces
 that touch collide is decided by rounding."""
+MOST_PAIRS = 5_000  # of shapes, whose distances are told
+_GEOM, _BVH = "OT_GEOM", "OT_BVH"  # coal's kinds of shapes
 
 
 class Checker(Protocol):
@@ -37,10 +43,32 @@ class Checker(Protocol):
         """Return all pairs that collide."""
         ...
 
+    def without(self, pairs: Collection[LinkPair]) -> Checker:
+        """Return a checker that does not watch some pairs."""
+        ...
 
-def pair_of(first: str, second: str) -> LinkPair:
-    """Return two names as a pair."""
-    return (first, second) if first <= second else (second, first)
+    def in_the_way(self, values: Array, shape: Geometry, at: Transform3, ignored: Collection[str]) -> list[str]:
+        """Return the links and objects but those `ignored` that a shape, at a pose in the root's frame, is within."""
+        ...
+
+
+@runtime_checkable
+class SearchingChecker(Checker, Protocol):
+    """One that examines many positions at once, and can search a way by itself."""
+
+    def first_bad(self, points: Array) -> int | None:
+        """Return the first of some positions, of shape (m, n), where something collides; None if there is none."""
+        ...
+
+    def prepare(self, space: JointSpace) -> None:
+        """Do at once what would delay the first motion."""
+        ...
+
+    def ways(
+        self, space: JointSpace, start: Array, goal: Array, *, seed: int, resolution: float, simplify: bool
+    ) -> Generator[int, None, Array | str]:
+        """Search a way; return its points, of shape (m, n), or why there is none. Yield how many were examined."""
+        ...
 
 
 def told(pairs: Collection[LinkPair], most: int = 3) -> str:
@@ -60,11 +88,21 @@ def adjacent_pairs(body: Body) -> frozenset[LinkPair]:
     return frozenset(found)
 
 
+@dataclass(frozen=True, slots=True)
+class CheckedPart:
+    """A shape that is examined: with which link it moves, where it is in the link's frame, and as coal has it."""
+
+    geometry: Geometry
+    link: str
+    origin: Transform3
+    coal: Coal
+
+
 class MeshChecker:
     """Examines the collision shapes of the body as they are, by coal and its tree of bounding boxes.
 
-    Pairs that the arm does not move relative to each other, and those in `allowed`, do not count. One thread at a time
-    may use it.
+    Pairs that the arm does not move relative to each other, and those in `allowed`, do not count. Links keep away from
+    objects by the `paddings` [m] of both. One thread at a time may use it.
     """
 
     def __init__(
@@ -73,8 +111,14 @@ class MeshChecker:
         meshes: Mapping[str, Path],
         allowed: Collection[LinkPair] = frozenset(),
         objects: Iterable[PlacedObject] = (),
+        paddings: Mapping[str, float] = MappingProxyType({}),
+        shapes: Shapes | None = None,
+        *,
+        is_rigid: bool = False,
     ) -> None:
-        """Build it; `meshes` are the files of meshes by their names in the URDF.
+        """Build it; `meshes` are the files of meshes by their names in the URDF, `shapes` those that were read before.
+
+        With `is_rigid`, it examines only the pairs that it would else leave out since nothing moves between them.
 
         Raises:
             ModuleNotFoundError: without Pinocchio.
@@ -85,27 +129,30 @@ class MeshChecker:
         self._pinocchio, self._model = pinocchio, model
         self._geometry: Any = pinocchio.GeometryModel()
         self._owners: list[str] = []
+        self._parts: list[CheckedPart] = []
         self._moved = dict(moved_links(model.body, model.group.joints))
+        self._paddings = dict(paddings)
+        known = shapes if shapes is not None else Shapes(meshes)
         for link in model.body.links.values():
             for shape in link.collisions:
-                self._add(link.name, link.name, coal_shape(shape.geometry, meshes), shape.origin)
-        touching = set(allowed)
-        for one in objects:
-            self._moved[one.name] = self._moved[one.link]
-            self._add(one.name, one.link, coal_shape(one.shape, {}), one.pose)
-            touching |= {pair_of(one.name, link) for link in one.touches}
-        self._pair(touching)
-        self._data = self._geometry.createData()
-        for request in self._data.collisionRequests:
-            request.security_margin = -TOUCH
-        self._manager = pinocchio.BroadPhaseManager_DynamicAABBTreeCollisionManager(
-            model.whole.model, self._geometry, self._data
-        )
+                self._add(link.name, link.name, known, shape.geometry, shape.origin)
+        touching, there = set(allowed), tuple(objects)
+        self._objects = {one.name for one in there}
+        for one in there:
+            self._moved[one.name], self._paddings[one.name] = self._moved[one.link], one.padding
+            for piece in one.all_pieces:
+                self._add(one.name, one.link, known, piece.shape, piece.pose)
+            touching |= {pair_of(one.name, other) for other in (*one.touches, *one.touches_objects)}
+        self._pair(touching, is_rigid)
+        self._prepare()
 
     def is_free(self, values: Array) -> bool:
         """Return whether nothing collides."""
         whole, find = self._model.whole, self._pinocchio.computeCollisions
-        return not find(whole.model, whole.data, self._manager, self._model.q(values), True)
+        if find(whole.model, whole.data, self._manager, self._model.q(values), True):
+            return False
+        check = self._pinocchio.computeCollision
+        return not any(check(self._geometry, self._data, index) for index in self._apart)
 
     def colliding(self, values: Array) -> list[LinkPair]:
         """Return all pairs that collide, without the help of the tree."""
@@ -120,40 +167,178 @@ class MeshChecker:
         )
         return list(dict.fromkeys(found))
 
-    def distance(self, values: Array) -> tuple[float, LinkPair]:
-        """Return the least distance [m], and the pair that has it; it takes milliseconds with meshes."""
-        whole = self._model.whole
-        nearest = self._pinocchio.computeDistances(
+    def in_the_way(self, values: Array, shape: Geometry, at: Transform3, ignored: Collection[str]) -> list[str]:
+        """Return the links and objects but those `ignored` that a shape, at a pose in the root's frame, is within."""
+        import coal
+
+        whole, placed = self._model.whole, coal_shape(shape, {})
+        self._pinocchio.updateGeometryPlacements(
             whole.model, whole.data, self._geometry, self._data, self._model.q(values)
         )
-        pair = self._geometry.collisionPairs[nearest]
-        owners = pair_of(self._owners[pair.first], self._owners[pair.second])
-        return float(self._data.distanceResults[nearest].min_distance), owners
+        x, y, z, w = at.rotation
+        there = coal.Transform3s(coal.Quaternion(w, x, y, z), np.array(at.translation))
+        found = dict[str, None]()
+        for index, owner in enumerate(self._owners):
+            if owner in ignored or owner in found:
+                continue
+            own, result = self._data.oMg[index], coal.CollisionResult()
+            other = coal.Transform3s(own.rotation, own.translation)
+            geometry = self._geometry.geometryObjects[index].geometry
+            if coal.collide(geometry, other, placed, there, coal.CollisionRequest(), result):
+                found[owner] = None
+        return list(found)
 
-    def _add(self, owner: str, link: str, shape: Coal, origin: Transform3) -> None:
+    @property
+    def watched(self) -> frozenset[str]:
+        """Return the links and objects that belong to a pair."""
+        return frozenset(
+            self._owners[one] for pair in self._geometry.collisionPairs for one in (pair.first, pair.second)
+        )
+
+    def pairs(self, values: Array, between: Collection[str] = ()) -> tuple[PairDistance, ...]:
+        """Return the distances of the pairs with all of `between`: what collides first, then the nearest.
+
+        Of very many pairs only those that collide are told. How deep meshes are within each other is an estimate of
+        coal's. One distance is computed at a time, so that other threads run: meshes take milliseconds.
+        """
+        colliding, found = set(self.colliding(values)), dict[LinkPair, float]()
+        wanted = [
+            (index, owners)
+            for index, pair in enumerate(self._geometry.collisionPairs)
+            if set(between) <= set(owners := pair_of(self._owners[pair.first], self._owners[pair.second]))
+        ]
+        if len(wanted) > MOST_PAIRS:
+            wanted = [(index, owners) for index, owners in wanted if owners in colliding]
+        for index, owners in wanted:
+            result = self._pinocchio.computeDistance(self._geometry, self._data, index)
+            distance = float(result.min_distance)
+            found[owners] = min(distance, found.get(owners, distance))
+        each = (PairDistance(*owners, distance, owners in colliding) for owners, distance in found.items())
+        return tuple(sorted(each, key=lambda one: (not one.collides, one.distance)))
+
+    def without(self, pairs: Collection[LinkPair]) -> MeshChecker:
+        """Return a checker of the same shapes that does not watch some pairs."""
+        made = copy(self)
+        made._geometry = self._geometry.copy()
+        made._geometry.removeAllCollisionPairs()
+        for one in self._geometry.collisionPairs:
+            if pair_of(self._owners[one.first], self._owners[one.second]) not in pairs:
+                made._geometry.addCollisionPair(self._pinocchio.CollisionPair(one.first, one.second))
+        made._prepare()
+        return made
+
+    @property
+    def watched_pairs(self) -> set[LinkPair]:
+        """Return the pairs that it examines."""
+        pairs = self._geometry.collisionPairs
+        return {pair_of(self._owners[one.first], self._owners[one.second]) for one in pairs}
+
+    @property
+    def kinematics(self) -> ArmKinematics:
+        """Return the body."""
+        return self._model
+
+    @property
+    def parts(self) -> list[CheckedPart]:
+        """Return all shapes, in the order in which `watched_parts` counts them."""
+        return self._parts
+
+    @property
+    def watched_parts(self) -> list[tuple[int, int, float]]:
+        """Return the pairs of shapes that it examines, and how far they must be from each other [m]."""
+        margins = (request.security_margin for request in self._data.collisionRequests)
+        return [
+            (pair.first, pair.second, margin)
+            for pair, margin in zip(self._geometry.collisionPairs, margins, strict=True)
+        ]
+
+    def collides(self, values: Array, pairs: Iterable[int]) -> bool:
+        """Return whether one of some pairs collides, by their places in `watched_parts`."""
+        whole, check = self._model.whole, self._pinocchio.computeCollision
+        self._pinocchio.updateGeometryPlacements(
+            whole.model, whole.data, self._geometry, self._data, self._model.q(values)
+        )
+        return any(check(self._geometry, self._data, one) for one in pairs)
+
+    def _prepare(self) -> None:
+        self._data = self._geometry.createData()
+        self._apart: list[int] = []  # pairs with a plane: the tree overlooks some that are inclined, or keep a distance
+        requests = zip(self._data.collisionRequests, self._geometry.collisionPairs, strict=True)
+        for index, (request, pair) in enumerate(requests):
+            request.security_margin = self._margin(pair.first, pair.second)
+            if any(self._is_plane(one) for one in (pair.first, pair.second)):
+                self._apart.append(index)
+        self._manager = self._pinocchio.BroadPhaseManager_DynamicAABBTreeCollisionManager(
+            self._model.whole.model, self._geometry, self._data
+        )
+
+    def _add(self, owner: str, link: str, known: Shapes, geometry: Geometry, origin: Transform3) -> None:
         frame = self._model.whole.model.frames[self._model.whole.frames[link]]
         placement = frame.placement * self._pinocchio.XYZQUATToSE3(
             np.array((*origin.translation, *origin.rotation), dtype=float)
         )
         name = f"{owner}_{len(self._owners)}"
         self._owners.append(owner)
+        self._parts.append(CheckedPart(geometry, link, origin, shape := known.of(geometry)))
         self._geometry.addGeometryObject(
             self._pinocchio.GeometryObject(name, frame.parentJoint, frame.parentFrame, placement, shape)
         )
 
-    def _pair(self, allowed: Collection[LinkPair]) -> None:
-        moved = self._moved
-        for first, second in combinations(range(len(self._owners)), 2):
+    def _pair(self, allowed: Collection[LinkPair], is_rigid: bool) -> None:
+        """Watch all pairs that the arm moves relative to each other; most of a large scene does not move at all."""
+        together: dict[frozenset[str], list[int]] = {}
+        for index, owner in enumerate(self._owners):
+            together.setdefault(self._moved[owner], []).append(index)
+        if is_rigid:
+            pairs = chain.from_iterable(combinations(one, 2) for one in together.values())
+        else:
+            pairs = chain.from_iterable(product(*groups) for groups in combinations(together.values(), 2))
+        for first, second in pairs:
             one, other = self._owners[first], self._owners[second]
-            if moved[one] != moved[other] and pair_of(one, other) not in allowed:
-                self._geometry.addCollisionPair(self._pinocchio.CollisionPair(first, second))
+            if one != other and pair_of(one, other) not in allowed:
+                pair = self._pinocchio.CollisionPair(min(first, second), max(first, second))
+                self._geometry.addCollisionPair(pair)
+
+    def _is_plane(self, shape: int) -> bool:
+        return str(self._geometry.geometryObjects[shape].geometry.getNodeType()) == "GEOM_HALFSPACE"
+
+    def _margin(self, first: int, second: int) -> float:
+        """Return how far two shapes keep from each other [m]; coal lets meshes be within nothing but meshes."""
+        owners = [self._owners[one] for one in (first, second)]
+        is_of_body = not any(one in self._objects for one in owners)
+        margin = -TOUCH + (0.0 if is_of_body else sum(self._paddings.get(one, 0.0) for one in owners))
+        kinds = [str(self._geometry.geometryObjects[one].geometry.getObjectType()) for one in (first, second)]
+        return margin if all(kind == _GEOM for kind in kinds) or kinds == [_BVH, _BVH] else max(margin, 0.0)
+
+
+class Shapes:
+    """Shapes for coal, each made once; `meshes` are the files of meshes by their names."""
+
+    def __init__(self, meshes: Mapping[str, Path]) -> None:
+        self._meshes = meshes
+        self._made: dict[Geometry, Coal] = {}
+
+    def of(self, geometry: Geometry) -> Coal:
+        """Return a shape; its axes are those of URDF.
+
+        Raises:
+            ValueError: if it is a mesh that cannot be read.
+        """
+        if geometry not in self._made:
+            self._made[geometry] = coal_shape(geometry, self._meshes)
+        return self._made[geometry]
+
+    def keep(self, wanted: Iterable[Geometry]) -> None:
+        """Forget all other shapes: those of clouds of points are large, and come again and again."""
+        kept = set(wanted)
+        self._made = {geometry: made for geometry, made in self._made.items() if geometry in kept}
 
 
 def coal_shape(geometry: Geometry, meshes: Mapping[str, Path]) -> Coal:
-    """Return a shape for coal; its axes are those of URDF.
+    """Return a shape for coal; a mesh that `meshes` does not name is a file of this name.
 
     Raises:
-        ValueError: if it is a mesh that cannot be read.
+        ValueError: if its file cannot be read.
     """
     import coal
 
@@ -164,12 +349,36 @@ def coal_shape(geometry: Geometry, meshes: Mapping[str, Path]) -> Coal:
             return coal.Sphere(*geometry.size)
         case "cylinder":
             return coal.Cylinder(*geometry.size)
+        case "cone":
+            return coal.Cone(*geometry.size)
         case "capsule":
             return coal.Capsule(*geometry.size)
-    path, scale = meshes.get(geometry.file), np.array(geometry.size or (1.0, 1.0, 1.0))
+        case "plane":
+            return coal.Halfspace(np.array(geometry.size[:3]), -geometry.size[3])
+        case "octree":
+            cells, side = np.array(geometry.points).reshape(-1, 3), geometry.size[0]
+            return coal.makeOctree(*(read_cells(Path(geometry.file), side) if geometry.file else (cells, side)))
+    scale = np.array(geometry.size or (1.0, 1.0, 1.0))
+    if geometry.points:
+        return _triangles(np.array(geometry.points).reshape(-1, 3) * scale, geometry.triangles)
+    path = meshes.get(geometry.file, Path(geometry.file))
     try:
-        if path is None:
+        if not path.is_file():
             raise ValueError("there is no such file")
         return coal.MeshLoader().load(str(path), scale)
-    except (ValueError, RuntimeError) as error:
+    except ValueError as error:
         raise ValueError(f"the mesh '{geometry.file}' cannot be read: {error}") from error
+    except RuntimeError as error:  # its text is about coal's own files
+        raise ValueError(f"the mesh '{geometry.file}' cannot be read: it is none") from error
+
+
+def _triangles(corners: Array, triangles: tuple[int, ...]) -> Coal:
+    import coal
+
+    made = coal.BVHModelOBBRSS()
+    made.beginModel(len(triangles) // 3, len(corners))
+    made.addVertices(corners)
+    made.addTriangles(np.array(triangles, dtype=np.int64).reshape(-1, 3))
+    made.endModel()
+    made.computeLocalAABB()
+    return made

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 
-from rbxcompose.body.model import Body
+from rbxcompose.body.model import Body, BodyJoint
 from rbxcompose.dataclass import dataclass
 
 
@@ -38,6 +38,13 @@ def group_of(body: Body, joints: Iterable[str]) -> ArmGroup:
     return ArmGroup(tuple(one.name for one in found), found[0].parent, found[-1].child)
 
 
+def together(body: Body, parts: Sequence[ArmGroup]) -> ArmGroup:
+    """Return the joints of several arms as one, in the order of the body; its tip is that of the last one."""
+    whole = group_of(body, (joint for part in parts for joint in part.joints))
+    first = next(part.base for part in parts if whole.joints[0] in part.joints)
+    return ArmGroup(whole.joints, first, parts[-1].tip)
+
+
 def moved_links(body: Body, joints: Iterable[str]) -> dict[str, frozenset[str]]:
     """Return which of some joints move each link in the root's frame, also those that others mimic."""
     own = set(joints)
@@ -48,3 +55,12 @@ def moved_links(body: Body, joints: Iterable[str]) -> dict[str, frozenset[str]]:
             leader = body.joints[leader.mimic.joint]
         found[joint.child] = found[joint.parent] | ({joint.name} if joint.moves and leader.name in own else set())
     return found
+
+
+def leader_of(joint: BodyJoint, joints: Mapping[str, BodyJoint]) -> tuple[str, float, float]:
+    """Return the joint that a joint mimics at last, itself if none, with the multiplier and the offset of all."""
+    multiplier, offset = 1.0, 0.0
+    while (mimic := joint.mimic) is not None:
+        multiplier, offset = multiplier * mimic.multiplier, multiplier * mimic.offset + offset
+        joint = joints[mimic.joint]
+    return joint.name, multiplier, offset

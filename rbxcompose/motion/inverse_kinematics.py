@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Generator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,16 +17,16 @@ from numpy.typing import NDArray
 from rbxcompose.dataclass import dataclass
 from rbxcompose.geometry import Transform3
 from rbxcompose.motion.arm_kinematics import ArmKinematics
+from rbxcompose.motion.damped_steps import DAMPING, LEAST_DAMPING, LONGEST, PATIENCE, PROGRESS
 from rbxcompose.motion.joint_space import JointSpace
 
 Array = NDArray[np.float64]
 
 TOLERANCE, ANGLE_TOLERANCE = 1e-3, math.radians(0.5)  # [m], [rad]
 RESTARTS = 60
-LEAST_DAMPING, DAMPING = 1e-6, 1e-2  # the second one times the square of the error
-LONGEST = 1.0  # [rad or m] that a joint moves in one iteration, at most
-PATIENCE, PROGRESS = 8, 0.95  # iterations without the error's square shrinking to this share, which end a descent
 ENOUGH = 3  # solutions, of which the nearest one is taken
+TOGETHER = 8  # descents of compiled code, after which a search lets others run
+EDGE = 1e-4  # [rad or m] from the limits of joints, so that curves through solutions stay within them
 CLOSER = 0.2  # of a tolerance that the search aims at, so that rounding decides nothing
 
 
@@ -64,6 +65,19 @@ class PoseTarget:
 
 
 @dataclass(frozen=True, slots=True)
+class SolverSettings:
+    """How to search positions of joints: from `restarts` random ones after the present ones, for at most `time` [s]."""
+
+    restarts: int = RESTARTS
+    time: float = math.inf
+    tolerance: float = TOLERANCE
+    angle_tolerance: float = ANGLE_TOLERANCE
+
+
+SOLVER = SolverSettings()
+
+
+@dataclass(frozen=True, slots=True)
 class PoseSolutions:
     """Positions of joints that meet a target, the nearest to the start first, each of shape (n,)."""
 
@@ -84,22 +98,29 @@ def solved(
     seed: int,
     restarts: int = RESTARTS,
     enough: int = ENOUGH,
+    is_late: Callable[[], bool] = lambda: False,
 ) -> Generator[None, None, PoseSolutions]:
-    """Return solutions within the limits of joints; it yields after each attempt. The same seed gives the same."""
+    """Return solutions within the limits of joints; it yields after some attempts. The same seed gives the same.
+
+    It ends with what it has when it `is_late`.
+    """
     free: list[Array] = []
     colliding: list[Array] = []
-    nearest, attempts = (math.inf, math.inf), 0
-    for first in (space.clamped(start), *space.samples(restarts, seed)):
-        attempts += 1
-        ending, away = descended(kinematics, space, target, first)
-        nearest, values = min(nearest, away), space.nearest_turns(ending, start)
+    nearest, attempts, bounds = (math.inf, math.inf), 0, _bounds(space)
+    firsts = space.clamped(start)[None]
+    while True:
+        tried, ending, each = _descents(kinematics, target, firsts, bounds)
+        attempts, firsts = attempts + tried, firsts[tried:]
+        nearest, away, values = min(nearest, *each), each[-1], space.nearest_turns(ending, start)
         if (
             away[0] <= target.tolerance
             and away[1] <= target.angle_tolerance
             and _is_verified(kinematics, target, values)
         ):
             (free if is_free(values) else colliding).append(values)
-        if len(free) >= enough:
+        if attempts == 1:
+            firsts = space.samples(restarts, seed)
+        if len(free) >= enough or is_late() or not len(firsts):
             break
         yield
     return PoseSolutions(_sorted(free, start), _sorted(colliding, start), nearest, attempts)
@@ -117,20 +138,60 @@ def descended(
     kinematics: ArmKinematics, space: JointSpace, target: PoseTarget, first: Array
 ) -> tuple[Array, tuple[float, float]]:
     """Return where the descent from `first` ends, and how far from the target [m, rad]; it ends when it gets stuck."""
-    values, lower, upper = first.copy(), space.lower, space.upper
-    wanted, rows = kinematics.placement(target.pose), slice(0, 3 if target.any_orientation else 6)
-    identity, best, patience = np.eye(rows.stop), math.inf, PATIENCE
+    _, values, each = _descents(kinematics, target, first[None], _bounds(space))
+    return values, each[-1]
+
+
+def _bounds(space: JointSpace) -> tuple[Array, Array]:
+    lower, upper = space.lower, space.upper
+    edge = np.minimum(EDGE, (upper - lower) / 4)
+    return lower + edge, upper - edge
+
+
+def _descents(
+    kinematics: ArmKinematics, target: PoseTarget, firsts: Array, bounds: tuple[Array, Array]
+) -> tuple[int, Array, list[tuple[float, float]]]:
+    """Descend from some of the positions, of shape (k, n), at most until one descent ends within the tolerances.
+
+    Return from how many, where the last one ended, and how far from the target [m, rad] each of them.
+    """
+    rows, tolerances = 3 if target.any_orientation else 6, (target.tolerance, target.angle_tolerance)
+    near = CLOSER * target.tolerance, CLOSER * target.angle_tolerance
+    if (tip := kinematics.compiled) is not None:
+        tried, values, away = tip.descend(tip.aim(target.pose, rows, near, tolerances, bounds), firsts[:TOGETHER])
+        return tried, values, [(one, other) for one, other in away[:tried].tolist()]
+    values, missed = _descent(kinematics, kinematics.placement(target.pose), firsts[0], rows, near, bounds)
+    return 1, values, [missed]
+
+
+def _descent(
+    kinematics: ArmKinematics,
+    wanted: Any,
+    first: Array,
+    rows: int,
+    near: tuple[float, float],
+    bounds: tuple[Array, Array],
+) -> tuple[Array, tuple[float, float]]:
+    values, (lower, upper) = first.copy(), bounds
+    identity, best, patience = np.eye(rows), math.inf, PATIENCE
     while True:
         error, jacobian = kinematics.error(values, wanted)
-        error, jacobian = error[rows], jacobian[rows]
-        away = math.hypot(*error[:3].tolist()), math.hypot(*error[3:].tolist())
-        square = float(error @ error)
+        if rows < len(error):
+            error, jacobian = error[:rows], jacobian[:rows]
+        parts = error.tolist()
+        away = math.hypot(*parts[:3]), math.hypot(*parts[3:])
+        square = away[0] * away[0] + away[1] * away[1]
         patience = PATIENCE if square < PROGRESS * best else patience - 1
         best = min(best, square)
-        is_met = away[0] <= CLOSER * target.tolerance and away[1] <= CLOSER * target.angle_tolerance
-        if is_met or not patience:
+        if (away[0] <= near[0] and away[1] <= near[1]) or not patience:
             return values, away
-        damped = jacobian @ jacobian.T + (LEAST_DAMPING + DAMPING * square) * identity
-        step = jacobian.T @ np.linalg.solve(damped, error)
-        step *= min(1.0, LONGEST / max(float(np.max(np.abs(step))), 1e-12))
-        values = np.clip(values + step, lower, upper)
+        damping = (LEAST_DAMPING + DAMPING * square) * identity
+        step = jacobian.T @ np.linalg.solve(jacobian @ jacobian.T + damping, error)
+        at_limit = np.where(step < 0.0, values <= lower, values >= upper)
+        if at_limit.any():  # the others do the part of joints that cannot: else most descents get stuck
+            jacobian = jacobian * ~at_limit
+            step = jacobian.T @ np.linalg.solve(jacobian @ jacobian.T + damping, error)
+        longest = float(np.abs(step).max())
+        if longest > LONGEST:
+            step *= LONGEST / longest
+        values = np.minimum(np.maximum(values + step, lower), upper)  # which is faster than clipping

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -37,6 +38,10 @@ class JointSpace:
     """The joints of an arm. All arrays of positions have the shape (n,), in [rad] or [m]."""
 
     joints: tuple[ArmJoint, ...]
+
+    def inside(self, spare: float) -> JointSpace:
+        """Return the space whose joints stay away from their limits by `spare` [rad or m], if there is room for it."""
+        return JointSpace(tuple(_inside(one, spare) for one in self.joints))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -92,3 +97,12 @@ def interpolated(waypoints: Sequence[Array] | Array, step: float) -> Array:
         count = max(1, math.ceil(float(np.max(np.abs(second - first))) / step))
         found.append(first + (second - first) * (np.arange(1, count + 1) / count)[:, None])
     return np.concatenate(found)
+
+
+def _inside(joint: ArmJoint, spare: float) -> ArmJoint:
+    limits = joint.limits
+    if joint.is_continuous or limits.greatest - limits.least < 4 * spare:
+        return joint
+    lower = None if limits.lower is None else limits.lower + spare
+    upper = None if limits.upper is None else limits.upper - spare
+    return replace(joint, limits=replace(limits, lower=lower, upper=upper))

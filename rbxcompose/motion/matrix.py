@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection
 import numpy as np
 from numpy.typing import NDArray
 
-from rbxcompose.motion.collisions import LinkPair
+from rbxcompose.body.link_pairs import LinkPair
 
 Array = NDArray[np.float64]
 SAMPLES, SEED = 200, 1

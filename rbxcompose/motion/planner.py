@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Collection, Generator, Iterator
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rbxcompose.body.link_pairs import LinkPair
 from rbxcompose.dataclass import dataclass
-from rbxcompose.motion.collisions import Checker, told
+from rbxcompose.motion.collisions import Checker, SearchingChecker, told
 from rbxcompose.motion.joint_space import JointSpace, interpolated
+from rbxcompose.motion.kept import KeptTip
+from rbxcompose.motion.kept_search import kept_path
 from rbxcompose.motion.parametrisation import Trajectory, speeds_of, timed
+from rbxcompose.motion.planner_types import AUTOMATIC, FAST, ompl_planner
 from rbxcompose.motion.reasons import MotionFailure, MotionReason
 from rbxcompose.motion.recheck import Rejected, examined
 from rbxcompose.motion.search import searched
@@ -22,6 +27,10 @@ FINE = 0.005  # [rad or m] between examined positions of a trajectory, in each j
 NEAR = 0.02  # [rad or m] by which a start may be outside of its limits: servos measure in ticks
 SAME = 1e-4  # [rad or m] between positions that are the same
 MOST_PER_SECOND = 50_000  # examined positions; more than any machine examines, and a limit where no time passes
+KEPT_SLICE = 200  # positions examined for what is to be kept, after which others may run
+FAST_TRIES = 3  # paths of the fast search that may collide on the shapes themselves
+FAST_SHARE = 0.25  # of the time, after which the fast search is given up
+LINE = "a straight line"
 ROUNDS = 6  # of adding points to a path, so that its curve keeps closer to the straight lines that are free
 
 
@@ -29,10 +38,11 @@ ROUNDS = 6  # of adding points to a path, so that its curve keeps closer to the 
 class PlannerSettings:
     """How to plan: at most `time` [s] and `attempts` paths, which follow from the seed."""
 
-    planner: str = "rrt_connect"
+    planner: str = AUTOMATIC
     time: float = 5.0
     attempts: int = 5
     seed: int = 1
+    simplify: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +53,10 @@ class MotionRequest:
     goal: Array
     speed: float = 1.0
     acceleration: float = 1.0
+    space: JointSpace | None = None
+    """Narrower limits of joints than those of the arm, if there are any."""
+    kept: KeptTip | None = None
+    """What the tip keeps on the whole way."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +67,12 @@ class MotionPlan:
     waypoints: Array
     attempts: int
     examined: int
+    share: float = 1.0
+    """How much of the way that was asked for it is."""
+    found_by: str = ""
+    """What found the way: a straight line, or the name of a planner."""
+    fast_failed: str = ""
+    """Why the fast search found none, if it was tried in vain."""
 
 
 Planning = Generator[None, None, "MotionPlan | MotionFailure"]
@@ -62,9 +82,16 @@ class MotionPlanner:
     """Plans motions of one arm. `now` is a time [s] that passes while it plans, if there is one."""
 
     def __init__(
-        self, space: JointSpace, checker: Checker, settings: PlannerSettings, now: Callable[[], float]
+        self,
+        space: JointSpace,
+        checker: Checker,
+        settings: PlannerSettings,
+        now: Callable[[], float],
+        unlikely: Collection[LinkPair] = (),
     ) -> None:
+        """Build it; `unlikely` are pairs that the first search may leave out: the examination has them all."""
         self.space, self.checker, self.settings, self.now = space, checker, settings, now
+        self.unlikely = unlikely
 
     def plan(self, request: MotionRequest) -> Planning:
         """Return a plan or why there is none; it yields while it works, so that others may run, and may be closed."""
@@ -76,6 +103,12 @@ class MotionPlanner:
             return MotionPlan(None, np.stack((run.start, run.goal)), 0, 0)
         return (yield from run.attempts())
 
+    def along(self, path: Array, request: MotionRequest) -> Planning:
+        """Return a plan along the points of a path, of shape (m, n), or why it cannot be; it yields as `plan` does."""
+        run = _Run(self, request)
+        failure = run.mistake()
+        return failure if failure is not None else (yield from run.only(path))
+
 
 class _Run:
     """One request."""
@@ -85,58 +118,113 @@ class _Run:
         self.start = np.asarray(request.start, dtype=float)
         self.goal = np.asarray(request.goal, dtype=float)
         self._began, self._examined = planner.now(), 0
+        self._space, self._kept = request.space or planner.space, request.kept
+        self._found_by = self._fast_failed = ""
+        self._is_fast_hopeless = False
 
     def mistake(self) -> MotionFailure | None:
         """Return what is wrong with start and goal; a start just outside of its limits is moved to them."""
-        space, checker = self._planner.space, self._planner.checker
-        for values, outside, hit, tolerance in (
-            (self.start, MotionReason.START_OUTSIDE_LIMITS, MotionReason.START_IN_COLLISION, NEAR),
-            (self.goal, MotionReason.GOAL_OUTSIDE_LIMITS, MotionReason.GOAL_IN_COLLISION, 0.0),
-        ):
-            if words := space.outside(values, tolerance):
-                return MotionFailure(outside, words)
-            inside = space.clamped(values)
-            if not checker.is_free(inside):
-                return MotionFailure(hit, told(checker.colliding(inside)))
+        space, checker = self._space, self._planner.checker
+        failure = mistake_in_start(space, checker, self.start) or _unfit(
+            space, checker, self.goal, (MotionReason.GOAL_OUTSIDE_LIMITS, MotionReason.GOAL_IN_COLLISION), 0.0
+        )
+        if failure is not None:
+            return failure
         self.start, self.goal = space.clamped(self.start), space.nearest_turns(self.goal, self.start)
+        for word, values in (("start", self.start), ("goal", self.goal)):
+            if self._kept is not None and not self._kept.is_kept(values):
+                words = self._kept.beyond(values) or "the tip is at the edge of what it is to keep"
+                return MotionFailure(MotionReason.NOT_KEPT, f"at the {word}, {words}")
         return None
 
+    def _fitness(self, attempt: int) -> Callable[[Array], bool]:
+        """Return what tells whether positions may be on a path; the first search leaves out unlikely pairs."""
+        planner, kept = self._planner, self._kept
+        checker = planner.checker if attempt or not planner.unlikely else planner.checker.without(planner.unlikely)
+        return checker.is_free if kept is None else lambda values: kept.is_kept(values) and checker.is_free(values)
+
+    def only(self, path: Array) -> Planning:
+        """Verify one path."""
+        found = yield from self._verified(np.concatenate((self.start[None], path[1:])))
+        return MotionPlan(found, path, 1, self._examined) if isinstance(found, Trajectory) else found
+
     def attempts(self) -> Planning:
-        """Search and verify with one seed after the other."""
-        settings, last = self._planner.settings, MotionFailure(MotionReason.NO_PATH_IN_TIME, "")
-        for attempt in range(settings.attempts):
-            path = yield from self._path(attempt)
+        """Search and verify one path after the other."""
+        last, paths = MotionFailure(MotionReason.NO_PATH_IN_TIME, ""), 0
+        for source in self._sources():
+            path = yield from source
             if path is None:
-                break
+                continue
+            paths += 1
             found = yield from self._verified(path)
             if isinstance(found, Trajectory):
-                return MotionPlan(found, path, attempt + 1, self._examined)
+                tried = (self._found_by, self._fast_failed)
+                return MotionPlan(found, path, paths, self._examined, 1.0, *tried)
+            if self._found_by == FAST:
+                self._fast_failed = found.text
             last = found
+        settings = self._planner.settings
+        beside = f"; fast: {self._fast_failed}" if self._fast_failed else ""
         if last.text:
-            tried = "1 path was" if attempt == 0 else f"{attempt + (path is not None)} paths were"
-            return MotionFailure(last.reason, f"{last.text} ({tried} found)")
-        return MotionFailure(
-            last.reason, f"{settings.planner} found none in {settings.time:g} s, {self._examined} positions examined"
-        )
+            tried_ = "1 path was" if paths == 1 else f"{paths} paths were"
+            return MotionFailure(last.reason, f"{last.text} ({tried_} found{beside})")
+        words = f"{ompl_planner(settings.planner)} found none in {settings.time:g} s"
+        return MotionFailure(last.reason, f"{words}, {self._examined} positions examined{beside}")
 
-    def _path(self, attempt: int) -> Generator[None, None, Array | None]:
-        """Return a path; None when the time is over. The straight line is tried first."""
-        planner, settings = self._planner, self._planner.settings
-        if attempt == 0:
-            line = np.stack((self.start, self.goal))
-            points = interpolated(line, RESOLUTION)
-            self._examined += len(points)
-            if all(planner.checker.is_free(one) for one in points):
-                return line
-        search = searched(
-            planner.space,
-            self.start,
-            self.goal,
-            planner.checker.is_free,
-            planner=settings.planner,
-            seed=settings.seed + attempt,
-            resolution=RESOLUTION,
+    def _sources(self) -> Iterator[Generator[None, None, Array | None]]:
+        """Yield what may find a path, while there is time: the straight line, the fast search, then OMPL by seeds."""
+        settings, checker = self._planner.settings, self._planner.checker
+        yield self._line()
+        first = int(self._found_by == LINE)
+        if isinstance(checker, SearchingChecker) and self._kept is None:
+            for seed in range(settings.seed, settings.seed + FAST_TRIES):
+                if self._is_late(FAST_SHARE) or self._is_fast_hopeless:
+                    break
+                yield self._fast(checker, seed)
+        for attempt in range(first, settings.attempts):
+            if self._is_late():
+                break
+            yield self._slow(attempt)
+
+    def _line(self) -> Generator[None, None, Array | None]:
+        """Return the straight line, None if it is not free."""
+        line = np.stack((self.start, self.goal))
+        points, checker = interpolated(line, RESOLUTION), self._planner.checker
+        self._examined += len(points)
+        if isinstance(checker, SearchingChecker) and self._kept is None:
+            is_free = checker.first_bad(points) is None
+        else:
+            is_free = all(map(self._fitness(0), points))
+        self._found_by = LINE if is_free else ""
+        yield from ()
+        return line if is_free else None
+
+    def _fast(self, checker: SearchingChecker, seed: int) -> Generator[None, None, Array | None]:
+        """Return a path on spheres, None if there is none."""
+        one, before = self._planner.settings, self._examined
+        search = checker.ways(
+            self._space, self.start, self.goal, seed=seed, resolution=RESOLUTION, simplify=one.simplify
         )
+        self._found_by = FAST
+        while not self._is_late(FAST_SHARE):
+            try:
+                self._examined = before + next(search)
+            except StopIteration as ended:
+                found: Array | str = ended.value
+                if not isinstance(found, str):
+                    return found
+                self._fast_failed, self._is_fast_hopeless = found, True
+                return None
+            yield
+        search.close()
+        self._fast_failed = f"none in {one.time * FAST_SHARE:g} s"
+        return None
+
+    def _slow(self, attempt: int) -> Generator[None, None, Array | None]:
+        """Return a path by OMPL, None when the time is over."""
+        settings = self._planner.settings
+        search = self._search(self._fitness(attempt), settings.seed + attempt)
+        self._found_by = ompl_planner(settings.planner)
         before = self._examined
         while not self._is_late():
             try:
@@ -148,15 +236,34 @@ class _Run:
         search.close()
         return None
 
-    def _is_late(self) -> bool:
-        time = self._planner.settings.time
+    def _search(self, is_fit: Callable[[Array], bool], seed: int) -> Generator[int, None, Array]:
+        """Return the search: by OMPL, whose constrained spaces find less (`kept_search` tells how much), or by ours."""
+        space, kept, start, goal = self._space, self._kept, self.start, self.goal
+        if kept is not None:
+            project = partial(kept.projected, space=space)
+            return kept_path(space, start, goal, is_fit, project, seed=seed, resolution=RESOLUTION)
+        one = self._planner.settings
+        return searched(
+            space,
+            start,
+            goal,
+            is_fit,
+            planner=ompl_planner(one.planner),
+            seed=seed,
+            resolution=RESOLUTION,
+            simplify=one.simplify,
+        )
+
+    def _is_late(self, share: float = 1.0) -> bool:
+        """Return whether a share of the time is over."""
+        time = self._planner.settings.time * share
         return self._planner.now() - self._began >= time or self._examined >= time * MOST_PER_SECOND
 
     def _verified(self, path: Array) -> Generator[None, None, Trajectory | MotionFailure]:
         """Return the trajectory along a path, once its curves are free and within all limits."""
         planner, request = self._planner, self._request
         limits = speeds_of(planner.space, request.speed, request.acceleration)
-        text = ""
+        last = Rejected(True, "", 0.0)
         for _ in range(ROUNDS):
             made = timed(path, *limits)
             if isinstance(made, str):
@@ -164,20 +271,36 @@ class _Run:
             rejected: Rejected | None = yield from self._examine(made)
             if rejected is None:
                 return made
-            path, text = _with_middles(path), rejected.text
-        return MotionFailure(MotionReason.PATH_IN_COLLISION, text)
+            path, last = _with_middles(path), rejected
+        reason = MotionReason.PATH_IN_COLLISION if last.is_collision or self._kept is None else MotionReason.NOT_KEPT
+        return MotionFailure(reason, last.text)
 
     def _examine(self, made: Trajectory) -> Generator[None, None, Rejected | None]:
         points = made.dense(FINE)
         self._examined += len(points)
-        examination = examined(points, self._planner.space, self._planner.checker)
-        while True:
-            try:
-                next(examination)
-            except StopIteration as ended:
-                found: Rejected | None = ended.value
-                return found
-            yield
+        rejected = yield from examined(points, self._space, self._planner.checker)
+        if rejected is not None or self._kept is None:
+            return rejected
+        for index, one in enumerate(points):
+            if words := self._kept.beyond(one):
+                return Rejected(False, words, index / len(points))
+            if index % KEPT_SLICE == KEPT_SLICE - 1:
+                yield
+        return None
+
+
+def mistake_in_start(space: JointSpace, checker: Checker, start: Array) -> MotionFailure | None:
+    """Return why no motion begins at these positions, if none does."""
+    return _unfit(space, checker, start, (MotionReason.START_OUTSIDE_LIMITS, MotionReason.START_IN_COLLISION), NEAR)
+
+
+def _unfit(
+    space: JointSpace, checker: Checker, values: Array, reasons: tuple[MotionReason, MotionReason], tolerance: float
+) -> MotionFailure | None:
+    if words := space.outside(values, tolerance):
+        return MotionFailure(reasons[0], words)
+    inside = space.clamped(values)
+    return None if checker.is_free(inside) else MotionFailure(reasons[1], told(checker.colliding(inside)))
 
 
 def _with_middles(path: Array) -> Array:

@@ -20,6 +20,8 @@ class MotionReason(StrEnum):
     GOAL_OUT_OF_REACH = "goal_out_of_reach"  # no positions of joints bring the tip there
     NO_PATH_IN_TIME = "no_path_in_time"
     PATH_IN_COLLISION = "path_in_collision"  # found, but not when examined finely
+    NOT_KEPT = "not_kept"  # start, goal or way break what is to be kept
+    PATH_INCOMPLETE = "path_incomplete"  # the tip gets along a part of its way only
     NO_TIMING = "no_timing"  # no velocities were found within the limits
     START_MOVED = "start_moved"  # the arm was moved while its motion was planned
     NOT_FOLLOWED = "not_followed"  # its controller failed
@@ -34,4 +36,32 @@ class MotionFailure:
     """Why there is no motion, with the details for people."""
 
     reason: MotionReason
+    text: str
+    share: float = 0.0
+    """How much of the way that was asked for would be possible."""
+
+
+class GraspReason(StrEnum):
+    """Why an object was not picked or placed, beside the reasons of motions."""
+
+    UNKNOWN_OBJECT = "unknown_object"  # it is not in the scene
+    ALREADY_HOLDS = "already_holds"  # the arm holds an object, so that it cannot pick
+    NOTHING_HELD = "nothing_held"  # the arm holds none, so that it cannot place
+    NO_GRASPS = "no_grasps"  # its shape does not tell how to hold it, and nothing else does
+    TOO_WIDE = "too_wide"  # the gripper does not open that far
+    LINE_OUT_OF_REACH = "line_out_of_reach"  # joints cannot follow a straight line of the tip
+    GRIPPER_FAILED = "gripper_failed"  # its controller failed
+    NOTHING_GRASPED = "nothing_grasped"  # the gripper closed farther than the object is wide
+    NOT_ATTACHED = "not_attached"  # the scene did not attach or detach the object
+
+
+GRASP_REASONS = (*REASONS, *map(str, GraspReason))
+
+
+@dataclass(frozen=True, slots=True)
+class StageFailure:
+    """Why an object was not picked or placed: in which stage, and why."""
+
+    stage: str
+    reason: MotionReason | GraspReason
     text: str

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbxcompose.motion.joint_space import JointSpace
-from rbxcompose.motion.planner_types import PLANNERS
+from rbxcompose.motion.planner_types import OMPL
 
 Array = NDArray[np.float64]
 IsFree = Callable[[Array], bool]
@@ -24,7 +24,15 @@ SEEDS = 2**31 - 1  # the largest seed that OMPL takes
 
 
 def searched(
-    space: JointSpace, start: Array, goal: Array, is_free: IsFree, *, planner: str, seed: int, resolution: float
+    space: JointSpace,
+    start: Array,
+    goal: Array,
+    is_free: IsFree,
+    *,
+    planner: str,
+    seed: int,
+    resolution: float,
+    simplify: bool = True,
 ) -> Generator[int, None, Array]:
     """Search a path and shorten it; return its points, of shape (m, n). Yield how many positions were examined.
 
@@ -34,7 +42,7 @@ def searched(
     with closing(_Search(space, start, goal, is_free, planner, seed, resolution)) as search:
         while not search.advance():
             yield search.examined
-        return search.shortened()
+        return search.path(simplify=simplify)
 
 
 class _Examiner:
@@ -69,7 +77,7 @@ class _Search:
         self._problem = base.ProblemDefinition(self._information)
         ends = [self._state(start), self._state(goal)]
         self._problem.setStartAndGoalStates(*ends)  # which copies them
-        self._planner = getattr(geometric, PLANNERS[planner])(self._information)
+        self._planner = getattr(geometric, OMPL[planner])(self._information)
         if hasattr(self._planner, "setRange"):
             self._planner.setRange(RANGE)
         self._planner.setProblemDefinition(self._problem)
@@ -86,12 +94,13 @@ class _Search:
         self._planner.solve(self._base.PlannerTerminationCondition(lambda: examiner.count >= until))
         return bool(self._problem.hasExactSolution())
 
-    def shortened(self) -> Array:
-        """Return the path, with shortcuts."""
+    def path(self, *, simplify: bool) -> Array:
+        """Return the path, with shortcuts if it is to be simplified."""
         path, simplifier = self._problem.getSolutionPath(), self._geometric.PathSimplifier(self._information)
-        simplifier.reduceVertices(path)
-        simplifier.partialShortcutPath(path, SHORTCUTS, SHORTCUTS)
-        simplifier.collapseCloseVertices(path)
+        if simplify:
+            simplifier.reduceVertices(path)
+            simplifier.partialShortcutPath(path, SHORTCUTS, SHORTCUTS)
+            simplifier.collapseCloseVertices(path)
         states = (path.getState(index) for index in range(path.getStateCount()))
         return np.array([[state[index] for index in range(self._size)] for state in states])
 

@@ -8,8 +8,9 @@ from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
 
+from rbxcompose.body.link_pairs import LinkPair
 from rbxcompose.motion.arm_kinematics import ArmKinematics
-from rbxcompose.motion.collisions import LinkPair, MeshChecker, adjacent_pairs
+from rbxcompose.motion.collisions import MeshChecker, adjacent_pairs
 from rbxcompose.motion.joint_space import JointSpace
 from rbxcompose.motion.matrix import SAMPLES, SEED, unavoidable_pairs
 

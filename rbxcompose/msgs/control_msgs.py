@@ -82,7 +82,9 @@ class FollowJointTrajectory(Action["FollowJointTrajectory.Goal", "FollowJointTra
         }
 
         trajectory: trajectory_msgs.JointTrajectory = field(default_factory=trajectory_msgs.JointTrajectory)
-        multi_dof_trajectory: trajectory_msgs.MultiDOFJointTrajectory = field(default_factory=trajectory_msgs.MultiDOFJointTrajectory)
+        multi_dof_trajectory: trajectory_msgs.MultiDOFJointTrajectory = field(
+        default_factory=trajectory_msgs.MultiDOFJointTrajectory
+    )
         path_tolerance: tuple[JointTolerance, ...] = ()
         component_path_tolerance: tuple[JointComponentTolerance, ...] = ()
         goal_tolerance: tuple[JointTolerance, ...] = ()
@@ -134,9 +136,15 @@ class FollowJointTrajectory(Action["FollowJointTrajectory.Goal", "FollowJointTra
         actual: trajectory_msgs.JointTrajectoryPoint = field(default_factory=trajectory_msgs.JointTrajectoryPoint)
         error: trajectory_msgs.JointTrajectoryPoint = field(default_factory=trajectory_msgs.JointTrajectoryPoint)
         multi_dof_joint_names: tuple[str, ...] = ()
-        multi_dof_desired: trajectory_msgs.MultiDOFJointTrajectoryPoint = field(default_factory=trajectory_msgs.MultiDOFJointTrajectoryPoint)
-        multi_dof_actual: trajectory_msgs.MultiDOFJointTrajectoryPoint = field(default_factory=trajectory_msgs.MultiDOFJointTrajectoryPoint)
-        multi_dof_error: trajectory_msgs.MultiDOFJointTrajectoryPoint = field(default_factory=trajectory_msgs.MultiDOFJointTrajectoryPoint)
+        multi_dof_desired: trajectory_msgs.MultiDOFJointTrajectoryPoint = field(
+        default_factory=trajectory_msgs.MultiDOFJointTrajectoryPoint
+    )
+        multi_dof_actual: trajectory_msgs.MultiDOFJointTrajectoryPoint = field(
+        default_factory=trajectory_msgs.MultiDOFJointTrajectoryPoint
+    )
+        multi_dof_error: trajectory_msgs.MultiDOFJointTrajectoryPoint = field(
+        default_factory=trajectory_msgs.MultiDOFJointTrajectoryPoint
+    )
 
     class SendGoal(Service["FollowJointTrajectory.SendGoal.Request", "FollowJointTrajectory.SendGoal.Response"]):
         """Sends a goal of `FollowJointTrajectory`."""

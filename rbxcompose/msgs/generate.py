@@ -26,6 +26,7 @@ from rbxcompose.msgs.definitions import (
 from rbxcompose.msgs.hashes import type_hash
 
 INDENT = "    "
+LONGEST = 120  # letters of a line
 TYPES = "rbxcompose.msgs.types"
 DATACLASS = "rbxcompose.dataclass"
 ARRAYS = "rbxcompose.msgs.arrays"
@@ -83,7 +84,9 @@ class _Module:
         yield ""
         yield from self._import_lines(DATACLASS)
         if self.packages:
-            yield f"from rbxcompose.msgs import {', '.join(sorted(self.packages))}"
+            line = f"from rbxcompose.msgs import {', '.join(sorted(self.packages))}"
+            each = [f"{INDENT}{package}," for package in sorted(self.packages)]
+            yield from [line] if len(line) <= LONGEST else ["from rbxcompose.msgs import (", *each, ")"]
         yield from self._import_lines(ARRAYS, TYPES)
         if ARRAYS in self.imports:
             yield from ("", "if TYPE_CHECKING:", "    import numpy as np", "    from numpy.typing import NDArray")
@@ -173,7 +176,10 @@ class _Module:
         python_type, default = self._python(field.type)
         if field.default is not None:
             default = _literal(field.default)
-        return _commented(f"{attribute(field.name)}: {python_type} = {default}", field.comment)
+        line = _commented(f"{attribute(field.name)}: {python_type} = {default}", field.comment)
+        if len(line) <= LONGEST - len(INDENT) or field.comment:
+            return line
+        return line.replace("field(", f"field(\n{INDENT}{INDENT}").removesuffix(")") + f"\n{INDENT})"
 
     def _python(self, type_: FieldType) -> tuple[str, str]:
         """Return the annotation and the default value of a field."""

@@ -19,6 +19,38 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
+class Vector3(Message):
+    """A free vector."""
+
+    TYPE: ClassVar[str] = "geometry_msgs/msg/Vector3"
+    HASH: ClassVar[str] = "RIHS01_cc12fe83e4c02719f1ce8070bfd14aecd40f75a96696a67a2a1f37f7dbb0765d"
+    FIELDS: ClassVar[Fields] = {
+        "x": "float64",
+        "y": "float64",
+        "z": "float64",
+    }
+
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Accel(Message):
+    """An acceleration, linear and angular."""
+
+    TYPE: ClassVar[str] = "geometry_msgs/msg/Accel"
+    HASH: ClassVar[str] = "RIHS01_dc448243ded9b1fcbcca24aba0c22f013dae06c354ba2d849571c0a2a3f57ca0"
+    FIELDS: ClassVar[Fields] = {
+        "linear": "geometry_msgs/msg/Vector3",
+        "angular": "geometry_msgs/msg/Vector3",
+    }
+
+    linear: Vector3 = field(default_factory=Vector3)
+    angular: Vector3 = field(default_factory=Vector3)
+
+
+@dataclass(frozen=True, slots=True)
 class Point(Message):
     """A position [m]."""
 
@@ -33,6 +65,51 @@ class Point(Message):
     x: float = 0.0
     y: float = 0.0
     z: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Point32(Message):
+    """A point [m], in half the digits."""
+
+    TYPE: ClassVar[str] = "geometry_msgs/msg/Point32"
+    HASH: ClassVar[str] = "RIHS01_2fc4db7cae16a4582c79a56b66173a8d48d52c7dc520ddc55a0d4bcf2a4bfdbc"
+    FIELDS: ClassVar[Fields] = {
+        "x": "float32",
+        "y": "float32",
+        "z": "float32",
+    }
+
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class PointStamped(Message):
+    """A point with its frame and time."""
+
+    TYPE: ClassVar[str] = "geometry_msgs/msg/PointStamped"
+    HASH: ClassVar[str] = "RIHS01_4c0296af86e01e562e9e0405d138a01537247580076c58ea38d7923ac1045897"
+    FIELDS: ClassVar[Fields] = {
+        "header": "std_msgs/msg/Header",
+        "point": "geometry_msgs/msg/Point",
+    }
+
+    header: std_msgs.Header = field(default_factory=std_msgs.Header)
+    point: Point = field(default_factory=Point)
+
+
+@dataclass(frozen=True, slots=True)
+class Polygon(Message):
+    """A closed line of points."""
+
+    TYPE: ClassVar[str] = "geometry_msgs/msg/Polygon"
+    HASH: ClassVar[str] = "RIHS01_3782f9f0bf044964d692d6c017d705e37611afb1f0bf6a9dee248a7dda0f784a"
+    FIELDS: ClassVar[Fields] = {
+        "points": "geometry_msgs/msg/Point32[]",
+    }
+
+    points: tuple[Point32, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,23 +174,6 @@ class PoseWithCovariance(ArrayMessage):
 
     pose: Pose = field(default_factory=Pose)
     covariance: NDArray[np.float64] = field(default_factory=lambda: zeros("float64", 36))  # row-major 6x6
-
-
-@dataclass(frozen=True, slots=True)
-class Vector3(Message):
-    """A free vector."""
-
-    TYPE: ClassVar[str] = "geometry_msgs/msg/Vector3"
-    HASH: ClassVar[str] = "RIHS01_cc12fe83e4c02719f1ce8070bfd14aecd40f75a96696a67a2a1f37f7dbb0765d"
-    FIELDS: ClassVar[Fields] = {
-        "x": "float64",
-        "y": "float64",
-        "z": "float64",
-    }
-
-    x: float = 0.0
-    y: float = 0.0
-    z: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,3 +251,18 @@ class TwistWithCovariance(ArrayMessage):
 
     twist: Twist = field(default_factory=Twist)
     covariance: NDArray[np.float64] = field(default_factory=lambda: zeros("float64", 36))  # row-major 6x6
+
+
+@dataclass(frozen=True, slots=True)
+class Wrench(Message):
+    """A force [N] and a torque [Nm]."""
+
+    TYPE: ClassVar[str] = "geometry_msgs/msg/Wrench"
+    HASH: ClassVar[str] = "RIHS01_018e8519d57c16adbe97c9fe1460ef21fec7e31bc541de3d653a35895677ce52"
+    FIELDS: ClassVar[Fields] = {
+        "force": "geometry_msgs/msg/Vector3",
+        "torque": "geometry_msgs/msg/Vector3",
+    }
+
+    force: Vector3 = field(default_factory=Vector3)
+    torque: Vector3 = field(default_factory=Vector3)

@@ -15,6 +15,8 @@ from rbxcompose.units import (
     Dimension,
 )
 
+Measures = Mapping[str, "Dimension | Measures | None"]
+"""What numbers of a message measure, by field: a map for a nested message, None for what depends on other fields."""
 _GEOMETRY = "geometry_msgs/msg/"
 _MEASURES: Mapping[tuple[str, str], Dimension] = {
     (f"{_GEOMETRY}Twist", "linear"): SPEED,

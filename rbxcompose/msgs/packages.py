@@ -15,7 +15,7 @@ _XML = """<?xml version="1.0"?>
   <name>{package}</name>
   <version>{version}</version>
   <description>Messages, services and actions of rbxcompose.</description>
-  <maintainer email="rbxcompose@localhost">rbxcompose</maintainer>
+  <maintainer email="rbxcompose@example.org">rbxcompose</maintainer>
   <license>{licence}</license>
   <buildtool_depend>ament_cmake</buildtool_depend>
   <buildtool_depend>rosidl_default_generators</buildtool_depend>

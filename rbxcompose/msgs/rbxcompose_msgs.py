@@ -9,13 +9,140 @@ from dataclasses import field
 from typing import TYPE_CHECKING, ClassVar
 
 from rbxcompose.dataclass import dataclass
-from rbxcompose.msgs import builtin_interfaces, geometry_msgs, unique_identifier_msgs
+from rbxcompose.msgs import builtin_interfaces, geometry_msgs, std_msgs, unique_identifier_msgs
 from rbxcompose.msgs.arrays import ArrayMessage, zeros
 from rbxcompose.msgs.types import Action, Fields, Message, Service
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+
+
+class FollowPoint(Action["FollowPoint.Goal", "FollowPoint.Result", "FollowPoint.Feedback"]):
+    """Lead the tip of an arm after a point that somebody tells, until that is lost."""
+
+    TYPE: ClassVar[str] = "rbxcompose_msgs/action/FollowPoint"
+    HASH: ClassVar[str] = "RIHS01_1cbddc3c7c49791de5b68f2a2273a700552e05a6046a1995c33c86ff2f908e87"
+
+    @dataclass(frozen=True, slots=True)
+    class Goal(Message):
+        """Goal of `FollowPoint`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/FollowPoint_Goal"
+        HASH: ClassVar[str] = "RIHS01_81427e6418fe9ace971ab9ed719fe1e3f702ca20038365ac14580c30f0e5288e"
+        FIELDS: ClassVar[Fields] = {
+            "patience": "float64",
+        }
+
+        patience: float = 0.0  # [s] without a point after which it is lost; 0 is 2 s
+
+    @dataclass(frozen=True, slots=True)
+    class Result(Message):
+        """Result of `FollowPoint`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/FollowPoint_Result"
+        HASH: ClassVar[str] = "RIHS01_24f109ce0670007758b1405a964838e4ea9a27a8e0dc662a8d4762911b5ec46f"
+        FIELDS: ClassVar[Fields] = {
+            "outcome": "string",
+            "message": "string",
+        }
+
+        outcome: str = ""  # lost, or the reason why the arm cannot rest
+        message: str = ""
+
+    @dataclass(frozen=True, slots=True)
+    class Feedback(Message):
+        """Feedback of `FollowPoint`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/FollowPoint_Feedback"
+        HASH: ClassVar[str] = "RIHS01_e8d2bef498cfb6f6ea75c085965ab17290ad780334d22655862808ffffbbb1d5"
+        FIELDS: ClassVar[Fields] = {
+            "state": "string",
+            "distance": "float64",
+        }
+
+        state: str = ""  # waiting, following, there, or far
+        distance: float = 0.0  # [m] from the tip to where it should be
+
+    class SendGoal(Service["FollowPoint.SendGoal.Request", "FollowPoint.SendGoal.Response"]):
+        """Sends a goal of `FollowPoint`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/FollowPoint_SendGoal"
+        HASH: ClassVar[str] = "RIHS01_6848f4d589fcab17433787841367da425e91161d60bd7cd3c46bcce681f89827"
+
+        @dataclass(frozen=True, slots=True)
+        class Request(Message):
+            """Request of `FollowPoint.SendGoal`."""
+
+            TYPE: ClassVar[str] = "rbxcompose_msgs/action/FollowPoint_SendGoal_Request"
+            HASH: ClassVar[str] = "RIHS01_c86563d1fd25dc75a368da66636ea387e1f84e62021ff43f1cc1756551245dfb"
+            FIELDS: ClassVar[Fields] = {
+                "goal_id": "unique_identifier_msgs/msg/UUID",
+                "goal": "rbxcompose_msgs/action/FollowPoint_Goal",
+            }
+
+            goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+            goal: FollowPoint.Goal = field(default_factory=lambda: FollowPoint.Goal())
+
+        @dataclass(frozen=True, slots=True)
+        class Response(Message):
+            """Response of `FollowPoint.SendGoal`."""
+
+            TYPE: ClassVar[str] = "rbxcompose_msgs/action/FollowPoint_SendGoal_Response"
+            HASH: ClassVar[str] = "RIHS01_555e816806b78ec590aca53966721209e310302aa4b3c67bfa3b959cd3b11d3a"
+            FIELDS: ClassVar[Fields] = {
+                "accepted": "bool",
+                "stamp": "builtin_interfaces/msg/Time",
+            }
+
+            accepted: bool = False
+            stamp: builtin_interfaces.Time = field(default_factory=builtin_interfaces.Time)
+
+    class GetResult(Service["FollowPoint.GetResult.Request", "FollowPoint.GetResult.Response"]):
+        """Waits for the result of a goal of `FollowPoint`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/FollowPoint_GetResult"
+        HASH: ClassVar[str] = "RIHS01_eed9bf2b579b211cb16b3fb52789d592e663ee17de7916da05a440bb13c37c17"
+
+        @dataclass(frozen=True, slots=True)
+        class Request(Message):
+            """Request of `FollowPoint.GetResult`."""
+
+            TYPE: ClassVar[str] = "rbxcompose_msgs/action/FollowPoint_GetResult_Request"
+            HASH: ClassVar[str] = "RIHS01_c356786b6a2a514403207148fbce97a4b3f56d98758732d04f652a67642b9424"
+            FIELDS: ClassVar[Fields] = {
+                "goal_id": "unique_identifier_msgs/msg/UUID",
+            }
+
+            goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+
+        @dataclass(frozen=True, slots=True)
+        class Response(Message):
+            """Response of `FollowPoint.GetResult`."""
+
+            TYPE: ClassVar[str] = "rbxcompose_msgs/action/FollowPoint_GetResult_Response"
+            HASH: ClassVar[str] = "RIHS01_8282c0ded274c0b3712e249b2660d35a1e0c49a6382d53232f55027985df0788"
+            FIELDS: ClassVar[Fields] = {
+                "status": "int8",
+                "result": "rbxcompose_msgs/action/FollowPoint_Result",
+            }
+
+            status: int = 0
+            result: FollowPoint.Result = field(default_factory=lambda: FollowPoint.Result())
+
+    @dataclass(frozen=True, slots=True)
+    class FeedbackMessage(Message):
+        """Feedback of `FollowPoint` and the goal that it is about."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/FollowPoint_FeedbackMessage"
+        HASH: ClassVar[str] = "RIHS01_e7776a8267c41a764f6f9f8ad6de8c3e2fa15045acd5828988dc90a93f6619d0"
+        FIELDS: ClassVar[Fields] = {
+            "goal_id": "unique_identifier_msgs/msg/UUID",
+            "feedback": "rbxcompose_msgs/action/FollowPoint_Feedback",
+        }
+
+        goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+        feedback: FollowPoint.Feedback = field(default_factory=lambda: FollowPoint.Feedback())
 
 
 class Grip(Action["Grip.Goal", "Grip.Result", "Grip.Feedback"]):
@@ -149,24 +276,241 @@ class Grip(Action["Grip.Goal", "Grip.Result", "Grip.Feedback"]):
         feedback: Grip.Feedback = field(default_factory=lambda: Grip.Feedback())
 
 
+class LookAtPoint(Action["LookAtPoint.Goal", "LookAtPoint.Result", "LookAtPoint.Feedback"]):
+    """Point the camera of a head at a point."""
+
+    TYPE: ClassVar[str] = "rbxcompose_msgs/action/LookAtPoint"
+    HASH: ClassVar[str] = "RIHS01_7ba7ba281d6af50cd89f82167c04ae7d67963f333b2bffaf9f0dbb386f303d20"
+
+    @dataclass(frozen=True, slots=True)
+    class Goal(Message):
+        """Goal of `LookAtPoint`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/LookAtPoint_Goal"
+        HASH: ClassVar[str] = "RIHS01_efd91166a258fec995606c2615efea259effd7b532bdde1d754d3db225fecf73"
+        FIELDS: ClassVar[Fields] = {
+            "object": "string",
+            "x": "float64",
+            "y": "float64",
+            "z": "float64",
+            "frame": "string",
+            "tolerance": "float64",
+            "duration": "float64",
+        }
+
+        object: str = ""  # of the scene, whose middle is the point; empty is none
+        x: float = 0.0  # [m] of the point in `frame`
+        y: float = 0.0
+        z: float = 0.0
+        frame: str = ""  # a link of the body, or a frame outside of it that the head knows; empty is the body's root
+        tolerance: float = 0.0  # [rad] by which it may look past the point; 0 is 1 degree
+        duration: float = 0.0  # [s] that it takes; 0 is as fast as its joints can
+
+    @dataclass(frozen=True, slots=True)
+    class Result(Message):
+        """Result of `LookAtPoint`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/LookAtPoint_Result"
+        HASH: ClassVar[str] = "RIHS01_3c2655e0409a753ef1f10aad7cffc376a88c0f049146c9009834a215701a6bef"
+        FIELDS: ClassVar[Fields] = {
+            "outcome": "string",
+            "message": "string",
+            "angle": "float64",
+        }
+
+        outcome: str = ""  # the reason of a failure, of a closed list
+        message: str = ""
+        angle: float = 0.0  # [rad] by which it looks past the point
+
+    @dataclass(frozen=True, slots=True)
+    class Feedback(Message):
+        """Feedback of `LookAtPoint`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/LookAtPoint_Feedback"
+        HASH: ClassVar[str] = "RIHS01_885cf513a039c72b7347474a1cb6dd77c74a309931a9ce416ba72bf0bca5553f"
+        FIELDS: ClassVar[Fields] = {
+            "angle": "float64",
+        }
+
+        angle: float = 0.0  # [rad]
+
+    class SendGoal(Service["LookAtPoint.SendGoal.Request", "LookAtPoint.SendGoal.Response"]):
+        """Sends a goal of `LookAtPoint`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/LookAtPoint_SendGoal"
+        HASH: ClassVar[str] = "RIHS01_3ed24cbff1f28113ffcbac30e50f4d3575682c4f8188c7513ac75d8a1ba242b8"
+
+        @dataclass(frozen=True, slots=True)
+        class Request(Message):
+            """Request of `LookAtPoint.SendGoal`."""
+
+            TYPE: ClassVar[str] = "rbxcompose_msgs/action/LookAtPoint_SendGoal_Request"
+            HASH: ClassVar[str] = "RIHS01_f74ad3c6c07ddfb60c2c0078b914ecddd9e6e8f3695e97511832ef083f0c6202"
+            FIELDS: ClassVar[Fields] = {
+                "goal_id": "unique_identifier_msgs/msg/UUID",
+                "goal": "rbxcompose_msgs/action/LookAtPoint_Goal",
+            }
+
+            goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+            goal: LookAtPoint.Goal = field(default_factory=lambda: LookAtPoint.Goal())
+
+        @dataclass(frozen=True, slots=True)
+        class Response(Message):
+            """Response of `LookAtPoint.SendGoal`."""
+
+            TYPE: ClassVar[str] = "rbxcompose_msgs/action/LookAtPoint_SendGoal_Response"
+            HASH: ClassVar[str] = "RIHS01_edaeee5ba4a8c86b190806113c59ec96617f367502ba44cc839f3f76795ec061"
+            FIELDS: ClassVar[Fields] = {
+                "accepted": "bool",
+                "stamp": "builtin_interfaces/msg/Time",
+            }
+
+            accepted: bool = False
+            stamp: builtin_interfaces.Time = field(default_factory=builtin_interfaces.Time)
+
+    class GetResult(Service["LookAtPoint.GetResult.Request", "LookAtPoint.GetResult.Response"]):
+        """Waits for the result of a goal of `LookAtPoint`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/LookAtPoint_GetResult"
+        HASH: ClassVar[str] = "RIHS01_592bae886f6ead770e4e63422a5258298f70a2eec86ac7f2999c57a1655ce1f7"
+
+        @dataclass(frozen=True, slots=True)
+        class Request(Message):
+            """Request of `LookAtPoint.GetResult`."""
+
+            TYPE: ClassVar[str] = "rbxcompose_msgs/action/LookAtPoint_GetResult_Request"
+            HASH: ClassVar[str] = "RIHS01_5aa49190bcce76aa86d3ade24b7f17e403c1a4de352d26ff5128bd9e8644268a"
+            FIELDS: ClassVar[Fields] = {
+                "goal_id": "unique_identifier_msgs/msg/UUID",
+            }
+
+            goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+
+        @dataclass(frozen=True, slots=True)
+        class Response(Message):
+            """Response of `LookAtPoint.GetResult`."""
+
+            TYPE: ClassVar[str] = "rbxcompose_msgs/action/LookAtPoint_GetResult_Response"
+            HASH: ClassVar[str] = "RIHS01_3b58fed679acadb2fdfd5d68090cdce06f6e1f0c573168796d01049bebd919e5"
+            FIELDS: ClassVar[Fields] = {
+                "status": "int8",
+                "result": "rbxcompose_msgs/action/LookAtPoint_Result",
+            }
+
+            status: int = 0
+            result: LookAtPoint.Result = field(default_factory=lambda: LookAtPoint.Result())
+
+    @dataclass(frozen=True, slots=True)
+    class FeedbackMessage(Message):
+        """Feedback of `LookAtPoint` and the goal that it is about."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/LookAtPoint_FeedbackMessage"
+        HASH: ClassVar[str] = "RIHS01_511b19abbf2cf8f5a88b379741d71caff79280673e1575c8de531dbf4522cba9"
+        FIELDS: ClassVar[Fields] = {
+            "goal_id": "unique_identifier_msgs/msg/UUID",
+            "feedback": "rbxcompose_msgs/action/LookAtPoint_Feedback",
+        }
+
+        goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+        feedback: LookAtPoint.Feedback = field(default_factory=lambda: LookAtPoint.Feedback())
+
+
+@dataclass(frozen=True, slots=True)
+class JointRange(Message):
+    """Where a joint may be."""
+
+    TYPE: ClassVar[str] = "rbxcompose_msgs/msg/JointRange"
+    HASH: ClassVar[str] = "RIHS01_68ccb127d7f899e76bee37e0abdfc3f6a4750d5584bad23d95105a518f7b874b"
+    FIELDS: ClassVar[Fields] = {
+        "name": "string",
+        "lower": "float64",
+        "upper": "float64",
+    }
+
+    name: str = ""
+    lower: float = 0.0  # [rad or m]
+    upper: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Sight(Message):
+    """What a sensor of the body sees: a disc that faces it, and nothing in the cone between them."""
+
+    TYPE: ClassVar[str] = "rbxcompose_msgs/msg/Sight"
+    HASH: ClassVar[str] = "RIHS01_e36fad9baefd008f3650a05d2cd50cba63c3c7f2e157d815da602b2e7bf84c4f"
+    FIELDS: ClassVar[Fields] = {
+        "sensor": "string",
+        "along": "string",
+        "target": "string",
+        "x": "float64",
+        "y": "float64",
+        "z": "float64",
+        "radius": "float64",
+        "angle": "float64",
+        "through": "string[]",
+    }
+
+    sensor: str = ""  # a link; without one, nothing is asked for
+    along: str = ""  # the axis of its frame along which it looks: x, y or z; empty is z of `..._optical_frame`, else x
+    target: str = ""  # the link in whose frame the middle of the disc is; empty is the root of the body
+    x: float = 0.0  # [m]
+    y: float = 0.0
+    z: float = 0.0
+    radius: float = 0.0  # [m] of the disc; 0 is 1 cm
+    angle: float = 0.0  # [rad] by which it may be off the axis; 0 is 30 degrees
+    through: tuple[str, ...] = ()  # links and objects that may be in between
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PathConstraints(ArrayMessage):
+    """What an arm keeps on its whole way."""
+
+    TYPE: ClassVar[str] = "rbxcompose_msgs/msg/PathConstraints"
+    HASH: ClassVar[str] = "RIHS01_6c22cd96f98c63ae3effbf882b875e69477b174c98efb6545f50e3b735cff21d"
+    FIELDS: ClassVar[Fields] = {
+        "roll": "float64",
+        "pitch": "float64",
+        "yaw": "float64",
+        "frame": "string",
+        "x": "float64[]",
+        "y": "float64[]",
+        "z": "float64[]",
+        "joints": "rbxcompose_msgs/msg/JointRange[]",
+        "sight": "rbxcompose_msgs/msg/Sight",
+    }
+
+    roll: float = 0.0  # [rad] by which the tip may be turned from how it is at the start, about x of `frame`; 0 is any
+    pitch: float = 0.0  # about y
+    yaw: float = 0.0  # about z
+    frame: str = ""  # a link of the body; empty is its root
+    x: NDArray[np.float64] = field(default_factory=lambda: zeros("float64", 0))  # [m] of the tip: from, to; or anything
+    y: NDArray[np.float64] = field(default_factory=lambda: zeros("float64", 0))
+    z: NDArray[np.float64] = field(default_factory=lambda: zeros("float64", 0))
+    joints: tuple[JointRange, ...] = ()
+    sight: Sight = field(default_factory=Sight)  # what a sensor sees
+
+
 class MoveArm(Action["MoveArm.Goal", "MoveArm.Result", "MoveArm.Feedback"]):
     """Plan a motion of an arm, verify it, and carry it out."""
 
     TYPE: ClassVar[str] = "rbxcompose_msgs/action/MoveArm"
-    HASH: ClassVar[str] = "RIHS01_30f676c93edb50a13fddf10ef0af05a4321ea40619db64d4e56d599c44235a4c"
+    HASH: ClassVar[str] = "RIHS01_5af952e2ea1df5b19d8162887e8a888caad3f83c67617ffc60e696c825759fb4"
 
     @dataclass(frozen=True, slots=True, eq=False)
     class Goal(ArrayMessage):
         """Goal of `MoveArm`."""
 
         TYPE: ClassVar[str] = "rbxcompose_msgs/action/MoveArm_Goal"
-        HASH: ClassVar[str] = "RIHS01_95469303712bb0672df99dedc8afcdd94c54cfa516aff05d12a0a7d09cfcbbb4"
+        HASH: ClassVar[str] = "RIHS01_8cd3b837e3290faefb4dd15c690655ff19c42baeb1f71f0179b2f68cc413327a"
         FIELDS: ClassVar[Fields] = {
             "pose": "string",
             "joints": "string[]",
             "positions": "float64[]",
             "speed": "float64",
             "acceleration": "float64",
+            "tolerance": "float64",
+            "keep": "rbxcompose_msgs/msg/PathConstraints",
+            "replan": "uint8",
         }
 
         pose: str = ""  # its name; empty if only joints are given
@@ -174,6 +518,9 @@ class MoveArm(Action["MoveArm.Goal", "MoveArm.Result", "MoveArm.Feedback"]):
         positions: NDArray[np.float64] = field(default_factory=lambda: zeros("float64", 0))  # [rad or m]
         speed: float = 0.0  # share of the greatest speeds of joints; 0 is all
         acceleration: float = 0.0  # share of the greatest accelerations; 0 is all
+        tolerance: float = 0.0  # [rad or m] by which joints may be elsewhere at the end if they cannot be there
+        keep: PathConstraints = field(default_factory=PathConstraints)  # on the whole way
+        replan: int = 3  # times that it is planned again when the scene has changed on its way
 
     @dataclass(frozen=True, slots=True)
     class Result(Message):
@@ -205,14 +552,14 @@ class MoveArm(Action["MoveArm.Goal", "MoveArm.Result", "MoveArm.Feedback"]):
         """Sends a goal of `MoveArm`."""
 
         TYPE: ClassVar[str] = "rbxcompose_msgs/action/MoveArm_SendGoal"
-        HASH: ClassVar[str] = "RIHS01_ba3a140029257a750ed3523d212ba0ee87c96f76e9ae5890e42d86fba5f411c3"
+        HASH: ClassVar[str] = "RIHS01_4704723bf897e03e17d860df9bb31778c5132054ebe4409dcc4ff37a08df16a5"
 
         @dataclass(frozen=True, slots=True)
         class Request(Message):
             """Request of `MoveArm.SendGoal`."""
 
             TYPE: ClassVar[str] = "rbxcompose_msgs/action/MoveArm_SendGoal_Request"
-            HASH: ClassVar[str] = "RIHS01_a4bc3dc33a507592c277f35cb9092f4324ac073da0e2d6154a27aee5544862cc"
+            HASH: ClassVar[str] = "RIHS01_6b2ec0a249e7e64b76dc998de67da38dce2863d320e814c37d33b826f586e247"
             FIELDS: ClassVar[Fields] = {
                 "goal_id": "unique_identifier_msgs/msg/UUID",
                 "goal": "rbxcompose_msgs/action/MoveArm_Goal",
@@ -405,18 +752,308 @@ class MoveJoints(Action["MoveJoints.Goal", "MoveJoints.Result", "MoveJoints.Feed
         feedback: MoveJoints.Feedback = field(default_factory=lambda: MoveJoints.Feedback())
 
 
+class PickObject(Action["PickObject.Goal", "PickObject.Result", "PickObject.Feedback"]):
+    """Grasp an object of the scene, and lift it."""
+
+    TYPE: ClassVar[str] = "rbxcompose_msgs/action/PickObject"
+    HASH: ClassVar[str] = "RIHS01_889ddcd633caf8edc1dc7065809377acff032c540c96f3171d8ccac3629c938e"
+
+    @dataclass(frozen=True, slots=True)
+    class Goal(Message):
+        """Goal of `PickObject`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/PickObject_Goal"
+        HASH: ClassVar[str] = "RIHS01_93d351597d3bd24f65bff1761ea1359ab714862cbcc7655b3cf53c5a6bd89706"
+        FIELDS: ClassVar[Fields] = {
+            "object": "string",
+            "approach": "float64",
+            "lift": "float64",
+            "opening": "float64",
+            "squeeze": "float64",
+            "speed": "float64",
+            "acceleration": "float64",
+        }
+
+        object: str = ""
+        approach: float = 0.0  # [m] of the straight way to the grasp; 0 is 8 cm
+        lift: float = 0.0  # [m] of the straight way up; 0 is 8 cm
+        opening: float = 0.0  # [m] with which the gripper goes to it; 0 is 3 cm more than its width
+        squeeze: float = 0.0  # [m] by which the gripper is asked to close farther than its width
+        speed: float = 0.0  # share of the greatest speeds of joints; 0 is all
+        acceleration: float = 0.0  # share of the greatest accelerations; 0 is all
+
+    @dataclass(frozen=True, slots=True)
+    class Result(Message):
+        """Result of `PickObject`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/PickObject_Result"
+        HASH: ClassVar[str] = "RIHS01_8657582ebc3f0981895f3bc9107dc378d2f03f525913344fd968d790d20317ae"
+        FIELDS: ClassVar[Fields] = {
+            "outcome": "string",
+            "message": "string",
+            "stage": "string",
+            "held": "string",
+        }
+
+        outcome: str = ""  # the reason of a failure, of a closed list
+        message: str = ""
+        stage: str = ""  # the one that failed
+        held: str = ""  # the object that the arm holds, if it holds one
+
+    @dataclass(frozen=True, slots=True)
+    class Feedback(Message):
+        """Feedback of `PickObject`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/PickObject_Feedback"
+        HASH: ClassVar[str] = "RIHS01_7fa40ca64b37e8a7f50c953103912b225beacbb6c43cad0cd789fb89c840e820"
+        FIELDS: ClassVar[Fields] = {
+            "stage": "string",
+        }
+
+        stage: str = ""
+
+    class SendGoal(Service["PickObject.SendGoal.Request", "PickObject.SendGoal.Response"]):
+        """Sends a goal of `PickObject`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/PickObject_SendGoal"
+        HASH: ClassVar[str] = "RIHS01_fbe7410fb485eeb9ebdb386eb3dc6203945153474a938fa7f580caa5e7f72953"
+
+        @dataclass(frozen=True, slots=True)
+        class Request(Message):
+            """Request of `PickObject.SendGoal`."""
+
+            TYPE: ClassVar[str] = "rbxcompose_msgs/action/PickObject_SendGoal_Request"
+            HASH: ClassVar[str] = "RIHS01_691ab7f6142e368dff7f2089fb459129042ba774592c6eafbbdaae3adea98a7e"
+            FIELDS: ClassVar[Fields] = {
+                "goal_id": "unique_identifier_msgs/msg/UUID",
+                "goal": "rbxcompose_msgs/action/PickObject_Goal",
+            }
+
+            goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+            goal: PickObject.Goal = field(default_factory=lambda: PickObject.Goal())
+
+        @dataclass(frozen=True, slots=True)
+        class Response(Message):
+            """Response of `PickObject.SendGoal`."""
+
+            TYPE: ClassVar[str] = "rbxcompose_msgs/action/PickObject_SendGoal_Response"
+            HASH: ClassVar[str] = "RIHS01_0e609e2a50ef344b9b4b87e1860a7f7061eeb5806ba5881bb88a009f262cc7a0"
+            FIELDS: ClassVar[Fields] = {
+                "accepted": "bool",
+                "stamp": "builtin_interfaces/msg/Time",
+            }
+
+            accepted: bool = False
+            stamp: builtin_interfaces.Time = field(default_factory=builtin_interfaces.Time)
+
+    class GetResult(Service["PickObject.GetResult.Request", "PickObject.GetResult.Response"]):
+        """Waits for the result of a goal of `PickObject`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/PickObject_GetResult"
+        HASH: ClassVar[str] = "RIHS01_8d26ff4f8d4a685c887b577284c10c1a31701370fa38e6e8397a60b14bfdbf66"
+
+        @dataclass(frozen=True, slots=True)
+        class Request(Message):
+            """Request of `PickObject.GetResult`."""
+
+            TYPE: ClassVar[str] = "rbxcompose_msgs/action/PickObject_GetResult_Request"
+            HASH: ClassVar[str] = "RIHS01_9ca3a8657332cc96bc05394d4aa584a1b30821e93e66677afde811d0a1daa6e0"
+            FIELDS: ClassVar[Fields] = {
+                "goal_id": "unique_identifier_msgs/msg/UUID",
+            }
+
+            goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+
+        @dataclass(frozen=True, slots=True)
+        class Response(Message):
+            """Response of `PickObject.GetResult`."""
+
+            TYPE: ClassVar[str] = "rbxcompose_msgs/action/PickObject_GetResult_Response"
+            HASH: ClassVar[str] = "RIHS01_d98427af9bb99eabcbfa9c8b0a494b647eae6e574242154bade5646f378e6c58"
+            FIELDS: ClassVar[Fields] = {
+                "status": "int8",
+                "result": "rbxcompose_msgs/action/PickObject_Result",
+            }
+
+            status: int = 0
+            result: PickObject.Result = field(default_factory=lambda: PickObject.Result())
+
+    @dataclass(frozen=True, slots=True)
+    class FeedbackMessage(Message):
+        """Feedback of `PickObject` and the goal that it is about."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/PickObject_FeedbackMessage"
+        HASH: ClassVar[str] = "RIHS01_e4199e44ba85302f7834f827a04f2e3f9dcf6931523279479030e6d96e12dfdd"
+        FIELDS: ClassVar[Fields] = {
+            "goal_id": "unique_identifier_msgs/msg/UUID",
+            "feedback": "rbxcompose_msgs/action/PickObject_Feedback",
+        }
+
+        goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+        feedback: PickObject.Feedback = field(default_factory=lambda: PickObject.Feedback())
+
+
+class PlaceObject(Action["PlaceObject.Goal", "PlaceObject.Result", "PlaceObject.Feedback"]):
+    """Put down the object that an arm holds."""
+
+    TYPE: ClassVar[str] = "rbxcompose_msgs/action/PlaceObject"
+    HASH: ClassVar[str] = "RIHS01_b4329d1e4cdaab1092e69bf10dadacbe74ca22bf6093d251fcd323c8e12267a5"
+
+    @dataclass(frozen=True, slots=True)
+    class Goal(Message):
+        """Goal of `PlaceObject`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/PlaceObject_Goal"
+        HASH: ClassVar[str] = "RIHS01_49bfd51960673677c36ddd0db0e2bde3a8d78c5b4c39d589280dbced40ceb0f2"
+        FIELDS: ClassVar[Fields] = {
+            "spot": "string",
+            "x": "float64",
+            "y": "float64",
+            "z": "float64",
+            "frame": "string",
+            "on": "string",
+            "tolerance": "float64",
+            "approach": "float64",
+            "retreat": "float64",
+            "speed": "float64",
+            "acceleration": "float64",
+        }
+
+        spot: str = ""  # a place by name, instead of the fields before `tolerance`
+        x: float = 0.0  # [m] of its middle in `frame`, or from the middle of the upper face of `on`
+        y: float = 0.0
+        z: float = 0.0
+        frame: str = ""  # a link of the body; empty is its root
+        on: str = ""  # an object of the scene, upon which it is put
+        tolerance: float = 0.0  # [m] by which x and y may be missed if the very point is out of reach
+        approach: float = 0.0  # [m] of the straight way down; 0 is 8 cm
+        retreat: float = 0.0  # [m] of the straight way back; 0 is 8 cm
+        speed: float = 0.0  # share of the greatest speeds of joints; 0 is all
+        acceleration: float = 0.0  # share of the greatest accelerations; 0 is all
+
+    @dataclass(frozen=True, slots=True)
+    class Result(Message):
+        """Result of `PlaceObject`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/PlaceObject_Result"
+        HASH: ClassVar[str] = "RIHS01_85b12951993fb826a44ee11b20f4f162c1f2feac7ee5b858a15a2c5dc53d45fa"
+        FIELDS: ClassVar[Fields] = {
+            "outcome": "string",
+            "message": "string",
+            "stage": "string",
+            "held": "string",
+        }
+
+        outcome: str = ""  # the reason of a failure, of a closed list
+        message: str = ""
+        stage: str = ""  # the one that failed
+        held: str = ""  # the object that the arm still holds, if it holds one
+
+    @dataclass(frozen=True, slots=True)
+    class Feedback(Message):
+        """Feedback of `PlaceObject`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/PlaceObject_Feedback"
+        HASH: ClassVar[str] = "RIHS01_edba9ad7936e237ec4c407e76164dbe317469302f39f7536278dcd7ec46e66d5"
+        FIELDS: ClassVar[Fields] = {
+            "stage": "string",
+        }
+
+        stage: str = ""
+
+    class SendGoal(Service["PlaceObject.SendGoal.Request", "PlaceObject.SendGoal.Response"]):
+        """Sends a goal of `PlaceObject`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/PlaceObject_SendGoal"
+        HASH: ClassVar[str] = "RIHS01_1b566915be15e384f5a7ae64a4f40909f91e30f07b6eb6e89ca4b94ca3e38d9f"
+
+        @dataclass(frozen=True, slots=True)
+        class Request(Message):
+            """Request of `PlaceObject.SendGoal`."""
+
+            TYPE: ClassVar[str] = "rbxcompose_msgs/action/PlaceObject_SendGoal_Request"
+            HASH: ClassVar[str] = "RIHS01_2c72e5565d90db40a099b2d955f98b2389844d035e6878fa799196ed190799b4"
+            FIELDS: ClassVar[Fields] = {
+                "goal_id": "unique_identifier_msgs/msg/UUID",
+                "goal": "rbxcompose_msgs/action/PlaceObject_Goal",
+            }
+
+            goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+            goal: PlaceObject.Goal = field(default_factory=lambda: PlaceObject.Goal())
+
+        @dataclass(frozen=True, slots=True)
+        class Response(Message):
+            """Response of `PlaceObject.SendGoal`."""
+
+            TYPE: ClassVar[str] = "rbxcompose_msgs/action/PlaceObject_SendGoal_Response"
+            HASH: ClassVar[str] = "RIHS01_411a57749a5448ce1ae76c0c1adb8d3b14e1c0ebbc4dd3ce85cd0ca08ad30df9"
+            FIELDS: ClassVar[Fields] = {
+                "accepted": "bool",
+                "stamp": "builtin_interfaces/msg/Time",
+            }
+
+            accepted: bool = False
+            stamp: builtin_interfaces.Time = field(default_factory=builtin_interfaces.Time)
+
+    class GetResult(Service["PlaceObject.GetResult.Request", "PlaceObject.GetResult.Response"]):
+        """Waits for the result of a goal of `PlaceObject`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/PlaceObject_GetResult"
+        HASH: ClassVar[str] = "RIHS01_a1fc906317d8fa2d1c9727e9b91df398728d8c9730a658850f2e2aacd1378e5b"
+
+        @dataclass(frozen=True, slots=True)
+        class Request(Message):
+            """Request of `PlaceObject.GetResult`."""
+
+            TYPE: ClassVar[str] = "rbxcompose_msgs/action/PlaceObject_GetResult_Request"
+            HASH: ClassVar[str] = "RIHS01_a2b34ea36db0f6b02d63c7f1aac9823bbae23caa0e63aab8f08a5db60bd6d63a"
+            FIELDS: ClassVar[Fields] = {
+                "goal_id": "unique_identifier_msgs/msg/UUID",
+            }
+
+            goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+
+        @dataclass(frozen=True, slots=True)
+        class Response(Message):
+            """Response of `PlaceObject.GetResult`."""
+
+            TYPE: ClassVar[str] = "rbxcompose_msgs/action/PlaceObject_GetResult_Response"
+            HASH: ClassVar[str] = "RIHS01_2244d45be76a39e11afee0ed854fcd2256da87b0a8d907dc4b9e93fd0c51c0ea"
+            FIELDS: ClassVar[Fields] = {
+                "status": "int8",
+                "result": "rbxcompose_msgs/action/PlaceObject_Result",
+            }
+
+            status: int = 0
+            result: PlaceObject.Result = field(default_factory=lambda: PlaceObject.Result())
+
+    @dataclass(frozen=True, slots=True)
+    class FeedbackMessage(Message):
+        """Feedback of `PlaceObject` and the goal that it is about."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/PlaceObject_FeedbackMessage"
+        HASH: ClassVar[str] = "RIHS01_88b2775281cc1e2edba836ca17a6ac8b79534bacba20a7f596d37685f9be8e97"
+        FIELDS: ClassVar[Fields] = {
+            "goal_id": "unique_identifier_msgs/msg/UUID",
+            "feedback": "rbxcompose_msgs/action/PlaceObject_Feedback",
+        }
+
+        goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+        feedback: PlaceObject.Feedback = field(default_factory=lambda: PlaceObject.Feedback())
+
+
 class ReachPose(Action["ReachPose.Goal", "ReachPose.Result", "ReachPose.Feedback"]):
     """Bring the tip of an arm to a pose, on a way that is planned and verified."""
 
     TYPE: ClassVar[str] = "rbxcompose_msgs/action/ReachPose"
-    HASH: ClassVar[str] = "RIHS01_e7492a87895b6a80e43e0a107ceecb4d793605a9e83e798555b3d5907fccaad0"
+    HASH: ClassVar[str] = "RIHS01_3f4665597c282cc88965176a8346bebe7eebf274b9bebaeae5e5b1cd1ac28006"
 
     @dataclass(frozen=True, slots=True)
     class Goal(Message):
         """Goal of `ReachPose`."""
 
         TYPE: ClassVar[str] = "rbxcompose_msgs/action/ReachPose_Goal"
-        HASH: ClassVar[str] = "RIHS01_d1bc502410968d73c30acdd0f23c7a070bc4faaf4de84fc5b4e1aab2298918e7"
+        HASH: ClassVar[str] = "RIHS01_0433f03fc9235c64b70d1abc6eeec475d564cb62ced486fb389a262937ff2ed1"
         FIELDS: ClassVar[Fields] = {
             "x": "float64",
             "y": "float64",
@@ -430,6 +1067,8 @@ class ReachPose(Action["ReachPose.Goal", "ReachPose.Result", "ReachPose.Feedback
             "angle_tolerance": "float64",
             "speed": "float64",
             "acceleration": "float64",
+            "keep": "rbxcompose_msgs/msg/PathConstraints",
+            "replan": "uint8",
         }
 
         x: float = 0.0  # [m] of the tip in `frame`
@@ -444,6 +1083,8 @@ class ReachPose(Action["ReachPose.Goal", "ReachPose.Result", "ReachPose.Feedback
         angle_tolerance: float = 0.0  # [rad]; 0 is 0.5 degrees
         speed: float = 0.0  # share of the greatest speeds of joints; 0 is all
         acceleration: float = 0.0  # share of the greatest accelerations; 0 is all
+        keep: PathConstraints = field(default_factory=PathConstraints)  # on the whole way
+        replan: int = 3  # times that it is planned again when the scene has changed on its way
 
     @dataclass(frozen=True, slots=True)
     class Result(Message):
@@ -475,14 +1116,14 @@ class ReachPose(Action["ReachPose.Goal", "ReachPose.Result", "ReachPose.Feedback
         """Sends a goal of `ReachPose`."""
 
         TYPE: ClassVar[str] = "rbxcompose_msgs/action/ReachPose_SendGoal"
-        HASH: ClassVar[str] = "RIHS01_44d60ea8d34e7f0411c2ed9586678c3bb3c7f67c9ef6123db2c5108d80dc4c61"
+        HASH: ClassVar[str] = "RIHS01_1c547b99ca120e7181f6f3ad0da2824cb4d8c3b320163084281b8e559a62c343"
 
         @dataclass(frozen=True, slots=True)
         class Request(Message):
             """Request of `ReachPose.SendGoal`."""
 
             TYPE: ClassVar[str] = "rbxcompose_msgs/action/ReachPose_SendGoal_Request"
-            HASH: ClassVar[str] = "RIHS01_e618a13b379b157bab031f07f70096e29cd21739a0e3531c369c4f85cc8f7d5c"
+            HASH: ClassVar[str] = "RIHS01_c6d55ef77ad42b0f86abecb06ca22204ca1885d63ad4c49feefcc3288ed43b11"
             FIELDS: ClassVar[Fields] = {
                 "goal_id": "unique_identifier_msgs/msg/UUID",
                 "goal": "rbxcompose_msgs/action/ReachPose_Goal",
@@ -673,40 +1314,311 @@ class Recharge(Action["Recharge.Goal", "Recharge.Result", "Recharge.Feedback"]):
         feedback: Recharge.Feedback = field(default_factory=lambda: Recharge.Feedback())
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class SceneObject(ArrayMessage):
-    """A thing that arms must not hit, or that one of them holds."""
+@dataclass(frozen=True, slots=True)
+class TipPoint(Message):
+    """A pose of the tip of an arm on its way."""
 
-    TYPE: ClassVar[str] = "rbxcompose_msgs/msg/SceneObject"
-    HASH: ClassVar[str] = "RIHS01_5b77623c22d0b72daf6a4eb34ce6855092adb89e37398d507dfce74c2134107a"
+    TYPE: ClassVar[str] = "rbxcompose_msgs/msg/TipPoint"
+    HASH: ClassVar[str] = "RIHS01_e5c973a340451e9e30863151da867024ca0e5f0075c0ce21bc52b9422e46ecc0"
     FIELDS: ClassVar[Fields] = {
-        "name": "string",
-        "shape": "string",
-        "size": "float64[]",
-        "link": "string",
-        "pose": "geometry_msgs/msg/Pose",
-        "touches": "string[]",
+        "x": "float64",
+        "y": "float64",
+        "z": "float64",
+        "roll": "float64",
+        "pitch": "float64",
+        "yaw": "float64",
+        "via": "bool",
     }
 
-    name: str = ""
-    shape: str = ""  # box, cylinder or sphere
-    size: NDArray[np.float64] = field(default_factory=lambda: zeros("float64", 0))  # [m]: sides, or radius and length
-    link: str = ""  # of the body, with which it moves
-    pose: geometry_msgs.Pose = field(default_factory=geometry_msgs.Pose)  # in the frame of the link
-    touches: tuple[str, ...] = ()  # links that it may touch
+    x: float = 0.0  # [m]
+    y: float = 0.0
+    z: float = 0.0
+    roll: float = 0.0  # [rad]
+    pitch: float = 0.0
+    yaw: float = 0.0
+    via: bool = False  # whether it is in the middle of an arc, which ends at the next point; its angles do not count
+
+
+class TraceArm(Action["TraceArm.Goal", "TraceArm.Result", "TraceArm.Feedback"]):
+    """Lead the tip of an arm along straight lines and arcs, on a way that is verified."""
+
+    TYPE: ClassVar[str] = "rbxcompose_msgs/action/TraceArm"
+    HASH: ClassVar[str] = "RIHS01_25868d4a99d52f8c5f564109646a47c43fc047aad8d2e9724f6252092954b959"
+
+    @dataclass(frozen=True, slots=True)
+    class Goal(Message):
+        """Goal of `TraceArm`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/TraceArm_Goal"
+        HASH: ClassVar[str] = "RIHS01_12bf9f829e78896197b59d75334656a780d091de48e0631b4d374d96e946a244"
+        FIELDS: ClassVar[Fields] = {
+            "points": "rbxcompose_msgs/msg/TipPoint[]",
+            "frame": "string",
+            "relative": "bool",
+            "keep_orientation": "bool",
+            "any_orientation": "bool",
+            "speed": "float64",
+            "acceleration": "float64",
+            "blend": "float64",
+            "least": "float64",
+        }
+
+        points: tuple[TipPoint, ...] = ()
+        frame: str = ""  # a link of the body in whose frame they are, or along whose axes; empty is its root
+        relative: bool = False  # whether they are shifts and turns from where the tip is at the start
+        keep_orientation: bool = False  # whether the tip stays turned as it is at the start
+        any_orientation: bool = False  # whether only the position counts
+        speed: float = 0.0  # [m/s] of the tip; 0 is as fast as the joints are
+        acceleration: float = 0.0  # share of the greatest accelerations of joints; 0 is all
+        blend: float = 0.0  # [m] before each corner from which on the tip cuts it; 0 is to rest there
+        least: float = 0.0  # share of the way that must be possible for the arm to move; 0 is all
+
+    @dataclass(frozen=True, slots=True)
+    class Result(Message):
+        """Result of `TraceArm`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/TraceArm_Result"
+        HASH: ClassVar[str] = "RIHS01_2679be4e764689a8e0759ad5aea613a3623ebfb440f03a81be82e6ce3f4325b1"
+        FIELDS: ClassVar[Fields] = {
+            "outcome": "string",
+            "message": "string",
+            "fraction": "float64",
+        }
+
+        outcome: str = ""  # the reason of a failure, of a closed list
+        message: str = ""
+        fraction: float = 0.0  # of the way that was found, from 0 to 1
+
+    @dataclass(frozen=True, slots=True)
+    class Feedback(Message):
+        """Feedback of `TraceArm`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/TraceArm_Feedback"
+        HASH: ClassVar[str] = "RIHS01_062cfc59f27c8d5224a9f8f480511440c6a5f66bf19067a9c2de244e8d622d93"
+        FIELDS: ClassVar[Fields] = {
+            "stage": "string",
+        }
+
+        stage: str = ""  # planning or moving
+
+    class SendGoal(Service["TraceArm.SendGoal.Request", "TraceArm.SendGoal.Response"]):
+        """Sends a goal of `TraceArm`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/TraceArm_SendGoal"
+        HASH: ClassVar[str] = "RIHS01_d8fbf19bc6295284b18cb338b5f177f7c2b354830bf84245a741042494f61439"
+
+        @dataclass(frozen=True, slots=True)
+        class Request(Message):
+            """Request of `TraceArm.SendGoal`."""
+
+            TYPE: ClassVar[str] = "rbxcompose_msgs/action/TraceArm_SendGoal_Request"
+            HASH: ClassVar[str] = "RIHS01_94508715d6298e5a5bd319e860f27efea09ae70a140ae443f214a18b5139bf33"
+            FIELDS: ClassVar[Fields] = {
+                "goal_id": "unique_identifier_msgs/msg/UUID",
+                "goal": "rbxcompose_msgs/action/TraceArm_Goal",
+            }
+
+            goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+            goal: TraceArm.Goal = field(default_factory=lambda: TraceArm.Goal())
+
+        @dataclass(frozen=True, slots=True)
+        class Response(Message):
+            """Response of `TraceArm.SendGoal`."""
+
+            TYPE: ClassVar[str] = "rbxcompose_msgs/action/TraceArm_SendGoal_Response"
+            HASH: ClassVar[str] = "RIHS01_2366feef77d0b5e5c751186f34e6011a25b6322f9f3d7b9f4e8359a136b4e354"
+            FIELDS: ClassVar[Fields] = {
+                "accepted": "bool",
+                "stamp": "builtin_interfaces/msg/Time",
+            }
+
+            accepted: bool = False
+            stamp: builtin_interfaces.Time = field(default_factory=builtin_interfaces.Time)
+
+    class GetResult(Service["TraceArm.GetResult.Request", "TraceArm.GetResult.Response"]):
+        """Waits for the result of a goal of `TraceArm`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/TraceArm_GetResult"
+        HASH: ClassVar[str] = "RIHS01_dcd2070ab8bae90146d8985ca2e59ed81935581996f610202162d379a90bf062"
+
+        @dataclass(frozen=True, slots=True)
+        class Request(Message):
+            """Request of `TraceArm.GetResult`."""
+
+            TYPE: ClassVar[str] = "rbxcompose_msgs/action/TraceArm_GetResult_Request"
+            HASH: ClassVar[str] = "RIHS01_39eb94e2516a5d84c21e8386875bc153b879fa63b1c5fa4c1cca7203af46bf4d"
+            FIELDS: ClassVar[Fields] = {
+                "goal_id": "unique_identifier_msgs/msg/UUID",
+            }
+
+            goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+
+        @dataclass(frozen=True, slots=True)
+        class Response(Message):
+            """Response of `TraceArm.GetResult`."""
+
+            TYPE: ClassVar[str] = "rbxcompose_msgs/action/TraceArm_GetResult_Response"
+            HASH: ClassVar[str] = "RIHS01_a1d5737eb2e857af86cc9136747843673435b2b5ce312f85c774c34890463578"
+            FIELDS: ClassVar[Fields] = {
+                "status": "int8",
+                "result": "rbxcompose_msgs/action/TraceArm_Result",
+            }
+
+            status: int = 0
+            result: TraceArm.Result = field(default_factory=lambda: TraceArm.Result())
+
+    @dataclass(frozen=True, slots=True)
+    class FeedbackMessage(Message):
+        """Feedback of `TraceArm` and the goal that it is about."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/action/TraceArm_FeedbackMessage"
+        HASH: ClassVar[str] = "RIHS01_0ed0a6a13119afc95bd9b64f8b9bd7c9e87c840a0f9b54d54a4bc0fdca106311"
+        FIELDS: ClassVar[Fields] = {
+            "goal_id": "unique_identifier_msgs/msg/UUID",
+            "feedback": "rbxcompose_msgs/action/TraceArm_Feedback",
+        }
+
+        goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
+        feedback: TraceArm.Feedback = field(default_factory=lambda: TraceArm.Feedback())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SceneShape(ArrayMessage):
+    """A shape of a thing in the planning scene; what its numbers mean depends on its kind."""
+
+    TYPE: ClassVar[str] = "rbxcompose_msgs/msg/SceneShape"
+    HASH: ClassVar[str] = "RIHS01_890882ebd45e4e2f4ab71ab89cc8fa3d3fe104af180cb29b7a2f3d5a1ad5b66e"
+    FIELDS: ClassVar[Fields] = {
+        "kind": "string",
+        "size": "float64[]",
+        "file": "string",
+        "points": "float64[]",
+        "triangles": "uint32[]",
+        "pose": "geometry_msgs/msg/Pose",
+    }
+
+    kind: str = ""  # box, cylinder, cone, sphere, plane, mesh or octree
+    size: NDArray[np.float64] = field(default_factory=lambda: zeros("float64", 0))  # [m]
+    file: str = ""  # of a mesh or an octree, or without one:
+    points: NDArray[np.float64] = field(default_factory=lambda: zeros("float64", 0))  # [m]
+    triangles: NDArray[np.uint32] = field(default_factory=lambda: zeros("uint32", 0))
+    pose: geometry_msgs.Pose = field(default_factory=geometry_msgs.Pose)  # in the frame of the object
 
 
 @dataclass(frozen=True, slots=True)
-class SceneObjects(Message):
+class SceneObject(Message):
+    """A thing that arms must not hit, or that one of them holds."""
+
+    TYPE: ClassVar[str] = "rbxcompose_msgs/msg/SceneObject"
+    HASH: ClassVar[str] = "RIHS01_0d6a8d5d79759f7557e927b629ae06b6fb411a861a4bb97b6907ac57757fadc8"
+    FIELDS: ClassVar[Fields] = {
+        "name": "string",
+        "link": "string",
+        "pose": "geometry_msgs/msg/Pose",
+        "shapes": "rbxcompose_msgs/msg/SceneShape[]",
+        "touches": "string[]",
+        "touches_objects": "string[]",
+        "padding": "float64",
+        "color": "std_msgs/msg/ColorRGBA",
+    }
+
+    name: str = ""
+    link: str = ""  # of the body, with which it moves
+    pose: geometry_msgs.Pose = field(default_factory=geometry_msgs.Pose)  # in the frame of the link
+    shapes: tuple[SceneShape, ...] = ()
+    touches: tuple[str, ...] = ()  # links that it may touch
+    touches_objects: tuple[str, ...] = ()  # other things that it may touch
+    padding: float = 0.0  # [m] that all else keeps from it
+    color: std_msgs.ColorRGBA = field(default_factory=std_msgs.ColorRGBA)  # none if its opacity is 0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SceneObjects(ArrayMessage):
     """All things that arms must not hit."""
 
     TYPE: ClassVar[str] = "rbxcompose_msgs/msg/SceneObjects"
-    HASH: ClassVar[str] = "RIHS01_240364b75c24b838a25b6d4e78e08e6a41019075adce1ab9151d98fdd59f6144"
+    HASH: ClassVar[str] = "RIHS01_a995be81e35febef6aecab70adea2d15ded8a96ab7b7a75d3adcf3aecc4caac5"
     FIELDS: ClassVar[Fields] = {
         "objects": "rbxcompose_msgs/msg/SceneObject[]",
+        "problem": "string",
+        "padded_links": "string[]",
+        "paddings": "float64[]",
     }
 
     objects: tuple[SceneObject, ...] = ()
+    problem: str = ""  # why not all of them are known; nothing may be planned then
+    padded_links: tuple[str, ...] = ()  # links that keep away from all objects
+    paddings: NDArray[np.float64] = field(default_factory=lambda: zeros("float64", 0))  # [m] how far each of them does
+
+
+class AttachObject(Service["AttachObject.Request", "AttachObject.Response"]):
+    """Let an object of the scene move with a link from now on; it stays where it is."""
+
+    TYPE: ClassVar[str] = "rbxcompose_msgs/srv/AttachObject"
+    HASH: ClassVar[str] = "RIHS01_125240fda0e5871cd1a79bf0aa7d75082325daacead5854778a6c8416a795d2b"
+
+    @dataclass(frozen=True, slots=True)
+    class Request(Message):
+        """Request of `AttachObject`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/srv/AttachObject_Request"
+        HASH: ClassVar[str] = "RIHS01_4808e677f977e201ec530126836641ef717d8bbcf6a27581b9836ab06433ff42"
+        FIELDS: ClassVar[Fields] = {
+            "object": "string",
+            "link": "string",
+            "touches": "string[]",
+        }
+
+        object: str = ""
+        link: str = ""
+        touches: tuple[str, ...] = ()  # links that it may touch; without any, the link and all that it carries
+
+    @dataclass(frozen=True, slots=True)
+    class Response(Message):
+        """Response of `AttachObject`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/srv/AttachObject_Response"
+        HASH: ClassVar[str] = "RIHS01_061d7123b23c49e581b0802add4a747c16431a7740cfbfb37a48d68590c63542"
+        FIELDS: ClassVar[Fields] = {
+            "success": "bool",
+            "message": "string",
+        }
+
+        success: bool = False
+        message: str = ""
+
+
+class DetachObject(Service["DetachObject.Request", "DetachObject.Response"]):
+    """Let an object of the scene stay where it is."""
+
+    TYPE: ClassVar[str] = "rbxcompose_msgs/srv/DetachObject"
+    HASH: ClassVar[str] = "RIHS01_06fe8ce6320f7af6b9a88415734cc65a947a3a2a69334e22fe96a874f74cd7a9"
+
+    @dataclass(frozen=True, slots=True)
+    class Request(Message):
+        """Request of `DetachObject`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/srv/DetachObject_Request"
+        HASH: ClassVar[str] = "RIHS01_682f919e30bff42922e317de4cc0e55fb02e43d78c6cb38f2b2392d0bf87d360"
+        FIELDS: ClassVar[Fields] = {
+            "object": "string",
+        }
+
+        object: str = ""
+
+    @dataclass(frozen=True, slots=True)
+    class Response(Message):
+        """Response of `DetachObject`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/srv/DetachObject_Response"
+        HASH: ClassVar[str] = "RIHS01_1da37213c137b0971e5c1647af37179b73f90341af409ba4c00686d2527d1f1a"
+        FIELDS: ClassVar[Fields] = {
+            "success": "bool",
+            "message": "string",
+        }
+
+        success: bool = False
+        message: str = ""
 
 
 class SetBatteryLevel(Service["SetBatteryLevel.Request", "SetBatteryLevel.Response"]):

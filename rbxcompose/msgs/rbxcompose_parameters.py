@@ -14,6 +14,25 @@ from rbxcompose.msgs.types import Fields, Message, Service
 
 
 @dataclass(frozen=True, slots=True)
+class NodeChange(Message):
+    """New values of parameters of one component."""
+
+    TYPE: ClassVar[str] = "rbxcompose_parameters/msg/NodeChange"
+    HASH: ClassVar[str] = "RIHS01_c2bd3700cc299801b756bb06a1660f45bf8b695317c4ff297191368ddb3ae2b8"
+    FIELDS: ClassVar[Fields] = {
+        "node": "string",
+        "parameters": "rcl_interfaces/msg/Parameter[]",
+        "expected": "rcl_interfaces/msg/Parameter[]",
+        "undoes": "uint32",
+    }
+
+    node: str = ""  # its name, such as /left/battery
+    parameters: tuple[rcl_interfaces.Parameter, ...] = ()
+    expected: tuple[rcl_interfaces.Parameter, ...] = ()  # values that these must still have
+    undoes: int = 0  # the change that this takes back; 0: none
+
+
+@dataclass(frozen=True, slots=True)
 class ParameterChange(Message):
     """A change of a parameter while the robot ran."""
 
@@ -43,21 +62,21 @@ class ParameterChange(Message):
 
 
 class ChangeParameters(Service["ChangeParameters.Request", "ChangeParameters.Response"]):
-    """Set parameters if others still have the values that the caller knows; ask for the changes so far."""
+    """Set parameters, within the rules of the robot; ask for the changes so far."""
 
     TYPE: ClassVar[str] = "rbxcompose_parameters/srv/ChangeParameters"
-    HASH: ClassVar[str] = "RIHS01_97ee3fe09d52af993ec59f8b00ea74070d1ab2724557670f6e6bab46709dd7cf"
+    HASH: ClassVar[str] = "RIHS01_002782b28860ab045db4c57bf3d4f8531df5add3286427649eb53170a5444e3e"
 
     @dataclass(frozen=True, slots=True)
     class Request(Message):
         """Request of `ChangeParameters`."""
 
         TYPE: ClassVar[str] = "rbxcompose_parameters/srv/ChangeParameters_Request"
-        HASH: ClassVar[str] = "RIHS01_e88ea29566e00fcc17f966815801d2c6fb0859a0d35202182f20031a6e0e21e2"
+        HASH: ClassVar[str] = "RIHS01_a5489da0a936a4b236c48892c08dc7deed2dbb45590b65f3492e10974963f9e9"
         FIELDS: ClassVar[Fields] = {
             "parameters": "rcl_interfaces/msg/Parameter[]",
             "expected": "rcl_interfaces/msg/Parameter[]",
-            "only_check": "bool",
+            "others": "rbxcompose_parameters/msg/NodeChange[]",
             "tell_changes": "bool",
             "by": "string",
             "together": "string",
@@ -66,7 +85,7 @@ class ChangeParameters(Service["ChangeParameters.Request", "ChangeParameters.Res
 
         parameters: tuple[rcl_interfaces.Parameter, ...] = ()
         expected: tuple[rcl_interfaces.Parameter, ...] = ()  # values that these must still have
-        only_check: bool = False  # change nothing
+        others: tuple[NodeChange, ...] = ()  # of other components: with these, all or none
         tell_changes: bool = False  # answer with the last changes
         by: str = ""  # who asks
         together: str = ""  # the same for all changes of one transaction
@@ -77,13 +96,19 @@ class ChangeParameters(Service["ChangeParameters.Request", "ChangeParameters.Res
         """Response of `ChangeParameters`."""
 
         TYPE: ClassVar[str] = "rbxcompose_parameters/srv/ChangeParameters_Response"
-        HASH: ClassVar[str] = "RIHS01_621d8752486793ea9b4987ad8acc25e81d577c0495d2e72d99ddcc871093a098"
+        HASH: ClassVar[str] = "RIHS01_39abb9089fd6aaea57eb48be98a832748c958f8fc2f91441241ebf9c269c9242"
         FIELDS: ClassVar[Fields] = {
             "success": "bool",
             "message": "string",
+            "help": "string",
+            "breaks_rule": "bool",
+            "is_half_done": "bool",
             "changes": "rbxcompose_parameters/msg/ParameterChange[]",
         }
 
         success: bool = False
         message: str = ""  # why nothing was changed
+        help: str = ""  # what to do instead
+        breaks_rule: bool = False  # it is a rule about the whole robot
+        is_half_done: bool = False  # a component did not take its old values back
         changes: tuple[ParameterChange, ...] = ()  # oldest first

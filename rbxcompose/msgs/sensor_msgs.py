@@ -327,6 +327,27 @@ class MagneticField(ArrayMessage):
 
 
 @dataclass(frozen=True, slots=True)
+class MultiDOFJointState(Message):
+    """Poses of joints that move in several ways."""
+
+    TYPE: ClassVar[str] = "sensor_msgs/msg/MultiDOFJointState"
+    HASH: ClassVar[str] = "RIHS01_4d4ded702cfba7ff3ec783835c1a1425f75e53939a430ff355d1fee4b3bbc40b"
+    FIELDS: ClassVar[Fields] = {
+        "header": "std_msgs/msg/Header",
+        "joint_names": "string[]",
+        "transforms": "geometry_msgs/msg/Transform[]",
+        "twist": "geometry_msgs/msg/Twist[]",
+        "wrench": "geometry_msgs/msg/Wrench[]",
+    }
+
+    header: std_msgs.Header = field(default_factory=std_msgs.Header)
+    joint_names: tuple[str, ...] = ()
+    transforms: tuple[geometry_msgs.Transform, ...] = ()
+    twist: tuple[geometry_msgs.Twist, ...] = ()
+    wrench: tuple[geometry_msgs.Wrench, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class NavSatStatus(Message):
     """Whether a receiver of satellites knows its place, and from which."""
 

@@ -32,6 +32,25 @@ class Bool(Message):
 
 
 @dataclass(frozen=True, slots=True)
+class ColorRGBA(Message):
+    """A colour: red, green, blue and opacity, from 0 to 1."""
+
+    TYPE: ClassVar[str] = "std_msgs/msg/ColorRGBA"
+    HASH: ClassVar[str] = "RIHS01_77a7a5b9ae477306097665106e0413ba74440245b1f3d0c6d6405fe5c7813fe8"
+    FIELDS: ClassVar[Fields] = {
+        "r": "float32",
+        "g": "float32",
+        "b": "float32",
+        "a": "float32",
+    }
+
+    r: float = 0.0
+    g: float = 0.0
+    b: float = 0.0
+    a: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class Empty(Message):
     """Says only that something happened."""
 

@@ -166,7 +166,11 @@ def _wait(ending: MuxEnding | None, profile: MuxProfile) -> float:
 
 
 def _ramp(config: MuxConfig) -> Ramp[Any] | None:
-    made, limits = RAMPS.get(config.message), config.handover
-    if made is None or limits is None:
-        return None
-    return made(*(math.inf if one is None else one for one in (limits.linear, limits.angular)))
+    made = RAMPS.get(config.message)
+    return None if made is None or config.handover is None else made(*handover_limits(config.handover))
+
+
+def handover_limits(limits: HandoverLimits | None) -> tuple[float, float]:
+    """Return the limits of a hand-over [m/s^2, rad/s^2]; infinite where there is none."""
+    linear, angular = (limits.linear, limits.angular) if limits else (None, None)
+    return math.inf if linear is None else linear, math.inf if angular is None else angular

@@ -116,6 +116,11 @@ class MuxCore(Generic[M]):
         self._last, self._shape = (name, message), message
         return message
 
+    def bound(self, linear: float, angular: float) -> None:
+        """Bound hand-overs, also one that goes on, by other limits."""
+        if self._handover is not None:
+            self._handover.limit(linear, angular)
+
     def heartbeat(self, lock: str, now: float) -> None:
         """Receive a heartbeat of `lock`: it blocks nothing until it has been silent for its timeout."""
         self.locks.heard(lock, now, is_on=False)

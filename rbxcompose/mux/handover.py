@@ -32,6 +32,10 @@ class TwistRamp:
         self._linear, self._angular = linear, angular
         self._last: tuple[Twist, float] | None = None  # what came out last, and when; None if nothing is bounded
 
+    def limit(self, linear: float, angular: float) -> None:
+        """Have other limits from now on."""
+        self._linear, self._angular = linear, angular
+
     def begin(self, last: Twist, now: float) -> None:
         """Begin at the velocity that came out last."""
         self._last = last, now
@@ -60,6 +64,10 @@ class StampedTwistRamp:
 
     def __init__(self, linear: float = math.inf, angular: float = math.inf) -> None:
         self._ramp = TwistRamp(linear, angular)
+
+    def limit(self, linear: float, angular: float) -> None:
+        """Have other limits from now on."""
+        self._ramp.limit(linear, angular)
 
     def begin(self, last: TwistStamped, now: float) -> None:
         """Begin at the velocity that came out last."""

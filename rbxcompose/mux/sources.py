@@ -46,6 +46,10 @@ class LockSource:
 class Ramp(Protocol[M]):
     """Bounds how fast the output changes from what one source commanded to what the next one commands."""
 
+    def limit(self, linear: float, angular: float) -> None:
+        """Have other limits from now on [m/s^2, rad/s^2]."""
+        ...
+
     def begin(self, last: M, now: float) -> None:
         """Begin at `last`, which came out before another source took over."""
         ...

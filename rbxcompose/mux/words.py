@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from rbxcompose.config import Acceleration, AngularAcceleration, Config, Time
+from rbxcompose.config import Acceleration, AngularAcceleration, Config, Live, Time
 
 MuxMode = Literal["priority", "select", "latest"]
 MuxProfile = Literal["default", "topic_tools", "twist_mux", "yocs"]
@@ -44,9 +44,9 @@ MuxEnding = Annotated[
 class HandoverLimits(Config):
     """How fast the output may grow from what one source commanded to what the next one commands."""
 
-    linear: Acceleration | None = Field(None, gt=0)
+    linear: Annotated[Acceleration | None, Live()] = Field(None, gt=0)
     """For each axis; without it, it is not limited."""
-    angular: AngularAcceleration | None = Field(None, gt=0)
+    angular: Annotated[AngularAcceleration | None, Live()] = Field(None, gt=0)
     """For each axis; without it, it is not limited."""
 
 

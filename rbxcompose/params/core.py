@@ -11,13 +11,13 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from enum import Enum
 from types import MappingProxyType
-from typing import Any, Literal, get_args, get_origin
+from typing import Any, Literal, TypeVar, get_args, get_origin
 
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from rbxcompose.config import Bound, Config, Dimensioned, is_live
+from rbxcompose.config import Bound, Config, Dimensioned, is_live, leaves, value_at, with_values
 from rbxcompose.dataclass import dataclass
 from rbxcompose.field_docs import field_docs
 from rbxcompose.findings import suggest
@@ -33,6 +33,7 @@ from rbxcompose.msgs.rcl_interfaces import (
 from rbxcompose.params.values import HIGHEST, LOWEST, from_message, parameter_type, to_message
 from rbxcompose.units import RATIO, UNITS, Dimension, Quantity, UnitError, format_number, format_quantity
 
+C = TypeVar("C", bound=Config)
 SEPARATOR = "."
 SettingBounds = Mapping[str, Sequence[Bound]]  # what bounds settings beside their fields, by name
 NO_BOUNDS: SettingBounds = MappingProxyType({})
@@ -53,7 +54,7 @@ class ParameterField:
     field: FieldInfo | None = None
     model: type[Config] | None = None  # whose field it is
     is_whole: bool = True
-    """Whether it is a field of the configuration itself."""
+    """Whether it is a field of the configuration, or of a group of its fields."""
     bounds: Sequence[Bound] = ()
     """What bounds it beside its field."""
 
@@ -172,10 +173,11 @@ def _si_unit(dimension: Dimension | None) -> str:
 def settings(config: Config, bounds: SettingBounds = NO_BOUNDS) -> dict[str, ParameterField]:
     """Return all parameters by name; fields without a plain value, such as a secret, are omitted."""
     found: dict[str, ParameterField] = {}
+    fields = dict(leaves(config))
     for name, field in type(config).model_fields.items():
         for one in _settings_of(name, getattr(config, name), field, type(config)):
-            is_whole = one.name == name
-            found[one.name] = replace(one, is_whole=is_whole, bounds=bounds.get(name, ()) if is_whole else ())
+            is_whole = one.name in fields
+            found[one.name] = replace(one, is_whole=is_whole, bounds=bounds.get(one.name, ()) if is_whole else ())
     return found
 
 
@@ -213,7 +215,7 @@ def listed(known: Iterable[str], prefixes: Sequence[str], depth: int) -> ListPar
     return ListParametersResult(names=tuple(names), prefixes=tuple(above))
 
 
-def changed(config: Config, parameters: Sequence[Parameter], bounds: SettingBounds = NO_BOUNDS) -> Config:
+def changed(config: C, parameters: Sequence[Parameter], bounds: SettingBounds = NO_BOUNDS) -> C:
     """Return the configuration with all of `parameters` set.
 
     Raises:
@@ -222,19 +224,28 @@ def changed(config: Config, parameters: Sequence[Parameter], bounds: SettingBoun
     known = settings(config)
     _require_single(parameters)
     wanted = {one.name: _wanted(known, one) for one in parameters}
-    fields = type(config).model_fields
-    data: dict[str, object] = {}
-    for name, field in fields.items():
-        value = _with_unit(wanted.get(name, getattr(config, name)), dimension_of(field))
-        data[field.alias or name] = _as_choice(name, value, field)
-    try:
-        new = type(config).model_validate(data, strict=True)
-    except ValidationError as error:
-        raise UnsettableError(_reason(error.errors(include_url=False)[0])) from error
+    new, fields = _made(config, wanted), dict(leaves(config))
     for name in wanted:
-        _require_within(name, getattr(new, name), dimension_of(fields[name]), bounds.get(name, ()))
-    same = {name: old for name in wanted if _is_same(old := getattr(config, name), getattr(new, name))}
-    return new.model_copy(update=same)
+        _require_within(name, value_at(new, name), dimension_of(fields[name]), bounds.get(name, ()))
+    same = {name: old for name in wanted if _is_same(old := value_at(config, name), value_at(new, name))}
+    return with_values(new, same)
+
+
+def _made(config: C, wanted: Mapping[str, object], above: str = "") -> C:
+    """Return a validated configuration; names and findings of a group of fields begin with what is `above` it."""
+    data: dict[str, object] = {}
+    for name, field in type(config).model_fields.items():
+        value, path = getattr(config, name), f"{above}{name}"
+        if isinstance(value, Config):
+            is_changed = any(one.startswith(path + SEPARATOR) for one in wanted)
+            data[field.alias or name] = _made(value, wanted, path + SEPARATOR) if is_changed else value
+        else:
+            value = _with_unit(wanted.get(path, value), dimension_of(field))
+            data[field.alias or name] = _as_choice(path, value, field)
+    try:
+        return type(config).model_validate(data, strict=True)
+    except ValidationError as error:
+        raise UnsettableError(_reason(error.errors(include_url=False)[0], above)) from error
 
 
 def _is_same(old: object, new: object) -> bool:
@@ -302,14 +313,14 @@ def _with_unit(value: object, dimension: Dimension | None) -> object:
     return value
 
 
-def _reason(error: ErrorDetails) -> str:
-    name = SEPARATOR.join(map(str, error["loc"]))
+def _reason(error: ErrorDetails, above: str) -> str:
+    name = above + SEPARATOR.join(map(str, error["loc"]))
     cause = error.get("ctx", {}).get("error")
     if isinstance(cause, UnitError):
         words = f"{cause.message}; {cause.detail}" if cause.detail else cause.message
     else:
         words = str(cause or error["msg"]).replace("Input should be", "must be")
-    return f"'{name}' {words}" if name else words
+    return f"'{name.removesuffix(SEPARATOR)}' {words}" if name else words
 
 
 def differences(old: Config, new: Config) -> tuple[Parameter, ...]:

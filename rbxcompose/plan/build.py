@@ -21,7 +21,7 @@ def build_plan(robot: Robot) -> Plan:
         robot=manifest.name,
         file=str(manifest.path),
         instances=tuple(_instance(robot.components[name]) for name in (*order, *last)),
-        bus=BusPlan(bus.domain, bus.namespace or "", bus.port, bus.wire, bus.router, bus.clock, bus.access),
+        bus=BusPlan(bus.domain, bus.namespace or "", bus.port, bus.wire, bus.router, bus.clock, bus.access, bus.links),
         start=manifest.start,
         is_simulated=manifest.is_simulated,
     )

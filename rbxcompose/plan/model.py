@@ -7,6 +7,7 @@ from dataclasses import field, replace
 
 from rbxcompose.config import Bound, Config
 from rbxcompose.dataclass import dataclass
+from rbxcompose.endpoints import LINK_LEASE
 from rbxcompose.levels import Level
 from rbxcompose.restarts import DEFAULT, Restart
 
@@ -60,6 +61,7 @@ class BusPlan:
     router: str | None = None
     clock: str = "own"  # or `external`: robot time follows `/clock`
     access: str = "machine"  # or `user`: the robot's own router takes programs of this user only
+    links: str = "direct"  # or `router`: its processes reach each other by the router only
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,6 +105,37 @@ class Share:
     tls: LinkTls | None = None
     access: tuple[HostAccess, ...] = ()  # with mutual TLS
     downsample: Mapping[str, float] = field(default_factory=dict)  # topic -> most messages per second that cross [Hz]
+    priorities: Mapping[str, str] = field(default_factory=dict)  # topic -> high, medium or low, where it crosses
+    largest: Mapping[str, int] = field(default_factory=dict)  # topic -> largest message that crosses [bytes]
+    lease: float = LINK_LEASE  # [s] of silence after which another host is gone
+
+
+@dataclass(frozen=True, slots=True)
+class SharedWire:
+    """A topic, service or action of a robot that other robots see under another name."""
+
+    own: str  # its name on the robot's bus
+    shared: str  # its name for other robots
+    type: str
+    qos: str = ""  # of a topic
+
+    @property
+    def pattern(self) -> str:
+        """Return the name of all that it is made of for other robots: an action is services and topics."""
+        return f"{self.shared}/_action/*" if "/action/" in self.type else self.shared
+
+
+@dataclass(frozen=True, slots=True)
+class Exchange:
+    """What a host carries between its robot and others: nothing else passes. Robots fetch from each other directly."""
+
+    listen: tuple[str, ...] = ()  # endpoints for robots that fetch
+    connect: tuple[str, ...] = ()  # endpoints of robots to fetch from
+    gives: tuple[SharedWire, ...] = ()
+    takes: tuple[SharedWire, ...] = ()
+    tls: LinkTls | None = None
+    access: tuple[HostAccess, ...] = ()  # with mutual TLS; robots on this host are reached without it
+    lease: float = LINK_LEASE  # [s] of silence after which other robots are gone
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,6 +149,7 @@ class Plan:
     start: str | None = None  # the mission that starts by itself
     is_simulated: bool = True
     share: Share | None = None  # None: the robot runs on one host
+    exchange: Exchange | None = None  # None: nothing is shared with other robots
 
     @property
     def everywhere(self) -> tuple[Instance, ...]:

@@ -10,6 +10,7 @@ from typing import Any, get_args
 from rbxcompose.dataclass import dataclass
 from rbxcompose.robot_events import ComponentNoted, MissionOver, RobotHeld
 from rbxcompose.runtime.host_report import HostReport
+from rbxcompose.runtime.setting_messages import SettingOrder, SettingWord
 from rbxcompose.typed_json import Family
 
 _CHUNK = 65536
@@ -228,6 +229,7 @@ ChannelOrder = (
     | Retire
     | Prepare
     | Reconfigure
+    | SettingOrder
     | Blocked
     | ToHosts
     | Shutdown
@@ -248,6 +250,7 @@ ChannelWord = (
     | Summary
     | Retired
     | Reconfigured
+    | SettingWord
     | FromHost
     | Alive
 )

@@ -13,9 +13,11 @@ import socket
 import struct
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import field
 from pathlib import Path
 from typing import TypeVar
 
+from rbxcompose.dataclass import dataclass
 from rbxcompose.requests import Refused, Request, requests
 from rbxcompose.runtime.folder import SOCKET, RobotFolder
 from rbxcompose.runtime.processes import Process
@@ -49,6 +51,15 @@ def _short_address(folder: Path) -> Iterator[str]:
         os.close(descriptor)
 
 
+@dataclass(slots=True)
+class _Connection:
+    """A client: what has arrived of its request, and what it has not taken yet of the answer."""
+
+    socket: socket.socket
+    received: bytearray = field(default_factory=bytearray)
+    unsent: bytearray = field(default_factory=bytearray)
+
+
 class ControlServer:
     """Takes requests of this user; each is answered once, now or later, by its number."""
 
@@ -57,7 +68,7 @@ class ControlServer:
         self.handle: Handle = lambda request, number: self.refuse(number, "nobody is here")
         self._selector = selector
         self._folder = folder
-        self._connections: dict[int, tuple[socket.socket, bytearray]] = {}
+        self._connections: dict[int, _Connection] = {}
         self._count = 0
         self._listener = self._listen()
 
@@ -111,13 +122,21 @@ class ControlServer:
             self._drop(next(iter(self._connections)))  # the oldest
         self._count += 1
         number = self._count
-        self._connections[number] = (connection, bytearray())
-        self._selector.register(connection, selectors.EVENT_READ, lambda: self._read(number))
+        self._connections[number] = _Connection(connection)
+        self._selector.register(connection, selectors.EVENT_READ, lambda: self._serve(number))
+
+    def _serve(self, number: int) -> None:
+        """Send the rest of an answer, or read more of a request."""
+        if self._connections[number].unsent:
+            self._send(number)
+        else:
+            self._read(number)
 
     def _read(self, number: int) -> None:
-        connection, received = self._connections[number]
+        client = self._connections[number]
+        received = client.received
         try:
-            chunk = connection.recv(_CHUNK)
+            chunk = client.socket.recv(_CHUNK)
         except BlockingIOError:
             return
         except OSError:
@@ -138,16 +157,29 @@ class ControlServer:
             self.handle(request, number)
 
     def _reply(self, number: int, reply: object) -> None:
-        found = self._connections.get(number)
-        if found is None:
-            return  # it did not wait
+        client = self._connections.get(number)
+        if client is not None:  # else it did not wait
+            client.unsent += json.dumps(reply).encode() + b"\n"
+            self._send(number)
+
+    def _send(self, number: int) -> None:
+        """Send as much of the answer as the client takes now; the rest follows when it takes more."""
+        client = self._connections[number]
         try:
-            found[0].sendall(json.dumps(reply).encode() + b"\n")
-        except (BlockingIOError, BrokenPipeError, ConnectionResetError):
-            self._drop(number)  # it does not read
+            del client.unsent[: client.socket.send(client.unsent)]
+        except BlockingIOError:
+            pass  # its buffer is full
+        except OSError:
+            self._drop(number)  # it is gone
+            return
+        self._selector.modify(
+            client.socket,
+            selectors.EVENT_WRITE if client.unsent else selectors.EVENT_READ,
+            lambda: self._serve(number),
+        )
 
     def _drop(self, number: int) -> None:
-        connection, _ = self._connections.pop(number)
+        connection = self._connections.pop(number).socket
         self._selector.unregister(connection)
         connection.close()
 
@@ -203,6 +235,6 @@ def _exchange(folder: RobotFolder, line: bytes, timeout: float) -> bytes:
                 reply = file.readline()
     except (OSError, TimeoutError) as error:
         raise NoAnswerError(str(error)) from error
-    if not reply:
+    if not reply.endswith(b"\n"):
         raise NoAnswerError("the supervisor has closed the connection")
     return reply

@@ -17,6 +17,7 @@ from pathlib import Path
 from rbxcompose.atomic_files import TEMPORARY, replace_file
 from rbxcompose.dataclass import dataclass
 from rbxcompose.regular_files import open_regular
+from rbxcompose.runtime.clock_offset import ClockOffset
 from rbxcompose.runtime.options import NO_LAYERS, ChosenLayers
 from rbxcompose.runtime.processes import Process, boot_id
 from rbxcompose.typed_json import UnreadableError, from_data, to_data
@@ -93,6 +94,9 @@ class RobotState:
     layers: ChosenLayers = NO_LAYERS
     stop: StopState | None = None
     rest_time: float = 1.0  # [s] that it may take to come to rest when it goes down
+    clocks: Mapping[str, ClockOffset] = field(
+        default_factory=dict
+    )  # of other hosts of the robot, against that of this one
 
     def to_text(self) -> str:
         """Return the text of the state file: a checksum, then JSON."""

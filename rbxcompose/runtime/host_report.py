@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import field
 
 from rbxcompose.dataclass import dataclass
+from rbxcompose.runtime.clock_offset import ClockOffset
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,3 +48,4 @@ class HostReport:
     stop: SharedStop = SharedStop()
     states: dict[str, str] = field(default_factory=dict)  # of its components
     end: RobotEnd | None = None
+    clock: ClockOffset | None = None  # its clock against that of the host which hears it, which measures it

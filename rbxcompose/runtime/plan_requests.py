@@ -34,6 +34,7 @@ class PlanComparison:
     impossible: tuple[str, ...]
     generation: int
     why_not: str
+    shares_change: bool = False  # what is known of other hosts, or carried to other robots
 
     @classmethod
     def of(cls, found: Changes, generation: int, why_not: str) -> PlanComparison:
@@ -42,7 +43,7 @@ class PlanComparison:
             ComponentChange(one.instance.name, one.instance.type, one.instance.process, one.fate, one.reasons)
             for one in found.fated
         )
-        return cls(found.before.robot, components, found.impossible, generation, why_not)
+        return cls(found.before.robot, components, found.impossible, generation, why_not, found.shares_change)
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,3 +65,14 @@ class ApplyPlan(Command):
     plan: str
     generation: int
     layers: ChosenLayers = NO_LAYERS
+
+
+@dataclass(frozen=True, slots=True)
+class RevertPlan(Command):
+    """Apply the plan from before the last change; answered when everything new is active.
+
+    With `generation`, only if that change was made to the plan of this generation.
+    """
+
+    about = ROBOT
+    generation: int | None = None

@@ -6,8 +6,10 @@ import ctypes
 import os
 import select
 import signal
+import sys
 import time
-from collections.abc import Iterator, Sequence
+import traceback
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -189,3 +191,26 @@ def describe_exit(status: int) -> str:
     """Return in words how a process ended, from its wait status."""
     code = os.waitstatus_to_exitcode(status)
     return f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with status {code}"
+
+
+def close_all(keep: Sequence[int]) -> None:
+    """Close all descriptors but the standard ones and `keep`: a lock held by mistake would be held for ever."""
+    lowest = 3
+    for descriptor in sorted(set(keep)):
+        os.closerange(lowest, descriptor)
+        lowest = descriptor + 1
+    os.closerange(lowest, os.sysconf("SC_OPEN_MAX"))
+
+
+def in_child(main: Callable[[], None]) -> None:
+    """Run `main` in a process that was just forked and end it there, bypassing all that the parent has registered."""
+    status = 1
+    try:
+        main()
+        status = 0
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(status)

@@ -42,7 +42,7 @@ def _told(section: Schema, definitions: Mapping[str, Schema]) -> Schema:
     about: dict[str, list[str]] = {}
     for name in (one for one in definitions if one.startswith(COMPONENT)):
         for key, schema in definitions[name]["properties"].items():
-            if key not in ("type", *OPTIONS):
+            if key not in ("type", *OPTIONS) and "description" in schema:  # a group of fields may have none
                 about.setdefault(key, []).append(f"Of `{name.removeprefix(COMPONENT)}`: {schema['description']}")
     keys = {key: {"description": "\n\n".join(texts)} for key, texts in sorted(about.items())}
     changed = {"if": {"not": {"anyOf": [{"required": ["type"]}]}}, "then": {"properties": keys}}

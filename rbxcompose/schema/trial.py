@@ -14,7 +14,7 @@ from rbxcompose.schema.scalars import Schema
 from rbxcompose.schema.settle import opened, schemas_of
 
 STEP = "step"
-WORDS: dict[str, Any] = {"robot": str, "mission": Name, "with": dict[Name, Any]}
+WORDS: dict[str, Any] = {"robot": str, "also": list[str], "profile": Name, "mission": Name, "with": dict[Name, Any]}
 _ABOUT = {
     STEP: "A skill, a named node or a state; a skill may be followed by its main argument, or a map of its arguments.",
     "ended": "How it ended: `success`, `failure`, `halted`, `skipped`, `running`, or an outcome of its own.",

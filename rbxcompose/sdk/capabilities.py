@@ -49,7 +49,7 @@ class Drives(Capability):
     drops_above: Setting[float] | None = None
     """It ignores commands above this multiple of its limits instead of limiting them."""
     stops_after: Setting[float] | None = None
-    """It brakes when no command has arrived for this long [s]."""
+    """It brakes when no command has arrived for this long [s]; infinite if never."""
     acceleration: Setting[float] | None = None
     """Acceleration, also of braking [m/s^2]."""
     turn_acceleration: Setting[float] | None = None
@@ -149,6 +149,10 @@ class BoundsGoals(Capability):
     """Arguments that are positions of joints, with the joint of each."""
     ranges: Setting[Mapping[str, tuple[float, float]]] | None = None
     """Arguments with the least and the greatest value of each, in SI."""
+    speed: Setting[float] | None = None
+    """How fast it moves these joints, [rad/s or m/s]."""
+    duration: Setting[str] | None = None
+    """The argument that says how long a motion takes [s], if one that is too fast for its joints is refused."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,6 +170,31 @@ class OpensPort(Capability):
 
     port: Setting[str]
     """A path, or `usb:VENDOR:PRODUCT` with `:SERIAL` behind it if there is one."""
+
+
+@dataclass(frozen=True, slots=True)
+class ConnectedBy(Capability):
+    """Its hardware is at a serial port, which it alone can open; also declared when a twin stands in for it."""
+
+    port: Setting[str]
+    """As in `OpensPort`."""
+
+
+@dataclass(frozen=True, slots=True)
+class ExpectsRate(Capability):
+    """It warns when messages come to its input `port` less often than `least`, or more often than `most` [Hz]."""
+
+    port: str
+    least: Setting[float]
+    most: Setting[float] | None = None
+    tolerance: float = 0.0
+    """The share by which a rate may miss them."""
+
+    def missed_by(self, rate: float) -> Setting[float] | None:
+        """Return the limit that a rate [Hz] does not keep."""
+        if rate < self.least.value * (1 - self.tolerance):
+            return self.least
+        return self.most if self.most and rate > self.most.value * (1 + self.tolerance) else None
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,21 +2,33 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated
 
 from pydantic import AfterValidator
 from pydantic_core import PydanticCustomError
 
+from rbxcompose.findings import nearest
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.definitions import FieldShape
 from rbxcompose.msgs.field_paths import NoFieldError, field_type
+
+_BETWEEN = re.compile(r"[/.:]+")  # the names in that of a type: `.` in Python, `::` in C++
 
 
 def _known(name: str) -> str:
     try:
         return registry.message(name).TYPE
     except KeyError:
-        context = {"name": name, "valid": tuple(registry.names("msg")), "what": "message types"}
+        known = tuple(registry.names("msg"))
+        short = _BETWEEN.split(name)[-1]
+        near = nearest(short, {one.rpartition("/")[-1]: one for one in known})
+        alike = tuple(one for one in known if near and one.rpartition("/")[-1] == near[0])
+        if alike and short == name:
+            full = " or ".join(f"'{one}'" for one in alike)
+            told = {"name": name, "help": f"write it with its package: {full}"}
+            raise PydanticCustomError("message", "there is no message type '{name}'", told) from None
+        context = {"name": name, "valid": alike or known, "what": "message types"}
         raise PydanticCustomError("message", "there is no message type '{name}'", context) from None
 
 

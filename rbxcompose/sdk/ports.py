@@ -10,10 +10,10 @@ from types import MappingProxyType
 from typing import Any, ClassVar, Generic, Protocol, Self, TypeVar, overload
 
 from rbxcompose.msgs.entries import ArrayEntries
+from rbxcompose.msgs.measures import Measures
 from rbxcompose.msgs.types import Action, Message, Service
 from rbxcompose.qos import Qos
 from rbxcompose.sdk.bound import ActionCaller, ActionServer, Caller, Latest, Look, Sender
-from rbxcompose.units import Dimension
 
 M = TypeVar("M", bound=Message)
 Q = TypeVar("Q", bound=Message)
@@ -91,15 +91,18 @@ class In(Port[Latest[M]]):
         is_open: bool = False,
         max_rate: float | None = None,
         max_size: int | None = None,
+        may_be_silent: bool = False,
     ) -> None:
         """Take `is_open` for an input that may also be fed from outside the robot.
+
+        `may_be_silent` is for one whose publishers speak only now and then: nobody misses them.
 
         At most `max_rate` messages per second are taken from each publisher of another process [Hz]; commands are
         always limited. Messages of other processes with more than `max_size` [B] are refused unread.
         """
         super().__init__(topic)
         self.interface, self.qos, self.unit, self.is_open, self.max_rate = message, Qos(qos), unit, is_open, max_rate
-        self.max_size = max_size
+        self.max_size, self.may_be_silent = max_size, may_be_silent
 
 
 class ServesTopic(In[M]):
@@ -199,7 +202,8 @@ class ServesAction(Port[ActionServer[G, R, F]]):
     method `accept_<port>` may refuse a goal by returning the reason. `skill` is its name in missions; without it, that
     is the last word of the topic, and None means that missions do not have it. Its arguments are the fields of the
     goal, and the `entries` of two of its arrays. `measures` are the dimensions of numbers of the goal, so that missions
-    write them with units: `{"opening": LENGTH}`. `choices` are the words that texts of the goal may be; the first of
+    write them with units: `{"opening": LENGTH}`; a map stands for those of a nested message, which becomes an argument
+    by it. `choices` are the words that texts of the goal may be; the first of
     these texts is the main argument.
     """
 
@@ -216,7 +220,7 @@ class ServesAction(Port[ActionServer[G, R, F]]):
         outcomes: Mapping[str, str] = MappingProxyType({}),
         skill: str | None = "",
         entries: ArrayEntries | None = None,
-        measures: Mapping[str, Dimension] = MappingProxyType({}),
+        measures: Measures = MappingProxyType({}),
         choices: Mapping[str, Collection[str]] = MappingProxyType({}),
     ) -> None:
         """Declare the port.
@@ -231,7 +235,7 @@ class ServesAction(Port[ActionServer[G, R, F]]):
         if entries is not None:
             entries.require_in(action.Goal)
         self.entries = entries
-        if wrong := [name for name in measures if action.Goal.FIELDS.get(name) not in ("float32", "float64")]:
+        if wrong := [name for name, one in measures.items() if not _is_measured(action.Goal.FIELDS.get(name, ""), one)]:
             raise ValueError(f"{action.Goal.TYPE} has no number '{wrong[0]}'")
         if wrong := [name for name in choices if action.Goal.FIELDS.get(name) != "string"]:
             raise ValueError(f"{action.Goal.TYPE} has no text '{wrong[0]}'")
@@ -248,6 +252,10 @@ class CallsAction(Port[ActionCaller[G, R, F]]):
     def __init__(self, action: type[Action[G, R, F]], topic: str) -> None:
         super().__init__(topic)
         self.interface = action
+
+
+def _is_measured(ros: str, measure: object) -> bool:
+    return "/" in ros if isinstance(measure, Mapping) else ros in ("float32", "float64")
 
 
 def _require_outcomes(outcomes: Mapping[str, str], end: type[Message] | None) -> None:

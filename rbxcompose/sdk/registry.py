@@ -79,6 +79,20 @@ def usable_names() -> list[str]:
     return [name for name in component_names() if _is_usable(name)]
 
 
+def types_with(port: type[Port[Any]], topic: str, interface: str) -> list[str]:
+    """Return the types of this project that users list and whose class has a port of this kind, topic and ROS type."""
+    own = [name for name in component_names() if name not in PLUGINS.third_party]
+    found = []
+    for name in own:
+        ports = [one for _, one in inspect.getmembers(component_type(name)) if isinstance(one, port)]
+        fitting = (
+            one.topic == topic and one.interface is not None and interface == one.interface.TYPE for one in ports
+        )
+        if any(fitting) and not component_type(name).made_by:
+            found.append(name)
+    return found
+
+
 def _is_usable(name: str) -> bool:
     try:
         component_type(name)

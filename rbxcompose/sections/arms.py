@@ -3,110 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any
+from typing import Annotated
 
-from pydantic import Field, WithJsonSchema, model_validator
+from pydantic import Field, model_validator
 
-from rbxcompose.body.model import Body, BodyJoint
-from rbxcompose.config import Config, JointName, LinkName, Name, Time
-from rbxcompose.control.limits import MotionLimits
+from rbxcompose.arm_model import ChainModel, PlannerModel, SolverModel
+from rbxcompose.body.description import Description
+from rbxcompose.body.link_pairs import LinkPair, PairReason
+from rbxcompose.body.model import Body
+from rbxcompose.config import Config, JointName, Length, LinkName, Name
 from rbxcompose.controller_interface import ControllerConfig, controller_type
 from rbxcompose.dataclass import dataclass
-from rbxcompose.findings import Finding, Related, kind
+from rbxcompose.findings import Finding, Related
+from rbxcompose.hand_config import GraspModel, HandConfig, SpotModel
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading
 from rbxcompose.manifest.tree import at, key_span, value_span
 from rbxcompose.manifest.validate import not_a_choice
 from rbxcompose.manifest.wanted_components import WantedComponent, Wiring
-from rbxcompose.motion.groups import ArmGroup, chain, group_of
+from rbxcompose.motion.group_findings import BEYOND, GRIPPER_ELSEWHERE, NO_CHAIN, NO_GRIPPER, NOT_LED, NOT_OF_ARM
+from rbxcompose.motion.groups import ArmGroup, chain, group_of, moved_links, together
 from rbxcompose.motion.planner_types import PLANNERS
 from rbxcompose.msgs.control_msgs import FollowJointTrajectory, GripperCommand
 from rbxcompose.references import ARM, CONTROLLER, Refers
-from rbxcompose.sdk.ports import ServesAction
+from rbxcompose.sdk.capabilities import BoundsGoals
 from rbxcompose.sections.body import body
 from rbxcompose.sections.controllers import controllers
-from rbxcompose.sections.joints import JointPosition, held_limits, joints
+from rbxcompose.sections.joints import JointPosition
+from rbxcompose.sections.led_joints import follow_topic, joint_limits, limits_in, served_topic, stream_topic
 from rbxcompose.units import ANGLE, LENGTH, Quantity, format_quantity
 
-NO_CHAIN = kind(
-    "RBX2301",
-    """The chain of an arm is none
-
-A chain leads from a link that carries the arm to a link at its end, by joints of which at least one moves. So the end
-is below the beginning in the tree of links: `rbxcompose body tree` shows it.
-
-Bad: `chain: {from: arm_tip, to: torso_link}`
-Good: `chain: {from: torso_link, to: arm_tip}`
-""",
-)
-NOT_LED = kind(
-    "RBX2302",
-    """The controller of an arm does not lead all of its joints
-
-An arm moves along trajectories, which its controller follows: it has the action `FollowJointTrajectory` of ROS, as
-those of the type `joint_trajectory` do, and leads each joint of the arm.
-
-Bad: `arm: {joints: [lift_joint, elbow_joint], controller: lift}`, where `lift` leads `lift_joint` alone.
-Good: `lift: {type: joint_trajectory, joints: [lift_joint, elbow_joint]}` under `controllers:`.
-""",
-)
-NOT_OF_ARM = kind(
-    "RBX2303",
-    """A pose of an arm names a joint that the arm does not have
-
-The joints of an arm are those that move between both ends of its chain, or those under `joints`. A joint that mimics
-another one is not among them.
-
-Bad: `poses: {resting: {head_pan_joint: 0 deg}}` of an arm.
-Good: `poses: {resting: {arm_lift_joint: 0 deg}}`
-""",
-)
-BEYOND = kind(
-    "RBX2304",
-    """An arm cannot take one of its poses
-
-A position is beyond the limits of its joint: those of the body, or the tighter ones under `joints:`. Or it is a length
-for a joint that turns, or an angle for one that slides.
-
-Bad: `poses: {up: {arm_lift_joint: -200 deg}}`, where the joint goes from -150 to 150 deg.
-Good: `poses: {up: {arm_lift_joint: -145 deg}}`
-""",
-)
-NO_GRIPPER = kind(
-    "RBX2305",
-    """The gripper of an arm is none
-
-A gripper is a controller that opens and closes something: it has the action `GripperCommand` of ROS, as those of the
-type `gripper` do.
-
-Bad: `arm: {..., gripper: arm_controller}`
-Good: `arm: {..., gripper: hand}`, where `controllers:` has `hand: {type: gripper, ...}`.
-""",
-)
+MOVE_GROUP = "move_group"
+"""The component that passes goals of programs for MoveIt on to arms."""
 _ROUNDING = 1e-6  # [rad or m]
-PlannerName = Annotated[str, WithJsonSchema({"type": "string", "enum": list(PLANNERS)})]
-
-
-class ChainModel(Config):
-    """From the link that carries an arm to the link at its end."""
-
-    from_: LinkName = Field(alias="from")
-    """The link that carries it."""
-    to: LinkName
-    """The link at its end, whose frame its goals are for."""
-
-
-class PlannerModel(Config):
-    """How motions are planned."""
-
-    type: PlannerName = "rrt_connect"
-    """The planner of OMPL."""
-    time: Time = Field(5.0, gt=0, le=60)
-    """How long it may search."""
-    attempts: int = Field(5, ge=1, le=100)
-    """How many paths it may find that collide when they are examined finely, before it gives up."""
-    seed: int = Field(1, ge=0)
-    """The same seed gives the same path."""
 
 
 class ArmModel(Config):
@@ -116,19 +45,37 @@ class ArmModel(Config):
     """Its joints are those between these links."""
     joints: list[JointName] = []
     """Its joints, instead of a chain."""
+    groups: list[Annotated[Name, Refers(ARM)]] = []
+    """Arms whose joints are its own, instead of a chain; the last one has the tip."""
+    passive: list[JointName] = []
+    """Joints of the chain that nothing drives: motions take them as they are."""
     controller: Annotated[Name, Refers(CONTROLLER)]
     """The controller that leads its joints."""
     gripper: Annotated[Name, Refers(CONTROLLER)] | None = None
     """The controller of its gripper, if it has one."""
+    grasp: LinkName | None = None
+    """The frame between the fingers of the gripper: x ahead, y across; without it, the tip."""
+    squeeze: Length = Field(0.0, ge=0)
+    """By how much the gripper is asked to close farther than an object is wide; simulated fingers feel no objects."""
+    grasps: dict[Name, list[GraspModel]] = {}
+    """How objects may be held, by their names; grasps of others follow from their shapes."""
+    pictures: str | None = Field(None, min_length=1)
+    """A folder, relative to this file, into which each failure of picking and placing draws the scene; 20 are kept."""
+    spots: dict[Name, SpotModel] = {}
+    """Where the arm may put things, by name."""
     poses: dict[Name, dict[JointName, JointPosition]] = {}
     """Positions of joints by the name of the pose; a joint that a pose leaves out stays where it is."""
     planner: PlannerModel = PlannerModel()
     """How its motions are planned."""
+    kinematics: SolverModel = SolverModel()
+    """How positions of joints are searched for a pose of the tip."""
 
     @model_validator(mode="after")
-    def _one_of_both(self) -> ArmModel:
-        if (self.chain is None) == (not self.joints):
-            raise ValueError("an arm has either 'chain' or 'joints'")
+    def _one_of_them(self) -> ArmModel:
+        if [self.chain is not None, bool(self.joints), bool(self.groups)].count(True) != 1:
+            raise ValueError("an arm has either 'chain' or 'joints' or 'groups'")
+        if self.passive and self.chain is None:
+            raise ValueError("'passive' is for joints of a chain")
         return self
 
 
@@ -154,52 +101,69 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
             "meshes": {mesh: str(path) for mesh, path in description.meshes.items()},
             "base": arm.group.base,
             "tip": arm.group.tip,
-            "joints": {joint: _joint(contents, description.body.joints[joint]) for joint in arm.group.joints},
+            "joints": {joint: joint_limits(contents, description.body.joints[joint]) for joint in arm.group.joints},
             "poses": {pose: _positions(arm.group, written) for pose, written in one.poses.items()},
             "controller": one.controller,
             "follow": follow_topic(contents, one.controller),
+            "stream": stream_topic(contents, one.controller),
             "planner": one.planner.model_dump(),
+            "kinematics": one.kinematics.model_dump(),
+            "pairs": _pairs(description, arm.group),
+            "hand": hand_in(contents, arm),
         }
         yield WantedComponent(name, "arm", config, ("arms", name), is_sound=arm.is_sound)
+    if found := contents.of(arms):
+        groups = {name: {"joints": one.group.joints} for name, one in found.items()}
+        yield WantedComponent(MOVE_GROUP, MOVE_GROUP, {"arms": groups}, ("arms",))
 
 
-def _joint(contents: Contents, joint: BodyJoint) -> dict[str, object]:
-    limits = limits_in(contents, joint)
-    return {
-        "lower": limits.lower,
-        "upper": limits.upper,
-        "velocity": limits.velocity,
-        "acceleration": limits.acceleration,
-        "is_continuous": joint.kind == "continuous",
-        "slides": joint.slides,
+def _pairs(description: Description, group: ArmGroup) -> dict[str, list[LinkPair]] | None:
+    """Return the pairs that an arm moves relative to each other and need not watch; None if they are not known."""
+    if (matrix := description.matrix) is None:
+        return None
+    moved = moved_links(description.body, group.joints)
+    chosen: dict[str, tuple[PairReason, ...]] = {
+        "adjacent": ("adjacent",),
+        "ignored": ("always", "user"),
+        "unlikely": ("never",),
     }
+    return {
+        key: [(one, other) for one, other in matrix.having(*reasons) if moved[one] != moved[other]]
+        for key, reasons in chosen.items()
+    }
+
+
+def hand_in(contents: Contents, arm: ArmOfRobot) -> HandConfig | None:
+    """Return the gripper of an arm, if it has one."""
+    one, there = arm.model, contents.of(controllers).get(arm.model.gripper or "")
+    if one.gripper is None or there is None:
+        return None
+    name = one.gripper
+    bounds = (each for each in controller_type(there.type).capabilities(name, there) if isinstance(each, BoundsGoals))
+    ranges = [pair for each in bounds if each.ranges is not None for pair in each.ranges.value.values()]
+    return HandConfig(
+        controller=name,
+        command=served_topic(name, there, GripperCommand),
+        opening=ranges[0] if ranges else None,
+        grasp=one.grasp or arm.group.tip,
+        squeeze=one.squeeze,
+        grasps=one.grasps,
+        spots=one.spots,
+        pictures=_folder(contents, arm),
+    )
+
+
+def _folder(contents: Contents, arm: ArmOfRobot) -> str:
+    """Return the folder of its pictures, which need not be there yet; nothing if none is written."""
+    if arm.model.pictures is None:
+        return ""
+    name = next(key for key, one in contents.of(arms).items() if one is arm)
+    file = contents.documents.writer(value_span(contents.root, ("arms", name, "pictures")), contents.file)
+    return str((file.parent / arm.model.pictures).resolve())
 
 
 def _positions(group: ArmGroup, written: Mapping[str, Quantity]) -> dict[str, float]:
     return {joint: one.value for joint, one in written.items() if joint in group.joints}
-
-
-def limits_in(contents: Contents, joint: BodyJoint) -> MotionLimits:
-    """Return the limits of a joint: those of the body, and the tighter ones of the joint if it is driven."""
-    driven = contents.of(joints).get(joint.name)
-    if driven is not None:
-        return held_limits(driven, joint)
-    outer = joint.limits
-    if outer is None or joint.kind == "continuous":
-        return MotionLimits()
-    return MotionLimits(outer.lower, outer.upper)
-
-
-def served_topic(name: str, one: ControllerConfig, action: type[Any]) -> str:
-    """Return the topic at which a controller serves an action; nothing if it does not."""
-    ports = controller_type(one.type).ports(name, one).values()
-    return next((port.topic for port in ports if isinstance(port, ServesAction) and port.interface is action), "")
-
-
-def follow_topic(contents: Contents, controller: str) -> str:
-    """Return the topic at which a controller takes trajectories; nothing if it takes none."""
-    there = contents.of(controllers).get(controller)
-    return served_topic(controller, there, FollowJointTrajectory) if there is not None else ""
 
 
 @section(
@@ -239,21 +203,61 @@ def arms(reading: Reading[ArmModel]) -> dict[str, ArmOfRobot]:
               forwards: {pan_joint: 0 deg}
               aside: {pan_joint: 60 deg}
     """
-    description, found = reading.contents.of(body), dict[str, ArmOfRobot]()
-    for name, one in reading.entries().items():
+    description, entries, found = reading.contents.of(body), reading.entries(), dict[str, ArmOfRobot]()
+    groups: dict[str, ArmGroup | None] = {}
+    for name, one in entries.items():
         if one.planner.type not in PLANNERS:
             path = ("arms", name, "planner", "type")
             node = at(reading.contents.root, path)
             reading.report.add(not_a_choice(value_span(reading.contents.root, path), "type", node, list(PLANNERS)))
         if description is None:
             continue  # it is missing or has a mistake, which is told
-        group = _group(reading, name, one, description.body)
+        group = _group_of(reading, name, entries, groups, description.body)
         if group is None:
             continue
         wrong = list(_mistakes(reading, name, one, group, description.body))
         reading.report.extend(wrong)
         found[name] = ArmOfRobot(one, group, not wrong and one.planner.type in PLANNERS)
     return found
+
+
+def _group_of(
+    reading: Reading[ArmModel],
+    name: str,
+    entries: Mapping[str, ArmModel],
+    groups: dict[str, ArmGroup | None],
+    known: Body,
+) -> ArmGroup | None:
+    """Return the joints of an arm, and note them in `groups`; None after a finding."""
+    one = entries.get(name)
+    if name in groups or one is None:
+        return groups.get(name)
+    if not one.groups:
+        groups[name] = _group(reading, name, one, known)
+        return groups[name]
+    groups[name] = None  # meanwhile
+    parts = []
+    for index, each in enumerate(one.groups):
+        if _leads_to(each, name, entries):
+            span = value_span(reading.contents.root, ("arms", name, "groups", index))
+            reading.report.add(NO_CHAIN.at(span, f"the arm '{name}' would be a part of itself"))
+            return None
+        parts.append(_group_of(reading, each, entries, groups, known))
+    there = [part for part in parts if part is not None]
+    groups[name] = together(known, there) if len(there) == len(parts) else None
+    return groups[name]
+
+
+def _leads_to(name: str, wanted: str, entries: Mapping[str, ArmModel]) -> bool:
+    """Return whether an arm is another one, or made of it."""
+    seen, waiting = set[str](), [name]
+    while waiting:
+        if (one := waiting.pop()) == wanted:
+            return True
+        if one not in seen and one in entries:
+            seen.add(one)
+            waiting += entries[one].groups
+    return False
 
 
 def _group(reading: Reading[ArmModel], name: str, one: ArmModel, known: Body) -> ArmGroup | None:
@@ -268,8 +272,13 @@ def _group(reading: Reading[ArmModel], name: str, one: ArmModel, known: Body) ->
                 return None
         return group_of(known, one.joints)
     found = chain(known, one.chain.from_, one.chain.to)
-    if found is not None and found.joints:
-        return found
+    for index, joint in enumerate(one.passive if found is not None else ()):
+        if found is not None and joint not in found.joints:
+            span = value_span(root, ("arms", name, "passive", index))
+            reading.report.add(NO_CHAIN.at(span, f"'{joint}' is not on the chain of the arm '{name}'"))
+            return None
+    if found is not None and (left := [joint for joint in found.joints if joint not in one.passive]):
+        return ArmGroup(tuple(left), found.base, found.tip)
     span = value_span(root, ("arms", name, "chain", "to"))
     if found is not None:
         message = f"nothing moves between '{one.chain.from_}' and '{one.chain.to}'"
@@ -289,9 +298,28 @@ def _mistakes(reading: Reading[ArmModel], name: str, one: ArmModel, group: ArmGr
     if one.gripper is not None and there is not None and not served_topic(one.gripper, there, GripperCommand):
         span = value_span(reading.contents.root, ("arms", name, "gripper"))
         yield NO_GRIPPER.at(span, f"'{one.gripper}' does not open and close anything, and is no gripper")
+    elif there is not None:
+        yield from _gripper_elsewhere(reading, name, one.gripper or "", there, group, known)
     for pose, written in one.poses.items():
         for joint, position in written.items():
             yield from _unfit(reading, (name, pose, joint), position, group, known)
+
+
+def _gripper_elsewhere(
+    reading: Reading[ArmModel], name: str, gripper: str, there: ControllerConfig, group: ArmGroup, known: Body
+) -> Iterator[Finding]:
+    moved, last = moved_links(known, group.joints), group.joints[-1]
+    for joint in there.claimed:
+        if joint not in known.joints:
+            continue  # told where the controller is
+        is_own = joint in group.joints
+        if is_own or last not in moved[known.joints[joint].parent]:
+            words = "is one of the arm's own" if is_own else f"is not carried by '{last}'"
+            message = f"'{gripper}' moves '{joint}', which {words}"
+            related = [Related(key_span(reading.contents.root, ("controllers", gripper)), "the gripper")]
+            span = value_span(reading.contents.root, ("arms", name, "gripper"))
+            yield GRIPPER_ELSEWHERE.at(span, message, related=related)
+            return
 
 
 def _unled(reading: Reading[ArmModel], name: str, one: ArmModel, group: ArmGroup) -> Iterator[Finding]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +13,12 @@ from pydantic import Field, model_validator
 from rbxcompose.body.attachment import PieceAttachment
 from rbxcompose.body.description import BodyPart, Description, describe
 from rbxcompose.body.files import BodyFile
+from rbxcompose.body.link_pairs import CollisionMatrix, digest_of, read_matrix
 from rbxcompose.config import Config, Name
-from rbxcompose.findings import Finding, Span, replacement
+from rbxcompose.findings import Finding, Severity, Span, kind, replacement
 from rbxcompose.manifest.fields import FileName
-from rbxcompose.manifest.files import project_of, resolve
-from rbxcompose.manifest.reader import UNREADABLE
+from rbxcompose.manifest.files import project_of, resolve, shown_name
+from rbxcompose.manifest.reader import UNREADABLE, read_source
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading
 from rbxcompose.manifest.tree import BROKEN, Entry, KeyPath, MappingNode, ScalarNode, TreeNode, at, key_span, value_span
@@ -25,6 +27,20 @@ from rbxcompose.manifest.wanted_components import WantedComponent, Wiring
 from rbxcompose.printable import plain
 from rbxcompose.references import JOINT, LINK
 from rbxcompose.units import Quantity, UnitError, parse_quantity
+
+STALE = kind(
+    "RBX2307",
+    """The pairs of links that arms need not watch are not those of this body
+
+The file under `collisions` is missing, or its `body` is the digest of another one: joints or shapes have changed since
+it was written. Without it, arms watch all pairs of links but those that a joint connects, which is safe and may be
+slower. A profile that changes the body has a file of its own.
+
+Bad: `body: {urdf: robot.urdf, collisions: robot.collisions.yaml}`, after a link got another shape.
+Good: the same, after `rbxcompose arm setup`
+""",
+    Severity.WARNING,
+)
 
 DESCRIPTION = "robot_description"
 """The component that a robot with a body runs."""
@@ -74,6 +90,8 @@ class BodyModel(BodyFileModel):
 
     pieces: dict[Name, PieceModel] = {}
     """Further pieces of the body, by the prefix of their links and joints; parts bring theirs."""
+    collisions: FileName | None = None
+    """Pairs of links that arms need not watch: a file that `arm setup` writes, relative to this one."""
 
     def lacks_file(self) -> str:
         """Return what is wrong if there is no file; its pieces may be all."""
@@ -147,7 +165,28 @@ def body(reading: Reading[BodyModel]) -> Description | None:
     usable = [one for one in parts if not isinstance(one, Finding)]
     found, findings = describe(named, reading.contents.file.parent, usable, reading.contents.documents.sources)
     report.extend(findings)
-    return found
+    return found and replace(found, matrix=_matrix(reading, reading.node, read, found))
+
+
+def _matrix(reading: Reading[BodyModel], node: TreeNode, read: BodyModel, found: Description) -> CollisionMatrix | None:
+    """Return the pairs of the file that the body names; None if there is none for just this body."""
+    if read.collisions is None:
+        return None
+    span, command = value_span(node, ("collisions",)), "run 'rbxcompose arm setup'"
+    path = resolve(read.collisions, _writer(reading, span), span)
+    if isinstance(path, Finding):
+        is_missing = path.code == UNREADABLE.code
+        reading.report.add(STALE.at(span, path.message, help=command) if is_missing else path)
+        return None
+    shown, digest = shown_name(path), digest_of(found.body, found.meshes)
+    text, findings = read_source(path, shown, reading.contents.documents.sources, what="a file of pairs of links")
+    matrix, more = read_matrix(text, shown, found.body, digest) if text is not None else (None, [])
+    reading.report.extend(replace(one, span=one.span or span) for one in (*findings, *more))
+    if matrix is None or matrix.digest == digest:
+        return matrix
+    words = f"'{plain(read.collisions)}' was made for another body, so arms watch all pairs of links"
+    reading.report.add(STALE.at(span, words, help=command))
+    return None
 
 
 def _xacro_as_urdf(node: TreeNode | None) -> Finding | None:

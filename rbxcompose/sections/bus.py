@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, model_validator
 
 from rbxcompose.config import Config
 from rbxcompose.endpoints import endpoint
@@ -29,8 +29,17 @@ class BusModel(Config):
     Unix sockets instead of the port."""
     router: Annotated[str, AfterValidator(endpoint)] | None = None
     """An existing router to use instead of the robot's own, such as `tcp/192.168.0.2:7447`."""
+    links: Literal["direct", "router"] = "direct"
+    """Whether processes send to each other directly, or by that `router` only. Directly is faster, and goes on without
+    the router; but then each process at the router has a link to each other one, also of other robots."""
     clock: Literal["own", "external"] = "own"
     """Whose time the robot follows: its own, or that of an external simulator, which publishes it on `/clock`."""
+
+    @model_validator(mode="after")
+    def _links_by_an_existing_router(self) -> Self:
+        if self.links == "router" and self.router is None:
+            raise ValueError("'links: router' needs 'router', an existing router for many robots")
+        return self
 
 
 @section("bus", BusModel, order=100, files=(ROBOT, OVERLAY))

@@ -9,7 +9,8 @@ from typing import Any
 
 from rbxcompose.config import Config, Name
 from rbxcompose.dataclass import dataclass
-from rbxcompose.findings import DID_YOU_MEAN, SIMILAR, Finding, Report, Span, kind
+from rbxcompose.findings import DID_YOU_MEAN, SIMILAR, Finding, Report, Span, kind, nearest, replacement, suggest
+from rbxcompose.manifest.foreign_words import COMPONENTS as FOREIGN_TYPES
 from rbxcompose.manifest.options import OPTIONS, ComponentOptions
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.renamer import Renames
@@ -167,7 +168,8 @@ def _component(reading: Reading[ComponentOptions], name: str, entry: Entry) -> C
         return None
     if not isinstance(node, MappingNode):
         message = f"component '{name}' must be a map with a 'type:' and its configuration"
-        report.add(WRONG_TYPE.at(node.span, message, label=label_of(node)))
+        help_text = "write its 'type' and its settings below it, further right"
+        report.add(WRONG_TYPE.at(node.span, message, label=label_of(node), help=help_text))
         return None
     # A missing key is reported at the component's name, not at whatever its first key happens to be.
     options_node = replace(_part(node, OPTIONS), span=entry.key.span)
@@ -178,11 +180,29 @@ def _component(reading: Reading[ComponentOptions], name: str, entry: Entry) -> C
     model = registry.component_type(type_name).config_type()
     keys = [key for key in node.entries if key not in (*OPTIONS, "type")]
     config_node = replace(_part(node, keys), span=entry.key.span)
+    before = len(report.findings)
     sound = validate(model, config_node, path, report, known, also=[*OPTIONS, "type"])
+    if sound is None:
+        _tell_other_type(type_name, {*keys} - {*model.model_fields}, keys, report, before)
     config = sound or salvaged(model, config_node, known)
     return ComponentEntry(
         name, type_name, options or ComponentOptions(), config, entry.key.span, is_sound=sound is not None
     )
+
+
+def _tell_other_type(
+    type_name: str, unknown: Collection[str], keys: Collection[str], report: Report, before: int
+) -> None:
+    """Add to the last findings on unknown keys that another type takes all that is written, if only one does."""
+    types = [one for one in _types() if one not in registry.PLUGINS.third_party and one != type_name]
+    fitting = [one for one in types if {*keys} <= registry.component_type(one).config_type().model_fields.keys()]
+    if not unknown or len(fitting) != 1:
+        return
+    for index, one in enumerate(report.findings[before:], before):
+        is_meant = one.code == UNKNOWN_KEY.code and not one.help.startswith(DID_YOU_MEAN)
+        if is_meant and any(one.message.startswith(f"unknown key '{key}' in") for key in unknown):
+            told = f"the type '{fitting[0]}' takes this key; {one.help}".removesuffix("; ")
+            report.findings[index] = replace(one, help=told)
 
 
 def _part(node: MappingNode, keys: Collection[str]) -> MappingNode:
@@ -197,8 +217,14 @@ def _type_name(name: str, entry: Entry, node: MappingNode, report: Report) -> st
         if misspelt:
             key, message = node.entries[misspelt[0]].key, f"unknown key '{misspelt[0]}' in component '{name}'"
             report.add(UNKNOWN_KEY.misspelt(key.span, message, key.text, ["type"]))
+        elif (other := _as_type(node)) is not None:
+            key, meant = other
+            message, fix = f"unknown key '{key.text}' in component '{name}'", replacement(key.span, key.text, "type")
+            report.add(UNKNOWN_KEY.at(key.span, message, help=f"write 'type: {meant.text}'", fix=fix))
         else:
-            report.add(MISSING_KEY.at(entry.key.span, f"component '{name}' needs the key 'type'"))
+            near = nearest(name, types := _listed())
+            help_text = f"write 'type: {near[0]}' below it, or another type" if near else suggest(name, types, "types")
+            report.add(MISSING_KEY.at(entry.key.span, f"component '{name}' needs the key 'type'", help=help_text))
         return None
     if not isinstance(written, ScalarNode):
         report.add(WRONG_TYPE.at(written.span, "'type' must be the name of a type", label=label_of(written)))
@@ -218,14 +244,32 @@ def _type_name(name: str, entry: Entry, node: MappingNode, report: Report) -> st
     return written.text
 
 
+def _as_type(node: MappingNode) -> tuple[ScalarNode, ScalarNode] | None:
+    """Return the key and the value of a component without a type that has one under another key: `platform: go_to`."""
+    found = [
+        (entry.key, entry.value)
+        for key, entry in node.entries.items()
+        if key not in OPTIONS and isinstance(entry.value, ScalarNode) and entry.value.text in registry.component_names()
+    ]
+    return found[0] if len(found) == 1 else None
+
+
 def _unknown_type(name: str, written: ScalarNode) -> Finding:
     shown = plain(written.text, 60)
     message = f"component '{name}' has a type that does not exist: '{shown}'"
+    if ours := FOREIGN_TYPES.get(written.text.rpartition("/")[-1]):
+        return UNKNOWN_TYPE.at(written.span, message, help=f"{DID_YOU_MEAN} '{ours}'?")
     finding = UNKNOWN_TYPE.misspelt(written.span, message, written.text, _types(), "types")
     if finding.help.startswith(DID_YOU_MEAN) or not is_valid(Name, written.text):
         return finding
     elsewhere = f"if a package brings it, install that; 'rbxcompose new component {shown}' begins one of your own"
     return replace(finding, help="; ".join(filter(None, (finding.help, elsewhere))))
+
+
+def _listed() -> list[str]:
+    """Return the names of the types that users list, and of those of other packages."""
+    foreign = registry.PLUGINS.third_party
+    return [one for one in _types() if one in foreign or not registry.component_type(one).made_by]
 
 
 def _types() -> list[str]:

@@ -11,6 +11,7 @@ from rbxcompose.body.model import BodyJoint
 from rbxcompose.config import Config
 from rbxcompose.controller_interface import ControllerConfig, controller_names, controller_type
 from rbxcompose.findings import Finding, Related, Span, kind
+from rbxcompose.manifest.given_values import decided_at
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Reading
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode, at, key_span, value_span
@@ -202,7 +203,9 @@ def _mistakes(
         yield NAME_OF_JOINT.at(here, f"'{name}' is a joint and a controller")
     if (mistake := cls.mistake(one)) is not None:
         field, reason = mistake
-        yield CANNOT_WORK.at(key_span(root, ("controllers", name, field)), f"controller '{name}': {reason}")
+        place = ("controllers", name, field)
+        span = decided_at(root, place, key_span(root, place))
+        yield CANNOT_WORK.at(span, f"controller '{name}': {reason}")
     else:
         yield from _beyond(reading, name, one)
         yield from _unknown_items(reading, name, one)
@@ -225,14 +228,22 @@ def _undriven(reading: Reading[ControllerConfig], name: str, one: ControllerConf
             if may_be_driven(reading.contents, joint):
                 return  # it has a mistake, which is told
             message = f"the controller '{name}' leads '{joint}', which no servo drives"
-            yield NOT_DRIVEN.misspelt(span, message, joint, driven, "joints with a servo")
+            if (description := reading.contents.of(body)) and joint in description.body.joints:
+                help_text = f"give it an actuator: '{joint}: {{actuator: ...}}' below 'joints', or leave it out here"
+                yield NOT_DRIVEN.at(span, message, help=help_text)
+            else:
+                others = {each: entry for each, entry in driven.items() if each not in one.claimed}
+                yield NOT_DRIVEN.misspelt(span, message, joint, others, "joints with a servo")
             return
-        for servo in (servos[each] for each in driven[joint].servos if each in servos):
+        for each, servo in ((each, servos[each]) for each in driven[joint].servos if each in servos):
             buses.add(servo.bus)
             if servo.mode != wanted:
                 given, taken = _PLURAL[wanted], _PLURAL[servo.mode]
                 message = f"the controller '{name}' gives {given}, and the servos of '{joint}' take {taken}"
-                yield NOT_DRIVEN.at(span, message, help=f"give the actuator 'mode: {wanted}'")
+                there = key_span(reading.contents.root, ("actuators", each))
+                first, other = (there, span) if there.file == span.file else (span, there)
+                related = [Related(other, "the controller" if first is there else "the actuator")]
+                yield NOT_DRIVEN.at(first, message, help=f"give '{each}' 'mode: {wanted}'", related=related)
         if len(buses) > 1:
             yield NOT_DRIVEN.at(
                 span, f"the joints of the controller '{name}' are on two buses: {', '.join(sorted(buses))}"
@@ -252,7 +263,7 @@ def _following(reading: Reading[ControllerConfig], name: str, one: ControllerCon
 
 def _unfit(reading: Reading[ControllerConfig], name: str, one: ControllerConfig) -> Iterator[Finding]:
     """Yield a finding for each joint whose kind the controller cannot lead."""
-    description, wanted = reading.contents.of(body), controller_type(one.type).kinds
+    description, wanted = reading.contents.of(body), controller_type(one.type).kinds_for(one)
     known = description.body.joints if description else {}
     for joint in one.claimed if wanted else ():
         if joint in known and known[joint].kind not in wanted:

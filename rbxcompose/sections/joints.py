@@ -19,7 +19,16 @@ from rbxcompose.control.limits import MotionLimits, Tightened, tightened
 from rbxcompose.findings import Finding, kind
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading
-from rbxcompose.manifest.tree import KeyPath, MappingNode, key_span, value_span
+from rbxcompose.manifest.tree import (
+    KeyPath,
+    MappingNode,
+    ScalarNode,
+    SequenceNode,
+    TreeNode,
+    at,
+    key_span,
+    value_span,
+)
 from rbxcompose.manifest.validate import MISSING_KEY, WRONG_TYPE, validate
 from rbxcompose.references import ACTUATOR, Refers
 from rbxcompose.sections.actuators import ActuatorModel, actuators
@@ -319,11 +328,21 @@ def _servos(
     there: Mapping[str, ActuatorModel] = {servo: known[servo] for servo in one.servos if servo in known}
     for servo in one.servos:
         if (other := users.setdefault(servo, name)) != name:
-            yield NOT_TOGETHER.at(at, f"the servo '{servo}' drives '{other}' and '{name}'")
+            free = ", ".join(f"'{one}'" for one in known if one not in _written_servos(reading.node))
+            help_text = f"actuators without a joint: {free}" if free else ""
+            yield NOT_TOGETHER.at(at, f"the servo '{servo}' drives '{other}' and '{name}'", help=help_text)
     for what in ("bus", "mode"):
         values = sorted({str(getattr(servo, what)) for servo in there.values()})
         if len(values) > 1:
             yield NOT_TOGETHER.at(at, f"the servos of joint '{name}' differ in their {what}: {', '.join(values)}")
+
+
+def _written_servos(node: TreeNode | None) -> set[str]:
+    """Return the servos that the joints name."""
+    entries = node.entries.values() if isinstance(node, MappingNode) else ()
+    named = [at(one.value, (key,)) for one in entries for key in ("actuator", "actuators")]
+    items = [*named, *(item for one in named if isinstance(one, SequenceNode) for item in one.items)]
+    return {one.text for one in items if isinstance(one, ScalarNode)}
 
 
 def _quantities(one: JointModel) -> Iterator[tuple[KeyPath, Quantity]]:

@@ -2,44 +2,102 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import field, replace
+from pathlib import Path
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
 from rbxcompose.body.attachment import FramePose
+from rbxcompose.body.mesh_files import FORMATS, mesh_problem
 from rbxcompose.body.model import Body, Geometry
-from rbxcompose.config import Config, Length, LinkName, Name
-from rbxcompose.findings import kind
+from rbxcompose.config import Config, Frequency, Length, LinkName, Name, Time
+from rbxcompose.dataclass import dataclass
+from rbxcompose.findings import Finding, Span, kind
+from rbxcompose.manifest.fields import FileName, TopicName
+from rbxcompose.manifest.files import resolve, shown_name
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading
-from rbxcompose.manifest.tree import key_span
+from rbxcompose.manifest.tree import KeyPath, key_span, value_span
 from rbxcompose.manifest.wanted_components import WantedComponent, Wiring
-from rbxcompose.motion.scene import PlacedObject, mistake_in
-from rbxcompose.references import OBJECT
+from rbxcompose.motion.scene import MOST_PADDING, MOST_SHAPES, PlacedObject, mistake_in
+from rbxcompose.motion.scene_text import LARGEST, NO_SCENE, SceneFile, read_scene
+from rbxcompose.printable import plain
+from rbxcompose.references import OBJECT, Refers
+from rbxcompose.regular_files import read_regular
 from rbxcompose.sections.arms import arms
 from rbxcompose.sections.body import body
 
 SCENE = "scene"
 """The component that a robot with arms runs."""
+CLOUD_MAPPER = "cloud_mapper"
+"""The type of what each entry of `clouds` runs."""
 NO_OBJECT = kind(
     "RBX2306",
     """An object of the scene cannot be
 
-Its lengths are above 0, and it does not have the name of a link of the body: findings about collisions name both.
+Its lengths are from 0.1 mm to 100 m, and it does not have the name of a link of the body: findings about collisions
+name both.
 
 Bad: `table: {box: [60 cm, 40 cm, 0 cm]}`
 Good: `table: {box: [60 cm, 40 cm, 2 cm]}`
 """,
 )
+NO_MESH = kind(
+    "RBX2350",
+    """The mesh of an object cannot be read
+
+An object of the scene is a mesh in a file beside the manifest. The file is too large, cut short, or not of the format
+that its name says.
+
+Bad: `cup: {mesh: {file: cup.stl}}`, where `cup.stl` is a page that says that the file was not found.
+Good: `cup: {mesh: {file: cup.stl, scale: 0.001}}`, where `cup.stl` is a mesh in millimetres.
+""",
+)
+COLOURS = {
+    "black": (0.1, 0.1, 0.1),
+    "white": (1.0, 1.0, 1.0),
+    "grey": (0.5, 0.5, 0.5),
+    "red": (0.8, 0.15, 0.1),
+    "green": (0.2, 0.6, 0.25),
+    "blue": (0.15, 0.35, 0.75),
+    "yellow": (0.95, 0.8, 0.2),
+    "orange": (0.95, 0.55, 0.1),
+    "brown": (0.55, 0.35, 0.2),
+}
+"""Names of colours: red, green and blue from 0 to 1."""
+ColourName = Literal["black", "white", "grey", "red", "green", "blue", "yellow", "orange", "brown"]
+Scale = Annotated[float, Field(gt=0)]
+Padding = Annotated[Length, Field(ge=0, le=MOST_PADDING)]
+_SHAPES = ("box", "cylinder", "cone", "sphere", "plane", "mesh", "octree")
 
 
 class CylinderModel(Config):
-    """An upright cylinder; its middle is at its place."""
+    """An upright cylinder, or a cone with its tip above; its middle is at its place."""
 
     radius: Length = Field(gt=0)
     """Its radius."""
     length: Length = Field(gt=0)
     """Its height."""
+
+
+class MeshModel(Config):
+    """A mesh in a file."""
+
+    file: FileName
+    """An STL, OBJ, COLLADA, PLY or GLB file, relative to this one."""
+    scale: Scale = 1.0
+    """Metres of one unit of the file: 0.001 for a mesh in millimetres."""
+
+
+class OctreeModel(Config):
+    """Occupied cells of space."""
+
+    file: FileName
+    """A tree of OctoMap (`.bt`), or a text with a point `x y z` [m] in each line; relative to this file."""
+    cell: Length = Field(0.02, ge=0.001, le=1)
+    """Side of a cell of points; a tree has its own."""
 
 
 class ObjectModel(Config):
@@ -49,33 +107,93 @@ class ObjectModel(Config):
     """Lengths along x, y and z."""
     cylinder: CylinderModel | None = None
     """Radius and length, along z."""
+    cone: CylinderModel | None = None
+    """Radius and length, along z."""
     sphere: Length | None = Field(None, gt=0)
     """Radius."""
+    plane: Literal["below"] | None = None
+    """All that is below: a floor, or a wall if it is turned."""
+    mesh: MeshModel | None = None
+    """A file with triangles."""
+    octree: OctreeModel | None = None
+    """A file with occupied space."""
     link: LinkName | None = None
     """The link that it moves with; without it the root of the body."""
+    frame: Name | None = None
+    """A frame outside of the body, such as `map`, in which it stays where it is while the robot drives."""
     at: FramePose = FramePose()
-    """Where it is in the frame of the link."""
+    """Where it is in the frame."""
     touches: list[LinkName] = []
     """Links that it may touch."""
+    touches_objects: list[Annotated[Name, Refers(OBJECT)]] = []
+    """Other things that it may touch, while an arm holds one of both."""
+    padding: Padding = 0.0
+    """How far arms keep from it."""
+    colour: ColourName | None = None
+    """How viewers show it."""
 
     @model_validator(mode="after")
     def _one_shape(self) -> ObjectModel:
-        if sum(one is not None for one in (self.box, self.cylinder, self.sphere)) != 1:
-            raise ValueError("an object has one shape: 'box', 'cylinder' or 'sphere'")
+        if sum(getattr(self, one) is not None for one in _SHAPES) != 1:
+            raise ValueError(f"an object has one shape: {', '.join(map(repr, _SHAPES[:-1]))} or '{_SHAPES[-1]}'")
+        if self.link is not None and self.frame is not None:
+            raise ValueError("an object stands in the frame of a 'link', or in another 'frame'")
         return self
 
     @property
-    def shape(self) -> Geometry:
-        """Return its shape."""
+    def file(self) -> str:
+        """Return the file that it names, or nothing."""
+        return (self.mesh or self.octree or OctreeModel(file="")).file
+
+    def shape(self, file: Path | None) -> Geometry:
+        """Return its shape; `file` is that of its mesh or its octree."""
         if self.box is not None:
             return Geometry("box", self.box)
-        if self.cylinder is not None:
-            return Geometry("cylinder", (self.cylinder.radius, self.cylinder.length))
+        if (round_one := self.cylinder or self.cone) is not None:
+            return Geometry("cylinder" if self.cylinder else "cone", (round_one.radius, round_one.length))
+        if self.plane is not None:
+            return Geometry("plane", (0.0, 0.0, 1.0, 0.0))
+        if self.mesh is not None:
+            return Geometry("mesh", (self.mesh.scale,) * 3, str(file))
+        if self.octree is not None:
+            return Geometry("octree", (self.octree.cell,), str(file))
         return Geometry("sphere", (self.sphere or 0.0,))
 
-    def placed(self, name: str, known: Body) -> PlacedObject:
-        """Return it as a thing in the scene of a body."""
-        return PlacedObject(name, self.shape, self.link or known.root, self.at.to_transform(), tuple(self.touches))
+    def placed(self, name: str, root: str, file: Path | None = None) -> PlacedObject:
+        """Return it as a thing in the scene of a body with this root."""
+        return PlacedObject(
+            name,
+            self.shape(file),
+            self.link or self.frame or root,
+            self.at.to_transform(),
+            tuple(self.touches),
+            tuple(self.touches_objects),
+            colour=(*COLOURS[self.colour], 1.0) if self.colour else None,
+            padding=self.padding,
+        )
+
+
+class CloudModel(Config):
+    """Clouds of points of a sensor, which arms plan around."""
+
+    topic: TopicName
+    """Their topic, of the type `sensor_msgs/PointCloud2`."""
+    range: Length = Field(1.5, gt=0, le=20)
+    """How far from the sensor points count."""
+    nearest: Length = Field(0.0, ge=0)
+    """Nearer points do not count."""
+    cell: Length = Field(0.02, ge=0.005, le=0.5)
+    """Side of the cells of space that are taken as occupied."""
+    least: int = Field(1, ge=1)
+    """How many points of one cloud a cell must have: more leave out noise."""
+    padding: Length = Field(0.03, ge=0, le=0.5)
+    """Points nearer to the robot or to things of the scene are taken for these."""
+    forget: Time = Field(5.0, gt=0)
+    """How long a cell stays in which clouds show nothing any more."""
+    rate: Frequency = Field(2.0, gt=0, le=30)
+    """How many clouds a second are used."""
+    frame: Name | None = None
+    """A frame such as `odom`, in which cells stay where they are while the robot drives; without it the body's root."""
 
 
 class SceneModel(Config):
@@ -83,27 +201,80 @@ class SceneModel(Config):
 
     objects: dict[Name, ObjectModel] = {}
     """Things by name."""
+    clouds: dict[Name, CloudModel] = {}
+    """What sensors of distances see, by the name of the thing that it becomes."""
+    file: FileName | None = None
+    """A `.scene` file of MoveIt with further things, in the frame of the body's root."""
+    frames: list[Name] = []
+    """Frames outside of the body in which things may stand later; those of `objects` need not be here."""
+    padding: Padding = 0.0
+    """How far all links keep from things."""
+    paddings: dict[LinkName, Padding] = {}
+    """How far some links keep from things, in place of `padding`."""
+
+
+@dataclass(frozen=True, slots=True)
+class SceneOfRobot:
+    """The things that there are from the start, the frames outside of the body, and the paddings of links [m]."""
+
+    objects: tuple[PlacedObject, ...] = ()
+    frames: tuple[str, ...] = ()
+    paddings: Mapping[str, float] = field(default_factory=dict)
+    clouds: Mapping[str, CloudModel] = field(default_factory=dict)
+
+    def on(self, known: Body) -> tuple[PlacedObject, ...]:
+        """Return the things as seen by a robot that stands at the origin of all frames."""
+        return tuple(one if one.link in known.links else replace(one, link=known.root) for one in self.objects)
 
 
 def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]:
     """Yield the component that tells arms of the scene; objects may come later, also if there are none now."""
-    description = contents.of(body)
+    description, found = contents.of(body), contents.of(scene)
     if description is None or not contents.of(arms):
         return
-    found = (one.placed(name, description.body) for name, one in contents.of(scene).objects.items())
-    objects = {
-        one.name: {
-            "shape": one.shape.kind,
-            "size": one.shape.size,
-            "link": one.link,
-            "position": one.pose.translation,
-            "rotation": one.pose.rotation,
-            "touches": one.touches,
-        }
-        for one in found
+    config = {
+        "urdf": description.text,
+        "objects": {one.name: _config(one) for one in found.objects},
+        "frames": found.frames,
+        "paddings": found.paddings,
+        "clouds": tuple(found.clouds),
     }
     path = (scene.name,) if scene.name in contents.root else (arms.name,)
-    yield WantedComponent(SCENE, SCENE, {"urdf": description.text, "objects": objects}, path)
+    yield WantedComponent(SCENE, SCENE, config, path)
+    for name, one in found.clouds.items():
+        cloud = {
+            **one.model_dump(exclude={"frame"}),
+            "name": name,
+            "urdf": description.text,
+            "meshes": {mesh: str(file) for mesh, file in description.meshes.items()},
+            "frame": one.frame or "",
+            "frames": found.frames,
+        }
+        yield WantedComponent(f"{SCENE}_{name}", CLOUD_MAPPER, cloud, (scene.name, "clouds", name))
+
+
+def _config(one: PlacedObject) -> dict[str, object]:
+    return {
+        "link": one.link,
+        "position": one.pose.translation,
+        "rotation": one.pose.rotation,
+        "shapes": [
+            {
+                "kind": each.shape.kind,
+                "size": each.shape.size,
+                "file": each.shape.file,
+                "points": each.shape.points,
+                "triangles": each.shape.triangles,
+                "position": each.pose.translation,
+                "rotation": each.pose.rotation,
+            }
+            for each in one.own_pieces
+        ],
+        "touches": one.touches,
+        "touches_objects": one.touches_objects,
+        "padding": one.padding,
+        "colour": one.colour,
+    }
 
 
 @section(
@@ -113,11 +284,11 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
     names=OBJECT,
     at=("objects",),
     entry="object",
-    shared=((), ("objects",)),
+    shared=((), ("objects",), ("clouds",)),
     wires=True,
     components=_components,
 )
-def scene(reading: Reading[SceneModel]) -> SceneModel:
+def scene(reading: Reading[SceneModel]) -> SceneOfRobot:
     """Things that arms must not hit, by name; they stand in the frame of a link, and move with it.
 
     Example:
@@ -134,12 +305,87 @@ def scene(reading: Reading[SceneModel]) -> SceneModel:
     """
     read = reading.whole() or SceneModel()
     description = reading.contents.of(body)
-    good = {}
+    if description is None:
+        return SceneOfRobot()
+    known = description.body
+    named = (
+        *(one.frame for one in read.objects.values()),
+        *(one.frame for one in read.clouds.values() if one.frame not in known.links),
+    )
+    frames = tuple(dict.fromkeys([*read.frames, *filter(None, named)]))
+    found = []
     for name, one in read.objects.items():
-        wrong = mistake_in(one.placed(name, description.body), description.body) if description else ""
+        path = ("scene", "objects", name)
+        file = _file(reading, one, path)
+        wrong = mistake_in(one.placed(name, known.root, file), known, frames)
         if wrong:
-            span = key_span(reading.contents.root, ("scene", "objects", name))
-            reading.report.add(NO_OBJECT.at(span, f"object '{name}': {wrong}"))
-        else:
-            good[name] = one
-    return SceneModel(objects=good)
+            reading.report.add(NO_OBJECT.at(key_span(reading.contents.root, path), f"object '{name}': {wrong}"))
+        elif not one.file or file is not None:
+            found.append(one.placed(name, known.root, file))
+    found += _of_file(reading, read, known, {one.name for one in found})
+    for name in read.clouds:
+        if name in known.links or any(one.name == name for one in found):
+            what = "a link of the body" if name in known.links else "an object of this scene"
+            span = key_span(reading.contents.root, ("scene", "clouds", name))
+            reading.report.add(NO_OBJECT.at(span, f"the cloud '{name}' would have the name of {what}"))
+    paddings = {link: padding for link in known.links if (padding := read.paddings.get(link, read.padding))}
+    return SceneOfRobot(tuple(found), frames, paddings, read.clouds)
+
+
+def _file(reading: Reading[SceneModel], one: ObjectModel, path: KeyPath) -> Path | None:
+    """Return the file of an object; None if it needs none, or after a finding."""
+    if not one.file:
+        return None
+    span = value_span(reading.contents.root, (*path, "mesh" if one.mesh else "octree", "file"))
+    found = _resolved(reading, one.file, span)
+    if found is None or one.mesh is None:
+        return found
+    if problem := mesh_mistake(found):
+        reading.report.add(NO_MESH.at(span, f"the mesh '{plain(one.file)}' {problem}"))
+        return None
+    return found
+
+
+def mesh_mistake(file: Path) -> str:
+    """Return why a file can be no mesh, nothing if it may be one."""
+    return mesh_problem(file) if file.suffix.lower() in FORMATS else f"is none of {', '.join(FORMATS)}"
+
+
+def _resolved(reading: Reading[SceneModel], written: str, span: Span) -> Path | None:
+    found = resolve(written, reading.contents.documents.writer(span, reading.contents.file), span)
+    if isinstance(found, Finding):
+        reading.report.add(found)
+        return None
+    return found
+
+
+def _of_file(reading: Reading[SceneModel], read: SceneModel, known: Body, taken: set[str]) -> list[PlacedObject]:
+    """Return the objects of the `.scene` file."""
+    if read.file is None:
+        return []
+    span = value_span(reading.contents.root, ("scene", "file"))
+    path = _resolved(reading, read.file, span)
+    if path is None:
+        return []
+    scene_file = scene_of(path)
+    if isinstance(scene_file, Finding):
+        reading.report.add(scene_file)
+        return []
+    found = [replace(one, link=known.root) for one in scene_file.objects]
+    wrong = [f"'{plain(one.name)}' is an object of this manifest, too" for one in found if one.name in taken]
+    wrong += [f"object '{plain(one.name)}': {words}" for one in found if (words := mistake_in(one, known))]
+    if len(taken) + sum(len(one.own_pieces) for one in found) > MOST_SHAPES:
+        wrong.append(f"there are more than {MOST_SHAPES:,} shapes")
+    reading.report.extend(NO_OBJECT.at(span, words) for words in wrong[:1])
+    return [] if wrong else found
+
+
+def scene_of(path: Path) -> SceneFile | Finding:
+    """Return the scene in a `.scene` file, or what is wrong with it."""
+    shown = shown_name(path)
+    try:
+        text = read_regular(path, LARGEST).decode()
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror or str(error) if isinstance(error, OSError) else "it is not text"
+        return NO_SCENE.at(Span(shown, 1, 1, 1, 1), f"the file cannot be read: {reason}")
+    return read_scene(text, shown)

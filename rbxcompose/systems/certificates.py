@@ -6,11 +6,15 @@ its own three files; the key of the authority stays where `security init` ran.
 
 from __future__ import annotations
 
+import contextlib
 import ipaddress
 import os
+import ssl
 import subprocess
+import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from rbxcompose.atomic_files import replace_file
 from rbxcompose.plan.model import LinkTls
@@ -44,6 +48,40 @@ def missing(tls: LinkTls) -> list[str]:
     return [path for path in (tls.authority, tls.certificate, tls.key) if not os.access(path, os.R_OK)]
 
 
+class CertificateError(Exception):
+    """Raised when the other hosts will not accept a certificate, with the reason."""
+
+
+def days_left(tls: LinkTls, name: str) -> float:
+    """Return for how many days other hosts will accept a host's certificate; `name` is the one that it must have.
+
+    The host shakes hands with itself, so what is examined is what the others will examine: chain, dates and key.
+
+    Raises:
+        CertificateError: if they would refuse it.
+        OSError: if a file cannot be read.
+    """
+    server, client = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER), ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    client.check_hostname = False  # its address is for those that dial it
+    one, other = ssl.MemoryBIO(), ssl.MemoryBIO()
+    try:
+        server.load_cert_chain(tls.certificate, tls.key)
+        client.load_verify_locations(tls.authority)
+        ends = (client.wrap_bio(one, other), server.wrap_bio(other, one, server_side=True))
+        for end in ends * 2:
+            with contextlib.suppress(ssl.SSLWantReadError):
+                end.do_handshake()
+    except ssl.SSLCertVerificationError as error:
+        raise CertificateError(error.verify_message) from error
+    except ssl.SSLError as error:
+        raise CertificateError(f"its files are damaged or do not belong together ({error.reason})") from error
+    found: Any = ends[0].getpeercert() or {}
+    names = [value for part in found["subject"] for key, value in part if key == "commonName"]
+    if names != [name]:
+        raise CertificateError(f"it is that of '{names[0] if names else 'nobody'}'")
+    return (ssl.cert_time_to_seconds(found["notAfter"]) - time.time()) / 86_400
+
+
 def make_authority(folder: Path, system: str) -> None:
     """Make the authority of a system, unless the folder has one.
 
@@ -59,7 +97,7 @@ def make_authority(folder: Path, system: str) -> None:
     _openssl(folder, "req", "-x509", *_NEW_KEY, "-days", str(DAYS_OF_AUTHORITY), *subject, *files)
 
 
-def make_certificate(folder: Path, system: str, host: str, address: str | None) -> None:
+def make_certificate(folder: Path, system: str, host: str, address: str | None, days: int = DAYS) -> None:
     """Make a new key and certificate of a host; its name is `HOST.SYSTEM`, and it proves to be at its address.
 
     Raises:
@@ -73,7 +111,7 @@ def make_certificate(folder: Path, system: str, host: str, address: str | None) 
     request = f"{host}/request.pem"
     subject = ("-subj", f"/CN={common_name(system, host)}")
     _openssl(folder, "req", *_NEW_KEY, *subject, "-keyout", f"{host}/{KEY}", "-out", request)
-    signed = ("-CA", AUTHORITY, "-CAkey", AUTHORITY_KEY, "-CAcreateserial", "-days", str(DAYS))
+    signed = ("-CA", AUTHORITY, "-CAkey", AUTHORITY_KEY, "-CAcreateserial", "-days", str(days))
     _openssl(
         folder,
         "x509",

@@ -44,6 +44,24 @@ Good:
 """,
     is_fixable=True,
 )
+SAME_NAME = kind(
+    "RBX6131",
+    """Two robots have one name
+
+The instances of a robot are NAME_1, NAME_2 and so on. No other robot of the system can have one of these names.
+
+Bad:
+```yaml
+robots:
+  scout: {robot: ../robots/scout/robot.yaml, instances: 3}
+  scout_2: {robot: ../robots/other/robot.yaml}
+```
+Good:
+```yaml
+  other: {robot: ../robots/other/robot.yaml}
+```
+""",
+)
 BROKEN_ROBOT = kind(
     "RBX6102",
     """A robot of the system has errors

@@ -14,7 +14,7 @@ from rbxcompose.manifest.tree import MappingNode, value_span
 from rbxcompose.model.robot import Robot
 from rbxcompose.plan.model import Plan
 from rbxcompose.systems.placement import Placement
-from rbxcompose.systems.traffic import Crossing, crossings
+from rbxcompose.systems.traffic import Crossing, TopicEnd, crossings, ends_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,11 +22,13 @@ class PlacedRobot:
     """A robot of a system: its plan as if it ran on one host, and where each component runs."""
 
     name: str
+    entry: str  # its key in the system's file; of several instances, the same
     model: SystemRobotModel
     robot: Robot
     plan: Plan
     placed: Mapping[str, Placement]
     link_port: int
+    share_port: int
     version: str  # of rbxcompose and the texts that it was compiled from
 
     @cached_property
@@ -39,9 +41,19 @@ class PlacedRobot:
         """Return what crosses between its hosts."""
         return tuple(crossings(self.plan, self.hosts))
 
-    def span(self, root: MappingNode, *keys: str) -> Span:
+    @cached_property
+    def ends(self) -> tuple[TopicEnd, ...]:
+        """Return all ends of its components."""
+        return tuple(ends_of(self.plan, self.hosts))
+
+    @property
+    def labels(self) -> frozenset[str]:
+        """Return what it may be called by, with others: its name, that of its instances, and its labels."""
+        return frozenset({self.name, self.entry, *self.model.labels})
+
+    def span(self, root: MappingNode, *keys: str | int) -> Span:
         """Return the place of a value of its entry in the system's file."""
-        return value_span(root, ("robots", self.name, *keys))
+        return value_span(root, ("robots", self.entry, *keys))
 
 
 @dataclass(slots=True)
@@ -57,3 +69,5 @@ class System:
     robots: dict[str, PlacedRobot] = field(default_factory=dict)
     report: Report = field(default_factory=Report)
     sources: dict[str, str] = field(default_factory=dict)
+    profiles: tuple[str, ...] = ()  # those that were chosen
+    known_profiles: tuple[str, ...] = ()

@@ -3,35 +3,48 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Any
 
 from rbxcompose import __version__
 from rbxcompose.compiler import Compilation, compile_robot
-from rbxcompose.findings import Finding
+from rbxcompose.composition.layers import chosen_profiles
+from rbxcompose.composition.overlay import compose, settled
+from rbxcompose.dataclass import dataclass
+from rbxcompose.findings import Finding, Span
 from rbxcompose.manifest.documents import Documents
-from rbxcompose.manifest.files import find, resolve, shown_name
+from rbxcompose.manifest.files import PROFILE, find, resolve, shown_name
 from rbxcompose.manifest.fill import fill
 from rbxcompose.manifest.fill_names import names_of
 from rbxcompose.manifest.library import PREFIX
+from rbxcompose.manifest.named_items import help_with_names
 from rbxcompose.manifest.section import SYSTEM
-from rbxcompose.manifest.system_file import LINKS, SECTIONS, SystemFile, SystemRobotModel
-from rbxcompose.manifest.tree import MappingNode, ScalarNode, key_span, value_span
-from rbxcompose.manifest.validate import MISSING_KEY, validate
+from rbxcompose.manifest.system_file import LINKS, PROFILES, SECTIONS, SystemFile, SystemRobotModel
+from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, key_span, value_span
+from rbxcompose.manifest.validate import MISSING_KEY, WRONG_TYPE, label_of, validate
+from rbxcompose.model.outside import NOTHING, Outside
+from rbxcompose.model.robot import Robot
+from rbxcompose.model.wires import resolve as absolute
 from rbxcompose.plan.model import Plan
-from rbxcompose.sdk.capabilities import OpensPort
+from rbxcompose.sdk.capabilities import ConnectedBy
 from rbxcompose.systems import codes
 from rbxcompose.systems.certificates import NO_SECURITY
+from rbxcompose.systems.exchange import shared_name
 from rbxcompose.systems.model import PlacedRobot, System
+from rbxcompose.systems.outside import joined, served_outside
 from rbxcompose.systems.placement import HostOffer, Wishes, hosts_called, place
 from rbxcompose.systems.rules import system_findings
 
+_PORTS, _APART = 65536, 1000  # all ports; from a robot's links to what it shares
 
-def compile_system(path: str, *, environment: Mapping[str, str], real: bool = False) -> System:
-    """Compile the file of a system and report all its mistakes, and those of its robots."""
-    out = System()
+
+def compile_system(
+    path: str, *, environment: Mapping[str, str], real: bool = False, profiles: Sequence[str] = ()
+) -> System:
+    """Compile the file of a system with these of its profiles; report all its mistakes, and those of its robots."""
+    out = System(profiles=tuple(profiles))
     file = find(path)
     if isinstance(file, Finding):
         out.report.add(file)
@@ -42,6 +55,7 @@ def compile_system(path: str, *, environment: Mapping[str, str], real: bool = Fa
         return out
     out.root = root = documents.meant(SystemFile, root)
     documents.check(SystemFile, root)
+    out.root = root = _with_profiles(root, out, documents)
     out.root = root = fill(root, names_of(_text(root, "name"), not real, environment), out.report)
     out.path, out.name, out.security = file, _text(root, "name"), _text(root, "security") or NO_SECURITY
     sections = {key: _section(key, model, out) for key, model in SECTIONS.items()}
@@ -50,12 +64,64 @@ def compile_system(path: str, *, environment: Mapping[str, str], real: bool = Fa
     out.hosts = sections["hosts"]
     if "links" in root:
         out.links = validate(LINKS["links"], root.entries["links"].value, ("links",), out.report) or {}
-    for name_, model in sections["robots"].items():
-        if (robot := _placed_robot(name_, model, out, environment, real)) is not None:
-            out.robots[name_] = robot
-    if len(out.robots) == len(sections["robots"]):
+    members = list(_members(sections["robots"], out))
+    seen: dict[str, _Member] = {}
+    for one in members:
+        if (other := seen.setdefault(one.name, one)) is not one:
+            span = key_span(out.root, ("robots", max(one.entry, other.entry, key=len)))
+            message = f"'{other.entry}' and '{one.entry}' both make a robot '{one.name}'"
+            out.report.add(codes.SAME_NAME.at(span, message, help="give one of them another name"))
+    compiling = _Compiling(out, environment, real)
+    compiling.outside = joined(compiling.given(one) for one in members)
+    for one in members:
+        if (robot := _placed_robot(one, out, compiling)) is not None:
+            out.robots[one.name] = robot
+    if len(out.robots) == len(members):
         out.report.extend(system_findings(out))
     return out
+
+
+@dataclass(frozen=True, slots=True)
+class _Member:
+    """A robot of a system: its name, its key in the file, and what stands there."""
+
+    name: str
+    entry: str
+    model: SystemRobotModel
+
+
+def _members(robots: Mapping[str, SystemRobotModel], out: System) -> Iterator[_Member]:
+    """Yield each robot; those of several instances take the hosts of a label in turn."""
+    facts = {key: HostOffer(frozenset(host.labels)) for key, host in out.hosts.items()}
+
+    def turned(called: str, number: int) -> str:
+        found = hosts_called(called, facts)
+        return found[number % len(found)] if found else called
+
+    for entry, model in robots.items():
+        if model.instances == 1:
+            yield _Member(entry, entry, model)
+            continue
+        for number in range(model.instances):
+            own = {
+                "on": turned(model.on, number) if model.on else None,
+                "place": {key: turned(called, number) for key, called in model.place.items()},
+                "link_port": model.link_port + number if model.link_port else None,
+                "share_port": model.share_port + number if model.share_port else None,
+            }
+            yield _Member(f"{entry}_{number + 1}", entry, model.model_copy(update=own))
+
+
+def _with_profiles(root: MappingNode, out: System, documents: Documents) -> MappingNode:
+    """Return a system without its profiles, changed by those that were chosen, in the order of the command."""
+    there = root.get("profiles")
+    own = replace(root, entries={key: entry for key, entry in root.entries.items() if key != "profiles"})
+    if there is not None and validate(PROFILES["profiles"], there, ("profiles",), out.report) is None:
+        return own
+    named = there.entries if isinstance(there, MappingNode) else {}
+    out.known_profiles = tuple(named)
+    overlays = [(one, f"profile '{name}'") for name, one in chosen_profiles(out.profiles, named, "system", documents)]
+    return compose(settled(own, out.report), overlays, out.report) if overlays else own
 
 
 def _text(root: MappingNode, key: str) -> str:
@@ -67,52 +133,98 @@ def _section(key: str, model: Any, out: System) -> Any:
     node = out.root.get(key)
     if not isinstance(node, MappingNode) or not node.entries:
         span = key_span(out.root, (key,)) if key in out.root else out.root.span
+        if isinstance(node, SequenceNode) and node.items:
+            message = f"'{key}' must be a map with a name for each entry"
+            out.report.add(WRONG_TYPE.at(span, message, label=label_of(node), help=help_with_names(node)))
+            return None
         what = "the machines" if key == "hosts" else "the robots and where they run"
         out.report.add(MISSING_KEY.at(span, f"a system needs '{key}': {what}"))
         return None
     return validate(model, node, (key,), out.report)
 
 
-def _placed_robot(
-    name: str, model: SystemRobotModel, out: System, environment: Mapping[str, str], real: bool
-) -> PlacedRobot | None:
+@dataclass(slots=True)
+class _Compiling:
+    """Compiles robots, each file with each profile once; `outside` is what robots of the system share."""
+
+    out: System
+    environment: Mapping[str, str]
+    real: bool
+    outside: Outside = NOTHING
+    done: dict[tuple[str, str | None], Compilation] = field(default_factory=dict)
+    alone: dict[tuple[str, str | None], Robot | None] = field(default_factory=dict)
+
+    def given(self, member: _Member) -> Outside:
+        """Return what a robot shares; one that others may call is compiled for that, without what they share."""
+        model = member.model
+        file = self._file(member.entry, model) if model.callers else None
+        if not isinstance(file, str):
+            return Outside(frozenset(shared_name(member.name, one) for one in model.share))
+        if (file, model.profile) not in self.alone:
+            self.alone[file, model.profile] = self._compile(file, model.profile, NOTHING).robot
+        robot = self.alone[file, model.profile]
+        space = robot.manifest.bus.namespace or "" if robot else ""
+        names = {absolute(one, space): shared_name(member.name, one) for one in model.share}
+        return served_outside(robot.components if robot else {}, member.name, names)
+
+    def _file(self, entry: str, model: SystemRobotModel) -> str | Finding:
+        """Return the file of a robot as findings show it."""
+        span = value_span(self.out.root, ("robots", entry, "robot"))
+        file = model.robot if model.robot.startswith(PREFIX) else resolve(model.robot, self.out.path or Path(), span)
+        return file if isinstance(file, str | Finding) else shown_name(file)
+
+    def _compile(self, file: str, profile: str | None, outside: Outside) -> Compilation:
+        profiles = [profile] if profile else []
+        return compile_robot(file, profiles=profiles, real=self.real, environment=self.environment, outside=outside)
+
+    def robot(self, entry: str, model: SystemRobotModel) -> Compilation | None:
+        """Return the robot of an entry; None after a finding that there is no such file."""
+        out, span = self.out, value_span(self.out.root, ("robots", entry, "robot"))
+        shown = self._file(entry, model)
+        if isinstance(shown, Finding):
+            out.report.add(shown)
+            return None
+        if (shown, model.profile) not in self.done:
+            at_profile = value_span(out.root, ("robots", entry, "profile"))
+            self.done[shown, model.profile] = self._compiled(shown, model.profile, at_profile)
+        compilation = self.done[shown, model.profile]
+        if compilation.plan is None:
+            message = f"the robot '{shown}' has errors, so the system cannot run it"
+            out.report.add(codes.BROKEN_ROBOT.at(span, message, help="see the findings of the robot"))
+        return compilation
+
+    def _compiled(self, shown: str, profile: str | None, at_profile: Span) -> Compilation:
+        compilation = self._compile(shown, profile, self.outside)
+        self.out.sources.update(compilation.sources)
+        known = {(one.code, one.span, one.message) for one in self.out.report}
+        for one in compilation.report:
+            told = replace(one, span=at_profile) if one.span is not None and one.span.file == PROFILE else one
+            if (told.code, told.span, told.message) not in known:
+                self.out.report.add(told)
+        return compilation
+
+
+def _placed_robot(member: _Member, out: System, compiling: _Compiling) -> PlacedRobot | None:
     """Return a robot with its placement; None after findings."""
-    compilation = _compiled(name, model, out, environment, real)
+    name, entry, model = member.name, member.entry, member.model
+    compilation = compiling.robot(entry, model)
     robot, plan = (compilation.robot, compilation.plan) if compilation else (None, None)
     if compilation is None or robot is None or plan is None:
         return None
-    plan = replace(plan, robot=name)
+    bus = replace(plan.bus, port=_next_port(plan.bus.port, {one.plan.bus.port for one in out.robots.values()}))
+    plan, link_port = replace(plan, robot=name, bus=bus), _link_port(model, plan, out)
     names = [one.name for one in plan.instances]
     parts = {key: part.components for key, part in robot.manifest.parts.items()}
-    problems = list(_wrong_wishes(name, model, out, {*names, *parts}))
+    problems = list(_wrong_wishes(entry, model, out, {*names, *parts}))
     out.report.extend(problems)
     if problems:
         return None
-    devices = {one.name: {opens.port.value} for one, opens in robot.declared(OpensPort)}
+    devices = {one.name: {connected.port.value} for one, connected in robot.declared(ConnectedBy)}
     facts = {key: HostOffer(frozenset(host.labels), frozenset(host.devices)) for key, host in out.hosts.items()}
     placed = place(names, facts, Wishes(model.on, model.place), parts, devices)
-    return PlacedRobot(name, model, robot, plan, placed, _link_port(model, plan, out), _version(compilation))
-
-
-def _compiled(
-    name: str, model: SystemRobotModel, out: System, environment: Mapping[str, str], real: bool
-) -> Compilation | None:
-    span = value_span(out.root, ("robots", name, "robot"))
-    writer = out.path or Path()
-    file = model.robot if model.robot.startswith(PREFIX) else resolve(model.robot, writer, span)
-    if isinstance(file, Finding):
-        out.report.add(file)
-        return None
-    shown = file if isinstance(file, str) else shown_name(file)
-    profiles = [model.profile] if model.profile else []
-    compilation = compile_robot(shown, profiles=profiles, real=real, environment=environment)
-    out.sources.update(compilation.sources)
-    known = {(one.code, one.span, one.message) for one in out.report}
-    out.report.extend(one for one in compilation.report if (one.code, one.span, one.message) not in known)
-    if compilation.plan is None:
-        message = f"the robot '{shown}' has errors, so the system cannot run it"
-        out.report.add(codes.BROKEN_ROBOT.at(span, message, help="see the findings of the robot"))
-    return compilation
+    share_port = model.share_port or (link_port + _APART) % _PORTS or _APART
+    version = _version(compilation, out)
+    return PlacedRobot(name, entry, model, robot, plan, placed, link_port, share_port, version)
 
 
 def _wrong_wishes(name: str, model: SystemRobotModel, out: System, known: Iterable[str]) -> Iterator[Finding]:
@@ -138,11 +250,17 @@ def _link_port(model: SystemRobotModel, plan: Plan, out: System) -> int:
     if model.link_port is not None:
         return model.link_port
     taken = {one.link_port for one in out.robots.values()}
-    ports: Iterable[int] = (*range(plan.bus.port, 65536), *range(1024, plan.bus.port))
+    return _next_port(plan.bus.port, taken)
+
+
+def _next_port(first: int, taken: Collection[int]) -> int:
+    """Return a port that no robot has; two robots of a host would else try one after the other."""
+    ports: Iterable[int] = (*range(first, _PORTS), *range(1024, first))
     return next(port for port in ports if port not in taken)
 
 
-def _version(compilation: Compilation) -> str:
+def _version(compilation: Compilation, out: System) -> str:
     """Return what all hosts of a robot must have in common: the version of rbxcompose, and the texts of its files."""
+    chosen = " ".join(out.profiles).encode()
     texts = sorted(hashlib.sha256(text.encode()).hexdigest() for text in compilation.sources.values())
-    return f"{__version__} {hashlib.sha256(''.join(texts).encode()).hexdigest()[:16]}"
+    return f"{__version__} {hashlib.sha256(''.join(texts).encode() + chosen).hexdigest()[:16]}"

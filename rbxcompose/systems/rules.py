@@ -8,10 +8,14 @@ from rbxcompose.findings import Finding, Related, Severity, Span, kind
 from rbxcompose.manifest.tree import key_span, value_span
 from rbxcompose.model.wires import resolve
 from rbxcompose.qos import Qos
-from rbxcompose.sdk.capabilities import Drives, OpensPort
+from rbxcompose.sdk.capabilities import ConnectedBy, Drives
+from rbxcompose.systems.certificates import MUTUAL, NO_SECURITY
 from rbxcompose.systems.codes import UNKNOWN_HOST
+from rbxcompose.systems.cut_link import slow_stops
+from rbxcompose.systems.exchange import exchanges
 from rbxcompose.systems.model import PlacedRobot, System
 from rbxcompose.systems.share import hosts_of, listens
+from rbxcompose.systems.share_rules import share_findings
 from rbxcompose.systems.traffic import Crossing
 from rbxcompose.units import BIT_RATE, FREQUENCY, TIME, format_quantity
 
@@ -101,7 +105,8 @@ NOT_OURS = kind(
     """A robot on several hosts uses a router of others, or keeps strangers out by sockets
 
 On several hosts, a robot needs routers of its own, which are linked. With `bus.router`, it uses one that exists. With
-`bus.access: user`, other users of the host are kept out, but the link would let every machine of the network in.
+`bus.access: user`, other users of the host are kept out, but without `security: mtls` the link would let every machine
+of the network in.
 
 Bad: a robot with `bus: {router: tcp/192.168.0.2:7447}` whose components are placed on two hosts.
 Good: the same robot without `bus.router`.
@@ -113,18 +118,18 @@ IDLE_LINK = kind(
     "RBX6118",
     """The topic does not cross this link
 
-`downsample` of a link is for topics with a publisher on one of its hosts and a subscriber on the other. This one stays
-within a host, goes another way, or does not exist.
+`downsample` and `priorities` of a link are for topics with a publisher on one of its hosts and a subscriber on the
+other. This one stays within a host, goes another way, or does not exist.
 
 Bad:
 ```yaml
 links:
-  wifi: {between: [robot, desk], downsample: {odm: 2 Hz}}
+  wifi: {between: [robot, desk], downsample: {batery_level: 2 Hz}}
 ```
 Good:
 ```yaml
 links:
-  wifi: {between: [robot, desk], downsample: {odom: 2 Hz}}
+  wifi: {between: [robot, desk], downsample: {battery_level: 2 Hz}}
 ```
 """,
     Severity.WARNING,
@@ -132,10 +137,10 @@ links:
 )
 FEWER_COMMANDS = kind(
     "RBX6119",
-    """Commands would be left out
+    """Commands would be left out, or wait
 
 A base brakes when no command has come for a while, and what steers it relies on each. Messages of the class `command`
-are not downsampled.
+are not downsampled, and go before all others.
 
 Bad:
 ```yaml
@@ -143,6 +148,16 @@ links:
   wifi: {between: [robot, desk], downsample: {cmd_vel: 1 Hz}}
 ```
 Good: run what commands on the host of what moves.
+""",
+)
+PLAIN_QUIC = kind(
+    "RBX6141",
+    """QUIC needs certificates
+
+QUIC is always encrypted, so its routers need the certificates that `security init` makes.
+
+Bad: `wifi: {between: [robot, desk], protocol: quic}` in a system without `security`.
+Good: the same with `security: mtls`.
 """,
 )
 TOO_MUCH = kind(
@@ -157,18 +172,65 @@ Good: `downsample: {scan: 2 Hz}` on this link.
     Severity.WARNING,
 )
 
+OPTIONAL_BASE = kind(
+    "RBX6145",
+    """What drives the robot runs on a host that it can do without
+
+The other hosts do not wait for a host that is `optional`: the robot starts, and its missions run, without its base.
+
+Bad:
+```yaml
+hosts:
+  robot: {address: 10.42.0.2, optional: true}
+robots:
+  turtlebot:
+    place: {base: robot}
+```
+Good:
+```yaml
+hosts:
+  robot: {address: 10.42.0.2}
+```
+""",
+    Severity.WARNING,
+)
+SAME_ADDRESS = kind(
+    "RBX6146",
+    """Two hosts have one address
+
+An address leads to one machine, so one of the hosts is never reached.
+
+Bad:
+```yaml
+hosts:
+  robot: {address: 10.42.0.2}
+  desk: {address: 10.42.0.2}
+```
+Good:
+```yaml
+hosts:
+  robot: {address: 10.42.0.2}
+  desk: {address: 10.42.0.1}
+```
+""",
+)
+
 
 def system_findings(system: System) -> Iterator[Finding]:
     """Yield what is wrong with a system whose robots are placed."""
+    yield from _same_addresses(system)
     for robot in system.robots.values():
         yield from _devices(system, robot)
+        yield from _bases(system, robot)
         yield from _addresses(system, robot)
         if len(hosts_of(system, robot)) > 1:
             yield from _router(system, robot)
+        yield from slow_stops(system, robot)
         for crossing in robot.crossings:
             yield from _commands(system, robot, crossing)
             yield from _bulk(system, robot, crossing)
     yield from _ports(system)
+    yield from share_findings(system)
     for name in system.links:
         yield from _link(system, name)
 
@@ -177,14 +239,14 @@ def _place(system: System, robot: PlacedRobot, component: str) -> Span:
     """Return where the system's file places a component."""
     for keys in (("place", component), ("on",)):
         if keys[-1] in robot.model.place or (keys == ("on",) and robot.model.on):
-            return value_span(system.root, ("robots", robot.name, *keys))
-    return value_span(system.root, ("robots", robot.name, "robot"))
+            return value_span(system.root, ("robots", robot.entry, *keys))
+    return value_span(system.root, ("robots", robot.entry, "robot"))
 
 
 def _devices(system: System, robot: PlacedRobot) -> Iterator[Finding]:
-    for component, opens in robot.robot.declared(OpensPort):
+    for component, connected in robot.robot.declared(ConnectedBy):
         host = robot.hosts[component.name]
-        port = opens.port.value
+        port = connected.port.value
         having = [name for name, one in system.hosts.items() if port in one.devices]
         if having and host not in having:
             message = f"'{component.name}' runs on '{host}', but {port} is connected to '{having[0]}'"
@@ -197,6 +259,25 @@ def _devices(system: System, robot: PlacedRobot) -> Iterator[Finding]:
             )
 
 
+def _bases(system: System, robot: PlacedRobot) -> Iterator[Finding]:
+    for base, _ in robot.robot.declared(Drives):
+        host = robot.hosts[base.name]
+        if system.hosts[host].optional and len(hosts_of(system, robot)) > 1:
+            span = key_span(system.root, ("hosts", host, "optional"))
+            message = f"'{robot.name}' starts without '{host}', where its base '{base.name}' runs"
+            related = [Related(_place(system, robot, base.name), "it runs there")]
+            yield OPTIONAL_BASE.at(span, message, help="remove 'optional', or run it on another host", related=related)
+
+
+def _same_addresses(system: System) -> Iterator[Finding]:
+    seen: dict[str, str] = {}
+    for name, host in system.hosts.items():
+        if host.address is not None and (other := seen.setdefault(host.address, name)) != name:
+            span, first = (value_span(system.root, ("hosts", one, "address")) for one in (name, other))
+            message = f"'{other}' and '{name}' have the same address"
+            yield SAME_ADDRESS.at(span, message, related=[Related(first, "the other host")])
+
+
 def _addresses(system: System, robot: PlacedRobot) -> Iterator[Finding]:
     without = [name for name in hosts_of(system, robot) if system.hosts[name].address is None]
     for name in without[1:]:
@@ -207,14 +288,14 @@ def _addresses(system: System, robot: PlacedRobot) -> Iterator[Finding]:
 
 
 def _router(system: System, robot: PlacedRobot) -> Iterator[Finding]:
-    bus, span = robot.plan.bus, value_span(system.root, ("robots", robot.name, "robot"))
+    bus, span = robot.plan.bus, value_span(system.root, ("robots", robot.entry, "robot"))
     if bus.router is not None:
         yield NOT_OURS.at(
             span, f"'{robot.name}' runs on several hosts and has 'bus.router'", help="remove 'bus.router'"
         )
-    if bus.access == "user":
+    if bus.access == "user" and system.security != MUTUAL:
         message = f"'{robot.name}' runs on several hosts and has 'bus.access: user'"
-        yield NOT_OURS.at(span, message, help="remove 'bus.access', or run it on one host")
+        yield NOT_OURS.at(span, message, help="add 'security: mtls', or remove 'bus.access'")
 
 
 def _commands(system: System, robot: PlacedRobot, crossing: Crossing) -> Iterator[Finding]:
@@ -240,12 +321,16 @@ def _bulk(system: System, robot: PlacedRobot, crossing: Crossing) -> Iterator[Fi
 
 
 def _ports(system: System) -> Iterator[Finding]:
-    seen: dict[str, PlacedRobot] = {}
+    seen: dict[tuple[str, str], PlacedRobot] = {}
+    shared = exchanges(system)
     for robot in system.robots.values():
         for host in hosts_of(system, robot):
-            for endpoint in listens(system, robot, host):
-                if (other := seen.setdefault(endpoint, robot)) is not robot:
-                    span = value_span(system.root, ("robots", robot.name, "link_port"))
+            carried = shared.get((robot.name, host))
+            for endpoint in (*listens(system, robot, host), *(carried.listen if carried else ())):
+                here = host if endpoint.startswith("tcp/127.") else ""  # each host has a loopback interface
+                if (other := seen.setdefault((here, endpoint), robot)) is not robot:
+                    is_link = carried is None or endpoint not in carried.listen
+                    span = value_span(system.root, ("robots", robot.entry, "link_port" if is_link else "share_port"))
                     message = f"the routers of '{other.name}' and '{robot.name}' on '{host}' both listen at {endpoint}"
                     yield SAME_ENDPOINT.at(span, message, help="give one of them another 'link_port', or none")
 
@@ -264,8 +349,11 @@ def _link(system: System, name: str) -> Iterator[Finding]:
         for one in robot.crossings
         if one.passes(link.between)
     }
-    for topic in link.downsample:
-        span = key_span(system.root, ("links", name, "downsample", topic))
+    if link.protocol == "quic" and system.security == NO_SECURITY:
+        span = value_span(system.root, ("links", name, "protocol"))
+        yield PLAIN_QUIC.at(span, f"'{name}' is to use QUIC without certificates", help="add 'security: mtls'")
+    for key, topic in [("downsample", one) for one in link.downsample] + [("priorities", o) for o in link.priorities]:
+        span = key_span(system.root, ("links", name, key, topic))
         found = [one for (robot, full), one in crossing.items() if full == _full(system, robot, topic)]
         if not any(one.qos for one in found):
             valid = sorted(full.removeprefix("/") for (_, full), one in crossing.items() if one.qos)

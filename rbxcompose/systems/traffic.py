@@ -76,16 +76,31 @@ _GIVES = (Out, Serves, ServesAction)
 _TAKES = (In, Calls, CallsAction)
 
 
+@dataclass(frozen=True, slots=True)
+class TopicEnd:
+    """An end of a topic, service or action."""
+
+    topic: str
+    type: str
+    end: End
+
+
+def ends_of(plan: Plan, hosts: Mapping[str, str]) -> Iterator[TopicEnd]:
+    """Yield all ends of components; `hosts` has the host of each."""
+    for one in plan.instances:
+        for (topic, type_), end in _ends(one, hosts[one.name]):
+            yield TopicEnd(topic, type_, end)
+
+
 def crossings(plan: Plan, hosts: Mapping[str, str]) -> Iterator[Crossing]:
     """Yield all that crosses, sorted by name; `hosts` has the host of each component.
 
     A topic crosses if anything that takes it runs on another host than anything that gives it.
     """
     ends: dict[tuple[str, str], tuple[list[End], list[End]]] = {}
-    for one in plan.instances:
-        for (topic, type_), end in _ends(one, hosts[one.name]):
-            givers, takers = ends.setdefault((topic, type_), ([], []))
-            (givers if isinstance(end.port, _GIVES) else takers).append(end)
+    for one in ends_of(plan, hosts):
+        givers, takers = ends.setdefault((one.topic, one.type), ([], []))
+        (givers if isinstance(one.end.port, _GIVES) else takers).append(one.end)
     for (topic, type_), (givers, takers) in sorted(ends.items()):
         away = [one for one in takers if any(giver.host != one.host for giver in givers)]
         sending = [one for one in givers if any(taker.host != one.host for taker in takers)]

@@ -145,6 +145,8 @@ def test_a_bare_share_of_one_may_be_a_percentage_of_either_kind() -> None:
         ("mps", units.SPEED, "write a number before 'm/s'"),
         ("mps", units.TIME, ""),
         ("45 grad", units.ANGLE, "did you mean 'rad'?"),
+        ("12 kgcm", units.TORQUE, "write '1.177 Nm': 1 kgcm is 0.0980665 Nm"),
+        ("150 oz-in", units.TORQUE, "write '1.059 Nm': 1 oz-in is 0.00706155 Nm"),
     ],
 )
 def test_the_help_for_an_unknown_unit_is_of_the_wanted_dimension(text: str, dimension: Dimension, fix: str) -> None:

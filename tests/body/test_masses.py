@@ -66,7 +66,7 @@ WRONG = {
     "a negative moment": ({"arm": inertial(1.0, 1, 1, 1, xy=2)}, "RBX2010 link 'arm' has a negative moment of inertia"),
     "one large moment": (
         {"arm": inertial(1.0, 1, 2, 3.1)},
-        "RBX2010 link 'arm' has a moment of inertia larger than the two others together",
+        "RBX2010 link 'arm' has a moment of inertia larger than the two others together: izz = 3.1, ixx + iyy = 3",
     ),
     "a point": (
         {"arm": inertial(1.0)},

@@ -21,7 +21,9 @@ from tests.misconfig.corpus import Case, cases, run
 # The codes of all rules that need to know what a component can do.
 CODES = {
     *("RBX3001", "RBX3013", "RBX3014", "RBX3102", "RBX3501", "RBX3502", "RBX3503", "RBX3504", "RBX3505", "RBX3509"),
-    *("RBX4120", "RBX4121", "RBX4122", "RBX4123", "RBX4124", "RBX4130", "RBX4160"),
+    "RBX3513",
+    "RBX3514",
+    *("RBX4120", "RBX4121", "RBX4122", "RBX4123", "RBX4124", "RBX4130", "RBX4160", "RBX4185"),
 }
 TYPES = {"battery_sim": "cell", "diff_drive_sim": "wheels", "go_to": "pilot", "charger": "filler"}
 KEYS = {
@@ -33,7 +35,14 @@ KEYS = {
 }
 # Robots with our fields, ports or process groups outside of a component's own lines.
 ELSEWHERE = {"anchors", "own_process_groups", "two_batteries"}
-ELSEWHERE |= {"profile_chosen", "profile_not_chosen", "set_from_outside", "charge_too_late/profile"}
+ELSEWHERE |= {"count_with_rates", "profile_that_swaps", "two_named_batteries"}
+ELSEWHERE |= {
+    "profile_chosen",
+    "profile_not_chosen",
+    "set_from_outside",
+    "settings_that_fit",
+    "charge_too_late/profile",
+}
 _KEY = re.compile(rf"^( +)({'|'.join(KEYS)}): (?=[^\s{{#])", re.MULTILINE)
 _COMPONENTS = re.compile(r"^components:\n(?: .*\n|\n)*", re.MULTILINE)
 _OURS = re.compile(rf"^  \w+:.*\n    type: (?:{'|'.join(TYPES)})\n(?:    .*\n)*", re.MULTILINE)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from pathlib import Path
 
 import pytest
 
@@ -16,7 +17,8 @@ REACH = "{x: 22 cm, y: -12 cm, z: 55 cm}"
 
 def in_order(words: Sequence[str]) -> list[str]:
     """Return the words with the robot behind the verb and its goal, before the options."""
-    return [*words[:2], PI_ROBOT, *words[2:]]
+    first = next((index for index, one in enumerate(words) if one.startswith("--")), len(words))
+    return [*words[:first], PI_ROBOT, *words[first:]]
 
 
 def answered(capsys: pytest.CaptureFixture[str], *words: str) -> dict[str, object]:
@@ -44,9 +46,32 @@ def test_what_inverse_kinematics_finds_is_where_forward_kinematics_ends(capsys: 
     assert position[0] == pytest.approx(0.12, abs=2e-3)  # the torso stands 10 cm behind the middle
 
 
+def test_a_way_tells_how_much_of_it_there_is(capsys: pytest.CaptureFixture[str]) -> None:
+    start = ("--from", "{right_arm_shoulder_lift_joint: -70 deg, right_arm_elbow_flex_joint: 40 deg}")
+    whole = answered(capsys, "trace", "{points: [{z: 3 cm}], relative: true, any_orientation: true}", *start)
+    assert whole["fraction"] == 1.0
+    words = "{points: [{x: 30 cm}], relative: true, any_orientation: true, least: 5 %}"
+    part = answered(capsys, "trace", words, *start)["fraction"]
+    assert isinstance(part, float)
+    assert 0.05 < part < 0.9
+
+
+def test_a_picture_tells_the_cells_that_the_tip_gets_to(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    out = str(tmp_path / "reach.png")
+    words = ("--layer", "z: 60 cm", "--cell", "5 cm", "--samples", "4000", "--out", out)
+    found = answered(capsys, "picture", "reach", *words)
+    assert (found["samples"], found["seed"], found["of"]) == (4000, 1, 50)
+    cells = found["cells"]
+    assert isinstance(cells, list)
+    assert {one["cell"][2] for one in cells} == {12}
+    assert (tmp_path / "reach.png").read_bytes().startswith(b"\x89PNG")
+
+
 @pytest.mark.parametrize(
     ("words", "told"),
     [
+        (["picture", "reach", "--out", "x.png", "--layer", "x: 1 cm, y: 2 cm"], "a layer has one of x, y and z"),
+        (["picture", "reach", "--out", "x.png", "--cell", "1 mm"], "a cell is at least 2 mm"),
         (["plan", "wav"], "did you mean 'wave'?"),
         (["plan", "{right_arm_elbow: 1 deg}"], "no joint of this arm"),
         (["plan", "{right_arm_elbow_flex_joint: 1}"], "must be an angle or a length"),
@@ -54,6 +79,12 @@ def test_what_inverse_kinematics_finds_is_where_forward_kinematics_ends(capsys: 
         (["ik", "{x: 2 m}"], "goal_out_of_reach: the tip got within"),
         (["ik", REACH, "--frame", "torso"], "there is no link 'torso'"),
         (["fk", "wave", "--arm", "left_arm"], "there is no arm 'left_arm'"),
+        (["plan", "wave", "--keep", "{roll: 10 deg}"], "not_kept: at the goal, the tip's"),
+        (["plan", "wave", "--keep", "{z: [1 m]}"], "unknown_goal: a range of 'keep'"),
+        (["plan", "wave", "--keep", "{rol: 1 deg}"], "unknown key 'rol'"),
+        (["trace", "{points: [{x: 2 m}]}"], "path_incomplete: only"),
+        (["trace", "{points: [{x: 2 cm}], frame: torso}"], "unknown_goal: there is no link 'torso'"),
+        (["trace", "{points: []}"], "unknown_goal: there are no points"),
     ],
 )
 def test_what_cannot_be_says_why(words: list[str], told: str, capsys: pytest.CaptureFixture[str]) -> None:

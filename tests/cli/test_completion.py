@@ -22,6 +22,7 @@ from rbxcompose.runtime.folder import ComponentState, RobotFolder, RobotState
 from rbxcompose.runtime.processes import Process, boot_id
 
 ROOT = Path(__file__).parents[2]
+ECHO_OPTIONS = ["--count", "--domain", "--help", "--json", "--once", "--profile", "--robot", "--router", "--ssh-config"]
 
 
 class Nothing:
@@ -47,7 +48,7 @@ def test_verbs_are_completed() -> None:
         (("topic", "e"), ["echo"]),
         (("topic", "echo", "TO"), ["TOPIC:topic"]),
         (("topic", "echo", "--on"), ["--once"]),
-        (("topic", "echo", "/odom", ""), ["--count", "--domain", "--help", "--json", "--once", "--robot", "--router"]),
+        (("topic", "echo", "/odom", ""), ECHO_OPTIONS),
         (("topic", "--robot", "x"), []),
         (("check", "--format", "s"), ["sarif"]),
         (("check", "--format=s"), ["--format=sarif"]),

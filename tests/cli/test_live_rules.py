@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from rbxcompose.cli.robots.live_rules import broken_rules
+from rbxcompose.cli.robots.live_rules import LiveRules
 from rbxcompose.config import Bound, Config
 from rbxcompose.model.robot import Robot
 from rbxcompose.msgs.rcl_interfaces import Parameter
@@ -17,6 +20,7 @@ from rbxcompose.plan.diff import difference
 from rbxcompose.plan.dump import dump, load
 from rbxcompose.runtime.supervision.changes import Fate, changes
 from rbxcompose.testing import check_text
+from tests.conftest import ROOT
 
 ROBOT = """rbx: 1
 kind: Robot
@@ -52,21 +56,26 @@ def set_to(config: Config, name: str, value: object) -> Config:
 
 def test_a_value_that_breaks_a_rule_across_components_is_found(robot: Robot) -> None:
     go_to = robot.components["go_to"].config
-    assert broken_rules(robot, {}, {"go_to": set_to(go_to, "speed", "0.4 m/s")}) == []
-    (broken,) = broken_rules(robot, {}, {"go_to": set_to(go_to, "speed", "0.55 m/s")})
-    assert broken.code == "RBX3503"
+    rules = LiveRules(robot)
+    assert rules.why_not({}, {"go_to": set_to(go_to, "speed", "0.4 m/s")}) is None
+    broken = rules.why_not({}, {"go_to": set_to(go_to, "speed", "0.55 m/s")})
+    assert broken is not None
+    assert (broken.breaks_rule, "RBX3503" in broken.reason, broken.help) == (
+        *(True, True),
+        "make 'speed' of 'go_to' at most 0.5 m/s",
+    )
 
 
 def test_what_other_components_have_now_counts(robot: Robot) -> None:
     now = {"base": set_to(robot.components["base"].config, "max_speed", "0.9 m/s")}
     new = set_to(robot.components["go_to"].config, "speed", "0.55 m/s")
-    assert broken_rules(robot, now, {"go_to": new}) == []
+    assert LiveRules(robot).why_not(now, {"go_to": new}) is None
 
 
 def test_what_was_broken_before_is_not_the_fault_of_a_change(robot: Robot) -> None:
     go_to = robot.components["go_to"].config
     now = {"go_to": set_to(go_to, "speed", "0.6 m/s")}
-    assert broken_rules(robot, now, {"go_to": set_to(go_to, "speed", "0.55 m/s")}) == []
+    assert LiveRules(robot).why_not(now, {"go_to": set_to(go_to, "speed", "0.55 m/s")}) is None
 
 
 def test_the_limits_of_an_argument_are_in_the_plan_and_change_live(tmp_path: Path) -> None:
@@ -87,3 +96,27 @@ def test_the_argument_of_a_part_is_bounded_by_the_one_that_it_is_given(tmp_path:
     (instance,) = (one for one in plan.instances if one.type == "go_to")
     assert [one.most for one in instance.bounds["speed"]] == [0.55, 0.6]
     assert replace(instance.bounds["speed"][0], most=None).by == "the argument 'fast' of the part 'legs'"
+
+
+MISSION = """rbx: 1
+kind: Mission
+name: hurry
+do:
+  - set_parameter: {component: go_to, parameter: speed, value: 0.4 m/s}
+  - set_parameter: {component: go_to, parameter: speed, value: 0.55 m/s}
+"""
+
+
+@pytest.mark.parametrize("pace", [(), ("--rate", "max")])
+def test_what_a_mission_sets_keeps_the_rules_of_the_robot(tmp_path: Path, pace: tuple[str, ...]) -> None:
+    text = ROBOT.replace(
+        "components:", "bus: {port: 7921}\nmissions: {hurry: hurry.yaml}\nstart: hurry\ncomponents:", 1
+    )
+    (tmp_path / "robot.yaml").write_text(text)
+    (tmp_path / "hurry.yaml").write_text(MISSION)
+    environment = {**os.environ, "XDG_RUNTIME_DIR": str(tmp_path), "PYTHONPATH": str(ROOT), "NO_COLOR": "1"}
+    words = [sys.executable, "-m", "rbxcompose", "up", str(tmp_path), *pace]
+    done = subprocess.run(words, env=environment, capture_output=True, text=True, timeout=30, cwd=ROOT)
+    assert "set: speed = 0.4 m/s, by mission hurry" in done.stdout, done.stdout + done.stderr
+    assert "'base' can do 0.5 m/s at most (RBX3503)" in done.stdout, done.stdout
+    assert "set: speed = 0.55 m/s" not in done.stdout

@@ -53,13 +53,25 @@ def test_the_package_has_the_texts_as_they_are_and_names_all_of_them(tmp_path: P
     folder = tmp_path / "rbxcompose_msgs"
     written = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
     own = {
+        "action/FollowPoint.action",
         "action/Grip.action",
+        "action/LookAtPoint.action",
         "action/MoveArm.action",
+        "action/PickObject.action",
+        "action/PlaceObject.action",
         "action/ReachPose.action",
+        "action/TraceArm.action",
+        "msg/JointRange.msg",
+        "msg/PathConstraints.msg",
+        "msg/Sight.msg",
+        "msg/TipPoint.msg",
         "msg/SceneObject.msg",
         "msg/SceneObjects.msg",
+        "msg/SceneShape.msg",
         "action/MoveJoints.action",
         "action/Recharge.action",
+        "srv/AttachObject.srv",
+        "srv/DetachObject.srv",
         "srv/SetBatteryLevel.srv",
         "srv/SetSpeed.srv",
     }
@@ -68,7 +80,8 @@ def test_the_package_has_the_texts_as_they_are_and_names_all_of_them(tmp_path: P
     assert all(f'"{name}"' in cmake for name in own)
     root = ElementTree.fromstring((folder / "package.xml").read_text())
     assert root.findtext("name") == "rbxcompose_msgs"
-    assert [one.text for one in root.iter("depend")] == ["action_msgs", "builtin_interfaces", "geometry_msgs"]
+    needed = ["action_msgs", "builtin_interfaces", "geometry_msgs", "std_msgs"]
+    assert [one.text for one in root.iter("depend")] == needed
 
 
 def test_an_export_overwrites_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -37,6 +37,7 @@ muxes:
     inputs:
       first: {from: go_to, priority: 1, timeout: 0.5 s}
       second: {from: second, priority: 2, timeout: 0.5 s}
+    handover: {linear: 1 m/s^2}  # gentle
 """
 
 Do = Callable[..., subprocess.CompletedProcess[str]]
@@ -127,6 +128,14 @@ def test_the_services_of_the_component_know_the_limit_of_an_argument(do: Do) -> 
     assert "must be at most 0.4 m/s" in done.stdout, done.stdout + done.stderr
 
 
+def test_rules_of_the_whole_robot_hold_for_tools_of_ros_too(do: Do) -> None:
+    request = "{parameters: [{name: speed, value: {type: 3, double_value: 0.7}}, {name: tolerance, value: {type: 1}}]}"
+    told = do("service", "call", "left/second/set_parameters", request).stdout.replace("''", "'")
+    assert "'base' can do 0.5 m/s at most (RBX3503); make 'speed' of 'second' at most 0.5 m/s" in told, told
+    assert "'tolerance' must be a length" in told
+    assert do("param", "get", "second", "speed").stdout == "0.3 m/s\n"
+
+
 def test_several_are_set_or_none(do: Do) -> None:
     done = do("param", "set", "battery.warn=60%", "second.speed=0.2 m/s")
     assert (done.returncode, done.stdout) == (0, "left/battery.warn = 60 %\nleft/second.speed = 0.2 m/s\n")
@@ -196,6 +205,23 @@ def test_live_values_are_saved_at_their_places_reset_and_compared(do: Do, base: 
     do("param", "set", "battery.runtime=45 s")
     assert do("param", "save").returncode == do("param", "diff").returncode == 0
     assert file.read_text() == before
+
+
+def test_a_setting_in_a_group_is_treated_as_any_other(do: Do, base: Path, tmp_path: Path) -> None:
+    file = base / "robot.yaml"
+    before = file.read_text()
+    assert do("param", "set", "cmd_vel", "handover.linear", "2 m/s^2").stdout == "2 m/s^2\n"
+    assert "'handover.linear' must be greater than 0" in do("param", "set", "cmd_vel.handover.linear=0").stderr
+    assert do("param", "get", "cmd_vel", "handover.linear").stdout == "2 m/s^2\n"
+    assert "group     handover" in do("param", "describe", "cmd_vel", "handover.linear").stdout
+    values = tmp_path / "values.yaml"
+    values.write_text(do("param", "dump", "cmd_vel").stdout)
+    assert do("param", "undo").stdout == "left/cmd_vel.handover.linear = 1 m/s^2\n"
+    assert do("param", "load", str(values)).returncode == 0
+    assert do("param", "save", "cmd_vel.handover.linear").returncode == 0
+    assert file.read_text() == before.replace("1 m/s^2", "2 m/s^2")
+    file.write_text(before)
+    assert do("param", "reset").stdout == "left/cmd_vel.handover.linear = 1 m/s^2\n"
 
 
 def test_a_file_that_was_edited_meanwhile_is_not_written_over(do: Do, base: Path) -> None:

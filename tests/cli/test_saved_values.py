@@ -7,8 +7,9 @@ import re
 import shutil
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import pytest
 from hypothesis import given
@@ -22,8 +23,42 @@ from rbxcompose.params.core import settings
 from rbxcompose.runtime.folder import RobotState
 from rbxcompose.runtime.options import NO_LAYERS, ChosenLayers
 from rbxcompose.runtime.processes import Process
+from rbxcompose.sdk import Component, Live, component
 from tests.conftest import ROOT
 
+
+class Axis(Config):
+    p: Annotated[float, Live()] = 1.0
+    i: Annotated[float, Live()] = 0.0
+
+
+class GroupedConfig(Config):
+    """Two groups of settings."""
+
+    left: Axis = Axis()
+    right: Axis = Axis()
+
+
+@component("toy_grouped")
+class Grouped(Component[GroupedConfig]):
+    """Has settings in groups."""
+
+
+GROUPED = """\
+rbx: 1
+kind: Robot
+name: one
+args:
+  gain: {type: number, default: 2, max: 3}
+components:
+  arm:
+    type: toy_grouped
+    left:
+      p: ${args.gain}
+      # how it forgets
+      i: 0.1   # slowly
+  leg: {type: toy_grouped, left: {p: 3}}
+"""
 PART = """rbx: 1
 kind: Part
 name: legs
@@ -98,7 +133,7 @@ def saved(folder: Path, layers: ChosenLayers = NO_LAYERS, **values: Any) -> Mapp
     """Save values; return the changed lines of each file, after the robot was compiled again with the new values."""
     state = state_of(folder, layers)
     before = live(state, **values)
-    texts = files_with(before, list(before.changes), state)
+    texts = files_with(before, list(before.changes), partial(compiled_as_it_runs, state))
     write(texts)
     assert list(replace(live(state), now=before.now).changes) == []
     return {path.name: lines(texts, path) for path in texts.after}
@@ -132,6 +167,28 @@ def test_each_value_is_written_at_its_place_and_every_other_byte_stays(tmp_path:
             '+   go_to: {type: go_to, speed: "${args.fast}", tolerance: "${args.wide}", turn_rate: 0.5 rad/s}',
         ],
     }
+
+
+def test_settings_in_groups_are_written_at_their_places(tmp_path: Path) -> None:
+    project(tmp_path, GROUPED)
+    arm, leg = GroupedConfig(left=Axis(p=2.5, i=0.2), right=Axis(p=4, i=5)), GroupedConfig(left=Axis(p=3, i=1))
+    assert saved(tmp_path, arm__left=arm.left, arm__right=arm.right, leg__left=leg.left) == {
+        "robot.yaml": [
+            "-   gain: {type: number, default: 2, max: 3}",
+            "+   gain: {type: number, default: 2.5, max: 3}",
+            "+     right: {p: 4, i: 5}",
+            "-       i: 0.1   # slowly",
+            "+       i: 0.2   # slowly",
+            "-   leg: {type: toy_grouped, left: {p: 3}}",
+            "+   leg: {type: toy_grouped, left: {p: 3, i: 1}}",
+        ]
+    }
+
+
+def test_the_limit_of_an_argument_holds_for_a_setting_in_a_group(tmp_path: Path) -> None:
+    project(tmp_path, GROUPED)
+    arm = live(state_of(tmp_path, NO_LAYERS)).robot.components["arm"]
+    assert {name: one.most for name, (one,) in arm.bounds.items()} == {"left.p": 3.0}
 
 
 @given(
@@ -191,7 +248,7 @@ def test_a_file_that_changes_before_it_is_written_stays(tmp_path: Path) -> None:
     project(tmp_path)
     state = state_of(tmp_path, ChosenLayers())
     before = live(state, battery__runtime=30.0)
-    texts = files_with(before, list(before.changes), state)
+    texts = files_with(before, list(before.changes), partial(compiled_as_it_runs, state))
     project(tmp_path, ROBOT.replace("45 s", "50 s"))
     with pytest.raises(NotDoneError, match="it has changed meanwhile"):
         write(texts)
@@ -213,7 +270,7 @@ def test_every_live_setting_of_shipped_robots_is_saved_in_one_line_or_refused(ro
 
 def lines_or_code(live: LiveSettings, state: RobotState) -> int | str:
     try:
-        texts = files_with(live, list(live.changes), state)
+        texts = files_with(live, list(live.changes), partial(compiled_as_it_runs, state))
     except NotDoneError as error:
         return error.finding.code
     return sum(len(lines(texts, path)) for path in texts.after)
@@ -225,8 +282,8 @@ def test_a_setting_of_a_library_part_is_refused_with_its_cure(tmp_path: Path) ->
     state = state_of(tmp_path / "robots/house", ChosenLayers())
     before = live(state, base_wheels__acceleration=0.5)
     with pytest.raises(NotDoneError) as refused:
-        files_with(before, list(before.changes), state)
+        files_with(before, list(before.changes), partial(compiled_as_it_runs, state))
     assert "components: {base_wheels: {acceleration: ...}}" in refused.value.finding.help
     before = live(state, base_wheels__max_speed=0.6)
     with pytest.raises(NotDoneError, match="the part 'base' has its own default for the argument 'max_speed'"):
-        files_with(before, list(before.changes), state)
+        files_with(before, list(before.changes), partial(compiled_as_it_runs, state))

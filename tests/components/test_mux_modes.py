@@ -50,6 +50,19 @@ def look(robot: Bench) -> MuxState:
     return robot.host.ask("cmd_vel", LookAtMux("cmd_vel"))
 
 
+def test_the_limits_of_a_hand_over_change_while_the_robot_runs() -> None:
+    robot = bench(handover={"linear": "0.1 m/s^2"})
+    out = robot.collect("/cmd_vel", Twist)
+    robot.publish("/cmd_vel/navigation", SLOW)
+    robot.publish("/cmd_vel/teleop", FAST)
+    robot.advance(0.1)
+    robot.publish("/cmd_vel/teleop", FAST)
+    robot.set_live("cmd_vel", **{"handover.linear": "1 m/s^2"})
+    robot.advance(0.1)
+    robot.publish("/cmd_vel/teleop", FAST)
+    assert [one.linear.x for one in out] == pytest.approx([0.1, 0.1, 0.11, 0.21])
+
+
 def test_the_services_of_topic_tools_select_and_list_by_topic() -> None:
     robot = selecting(profile="topic_tools")
     out = robot.collect("/cmd_vel", Twist)

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.controller_manager import ControllerManager
-from rbxcompose.controller_requests import ControllerState, ListControllers, SwitchControllers
+from rbxcompose.controller_requests import ControllerState, ListControllers, ScaleMotion, SwitchControllers
 from rbxcompose.controllers.joint_trajectory import JointTrajectoryConfig
 from rbxcompose.msgs.rbxcompose_msgs import MoveJoints
 from rbxcompose.requests import Refused
@@ -85,6 +85,25 @@ CONFIG = {
         },
     },
 }
+
+
+def test_a_controller_is_held_and_goes_on_by_the_word_of_a_person() -> None:
+    robot = Bench(instance("servos", "servo_bus", CONFIG), start=False)
+    ended: list[Ended[MoveJoints.Result]] = []
+    head = robot.bus.action_client("me", "/head/move", MoveJoints)
+    robot.advance(0.2)
+    bus: Any = robot.component("servos")
+    assert bus.handle(ScaleMotion("servos", "head", 0.0)) == "'head' holds: the speed is 0 %"
+    head(MoveJoints.Goal(joints=("pan",), positions=np.array([1.0])), ended.append)
+    robot.advance(20.0)
+    assert not ended
+    assert bus.handle(ListControllers("servos"))[0].note == "held: the speed is 0 %"
+    assert bus.handle(ScaleMotion("servos", "head", 1.0)) == "'head' follows goals at 100% of the speed"
+    robot.advance(3.0)
+    assert [one.outcome for one in ended] == [Outcome.SUCCEEDED]
+    for name, share, words in (("nobody", 1.0, "no controller 'nobody'"), ("head", 2.0, "from 0 % to 100 %")):
+        with pytest.raises(Refused, match=words):
+            bus.handle(ScaleMotion("servos", name, share))
 
 
 def test_a_controller_that_is_switched_off_ends_its_goal_and_refuses_others() -> None:

@@ -45,6 +45,7 @@ MODELS: dict[str, dict[str, Any]] = {
     "one_sided": {"joint": "a", "pad_width": "1 cm", "finger_length": "5 cm", "opening": ["0 cm", "9 cm"]},
     "dual": {"left": "a", "right": "b", "pad_width": "1 cm", "finger_length": "5 cm", "opening": ["0 cm", "9 cm"]},
     "parallel": {"joint": "a", "travel": "12 cm", "opening": ["0 cm", "4 cm"]},
+    "sliding": {"joint": "a", "opening": ["0 cm", "4 cm"]},
     "calibrated": {
         "joint": "a",
         "calibration": [{"opening": "4 cm", "angle": "50 deg"}, {"opening": "0 mm", "angle": "10 deg"}],
@@ -294,6 +295,12 @@ def test_travel_is_the_opening_of_one_turn() -> None:
     assert inverted.angles(0.05) == pytest.approx((-math.pi,))
 
 
+def test_fingers_that_slide_go_half_of_the_opening_each() -> None:
+    config = config_of("sliding", opening=["1 cm", "10 cm"])
+    assert model_of(config).angles(0.06) == (0.03,)
+    assert GripperController.asks(config) == {"a": (0.005, 0.05)}
+
+
 # A robot in YAML
 
 BODY = """<robot name="hand">
@@ -325,6 +332,9 @@ controllers:
     opening: [0 cm, 16 cm]
 """
 WRONG = {
+    "fingers that slide with a joint that turns": ROBOT.replace("one_sided", "sliding")
+    .replace("    pad_width: 7 cm\n", "")
+    .replace("    finger_length: 10 cm\n", ""),
     "a key of another model": ROBOT + "    travel: 8 mm\n",
     "an opening that is not reachable": ROBOT.replace("16 cm", "30 cm"),
     "an opening beyond the limits of the joint": ROBOT.replace("16 cm", "20 cm"),

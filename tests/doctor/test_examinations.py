@@ -20,6 +20,7 @@ from rbxcompose.doctor.facts import BusFacts, Clocks, HostFacts, Listener, Resou
 from rbxcompose.doctor.registry import EXAMINATIONS, PLUGINS, ExaminationResult, examination, examine_all, has_errors
 from rbxcompose.findings import Finding
 from rbxcompose.model.robot import Robot
+from rbxcompose.runtime.clock_offset import ClockOffset
 from rbxcompose.runtime.folder import RobotFolder, RobotState
 from rbxcompose.runtime.processes import Process, boot_id
 
@@ -206,6 +207,15 @@ def test_a_node_whose_stamps_are_of_another_time_is_told() -> None:
         "ok",
         "cart: the stamps of 1 nodes agree with this clock",
     )
+
+
+def test_a_host_of_a_robot_whose_clock_is_too_far_off_is_told() -> None:
+    apart = replace(state(), clocks={"desk": ClockOffset(0.3, 0.01), "robot": ClockOffset(-0.001, 0.01)})
+    _, *others = told("clocks", replace(FINE, running=(running(apart),)))
+    assert others == [
+        ("RBX6129", "cart: the clock of host 'desk' is 300.0 ms ahead of ours (± 10.0 ms)"),
+        ("ok", "cart: the clock of host 'robot' is 1.0 ms behind ours (± 10.0 ms)"),
+    ]
 
 
 def test_low_limits_are_told() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import shutil
 import socket
 import subprocess
@@ -13,14 +14,27 @@ import yaml
 
 from rbxcompose.cli.main import main
 from rbxcompose.exporting import compose, kubernetes, systemd
-from rbxcompose.exporting.exported_share import ExportedShare, shares
+from rbxcompose.exporting.exported_share import CERTIFICATES, CONFIGURATION, FILE, ExportedShare, shares
 from rbxcompose.runtime.service_manager import ALIVE, READY, ServiceManager
 from rbxcompose.systems.bundle import files_of
+from rbxcompose.systems.certificates import folder_of
 from rbxcompose.systems.reader import compile_system
 from rbxcompose.testing.golden import Golden
 
 PATH = "systems/patrol_two_hosts.yaml"
 WITH_DEVICE = ExportedShare("lab", "arm", "bench", ("up", "{file}", "--host", "bench"), ("/dev/ttyUSB0",), 1.0)
+SECRET = ExportedShare("lab", "arm", "bench", ("up", "{file}"), (), 1.0, has_certificates=True, secrets=("api_key",))
+OVERLAY = """
+apiVersion: kustomize.config.k8s.io/v1beta1
+kind: Kustomization
+resources: [../base]
+namePrefix: second-
+images: [{name: "robot", newTag: "2"}]
+patches:
+  - target: {kind: Deployment}
+    patch: |-
+      - {op: add, path: /spec/template/spec/nodeSelector/fleet, value: second}
+"""
 
 
 @pytest.fixture
@@ -59,6 +73,36 @@ def test_a_compose_file_has_a_service_for_each_share_in_the_profile_of_its_host(
     assert services["arm-bench"]["devices"] == ["/dev/ttyUSB0:/dev/ttyUSB0"]
 
 
+def composer(text: str) -> tuple[list[str], str]:
+    """Return the words for Compose, and what it reads of the file: version 1 knows all keys of version 2 but `name`."""
+    newest = ["docker", "compose"]
+    if shutil.which("docker") and subprocess.run([*newest, "version"], capture_output=True).returncode == 0:
+        return newest, text
+    command = tool("docker-compose")
+    version = subprocess.run([command, "version", "--short"], capture_output=True, text=True, check=True).stdout
+    return [command], text.replace("\nname: lab\n", "\n") if version.startswith("1.") else text
+
+
+def test_compose_accepts_the_file_and_would_refuse_a_key_that_it_does_not_know(
+    found: list[ExportedShare], tmp_path: Path
+) -> None:
+    given = [*found, dataclasses.replace(SECRET, devices=WITH_DEVICE.devices)]
+    command, text = composer(compose.compose_file(given, system="lab", file=PATH))
+    profiles = [word for share in given for word in ("--profile", share.host)]
+    path = tmp_path / "compose.yaml"
+
+    def read(text: str) -> subprocess.CompletedProcess[str]:
+        path.write_text(text, encoding="utf-8")
+        return subprocess.run([*command, "-f", path, *profiles, "config"], capture_output=True, text=True, check=False)
+
+    done = read(text)
+    assert done.returncode == 0, done.stderr
+    services = yaml.safe_load(done.stdout)["services"]
+    commands = {share.name: [f"/robot/{PATH}" if word == FILE else word for word in share.command] for share in given}
+    assert {name: one["command"] for name, one in services.items()} == commands
+    assert "mem_limits" in read(text.replace("mem_limit", "mem_limits")).stderr
+
+
 def k8s(found: list[ExportedShare]) -> dict[str, str]:
     file, files = files_of(compile_system(PATH, environment={}))
     return kubernetes.manifests(found, system="patrol_two_hosts", file=file, files=files, image="robot:1")
@@ -88,6 +132,45 @@ def test_kustomize_accepts_the_manifests(found: list[ExportedShare], tmp_path: P
     assert done.returncode == 0, done.stderr
     kinds = [one["kind"] for one in yaml.safe_load_all(done.stdout)]
     assert sorted(kinds) == ["ConfigMap", "Deployment", "Deployment"]
+
+
+def test_each_robot_of_a_fleet_is_an_overlay(found: list[ExportedShare], tmp_path: Path) -> None:
+    kubectl = tool("kubectl")
+    for folder in ("base", "second"):
+        (tmp_path / folder).mkdir()
+    for name, text in k8s([*found, SECRET]).items():
+        (tmp_path / "base" / name).write_text(text, encoding="utf-8")
+    (tmp_path / "second/kustomization.yaml").write_text(OVERLAY, encoding="utf-8")
+    done = subprocess.run([kubectl, "kustomize", tmp_path / "second"], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    made = {one["metadata"]["name"]: one for one in yaml.safe_load_all(done.stdout)}
+    pod = made["second-turtlebot-robot"]["spec"]["template"]["spec"]
+    assert pod["nodeSelector"] == {"rbxcompose/host": "robot", "fleet": "second"}
+    assert pod["volumes"][0]["configMap"]["name"] in made
+    assert pod["containers"][0]["image"] == "robot:2"
+
+
+def test_the_schemas_of_kubernetes_accept_the_manifests(found: list[ExportedShare]) -> None:
+    validator = pytest.importorskip("kubernetes_validate", reason="needs kubernetes-validate")
+    for text in k8s([*found, WITH_DEVICE, SECRET]).values():
+        if (one := yaml.safe_load(text))["kind"] != "Kustomization":
+            validator.validate(one, validator.latest_version(), strict=True)
+
+
+@pytest.mark.usefixtures("repository")
+def test_secrets_are_named_and_never_written_down() -> None:
+    text = k8s([SECRET])["arm-bench.yaml"]
+    container = (pod := yaml.safe_load(text)["spec"]["template"]["spec"])["containers"][0]
+    assert "# kubectl create secret generic arm-bench-api-key --from-file=value=secrets/api_key" in text
+    assert container["env"][-1]["valueFrom"] == {"secretKeyRef": {"name": "arm-bench-api-key", "key": "value"}}
+    certificates = {one["name"]: one for one in pod["volumes"]}["certificates"]
+    assert certificates["secret"]["secretName"] == "arm-bench-certificates"
+    composed = yaml.safe_load(compose.compose_file([SECRET], system="lab", file=PATH))
+    service = composed["services"]["arm-bench"]
+    assert service["environment"] == ["RBX_SECRET_API_KEY"]
+    assert {one["source"] for one in service["secrets"]} == composed["secrets"].keys()
+    folder = folder_of("lab", {"XDG_CONFIG_HOME": CONFIGURATION}) / "bench"
+    assert [one["target"] for one in service["secrets"]] == [str(folder / name) for name in CERTIFICATES]
 
 
 def test_files_go_to_a_new_folder_only(repository: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -17,7 +17,7 @@ from rbxcompose.runtime.folder import LOCK, SOCKET
 from rbxcompose.runtime.processes import wait_until_ended
 from tests.exposure.sockets import listeners
 from tests.exposure.test_listeners import NOBODY, answers, running
-from tests.runtime.test_real_processes import Robot, eventually
+from tests.runtime.real_robot import Robot, eventually
 
 
 @pytest.fixture(scope="module")

@@ -26,7 +26,7 @@ from rbxcompose.runtime.folder import SOCKET, RobotFolder
 from rbxcompose.runtime.requests import RobotStatus
 from tests.exposure.attacks import ON_CONTROL, ON_ROUTER, REQUESTS, sending
 from tests.exposure.sockets import Listener, listeners
-from tests.runtime.test_real_processes import PATIENCE, Robot, eventually
+from tests.runtime.real_robot import PATIENCE, Robot, eventually
 from tests.soak import Soak
 
 NOBODY = 65534  # uid

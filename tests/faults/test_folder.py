@@ -10,7 +10,8 @@ import pytest
 from rbxcompose.atomic_files import TEMPORARY
 from rbxcompose.runtime.folder import STATE
 from rbxcompose.runtime.processes import titled
-from tests.runtime.test_real_processes import PATIENCE, Robot, eventually, robot
+from tests.runtime.conftest import robot
+from tests.runtime.real_robot import PATIENCE, Robot, eventually
 
 __all__ = ["robot"]
 

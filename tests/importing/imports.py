@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,7 @@ class Imported:
     text: str
     report: Report
     sources: dict[str, str]
+    beside: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def told(self) -> list[tuple[str, int]]:
@@ -48,7 +49,8 @@ class Imported:
 
 def import_files(paths: Sequence[Path], name: str = "tried", program: str = "arbotix") -> Imported:
     report, sources = Report(), dict[str, str]()
-    return Imported(imported(program, read_files(paths, report, sources), name, report), report, sources)
+    made = imported(program, read_files(paths, report, sources), name, report)
+    return Imported(made.text, report, sources, made.beside)
 
 
 def import_texts(folder: Path, *texts: str, program: str = "arbotix") -> Imported:

@@ -132,4 +132,4 @@ def test_whatever_a_file_says_what_is_written_is_a_robot(
     folder = tmp_path_factory.mktemp("any")
     found = params(folder, yaml.safe_dump({name: {"ros__parameters": one} for name, one in nodes.items()}))
     if found.text:
-        assert check_text(found.text, folder).codes == []
+        assert set(check_text(found.text, folder).codes) <= {"RBX1209"}  # what is not used yet is told

@@ -22,6 +22,7 @@ from rosbags.interfaces import Nodetype
 import rbxcompose.msgs
 
 EMPTY = "uint8 structure_needs_at_least_one_member\n"  # what takes the place of no fields at all
+ZEROS = {"string": "", "bool": False, "float32": 0.0, "float64": 0.0}
 INTERFACES = Path(rbxcompose.msgs.__file__).parent / "interfaces"
 
 
@@ -99,22 +100,34 @@ class Peer:
                 "SendGoal": f"{uuid}{goal}---\nbool accepted\n{stamp}",
                 "GetResult": f"{uuid}---\nint8 status\n{result}",
             }[part]
-        request, response = text.split("---\n")
+        request, response = (qualified(part, package) for part in text.split("---\n"))
         for held in (*fields_of(request), *fields_of(response)):
             if "/" in held:
                 self._load(held.replace("/", "/msg/"))
         return {"request_definition": request, "response_definition": response}
 
     def _filled(self, store_type: str, fields: dict[str, Any]) -> dict[str, Any]:
-        """Return `fields` with maps made into nested messages, and lists (of numbers) into arrays."""
-        store = self._session.store
-        filled = dict(fields)
-        for name, (kind, about) in store.fielddefs[store_type][1]:
-            if kind is Nodetype.NAME and name in fields:
-                filled[name] = store.types[about](**self._filled(about, fields[name]))
-            elif kind is Nodetype.ARRAY and name in fields:
-                filled[name] = numpy.array(fields[name], about[0][1][0])
-        return filled
+        """Return all fields of a message: maps become nested ones, lists of numbers arrays; the others are zero."""
+        known = self._session.store.fielddefs[store_type][1]
+        return {name: self._value(kind, about, fields.get(name)) for name, (kind, about) in known}
+
+    def _value(self, kind: Nodetype, about: Any, given: Any) -> Any:
+        if kind is Nodetype.NAME:
+            return self._session.store.types[about](**self._filled(about, given or {}))
+        if kind is Nodetype.BASE:
+            return ZEROS.get(about[0], 0) if given is None else given
+        (inner, of), count = about
+        values = [None] * (count if kind is Nodetype.ARRAY else 0) if given is None else given
+        found = [self._value(inner, of, one) for one in values]
+        return found if inner is Nodetype.NAME or of[0] == "string" else numpy.array(found, of[0])
+
+
+def qualified(definition: str, package: str) -> str:
+    """Return a definition whose messages of the same package are named with it, as those of others are."""
+    lines = definition.splitlines()
+    bare = (line[:1].isupper() and "/" not in line.split(" ")[0] for line in lines)
+    lines = [f"{package}/{line}" if is_bare else line for line, is_bare in zip(lines, bare, strict=True)]
+    return "".join(f"{line}\n" for line in lines)
 
 
 def fields_of(definition: str) -> list[str]:

@@ -6,7 +6,7 @@ import os
 import subprocess
 from pathlib import Path
 
-from tests.runtime.test_real_processes import ROOT, TOY
+from tests.runtime.real_robot import ROOT, TOY
 
 
 def test_a_robot_without_a_place_for_its_state_is_refused(tmp_path: Path) -> None:

@@ -232,7 +232,8 @@ def check_renaming(names: Names, symbol: Symbol) -> None:
         prepare(names.index, mention.file, *place)
         made = rename(names.index, mention.file, *place, new, names.compiled)
     except CannotRenameError as error:
-        assert "is a topic" in str(error) or "base_footprint" in str(error)  # noqa: PT017 - all others can be renamed
+        # All others can be renamed. What an instance brings is called after it, also where names are not followed.
+        assert symbol.sort == "include" or "is a topic" in str(error) or "base_footprint" in str(error)  # noqa: PT017
         return
     for path, text in made.texts.items():
         assert text.replace(new, symbol.name) == files.text(path)
@@ -247,6 +248,7 @@ def check_renaming(names: Names, symbol: Symbol) -> None:
             assert sorted(_WORD.findall(text)) == sorted(_WORD.findall(names.plans[robot]))  # some order is theirs
 
 
+@pytest.mark.timeout(200)
 def test_after_any_rename_a_robot_is_the_same_but_for_the_name(shipped: Names, soak: Soak) -> None:
     symbols = sorted(shipped.index.symbols, key=str)
 

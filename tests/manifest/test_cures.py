@@ -105,6 +105,33 @@ CURES = [
         "name: helper\nabout: rtsp://admin:hunter2@camera/live",
         "where a secret is taken, put the whole address into 'secrets/NAME' and write '${secret.NAME}'",
     ),
+    ("    type: go_to\n", "    platform: go_to\n", "write 'type: go_to'"),
+    (
+        "missions:",
+        "---\nrbx: 1\nkind: Mission\nmissions:",
+        "a file holds one manifest: move what follows, without the '---', to a file of its own",
+    ),
+    ("rbx: 1\n", "rbx: 1\n---\n", "a file holds one manifest: remove the '---'"),
+    (
+        "missions:",
+        "profiles:\n  bare:\n    components:\n      go_to: null\nmissions:",
+        "to remove it, write 'go_to: !remove'",
+    ),
+    (
+        GO_TO,
+        f"{GO_TO}  watch: {{type: topic_monitor, topic: odom, message: nav_msgs.msg.Odometry, rate: 1 Hz}}\n",
+        "did you mean 'nav_msgs/msg/Odometry'?",
+    ),
+    (
+        GO_TO,
+        f"{GO_TO}  watch: {{type: topic_monitor, topic: odom, message: geometry_msgs/Pose, rate: 1 Hz}}\n",
+        "write 'message: nav_msgs/Odometry' in 'watch', or another topic",
+    ),
+    (
+        "missions:",
+        "diagnostics: {ignore: [{regex: '*camera*'}]}\nmissions:",
+        "write '.*camera.*', or 'contains: camera' instead of 'regex'",
+    ),
 ]
 
 

@@ -160,7 +160,7 @@ MISTAKES = [
     (("    type: go_to\n", ""), "RBX1002", "component 'go_to' needs the key 'type'"),
     (("\nplaces:", "\nbus: {wire: jazy}\nplaces:"), "RBX1004", "'wire' must be"),
     (("    reach: 20 cm", "    reach: 20 cm\n    proces: own"), "RBX1001", "unknown key 'proces' in component"),
-    (("components:\n", "components: 5\nx:\n"), "RBX1001", "unknown key 'x' in this file"),
+    (("\ncomponents:\n", "\ncomponents: 5\nx:\n"), "RBX1001", "unknown key 'x' in this file"),
     (("\nplaces:", "\nbus: {port: 0}\nplaces:"), "RBX1005", "'port' must be at least 1"),
     (("args:\n", "args: 5\nx:\n"), "RBX1003", "'args' must be a map of named entries"),
     (("  speed:\n    type: speed", "  Speed:\n    type: speed"), "RBX1006", "'Speed' is not a valid name"),

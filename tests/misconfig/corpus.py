@@ -27,6 +27,7 @@ EXPECT = re.compile(r"# expect(-next)?: ([A-Z0-9, ]+)$")
 OPTION = re.compile(r"^# (check|environment): (.*)$", re.MULTILINE)
 NOISE = re.compile(r"# noise: ([A-Z0-9, ]+)$", re.MULTILINE)
 MISSES = re.compile(r"# misses: (.*)$", re.MULTILINE)
+KNOWN = (".yaml", ".urdf", ".scene", ".stl", ".xyz")  # endings of files of a case
 ROBOT, MISSION = "robot.yaml", "mission.yaml"
 VALUES = "values:\n  battery: battery.battery_level\n"  # for missions that read it
 
@@ -124,7 +125,7 @@ def _in_a_cell(title: str) -> str:
 def _case(path: Path, kind: str) -> Case:
     name = f"{kind}/{path.stem}" if kind else path.stem
     if path.is_dir():
-        files = (file for file in sorted(path.rglob("*")) if file.suffix in (".yaml", ".urdf"))
+        files = (file for file in sorted(path.rglob("*")) if file.suffix in KNOWN)
         return Case(name, kind, {str(file.relative_to(path)): _text(file) for file in files})
     text = _text(path)
     if "\nkind: Mission\n" in text:

@@ -31,6 +31,7 @@ def test_an_unusual_robot_that_is_right_gives_no_finding(case: Case, tmp_path: P
     assert run(case, tmp_path).found == frozenset()
 
 
+@pytest.mark.timeout(100)
 def test_the_corpus_is_as_large_as_it_says_and_most_of_it_is_caught() -> None:
     found = figures()
     assert found.wrong >= 120
@@ -60,6 +61,7 @@ def test_every_expected_code_exists_and_every_check_has_a_case() -> None:
     assert rules - expected == NOT_SHIPPED
 
 
+@pytest.mark.timeout(100)
 def test_the_page_of_the_corpus_is_up_to_date() -> None:
     written = Path(__file__).parents[2] / "docs" / "misconfig.md"
     assert written.read_text(encoding="utf-8") == page(), "run `make docs`"

@@ -16,10 +16,12 @@ from tests.mission_tests.trying import Trying
 PATROL = "missions/tests/patrol.test.yaml"
 
 
+@pytest.mark.timeout(600)
 def test_all_tests_of_the_missions_pass(repository: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert command(["test", "--json"]) == 0, capsys.readouterr().out
     told = json.loads(capsys.readouterr().out)
-    assert len(told["tests"]) == len(list((ROOT / "missions").rglob("*.test.yaml"))) >= 5
+    files = list((ROOT / "missions").rglob("*.test.yaml"))
+    assert {test["file"] for test in told["tests"]} == {str(file.relative_to(ROOT)) for file in files}
     assert all(test["passed"] for test in told["tests"])
 
 
@@ -182,3 +184,25 @@ def test_nothing_that_a_user_wrote_reaches_the_terminal_raw(tmp_path: Path, caps
     assert "\x1b" not in captured.out + captured.err
     assert "FAILED  \\x1b[31mred" in captured.out
     assert "?[31mred" in junit.read_text()
+
+
+def test_one_file_may_test_several_robots(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    trying = Trying(tmp_path)
+    (tmp_path / "second.yaml").write_text((tmp_path / "robot.yaml").read_text())
+    (tmp_path / "third").mkdir()
+    broken(tmp_path / "third")
+    test = "expect:\n  outcome: success\n"
+    head = "rbx: 1\nkind: Test\nname: opens\nrobot: robot.yaml\nmission: patrol\nmocks: {go_to: , recharge: }\n"
+    head += "events: [{at: 0 s, set: {battery: 100 %, door: false}}]\n"
+    file = tmp_path / "tried.test.yaml"
+    file.write_text(f"{head}also: [second.yaml]\n{test}")
+    command(["test", "--json", str(file)])
+    told = json.loads(capsys.readouterr().out)["tests"]
+    assert [one["name"] for one in told] == ["opens", "opens (second)"]
+    assert len({one["passed"] for one in told}) == 1
+    file.write_text(f"{head}also: [second.yaml, third/robot.yaml]\n{test}")
+    assert command(["test", "--json", str(file)]) == 1
+    assert [one["name"] for one in json.loads(capsys.readouterr().out)["tests"]][2] == "opens (third)"
+    assert trying.reading.read(file)[1].has_errors
+    file.write_text(f"{head}also: second.yaml\n{test}")
+    assert [one.message for one in trying.reading.read(file)[1]] == ["'also' must be a list of robots"]

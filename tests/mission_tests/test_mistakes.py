@@ -97,10 +97,51 @@ def test_a_wrong_shape_is_told(trying: Trying, text: str, words: str) -> None:
     assert words in found
 
 
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("steps: [go_to: dock]\n  never: [go_to: dock]", "'go_to dock' must never be"),
+        ("steps: [go_to: dock]\n  never: [go_to]", "'go_to' must never be"),
+        ("steps: [{go_to: dock, ended: halted}]\n  never: [go_to: dock]", "'go_to dock' must never be"),
+        ("steps: [recharge, recharge]\n  count: {recharge: 1}", "that is 2 times"),
+        ("steps: [{recharge: , at: 5 s}, {go_to: , at: 4 s}]", "this is earlier"),
+    ],
+)
+def test_expectations_that_contradict_each_other_are_told(trying: Trying, text: str, words: str) -> None:
+    trial, found = trying.read(f"mocks:\n  go_to:\n  recharge:\nexpect:\n  for: 9 s\n  {text}\n")
+    assert trial is None
+    assert codes.NEVER.code in found
+    assert words in found
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "steps: [go_to: dock]\n  never: [go_to: corner_1]",
+        "steps: [go_to: dock]\n  never: [{go_to: dock, ended: failure}]",
+        "steps: [{go_to: dock, ended: halted}]\n  never: [{go_to: dock, ended: failure}]",
+        "steps: [go_to]\n  never: [go_to: dock]",
+        "steps: [recharge, recharge]\n  count: {recharge: 2}",
+        "steps: [{recharge: , at: 4 s}, {go_to: , at: 4 s}]",
+    ],
+)
+def test_expectations_that_can_be_met_together_are_fine(trying: Trying, text: str) -> None:
+    trial, found = trying.read(f"mocks:\n  go_to:\n  recharge:\nexpect:\n  for: 9 s\n  {text}\n")
+    assert trial is not None, found
+
+
 def test_values_without_the_brackets_of_a_list_are_told_with_them(trying: Trying) -> None:
     trial, found = trying.read("mocks:\n  go_to:\n    fails_for: dock\nexpect:\n  for: 1 s\n")
     assert trial is None
     assert "a list needs brackets: write '[dock]'" in found
+
+
+def test_a_profile_that_the_robot_does_not_have_is_told_in_the_test(trying: Trying) -> None:
+    trial, found = trying.read(f"profile: simulation\n{FINE}")
+    assert trial is None
+    assert "the robot has no profile 'simulation'\n  --> tried.test.yaml" in found
+    assert "has errors, so the test cannot run" not in found
+    assert not trying.reading.report.has_errors
 
 
 def test_a_mock_that_nothing_uses_is_a_warning(trying: Trying) -> None:

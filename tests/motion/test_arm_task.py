@@ -17,6 +17,8 @@ from rbxcompose.motion.inverse_kinematics import PoseTarget
 from rbxcompose.motion.parametrisation import Trajectory
 from rbxcompose.motion.reasons import MotionReason
 from rbxcompose.motion.scene import PlacedObject
+from rbxcompose.motion.tip_path import WayPoint
+from rbxcompose.motion.trace_planner import TraceWish
 from tests.motion.toy_arm import kinematics, planner
 
 KINEMATICS, PLANNER = kinematics(), planner()
@@ -36,7 +38,7 @@ class Site:
     """What a task needs; `sent` are trajectories that nobody has ended yet."""
 
     def __init__(self) -> None:
-        self.now, self.is_ready = 0.0, True
+        self.now, self.is_ready, self.problem = 0.0, True, "nothing is known"
         self.measured: dict[str, tuple[float, float]] = {name: (value, 0.0) for name, value in AT.items()}
         self.poses: Mapping[str, Mapping[str, float]] = {"aside": {"turn": 1.2}, "up": {"lift": 1.0, "bend": 0.0}}
         self.sent: list[tuple[Trajectory, Callable[[str, bool], None]]] = []
@@ -53,7 +55,7 @@ class Site:
         self.stages.append(stage)
 
     def info(self, text: str) -> None:
-        assert "positions examined" in text
+        assert "positions examined" in text or "planned again" in text
 
 
 def begun(site: Site, goal: ArmGoal) -> ArmTask:
@@ -195,3 +197,43 @@ def test_an_arm_whose_velocities_are_noise_is_at_rest_and_one_that_moves_is_not(
             task.advance()
         assert bool(site.sent) is is_at_rest
         assert (task.failure is None) is is_at_rest
+
+
+def test_a_motion_that_something_stops_is_planned_again_as_often_as_was_asked_for() -> None:
+    site, used = Site(), planner()
+    task = ArmTask(site, KINEMATICS, used, ArmGoal("up", replans=1))
+    for times in (1, 2):
+        while len(site.sent) < times:
+            task.advance()
+        trajectory, ended = site.sent[-1]
+        middle = KINEMATICS.tip_pose(trajectory.positions[len(trajectory.positions) // 2])
+        block = PlacedObject("block", Geometry("box", (0.02, 0.02, 0.02)), "ground", middle)
+        used.checker = MeshChecker(KINEMATICS, {}, adjacent_pairs(KINEMATICS.body), [block])
+        task.look_again()
+        assert site.stops == times
+        ended("its trajectory was canceled", True)
+    assert task.is_over
+    assert task.failure is not None
+    assert task.failure.reason is MotionReason.PATH_IN_COLLISION
+    assert site.stages == ["planning", "moving", "planning", "moving"]
+
+
+def test_joints_may_be_elsewhere_within_the_tolerance_if_the_goal_collides() -> None:
+    for tolerance, moves in ((0.0, False), (0.3, True)):
+        site = Site()
+        task = begun(site, ArmGoal(positions={"turn": 0.1}, tolerance=tolerance))
+        assert bool(site.sent) is moves
+        if moves:
+            assert np.max(np.abs(site.sent[0][0].positions[-1] - (0.1, 0.0, 0.2))) <= tolerance
+        else:
+            assert task.failure is not None
+            assert task.failure.reason is MotionReason.GOAL_IN_COLLISION
+
+
+def test_a_way_of_the_tip_is_planned_and_followed_and_tells_its_share() -> None:
+    site = Site()
+    way = TraceWish((WayPoint(Transform3((-0.1, 0.0, 0.0))),), relative=True, any_orientation=True)
+    task = begun(site, ArmGoal(trace=way))
+    before, after = (np.array(KINEMATICS.tip_pose(site.sent[0][0].positions[one]).translation) for one in (0, -1))
+    assert np.allclose(after - before, (-0.1, 0.0, 0.0), atol=1e-3)
+    assert task.share == 1.0

@@ -13,10 +13,10 @@ from rbxcompose.control.limits import MotionLimits
 from rbxcompose.geometry import Transform3
 from rbxcompose.motion.arm_kinematics import ArmKinematics
 from rbxcompose.motion.groups import chain
-from rbxcompose.motion.inverse_kinematics import PoseSolutions, PoseTarget, solved
+from rbxcompose.motion.inverse_kinematics import EDGE, PoseSolutions, PoseTarget, descended, solved
 from rbxcompose.motion.joint_space import ArmJoint, JointSpace
 from tests.body.kinematics import Three, description_of, matrix
-from tests.motion.toy_arm import Array, ended
+from tests.motion.toy_arm import ended
 
 AXES = ("0 0 1", "0 1 0", "0 1 0", "1 0 0", "0 1 0", "1 0 0")
 LIMIT = '<limit lower="-2.6" upper="2.6" effort="1" velocity="1"/>'
@@ -43,6 +43,10 @@ DESCRIPTION = description_of(six_joints())
 GROUP = chain(DESCRIPTION.body, "l0", "tip")
 assert GROUP is not None
 ARM = ArmKinematics(DESCRIPTION, GROUP)
+LIFTED = description_of(
+    six_joints().replace('axis xyz="0 0 1"', 'axis xyz="0 0.6 0.8"').replace("revolute", "prismatic", 1)
+)
+LIFT_GROUP = chain(LIFTED.body, "l1", "tip")  # its first joint is none of the arm's
 SPACE = JointSpace(
     tuple(
         ArmJoint(name, MotionLimits() if name == "j4" else MotionLimits(-2.6, 2.6), is_continuous=name == "j4")
@@ -51,17 +55,27 @@ SPACE = JointSpace(
 )
 
 
-def solve(target: PoseTarget, start: Array | None = None, free: bool = True) -> PoseSolutions:
-    first = np.zeros(6) if start is None else start
-    return ended(solved(ARM, SPACE, target, first, lambda values: free, seed=1))
+@pytest.fixture(scope="module", params=["plain", "compiled"])
+def arm(request: pytest.FixtureRequest) -> ArmKinematics:
+    """Return the arm, which searches by plain or by compiled code."""
+    if request.param == "plain":
+        return ARM
+    assert GROUP is not None
+    fast = ArmKinematics(DESCRIPTION, GROUP)
+    assert fast.hasten()
+    return fast
+
+
+def solve(arm: ArmKinematics, target: PoseTarget, free: bool = True) -> PoseSolutions:
+    return ended(solved(arm, SPACE, target, np.zeros(6), lambda values: free, seed=1))
 
 
 @settings(max_examples=15, deadline=None)
 @given(st.integers(0, 2**31))
-def test_each_solution_is_at_the_target_by_two_other_libraries_and_within_limits(seed: int) -> None:
+def test_each_solution_is_at_the_target_by_two_other_libraries_and_within_limits(arm: ArmKinematics, seed: int) -> None:
     goal = SPACE.samples(1, seed)[0]
     pose = ARM.tip_pose(goal)
-    found = solve(PoseTarget(pose, tolerance=1e-4, angle_tolerance=1e-4))
+    found = solve(arm, PoseTarget(pose, tolerance=1e-4, angle_tolerance=1e-4))
     assert found.free
     for values in found.free:
         assert not SPACE.outside(values)
@@ -83,22 +97,70 @@ def test_the_jacobian_is_what_small_steps_do(seed: int) -> None:
         assert np.allclose(error / step, jacobian[:, index], atol=1e-4)
 
 
-def test_the_same_seed_finds_the_same_and_the_nearest_comes_first() -> None:
+def test_the_same_seed_finds_the_same_and_the_nearest_comes_first(arm: ArmKinematics) -> None:
     target = PoseTarget(ARM.tip_pose(np.array([0.4, -0.7, 1.0, 0.3, -0.6, 0.2])))
-    first, second = solve(target), solve(target)
+    first, second = solve(arm, target), solve(arm, target)
     assert [one.tolist() for one in first.free] == [one.tolist() for one in second.free]
     ways = [float(np.max(np.abs(one))) for one in first.free]
     assert ways == sorted(ways)
 
 
-def test_what_is_out_of_reach_tells_how_near_the_tip_gets() -> None:
-    found = solve(PoseTarget(Transform3((5.0, 0.0, 0.3)), any_orientation=True))
+def test_what_is_out_of_reach_tells_how_near_the_tip_gets(arm: ArmKinematics) -> None:
+    found = solve(arm, PoseTarget(Transform3((5.0, 0.0, 0.3)), any_orientation=True))
     assert (found.free, found.colliding) == ((), ())
     assert 3.5 < found.nearest[0] < 4.0
 
 
-def test_solutions_that_collide_are_told_apart() -> None:
-    found = solve(PoseTarget(ARM.tip_pose(np.full(6, 0.3))), free=False)
+def test_a_target_at_a_limit_is_met_just_before_it_so_that_curves_through_solutions_stay_within(
+    arm: ArmKinematics,
+) -> None:
+    found = solve(arm, PoseTarget(ARM.tip_pose(np.array([0.4, 2.6, 1.0, 0.3, -0.6, 0.2]))))
+    assert found.free
+    for values in found.free:
+        assert np.all(np.delete(np.abs(values), 3) <= 2.6 - EDGE)
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.integers(0, 2**31), st.booleans())
+def test_plain_and_compiled_code_take_the_same_way(seed: int, any_orientation: bool) -> None:
+    assert GROUP is not None
+    fast = ArmKinematics(DESCRIPTION, GROUP)
+    fast.hasten()
+    goal, first = SPACE.samples(2, seed)
+    target = PoseTarget(ARM.tip_pose(goal), any_orientation)
+    (one, away), (other, missed) = (descended(each, SPACE, target, first) for each in (ARM, fast))
+    assert np.allclose(away, missed, atol=1e-6)
+    assert np.allclose(one, other, atol=1e-5)
+
+
+def test_nothing_is_compiled_anew_while_an_arm_works() -> None:
+    from rbxcompose.motion.compiled_descent import _descents
+
+    assert GROUP is not None
+    fast = ArmKinematics(DESCRIPTION, GROUP)
+    fast.hasten()
+    before = len(_descents.signatures)  # type: ignore[attr-defined]
+    first = np.zeros((6, 2))[:, 0]
+    first.flags.writeable = False
+    for any_orientation in (False, True):
+        descended(fast, SPACE, PoseTarget(Transform3(), any_orientation, 1, 1), first)
+    assert len(_descents.signatures) == before  # type: ignore[attr-defined]
+
+
+def test_compiled_code_follows_where_other_joints_are(arm: ArmKinematics) -> None:
+    assert LIFT_GROUP is not None
+    lifted = ArmKinematics(LIFTED, LIFT_GROUP)
+    assert arm is ARM or lifted.hasten()
+    space = JointSpace(tuple(ArmJoint(name, MotionLimits(-2.6, 2.6)) for name in LIFT_GROUP.joints))
+    for lift in (0.0, 0.7):
+        lifted.place({"j1": lift})
+        pose = lifted.tip_pose(np.full(5, 0.4))
+        values, _ = descended(lifted, space, PoseTarget(pose), np.full(5, 0.3))
+        assert PoseTarget(pose).is_met(lifted.tip_pose(values))
+
+
+def test_solutions_that_collide_are_told_apart(arm: ArmKinematics) -> None:
+    found = solve(arm, PoseTarget(ARM.tip_pose(np.full(6, 0.3))), free=False)
     assert not found.free
     assert found.colliding
 
@@ -115,3 +177,13 @@ def test_solutions_that_collide_are_told_apart() -> None:
 def test_a_target_that_is_none_says_why(target: PoseTarget, named: str) -> None:
     assert named in target.mistake
     assert bool(named) is bool(target.mistake)
+
+
+def test_a_search_ends_with_its_restarts_or_its_time(arm: ArmKinematics) -> None:
+    far = PoseTarget(Transform3((9.0, 0.0, 0.0)))
+    start = np.zeros(6)
+    for restarts in (0, 3):
+        found = ended(solved(arm, SPACE, far, start, lambda values: True, seed=1, restarts=restarts))
+        assert found.attempts == restarts + 1
+    late = ended(solved(arm, SPACE, far, start, lambda values: True, seed=1, is_late=lambda: True))
+    assert late.attempts == 1

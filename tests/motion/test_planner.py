@@ -13,6 +13,7 @@ from rbxcompose.control.curves import cubic
 from rbxcompose.motion.collisions import TOUCH
 from rbxcompose.motion.parametrisation import Trajectory
 from rbxcompose.motion.planner import MotionPlan, MotionRequest
+from rbxcompose.motion.planner_types import OMPL
 from rbxcompose.motion.reasons import MotionFailure, MotionReason
 from rbxcompose.motion.search import searched
 from tests.body.kinematics import description_of
@@ -102,7 +103,7 @@ def test_a_goal_behind_a_fence_is_given_up_in_time() -> None:
     assert "rrt_connect found none in 0.2 s" in found.text
 
 
-@pytest.mark.parametrize("name", ["rrt_connect", "rrt", "bit_star", "bkpiece", "kpiece", "lbkpiece"])
+@pytest.mark.parametrize("name", OMPL)
 def test_a_search_that_is_given_up_leaves_nothing_behind_that_could_crash(name: str) -> None:
     used = planner(FENCE)
     for seed in range(3):
@@ -116,3 +117,21 @@ def test_a_start_that_servos_measure_just_outside_of_its_limits_is_none() -> Non
     far = plan(np.array([0.8, 1.6, 0.2]), LEFT)
     assert isinstance(far, MotionFailure)
     assert far.reason is MotionReason.START_OUTSIDE_LIMITS
+
+
+@pytest.mark.parametrize("name", ["rrt_star", "informed_rrt_star", "aorrtc"])
+def test_a_planner_that_improves_its_path_finds_one(name: str) -> None:
+    found = plan(LEFT, RIGHT, planner=name, time=2.0)
+    assert isinstance(found, MotionPlan), found
+    again = plan(LEFT, RIGHT, planner=name, time=2.0)
+    assert isinstance(again, MotionPlan)
+    assert again.waypoints.tobytes() == found.waypoints.tobytes()
+
+
+def test_a_path_that_is_not_simplified_is_longer() -> None:
+    lengths = []
+    for simplify in (True, False):
+        found = plan(LEFT, RIGHT, simplify=simplify, planner="rrt")
+        assert isinstance(found, MotionPlan)
+        lengths.append(float(np.linalg.norm(np.diff(found.waypoints, axis=0), axis=1).sum()))
+    assert lengths[0] < lengths[1]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Iterable
 from typing import TypeVar
 
 import numpy as np
@@ -16,6 +16,7 @@ from rbxcompose.motion.collisions import MeshChecker, adjacent_pairs
 from rbxcompose.motion.groups import chain
 from rbxcompose.motion.joint_space import ArmJoint, JointSpace
 from rbxcompose.motion.planner import MotionPlanner, PlannerSettings
+from rbxcompose.motion.scene import PlacedObject
 from tests.body.kinematics import description_of
 
 Array = NDArray[np.float64]
@@ -68,6 +69,21 @@ def planner(wall: tuple[float, float, float] = WALL, **settings: object) -> Moti
     joints = tuple(ArmJoint(name, _limits(arm.body, name)) for name in arm.group.joints)
     checker = MeshChecker(arm, {}, adjacent_pairs(arm.body))
     return MotionPlanner(JointSpace(joints), checker, PlannerSettings(**settings), lambda: 0.0)  # type: ignore[arg-type]
+
+
+def fast_planner(
+    wall: tuple[float, float, float] = WALL, things: Iterable[PlacedObject] = (), **settings: object
+) -> MotionPlanner:
+    """Return the same on the fast path."""
+    from rbxcompose.motion.sphere_checker import SphereChecker  # which imports numba
+    from rbxcompose.motion.sphere_model import Trees
+
+    made = planner(wall, **settings)
+    arm = kinematics(wall)
+    checker = SphereChecker(MeshChecker(arm, {}, adjacent_pairs(arm.body), things), Trees())
+    checker.prepare(made.space)
+    made.checker = checker
+    return made
 
 
 def _limits(body: Body, name: str) -> MotionLimits:

@@ -9,6 +9,7 @@ from tests.msgs.samples import JAZZY, MESSAGES, ORACLE, STRUCTURES
 
 FIBONACCI = "example_interfaces/action/Fibonacci"
 GRIP = "rbxcompose_msgs/action/Grip"
+MOVE_GROUP, EXECUTE = "moveit_msgs/action/MoveGroup", "moveit_msgs/action/ExecuteTrajectory"
 NAVIGATE = "nav2_msgs/action/NavigateToPose"
 RECHARGE = "rbxcompose_msgs/action/Recharge"
 MOVE = "rbxcompose_msgs/action/MoveJoints"
@@ -78,6 +79,9 @@ FROZEN = {
     f"{NAVIGATE}_SendGoal": "a4fcb3bee1bf32e21a0e541a943b221aa0826996e2c98f079b47022b256f48b5",
     f"{NAVIGATE}_GetResult": "c407920357d566771e8882b4ef4d1f1a84ee922d609920ccd57faa6d6e391dc5",
     f"{NAVIGATE}_FeedbackMessage": "9d1f6fa2eb975ce733b419ac2e97b134d8ff92b6478b6559feed9a50bdfd82b3",
+    # These two have the fields of moveit_msgs 2.6.0, which is that of Jazzy.
+    MOVE_GROUP: "8c41d70908a2d26b564ddac31e9710f697a753bbd2a4d229542f76271daefc0b",
+    EXECUTE: "e1ed3386f275fc8cea91cc78701074f892e78e583be2f8063eea5616dd1065fc",
     RECHARGE: "ba24e6e4a85486586b664f3dc040dbb21a3965b9214f48e27233001ca2b44192",
     f"{RECHARGE}_SendGoal": "6695726de16a4b12f7a1622217a6a451feeef4522e0a2b9f60f2481a7123c3b1",
     f"{RECHARGE}_GetResult": "589276a9fce043dd216c8a3eaeba22b469c27b528c40dd1bc3bbbd894bcf47aa",

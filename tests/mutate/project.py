@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import time
 import traceback
 from collections import Counter
@@ -13,6 +14,7 @@ from rbxcompose.compiler import Compilation, compile_robot
 from rbxcompose.findings import Severity, Span
 from rbxcompose.formats import format_names, renderer
 from rbxcompose.plan.dump import dump, load
+from tests.conftest import ROOT
 from tests.mutate.mutants import Mutant, mutant, originals
 
 SLOW = 6.0  # [s] of processor time: three times what any manifest may take, since machines differ by that factor
@@ -46,6 +48,7 @@ class Project:
             path = folder / name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(data)
+        shutil.copytree(ROOT / "parts/body", folder / "parts/body")  # as they are
         self.robots = [name for name in self.files if name.endswith("robot.yaml")]
         self.read: dict[str, set[str]] = {name: self.read_by(name) for name in self.robots}
 

@@ -24,6 +24,7 @@ from rbxcompose.units import parse_quantity
 PARTS = Path(__file__).parents[2] / "parts"
 HERE = Span("robot.yaml", 1, 1, 1, 1)
 ARM = ["shoulder_pan", "shoulder_lift", "shoulder_roll", "elbow_flex", "forearm_flex", "wrist_flex"]
+ROLLING = ["shoulder_pan", "shoulder_lift", "upperarm_roll", "elbow_flex", "forearm_roll", "wrist_flex", "wrist_roll"]
 CAMERA = ["link", "depth_frame", "depth_optical_frame", "rgb_frame", "rgb_optical_frame"]
 BASE = (
     "footprint",
@@ -41,6 +42,9 @@ WHOLE: dict[str, tuple[str, list[str], list[str], tuple[float, float]]] = {  # r
     "laser": ("link", ["frame"], [], (0.1, 0.4)),
     "pan_tilt_head": ("base_link", ["pan_link", "tilt_link", "top"], ["pan_joint", "tilt_joint"], (0.12, 0.25)),
     "arm": ("base_link", [*(f"{one}_link" for one in ARM), "tip"], [f"{one}_joint" for one in ARM], (0.4, 0.8)),
+    "roll_arm": ("base_link", ["tip"], [f"{one}_joint" for one in ROLLING], (5, 12)),
+    "lift": ("link", ["carriage_link", "shoulder", "top"], ["joint"], (20, 25)),
+    "parallel_gripper": ("link", ["right_finger_link", "grasp"], ["left_finger_joint"], (1, 2)),
     "gripper": ("link", ["static_finger_link", "finger_link", "grasp"], ["finger_joint"], (0.1, 0.3)),
 }
 PIECES = sorted(path.name.split(".")[0] for path in PARTS.glob("body/*.urdf.xacro"))
@@ -186,6 +190,16 @@ def test_the_arm_hangs_down_and_is_stretched_forwards_by_its_lift() -> None:
     assert shoulder[1] < 0  # to the right
     panned = body.poses({"shoulder_lift_joint": -math.pi / 2, "shoulder_pan_joint": 0.5})
     assert direction(panned["tip"], (1, 0, 0))[1] > 0  # to the left
+
+
+def test_the_arm_that_rolls_is_stretched_forwards_and_its_positive_lift_lowers_it() -> None:
+    body = piece("roll_arm")
+    shoulder, tip = (body.poses({})[link] for link in ("shoulder_lift_link", "tip"))
+    assert tip.rotation == (0.0, 0.0, 0.0, 1.0)
+    assert tip.translation == pytest.approx((shoulder.translation[0] + 0.878, *shoulder.translation[1:]))
+    assert body.poses({"shoulder_lift_joint": 0.3})["tip"].translation[2] < tip.translation[2]
+    rolling = {joint.name for joint in body.moving if joint.kind == "continuous"}
+    assert rolling == {f"{one}_roll_joint" for one in ("upperarm", "forearm", "wrist")}
 
 
 def test_the_head_pans_left_and_tilts_down() -> None:

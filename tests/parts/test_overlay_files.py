@@ -90,19 +90,17 @@ def test_a_broken_profile_is_found_before_it_is_used(project: Project) -> None:
 def test_a_profile_that_breaks_something_else_is_told_with_the_profile(project: Project) -> None:
     project.check(ROBOT.replace("battery: {runtime: 30 s}", "battery: !remove"))
     (finding,) = project.findings
-    assert (finding.code, str(finding.span)) == ("RBX3005", "robots/one/robot.yaml:6:19")
-    assert [(str(one.span), one.message) for one in finding.related] == [
-        ("robots/one/robot.yaml:8:3", "with this profile")
-    ]
+    assert (finding.code, str(finding.span)) == ("RBX1310", "robots/one/robot.yaml:10:7")
+    assert [str(one.span) for one in finding.related] == ["robots/one/robot.yaml:6:19"]
 
 
-def test_a_warning_that_only_a_profile_causes_is_told_with_the_profile_wherever_it_is(project: Project) -> None:
+def test_a_warning_that_only_a_profile_causes_is_told_where_the_profile_causes_it(project: Project) -> None:
     robot = ROBOT.replace("battery: {runtime: 30 s}", "base: {connect: {cmd_vel: nobody}}")
     driving = "components:\n  base: {type: diff_drive_sim}\n  go_to: {type: go_to}"
     project.check(robot.replace("components:", driving, 1))
     (finding,) = project.findings
-    assert (finding.code, str(finding.span)) == ("RBX3011", "robots/one/robot.yaml:6:3")
-    assert "with this profile" in [one.message for one in finding.related]
+    assert (finding.code, str(finding.span)) == ("RBX3011", "robots/one/robot.yaml:12:24")
+    assert str(finding.related[0].span) == "robots/one/robot.yaml:6:3"
 
 
 def test_profiles_that_were_not_chosen_say_nothing_of_overlays_and_sets(project: Project) -> None:

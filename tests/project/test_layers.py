@@ -23,8 +23,10 @@ GROUND = {
     "fence": "",
     "field_docs": "",
     "findings": "dataclass per_compile",
+    "foreign_units": "",
     "formats": "findings plugins",
     "geometry": "dataclass",
+    "key_feed": "",
     "levels": "",
     "manifest": "config dataclass expressions field_docs findings per_compile plugins printable references "
     "regular_files restarts slips units",
@@ -42,30 +44,37 @@ GROUND = {
     "scheduler": "",
     "slips": "dataclass findings",
     "typed_json": "",
-    "units": "dataclass findings",
+    "units": "dataclass findings foreign_units",
 }
 # What the others import beside the ground and themselves. A row may be that of a package, a module or what lies deeper.
 ABOVE = {
     "__main__": "cli.main",
     "actuation": "control devices",
-    "arm_config": "body control motion",
+    "arm_config": "body control hand_config motion",
+    "arm_goals": "motion",
+    "arm_model": "motion.planner_types",
+    "arm_moveit": "arm_config motion sdk",
+    "arm_hand": "arm_config arm_pictures hand_config motion sdk",
+    "arm_pictures": "arm_config body motion",
+    "arm_servo": "arm_config motion sdk",
     "body": "",
     "bus": "sdk.bound",
     "bus_types": "actuation",
     "check_runner": "missions.analysis model.doubts model.robot",
-    "checks": "actuation body.model check_runner composition diagnostics missions model mux params sdk sections",
-    "cli": "actuation arm_config body bus compiler composition controller_requests devices diagnostics.requests "
-    "doctor executive.requests exporting finding_pages importing inspection lsp.server mission_tests missions model "
-    "motion mux.requests params plan recording rendering replay runtime scaffold scene_requests schema.documents sdk "
-    "sections systems",
+    "checks": "actuation body.model check_runner composition diagnostics hand_config missions model motion mux params "
+    "sdk sections",
+    "cli": "actuation arm_config arm_goals body bus compiler composition controller_requests devices "
+    "diagnostics.requests doctor executive.requests exporting finding_pages importing inspection "
+    "lsp.server mission_tests missions model motion mux.requests params plan recording rendering replay "
+    "runtime scaffold scene_requests scene_view schema.documents sdk sections systems",
     "controller_interface": "control sdk",
     "controller_manager": "controller_interface sdk",
     "controller_requests": "",
     "controllers": "control controller_interface sdk",
     "compiler": "check_runner composition model plan",
-    "components": "actuation arm_config body control controller_interface controller_manager controller_requests "
-    "devices diagnostics executive missions monitors motion mux navigation scene_requests sdk servo_bus_config "
-    "servo_bus_line servo_report sim twins.fault_script",
+    "components": "actuation arm_config arm_goals arm_hand arm_moveit arm_servo body control controller_interface "
+    "controller_manager controller_requests devices diagnostics executive missions monitors motion mux navigation "
+    "scene_requests scene_view sdk servo_bus_config servo_bus_line servo_report sim twins.fault_script",
     "servo_report": "actuation control",
     "composition": "body.description diagnostics.settings sections",
     "control": "",
@@ -73,9 +82,11 @@ ABOVE = {
     "diagnostics": "",
     "doctor": "devices bus.graph composition model.flow model.robot runtime.folder runtime.processes sdk sections",
     "executive": "missions sdk",
-    "exporting": "plan sdk systems",
+    "exporting": "body plan sdk sections systems",
     "finding_pages": "check_runner missions.analysis",
-    "importing": "actuation.servo_models composition.dump mux.words scaffold.answers sdk.registry sections",
+    "importing": "actuation.servo_models body composition.dump motion.groups mux.words scaffold.answers "
+    "sdk.registry sections",
+    "hand_config": "",
     "inspection": "body.model bus.names bus.wire composition missions model plan schema sdk sections systems",
     "lsp": "compiler composition missions model.robot schema sections",
     "mission_tests": "compiler components.mission composition executive missions model plan.model sdk sections.faults "
@@ -96,16 +107,18 @@ ABOVE = {
     "scaffold": "actuation.bus_load actuation.servo_models actuation.torques composition missions sdk",
     "schema": "controller_interface missions sdk sections",
     "sdk": "diagnostics.updater",
-    "sections": "actuation.bus_types actuation.control_tables actuation.servo_models actuation.torques body "
-    "control.calibration control.limits controller_interface devices.usb diagnostics.settings motion.groups "
-    "motion.planner_types motion.scene mux.words sdk twins.servo_faults",
-    "scene_requests": "",
+    "sections": "arm_model actuation.bus_types actuation.control_tables actuation.servo_models actuation.torques body "
+    "control.calibration control.limits controller_interface devices.usb diagnostics.settings hand_config "
+    "motion.group_findings "
+    "motion.gaze motion.groups motion.planner_types motion.scene motion.scene_text mux.words sdk twins.servo_faults",
+    "scene_requests": "motion.scene",
+    "scene_view": "motion.reasons motion.scene",
     "servo_bus_config": "actuation control controller_interface sdk.ports twins.fault_script",
     "servo_bus_line": "actuation servo_bus_config twins",
     "sim": "",
     "skills": "sdk",
     "twins": "actuation devices.port_errors",
-    "systems": "compiler model plan sdk",
+    "systems": "compiler composition missions.program.sources model plan sdk",
     "testing": "twins bus compiler components missions model.wires mux.config params plan.model recording.message "
     "rendering.text runtime.process_group runtime.records sdk",
 }
@@ -115,7 +128,7 @@ TABLE = {
     **{name: frozenset(row.split()) for name, row in GROUND.items()},
     **{name: frozenset(row.split()) | GROUND.keys() for name, row in ABOVE.items()},
 }
-TYPE_CHECKING_BLOCKS = 15
+TYPE_CHECKING_BLOCKS = 17
 
 
 def imports(path: Path) -> set[str]:

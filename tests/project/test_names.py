@@ -18,7 +18,9 @@ TWO_SIDES = {  # what a component sees, as a protocol of the SDK, and the bus's 
 NAMED_BY_ROS = {  # the messages have the names that ROS gave them
     "Clock",  # ours tells the time of which this one is the message
     "Empty",  # a message and a service
+    "PlanningScene",  # ours keeps the objects of which this one is a message
     "Quaternion",  # ours is the plain tuple of its numbers
+    "RobotState",  # ours is what a supervisor tells of its robot
     "Temperature",  # ours is the unit of a setting
     "Time",  # ours is the unit of a setting
     "Vector3",  # ours is the plain tuple of its numbers

@@ -17,9 +17,15 @@ from rbxcompose.testing import Bench
 from tests.conftest import ROOT
 
 ARM = ("shoulder_pan", "shoulder_lift", "shoulder_roll", "elbow_flex", "forearm_flex", "wrist_flex")
+ROLLING = ("shoulder_pan", "shoulder_lift", "upperarm_roll", "elbow_flex", "forearm_roll", "wrist_flex", "wrist_roll")
 HEAD = {"head_pan_joint": 1, "head_tilt_joint": 2}
 PI = HEAD | {f"right_arm_{name}_joint": 3 + n for n, name in enumerate(ARM)} | {"right_gripper_finger_joint": 9}
 LEFT = {f"left_arm_{name}_joint": 10 + n for n, name in enumerate(ARM)} | {"left_gripper_finger_joint": 16}
+PORTER = (
+    {"torso_joint": 1, "head_pan_joint": 2, "head_tilt_joint": 3}
+    | {f"right_arm_{name}_joint": 4 + n for n, name in enumerate(ROLLING)}
+    | {"right_gripper_left_finger_joint": 11}
+)
 FLAT = 0.006  # thickness of a finger [m]
 TICK = 0.00512  # [rad] of an AX-12
 
@@ -43,6 +49,7 @@ def driver(name: str, profile: str = "") -> Any:
         ("box_robot", "pan_tilt_head", HEAD),
         ("box_robot", "telescoping", PI),
         ("box_robot", "two_arms", PI | LEFT),
+        ("porter", "", PORTER),
     ],
 )
 def test_one_bus_has_all_joints_of_all_parts(name: str, profile: str, ids: dict[str, int]) -> None:

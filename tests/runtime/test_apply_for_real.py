@@ -103,6 +103,11 @@ def test_only_what_has_changed_restarts(robot: Changing) -> None:
     robot.edit(AT_REST)
     robot.do("apply", "robots/turtlebot", "--yes")
     assert robot.ps().keys() == before.keys()
+    assert "lamp added" in robot.do("apply", NAME, "--undo", "--yes")
+    assert "no such change" in robot.do("apply", NAME, "--undo", "0", "--yes", code=1)
+    assert robot.ps().keys() == after.keys()
+    robot.do("apply", NAME, "--undo", "--yes")
+    assert robot.ps().keys() == before.keys()
     assert len([one for one in titled(f"rbxcompose {NAME}: ") if one.is_running]) == 6
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from rbxcompose.requests import Query, Refused, requests
 from rbxcompose.runtime.control import ControlServer, NoAnswerError, ask
-from rbxcompose.runtime.folder import RobotFolder
+from rbxcompose.runtime.folder import SOCKET, RobotFolder
 from rbxcompose.typed_json import name_in, to_data
 
 
@@ -73,6 +73,31 @@ def served(tmp_path: Path) -> Iterator[Served]:
     made = Served(folder)
     yield made
     made.close()
+
+
+@pytest.mark.parametrize("size", [100_000, 219_000, 5_000_000])
+def test_an_answer_of_any_size_arrives_whole(served: Served, size: int) -> None:
+    assert ask(served.folder, Echo("x" * size)) == Echoed("x" * size)
+
+
+def test_a_client_that_takes_its_answer_slowly_holds_up_nobody(served: Served) -> None:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as slow, pytest.MonkeyPatch.context() as patch:
+        patch.chdir(served.folder.path)
+        slow.connect(SOCKET)
+        slow.sendall(TAKEN.to_line(Echo("x" * 2_000_000)))
+        assert ask(served.folder, Echo("quick")) == Echoed("quick")
+        with slow.makefile("rb") as file:
+            assert len(file.readline()) > 2_000_000
+
+
+def test_an_answer_that_is_cut_is_no_answer(served: Served) -> None:
+    def cut(request: object, number: int) -> None:
+        served.server.answer(number, "x" * 5_000_000)
+        served.server._drop(number)
+
+    served.server.handle = cut
+    with pytest.raises(NoAnswerError):
+        ask(served.folder, Echo("x"))
 
 
 def test_a_request_is_answered(served: Served) -> None:

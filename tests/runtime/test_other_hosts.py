@@ -8,7 +8,9 @@ from rbxcompose.levels import Level
 from rbxcompose.plan.model import OtherHost, Plan, Share
 from rbxcompose.robot_events import MissionOver
 from rbxcompose.runtime import channel as say
+from rbxcompose.runtime.clock_offset import ClockOffset
 from rbxcompose.runtime.host_report import HostReport, RobotEnd
+from rbxcompose.runtime.supervision.changes import changes
 from rbxcompose.runtime.supervision.conductor import INTERRUPTED
 from rbxcompose.runtime.supervision.members import Phase
 from rbxcompose.runtime.supervision.other_hosts import SILENT
@@ -105,3 +107,29 @@ def test_hosts_with_other_files_are_told_once() -> None:
     for _ in range(3):
         tell(stage, version="2")
     assert len([text for _, text in stage.records if "other files" in text]) == 1
+
+
+def test_a_clock_that_is_too_far_off_is_told_once_and_again_when_it_is_right() -> None:
+    stage = desk()
+    for offset in (0.3, 0.31, 0.001):
+        tell(stage, clock=ClockOffset(offset, 0.001))
+        assert stage.conductor.hosts.clocks == {"robot": ClockOffset(offset, 0.001)}
+    told = [text for _, text in stage.records if "clock" in text]
+    assert ["300.0 ms ahead" in told[0], "1.0 ms ahead" in told[1], len(told)] == [True, True, 2]
+
+
+def test_a_changed_link_is_opened_again_by_the_router_and_the_other_files_are_known_to_be_the_same() -> None:
+    stage = desk()
+    tell(stage)
+    before = stage.conductor.plan
+    assert before.share is not None
+    after = replace(before, share=replace(before.share, version="2", downsample={"/odom": 1.0}))
+    found = changes(before, after)
+    assert (found.shares_change, found.links_change, found.impossible) == (True, True, ())
+    stage.conductor.change(found, lambda text, is_refused: None)
+    assert [process for process, _ in stage.orders(say.Adopt)] == ["router"]
+    tell(stage, version="2", run="second")
+    assert not any("runs other files" in text for _, text in stage.records)
+    only_files = changes(after, replace(after, share=replace(before.share, version="3", downsample={"/odom": 1.0})))
+    assert (only_files.shares_change, only_files.links_change) == (True, False)
+    assert changes(after, replace(after, share=None)).impossible

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from dataclasses import dataclass, replace
+from selectors import DefaultSelector
 from typing import Any
 
 import pytest
@@ -26,7 +27,9 @@ from rbxcompose.runtime.processes import Process
 from rbxcompose.runtime.requests import BringDown, ReleaseRobot, RobotStatus, StopRobot
 from rbxcompose.runtime.supervision.changes import Fate
 from rbxcompose.runtime.supervision.conductor import Conductor
+from rbxcompose.runtime.supervision.judge import Judge
 from rbxcompose.runtime.supervision.request_handler import RequestHandler
+from rbxcompose.runtime.supervision.setting_line import SettingLine
 from rbxcompose.scheduler import Scheduler
 from rbxcompose.sdk import Component, Config, component
 from rbxcompose.testing.bench import Bench, instance
@@ -59,7 +62,8 @@ class Desk:
         self.texts: list[str] = []
         self.replies: list[tuple[int, object, bool]] = []
         self.conductor = Conductor(plan, RunOptions(is_stepped=is_stepped), Scheduler(), self, router=None)
-        self.handler = RequestHandler(self, is_stepped=is_stepped)
+        changes = SettingLine(self, Judge(None, "rules", DefaultSelector(), Scheduler())).changes
+        self.handler = RequestHandler(self, changes, is_stepped=is_stepped)
         self.conductor.states["patrol"] = ("active", 0)
         self.conductor.members["mission"].is_configured = True
 

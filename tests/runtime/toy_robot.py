@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import argparse
+import os
 import signal
 import sys
 import time
+from typing import Annotated
+
+from pydantic import ValidationInfo, field_validator
 
 from rbxcompose.cli.robots.run_view import run_plan
 from rbxcompose.plan.model import BusPlan, Instance, Plan
 from rbxcompose.runtime.options import RunOptions
-from rbxcompose.sdk import Component, Config, MissionOver, MissionWaits, RobotHeld, component
+from rbxcompose.sdk import Component, Config, Live, MissionOver, MissionWaits, RobotHeld, component
 
 SLOW = 5.0  # [s]
 
@@ -38,6 +42,20 @@ class ToyConfig(Config):
     """How long it needs that [s]."""
     hangs_at: float = 0.0
     """When it hangs [s of robot time]; 0: never."""
+    waits_for: str = ""
+    """The file for whose end it waits before it says whether it would take another size."""
+    size: Annotated[int, Live()] = 0
+    """Tells when somebody wants to change it."""
+
+    @field_validator("size")
+    @classmethod
+    def _asked(cls, size: int, others: ValidationInfo) -> int:
+        file = others.data["waits_for"]
+        if size:
+            print(f"{file or 'first'} asked to be {size}")  # noqa: T201
+            while file and os.path.exists(file):
+                time.sleep(0.01)
+        return size
 
 
 @component("toy")

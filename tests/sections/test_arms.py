@@ -7,6 +7,8 @@ from typing import Any
 
 import pytest
 
+from rbxcompose.body.link_pairs import digest_of
+from rbxcompose.motion.inverse_kinematics import SolverSettings
 from tests.parts.project import Project
 
 ROBOT = """
@@ -63,7 +65,145 @@ def test_a_pose_that_does_not_exist_is_a_finding_of_the_mission(tmp_path: Path) 
     assert "resting" in checked.text
 
 
+@pytest.mark.parametrize(
+    ("points", "told"),
+    [
+        ("[{x: 1 cm, via: true}, {yaw: 90 deg}]", ""),
+        ("[{y: 1 cm, xx: 1 cm}]", "item 1 of the argument 'points' of 'trace_right_arm' has no entry 'xx'"),
+        ("[{x: 1 cm}, {x: 3 deg}]", "'x' of item 2 of the argument 'points' of 'trace_right_arm'"),
+        ("{x: 1 cm}", "must be a list"),
+        ("[5 cm]", "item 1 of the argument 'points' of 'trace_right_arm' must be a map"),
+    ],
+)
+def test_points_of_a_way_are_checked_one_by_one(points: str, told: str, tmp_path: Path) -> None:
+    project = Project(tmp_path)
+    mission = f"rbx: 1\nkind: Mission\nname: go\ndo: {{trace_right_arm: {{points: {points}}}}}\n"
+    checked = project.check(ROBOT + "missions: {go: ../../go.yaml}\n", files={"go.yaml": mission})
+    assert checked.codes == (["RBX4105"] if told else []), checked.text
+    assert told in checked.text
+
+
 def test_both_a_chain_and_joints_are_too_much(tmp_path: Path) -> None:
     project = Project(tmp_path)
     checked = project.check(ROBOT + "arms: {right_arm: {joints: [right_arm_elbow_flex_joint]}}\n")
     assert "either 'chain' or 'joints'" in checked.text
+
+
+PAIRS = """\
+body: "{digest}"
+samples: 10
+seed: 1
+pairs:
+- [right_arm_elbow_flex_link, right_arm_elbow_flex_servo_link, adjacent]
+- [right_arm_elbow_flex_link, right_arm_wrist_flex_link, user]
+- [right_arm_base_link, right_arm_elbow_flex_link, never]
+- [right_arm_base_link, right_arm_forearm_flex_link, default]
+"""
+WITH_PAIRS = ROBOT + "body: {collisions: pairs.yaml}\n"
+
+
+def digest(project: Project) -> str:
+    project.check(ROBOT)
+    body = project.manifest.body
+    assert body is not None
+    return digest_of(body.body, body.meshes)
+
+
+def test_an_arm_gets_the_pairs_of_its_body_by_what_they_mean_for_it(tmp_path: Path) -> None:
+    project = Project(tmp_path)
+    pairs = PAIRS.format(digest=digest(project))
+    project.check(WITH_PAIRS, files={"robots/one/pairs.yaml": pairs})
+    assert project.findings == []
+    found = arm_of(project).config.pairs
+    assert len(found.adjacent) == len(found.ignored) == len(found.unlikely) == 1
+
+
+@pytest.mark.parametrize("files", [{}, {"robots/one/pairs.yaml": PAIRS.format(digest="0")}], ids=["none", "old"])
+def test_pairs_of_another_body_are_told_and_not_used(tmp_path: Path, files: dict[str, str]) -> None:
+    project = Project(tmp_path)
+    checked = project.check(WITH_PAIRS, files=files)
+    assert checked.codes == ["RBX2307"]
+    assert "rbxcompose arm setup" in checked.text
+    assert arm_of(project).config.pairs is None
+
+
+def test_a_pair_that_names_no_link_is_told_at_its_line(tmp_path: Path) -> None:
+    project = Project(tmp_path)
+    pairs = PAIRS.format(digest=digest(project)).replace("right_arm_wrist_flex_link", "right_arm_wrist_link")
+    checked = project.check(WITH_PAIRS, files={"robots/one/pairs.yaml": pairs})
+    [finding] = checked.compilation.report
+    assert finding.span is not None
+    assert (Path(finding.span.file).name, finding.span.line) == ("pairs.yaml", 6)
+
+
+def test_a_part_has_no_pairs_of_its_own(tmp_path: Path) -> None:
+    project = Project(tmp_path)
+    checked = project.check("include: {arm: {part: ../../parts/arm.yaml}}\n", {"arm": "body: {collisions: p.yaml}\n"})
+    assert "collisions" in checked.text
+
+
+LED = "controller: wrist_controller"
+WRIST = """
+controllers:
+  wrist_controller: {type: joint_trajectory, joints: [right_arm_wrist_flex_joint], start: inactive}
+arms:
+  wrist: {joints: [right_arm_wrist_flex_joint], controller: wrist_controller}
+"""
+
+
+def group(text: str) -> str:
+    return ROBOT + WRIST + "  whole: {" + text + "}\n"
+
+
+def config_of(project: Project, name: str) -> Any:
+    assert project.checked
+    return next(one for one in project.checked.plan.instances if one.name == name).config
+
+
+def test_an_arm_of_other_arms_has_the_joints_of_all_in_the_order_of_the_body(tmp_path: Path) -> None:
+    project = Project(tmp_path)
+    text = "groups: [upper, wrist], controller: right_arm_controller}\n  upper: {joints: [right_arm_elbow_flex_joint], "
+    project.check(group(text + "controller: right_arm_controller"))
+    assert project.findings == []
+    config = config_of(project, "whole")
+    assert list(config.joints) == ["right_arm_elbow_flex_joint", "right_arm_wrist_flex_joint"]
+    assert (config.base, config.tip) == ("right_arm_elbow_flex_servo_link", config_of(project, "wrist").tip)
+
+
+@pytest.mark.parametrize(
+    ("text", "code", "words"),
+    [
+        (
+            f"groups: [wrist, more], {LED}}}\n  more: {{groups: [whole], {LED}",
+            "RBX2301",
+            "itself",
+        ),
+        (f"groups: [wrst], {LED}", "RBX10", "wrst"),
+        (f"groups: [right_arm], {LED}", "RBX2302", "does not lead"),
+    ],
+)
+def test_what_is_wrong_with_an_arm_of_other_arms_is_told(tmp_path: Path, text: str, code: str, words: str) -> None:
+    checked = Project(tmp_path).check(group(text))
+    assert checked.codes
+    assert checked.codes[0].startswith(code), checked.text
+    assert words in checked.text
+
+
+def test_passive_joints_of_a_chain_are_not_moved(tmp_path: Path) -> None:
+    project = Project(tmp_path)
+    elbow = "right_arm_elbow_flex_joint"
+    project.check(ROBOT + f"arms: {{right_arm: {{passive: [{elbow}], poses: !replace {{}}}}}}\n")
+    assert project.findings == []
+    assert elbow not in arm_of(project).config.joints
+    checked = project.check(ROBOT + "arms: {right_arm: {passive: [right_arm_base_joint]}}\n")
+    assert checked.codes, checked.text
+
+
+def test_settings_of_the_searches_reach_the_arm(tmp_path: Path) -> None:
+    project = Project(tmp_path)
+    settings = "planner: {simplify: false}, kinematics: {restarts: 3, time: 1 s, tolerance: 1 cm}"
+    project.check(ROBOT + f"arms: {{right_arm: {{{settings}}}}}\n")
+    assert project.findings == []
+    config = arm_of(project).config
+    assert not config.planner.simplify
+    assert config.kinematics.settings == SolverSettings(3, 1.0, 0.01)

@@ -104,8 +104,7 @@ def test_a_device_without_a_section_is_told(tmp_path: Path) -> None:
 PART = f"""rbx: 1
 kind: Part
 name: head
-args:
-  port: {{type: text, default: "dev:own"}}
+ARGS
 devices:
   own: {{vendor: 0403, product: 6014}}
 body: {{urdf: head.urdf}}
@@ -122,7 +121,8 @@ body: {{urdf: head.urdf}}
 )
 def test_a_part_may_bring_its_device_or_use_one_of_the_robot(port: str, given: str, found: str, tmp_path: Path) -> None:
     robot = "rbx: 1\nkind: Robot\nname: r\ndevices: {robots: {vendor: 1a86, product: 7523}}\ninclude:\n  left: "
-    others = {"head.urdf": BODY, "part.yaml": PART.replace("PORT", port)}
+    declared = 'args: {port: {type: text, default: "dev:own"}}' if given else ""
+    others = {"head.urdf": BODY, "part.yaml": PART.replace("PORT", port).replace("ARGS", declared)}
     checked = check_text(f"{robot}{{part: part.yaml{given}}}\n", tmp_path, others=others, real=True)
     assert checked.text == ""
     assert port_of(checked) == found

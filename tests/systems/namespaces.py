@@ -1,4 +1,4 @@
-"""Two hosts on one machine: network namespaces with a cable between them, made here and removed at the end."""
+"""Hosts on one machine: network namespaces, each with a cable to a switch, made here and removed at the end."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Self
 
+SWITCH, DEVICE = "switch", "cable"
 PATIENCE = 10.0  # [s] for what is asked to end
 _OWN_MEMORY = 'mount -t tmpfs tmpfs /dev/shm && exec "$@"'  # hosts share no memory
 _NUMBERS = iter(range(1000))
@@ -28,7 +29,7 @@ def _run(*words: str) -> None:
         raise NotPermittedError(f"{' '.join(words)}: {done.stderr.strip()}")
 
 
-class TwoHosts:
+class Hosts:
     """`addresses` by host; each host has a folder, memory and loopback interface of its own."""
 
     def __init__(self, folder: Path, addresses: Mapping[str, str]) -> None:
@@ -48,26 +49,28 @@ class TwoHosts:
             raise
 
     def _make(self) -> None:
-        for host in self.addresses:
+        for host in (SWITCH, *self.addresses):
             _run("ip", "netns", "add", self.namespace(host))
             self._made.append(host)
-            (self.folder / host / "temporary").mkdir(parents=True)
-        one, other = self.addresses
-        ends = [("netns", self.namespace(host), "name", self.device(host)) for host in (one, other)]
-        _run("ip", "link", "add", "name", ends[0][3], *ends[0][:2], "type", "veth", "peer", *ends[1][2:], *ends[1][:2])
+        self.ip(SWITCH, "link", "add", "switch", "type", "bridge")
+        self.ip(SWITCH, "link", "set", "switch", "up")
         for host, address in self.addresses.items():
-            _run("ip", "-n", self.namespace(host), "addr", "add", f"{address}/24", "dev", self.device(host))
-            for device in ("lo", self.device(host)):
-                _run("ip", "-n", self.namespace(host), "link", "set", device, "up")
+            (self.folder / host / "temporary").mkdir(parents=True, exist_ok=True)
+            there = ("peer", "name", host, "netns", self.namespace(SWITCH))
+            _run("ip", "link", "add", DEVICE, "netns", self.namespace(host), "type", "veth", *there)
+            self.ip(SWITCH, "link", "set", "dev", host, "master", "switch", "up")
+            self.ip(host, "addr", "add", f"{address}/24", "dev", DEVICE)
+            for device in ("lo", DEVICE):
+                self.ip(host, "link", "set", device, "up")
             self.start(host, "true").wait(PATIENCE)
+
+    def ip(self, host: str, *words: str) -> None:
+        """Run `ip` on a host, or on the switch."""
+        _run("ip", "-n", self.namespace(host), *words)
 
     def namespace(self, host: str) -> str:
         """Return the name of a host's network namespace."""
         return f"rbx{self._mark}{host}"
-
-    def device(self, host: str) -> str:
-        """Return the name of a host's end of the cable; the kernel takes 15 characters."""
-        return f"v{self._mark}{host}"[:15]
 
     def __enter__(self) -> Self:
         return self
@@ -95,38 +98,54 @@ class TwoHosts:
         self._processes.append(process)
         return process
 
-    def cut(self) -> float:
-        """Pull the cable; return when [s, monotonic]."""
-        self._set_cable("down")
+    def cut(self, host: str) -> float:
+        """Pull the cable of a host; return the time just before [s, monotonic]."""
+        before = time.monotonic()
+        self.ip(host, "link", "set", DEVICE, "down")
+        return before
+
+    def mend(self, host: str) -> float:
+        """Plug the cable of a host in again; return when [s, monotonic]."""
+        self.ip(host, "link", "set", DEVICE, "up")
         return time.monotonic()
 
-    def mend(self) -> float:
-        """Plug the cable in again; return when [s, monotonic]."""
-        self._set_cable("up")
-        return time.monotonic()
+    def slow_down(self, host: str, *words: str) -> None:
+        """Delay, lose or limit what a host sends, in the words of `tc`.
 
-    def _set_cable(self, state: str) -> None:
-        host = next(iter(self.addresses))
-        _run("ip", "-n", self.namespace(host), "link", "set", self.device(host), state)
+        Raises:
+            NotPermittedError: if this kernel cannot.
+        """
+        _run("tc", "-n", self.namespace(host), "qdisc", "replace", "dev", DEVICE, "root", *words)
 
-    def pids(self) -> list[int]:
-        """Return all processes that run on these hosts."""
-        found = [
-            subprocess.check_output(["ip", "netns", "pids", self.namespace(host)], text=True) for host in self._made
-        ]
-        return [int(pid) for text in found for pid in text.split()]
+    def pids(self, host: str) -> list[int]:
+        """Return all processes that run on a host."""
+        text = subprocess.check_output(["ip", "netns", "pids", self.namespace(host)], text=True)
+        return [int(pid) for pid in text.split()]
+
+    def freeze(self, host: str) -> float:
+        """Let nothing on a host run any more; return the time just before [s, monotonic]."""
+        before = time.monotonic()
+        for pid in self.pids(host):
+            os.kill(pid, signal.SIGSTOP)
+        return before
+
+    def thaw(self, host: str) -> None:
+        """Let all on a host go on."""
+        for pid in self.pids(host):
+            os.kill(pid, signal.SIGCONT)
 
     def remove(self) -> None:
         """End all that still runs on the hosts, and remove them."""
         for process in self._processes:
             if process.poll() is None:
-                process.send_signal(signal.SIGINT)
+                process.terminate()
         for process in self._processes:
             try:
                 process.communicate(timeout=PATIENCE)
             except (subprocess.TimeoutExpired, ValueError):
                 process.kill()
-        for pid in self.pids():
+                process.communicate()
+        for pid in [pid for host in self._made for pid in self.pids(host)]:
             os.kill(pid, signal.SIGKILL)
         for host in self._made:
             _run("ip", "netns", "del", self.namespace(host))

@@ -13,10 +13,10 @@ from pathlib import Path
 
 from rbxcompose.runtime.folder import RobotFolder, RobotState
 from tests.conftest import ROOT
-from tests.systems.namespaces import TwoHosts
+from tests.systems.namespaces import Hosts
 
 ADDRESSES = {"r": "10.42.7.2", "d": "10.42.7.1"}
-SPEED, ACCELERATION, DEADLINE, CYCLE = 0.3, 1.0, 0.5, 0.02  # [m/s], [m/s^2], [s], [s]
+SPEED, ACCELERATION, DEADLINE, CYCLE = 0.3, 1.0, 0.25, 0.02  # [m/s], [m/s^2], [s], [s]
 LONGEST = 40.0  # [s] for anything to happen
 ENVIRONMENT = {"PYTHONPATH": str(ROOT)}
 SYSTEM = """
@@ -29,17 +29,21 @@ hosts:
 robots:
   NAME:
     robot: robots/robot.yaml
+    profile: linked
+    stop_within: 0.6 s
     on: d
     place: {base: r, battery: r}
 """
 
 
-class PatrolOnTwoHosts:
+class PatrolOnHosts:
     """Its base and battery run on `r`, all else on `d`."""
 
-    def __init__(self, hosts: TwoHosts, rounds: int = 1) -> None:
+    def __init__(self, hosts: Hosts, rounds: int = 1) -> None:
         self.name = f"two_hosts_{os.getpid()}"
         self.hosts = hosts
+        self.environment: dict[str, dict[str, str]] = {}  # of a host
+        self.shares: dict[str, subprocess.Popen[str]] = {}  # by host, the last one that was started
         folder = hosts.folder
         (folder / "robots").mkdir()
         (folder / "missions").mkdir()
@@ -69,11 +73,13 @@ class PatrolOnTwoHosts:
 
     def rbx(self, host: str, *words: str) -> subprocess.Popen[str]:
         """Start a command of rbxcompose on a host."""
-        return self.hosts.start(host, sys.executable, "-m", "rbxcompose", *words, environment=ENVIRONMENT)
+        environment = {**ENVIRONMENT, **self.environment.get(host, {})}
+        return self.hosts.start(host, sys.executable, "-m", "rbxcompose", *words, environment=environment)
 
     def up(self, host: str) -> subprocess.Popen[str]:
         """Start the share of a host."""
-        return self.rbx(host, "up", "system.yaml", "--host", host)
+        self.shares[host] = self.rbx(host, "up", "system.yaml", "--host", host)
+        return self.shares[host]
 
     def change_mission(self, before: str, after: str) -> None:
         """Change the text of the mission."""
@@ -81,12 +87,13 @@ class PatrolOnTwoHosts:
         path.write_text(path.read_text(encoding="utf-8").replace(before, after), encoding="utf-8")
 
     def kill(self, host: str, process: str) -> float:
-        """Kill a process of a share; return when [s, monotonic]."""
-        state = self.state(host)
-        assert state is not None
-        victim = state.supervisor if process == "supervisor" else state.processes[process]
-        victim.send_signal(signal.SIGKILL)
-        return time.monotonic()
+        """Kill a process of a share; return the time just before [s, monotonic]."""
+        title = f"rbxcompose {self.name}: {process}".encode()
+        pids = self.hosts.pids(host)
+        (victim,) = [pid for pid in pids if Path(f"/proc/{pid}/cmdline").read_bytes().startswith(title)]
+        before = time.monotonic()
+        os.kill(victim, signal.SIGKILL)
+        return before
 
     def is_active(self, host: str) -> bool:
         """Return whether all components of a share are active and all its processes are there."""
@@ -126,6 +133,15 @@ class PatrolOnTwoHosts:
     def has_moved_since(self, since: float) -> bool:
         """Return whether it moved after `since`."""
         return any(moves for at, moves in self.motion() if at > since)
+
+    @property
+    def is_moving(self) -> bool:
+        """Return whether it moved when it was last seen."""
+        return bool(self.motion()) and self.motion()[-1][1]
+
+    def rest_after(self, since: float) -> float | None:
+        """Return when it first stood still after `since`, if it did."""
+        return next((at for at, moves in self.motion() if at > since and not moves), None)
 
     @staticmethod
     def wait_until(holds: Callable[[], bool], within: float = LONGEST) -> None:

@@ -13,7 +13,7 @@ import time
 from pathlib import Path
 
 from tests.conftest import ROOT
-from tests.systems.namespaces import NotPermittedError, TwoHosts
+from tests.systems.namespaces import Hosts, NotPermittedError
 
 PORT = 2222
 _PREPARED = """
@@ -54,7 +54,7 @@ def program() -> str:
     return found
 
 
-def serve(hosts: TwoHosts, host: str) -> Path:
+def serve(hosts: Hosts, host: str) -> Path:
     """Start an ssh server on a host and return the configuration with which ssh reaches it by the host's name."""
     server, folder = program(), hosts.folder / f"ssh_{host}"
     folder.mkdir(mode=0o700)
@@ -76,7 +76,7 @@ def serve(hosts: TwoHosts, host: str) -> Path:
     return folder / "ssh_config"
 
 
-def _wait_for(hosts: TwoHosts, host: str, config: Path) -> None:
+def _wait_for(hosts: Hosts, host: str, config: Path) -> None:
     other = next(name for name in hosts.addresses if name != host)
     for _ in range(50):
         probe = hosts.start(other, "ssh", "-F", str(config), "-o", "BatchMode=yes", host, "true")

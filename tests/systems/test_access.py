@@ -23,13 +23,19 @@ ALLOWED, DENIED = "0/cmd_vel/type/hash", "0/odom/type/hash"
 
 def test_a_host_may_give_and_take_what_its_components_declare_and_nothing_else() -> None:
     desk = access_of(SYSTEM, ROBOT, "robot", "desk")
-    assert (desk.gives, desk.takes) == (("/cmd_vel",), ("/battery_level", "/set_battery_level", "/tf"))
     robot = access_of(SYSTEM, ROBOT, "desk", "robot")
     assert (robot.gives, robot.takes) == (desk.takes, desk.gives)
+    gives, takes = (tuple(one for one in names if "parameter" not in one) for names in (desk.gives, desk.takes))
+    assert (gives, takes) == (("/cmd_vel",), ("/battery_level", "/set_battery_level", "/tf"))
+    assert "/battery/set_parameters" in desk.takes
+    assert "/go_to/set_parameters" in desk.gives
 
 
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="needs openssl")
-def test_a_message_that_a_host_may_not_send_does_not_arrive_and_one_that_it_may_does(tmp_path: Path) -> None:
+@pytest.mark.parametrize("protocol", ["tls", "quic"])
+def test_a_message_that_a_host_may_not_send_does_not_arrive_and_one_that_it_may_does(
+    protocol: str, tmp_path: Path
+) -> None:
     make_authority(tmp_path, "lab")
     settings = {}
     for host in ("robot", "desk"):
@@ -37,7 +43,7 @@ def test_a_message_that_a_host_may_not_send_does_not_arrive_and_one_that_it_may_
         files = tls_of(tmp_path, host, "mtls")
         assert missing(files) == []
         settings[host] = tls_settings(files.authority, files.certificate, files.key, mutual=True)
-    link = f"tls/127.0.0.1:{free_port()}"
+    link = f"{protocol}/127.0.0.1:{free_port()}"
     here, there = tcp_endpoint(free_port()), tcp_endpoint(free_port())
     allowed = AllowedHost(common_name("lab", "desk"), ("/cmd_vel",), (), ())
     access = access_control("lab", 0, [allowed])
@@ -66,5 +72,5 @@ def test_a_message_that_a_host_may_not_send_does_not_arrive_and_one_that_it_may_
         until(is_heard)
         assert got[f"{DENIED} desk"] == 0
     finally:
-        for each in (base, steering, local, robot, desk):
+        for each in (base, steering, local, desk, robot):
             each.close()

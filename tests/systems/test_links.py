@@ -7,6 +7,8 @@ import time
 from collections import Counter
 from collections.abc import Callable
 
+import zenoh
+
 from rbxcompose.bus.names import topic_pattern
 from rbxcompose.bus.transport import Arrival
 from rbxcompose.bus.zenoh_session import RouterLink, open_peer, open_router
@@ -70,3 +72,33 @@ def test_a_topic_is_downsampled_on_its_way_to_another_host_and_whole_on_its_own(
     finally:
         for each in (sender, neighbour, stranger, one, other):
             each.close()
+
+
+def test_on_its_way_to_another_host_a_topic_has_its_own_priority_and_what_is_too_large_is_left_out() -> None:
+    link, here, there = (tcp_endpoint(free_port()) for _ in range(3))
+    scan, odom = (topic_pattern(0, topic) for topic in ("/scan", "/odom"))
+    one = open_router(here, RouterLink((link,), (), priorities={scan: "low"}, largest={odom: 100}))
+    other = open_router(there, RouterLink((), (link,)))
+    sender, stranger = transport(here), open_peer(there)
+    got: Counter[tuple[str, int, str]] = Counter()
+    first, last = "Priority.INTERACTIVE_HIGH", "Priority.BACKGROUND"
+
+    def take(sample: zenoh.Sample) -> None:
+        got[str(sample.key_expr).split("/")[1], len(sample.payload), str(sample.priority)] += 1
+
+    stranger.declare_subscriber("0/**", zenoh.handlers.Callback(take, indirect=False))
+    publishers = [sender.publisher(f"0/{topic}/type/hash", Qos.STATE) for topic in ("scan", "odom")]
+
+    def is_met() -> bool:
+        for size in (200, 10):  # the one that is left out comes first
+            for publisher in publishers:
+                publisher.put(bytes(size), b"")
+        return got["odom", 10, first] > 2 and got["scan", 10, last] > 2
+
+    try:
+        until(is_met)
+        assert got.keys() == {("odom", 10, first), ("scan", 10, last), ("scan", 200, last)}
+    finally:
+        sender.close()
+        for session in (stranger, one, other):
+            session.close()  # type: ignore[no-untyped-call]

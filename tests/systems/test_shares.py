@@ -84,5 +84,24 @@ def test_a_topic_is_downsampled_where_it_leaves_and_by_nobody_else(hosts: dict[s
         assert share is None or share.downsample == ({"/battery_level": 0.5} if leaves else {})
 
 
+def test_a_link_decides_what_dials_it_by_which_protocol_and_what_its_limit_leaves_out() -> None:
+    system, robot = spread(
+        {
+            **ROBOT.hosts,
+            "base": "a",
+            "battery": "a",
+            **dict.fromkeys((name for name, host in ROBOT.hosts.items() if host == "desk"), "b"),
+        }
+    )
+    wifi = LinkModel(between=("b", "a"), protocol="quic", limit=1e6, priorities={"battery_level": "low"})
+    system.links, system.security = {"wifi": wifi}, "mtls"
+    here, there = (share_of(system, robot, host).share for host in ("a", "b"))
+    assert here is not None
+    assert there is not None
+    assert here.listen == there.connect == ("quic/10.0.0.1:7447",)
+    assert (here.priorities, here.largest) == ({"/battery_level": "low"}, {"/battery_level": 125_000, "/tf": 125_000})
+    assert (there.priorities, there.largest) == ({}, {})
+
+
 def test_a_plan_shows_hosts_reasons_and_what_crosses(golden: Golden, repository: Path) -> None:
     golden.check("plan.txt", system_text(compile_system("systems/patrol_two_hosts.yaml", environment={})) + "\n")

@@ -71,7 +71,7 @@ def described(arguments: argparse.Namespace) -> DescribedBody:
         raise MisuseError("--with is for .xacro files: a URDF has no arguments")
     values = dict(_pair(written, "--with") for written in arguments.with_)
     folders = {name: _folder(value) for name, value in (_pair(one, "--package") for one in arguments.packages)}
-    return _bare(arguments.path, {name: _value(one) for name, one in values.items()}, folders)
+    return bare_body(arguments.path, {name: _value(one) for name, one in values.items()}, folders)
 
 
 def is_description(path: str) -> bool:
@@ -90,7 +90,7 @@ def _refuse_options(arguments: argparse.Namespace, options: Mapping[str, str], w
 
 
 @one_compile()
-def _bare(path: str, values: dict[str, str], folders: dict[str, Path]) -> DescribedBody:
+def bare_body(path: str, values: Mapping[str, str] = {}, folders: Mapping[str, Path] = {}) -> DescribedBody:
     """Return the body of a file without a robot; it may use what its project and the packages contain."""
     found, out = find(path), DescribedBody()
     if isinstance(found, Finding):

@@ -13,6 +13,7 @@ from rbxcompose.cli.bus.guest import Guest
 from rbxcompose.cli.bus.place import add_bus_options, find_place
 from rbxcompose.cli.output.console import refuse, tell
 from rbxcompose.cli.robots.lookup import NotDoneError
+from rbxcompose.cli.systems.options import add_system_options
 from rbxcompose.findings import kind
 from rbxcompose.printable import plain
 from rbxcompose.units import FREQUENCY, TIME, Dimension, UnitError, to_si
@@ -126,6 +127,7 @@ def add_server_verbs(
     for one, done in zip((ls, send), do, strict=True):
         one.set_defaults(do=done)
         add_bus_options(one)
+        add_system_options(one)
 
 
 def add_ls_options(parser: argparse.ArgumentParser) -> None:

@@ -93,15 +93,14 @@ def _inputs(given: Mapping[str, str]) -> list[str]:
 
 def _live(component: ComponentState) -> list[str]:
     """Return the settings of a component that may change, as its type declares them: the bus is not asked."""
-    from rbxcompose.config import is_live
+    from rbxcompose.config import live_names
     from rbxcompose.plugins import BrokenPluginError
     from rbxcompose.sdk.registry import component_type
 
     try:
-        fields = component_type(component.type).config_type().model_fields
+        return list(live_names(component_type(component.type).config_type()))
     except (KeyError, BrokenPluginError):
         return []
-    return [name for name, field in fields.items() if is_live(field)]
 
 
 def _place(given: Mapping[str, str]) -> BusPlace:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Sequence
+from functools import partial
 
 from rbxcompose.cli.bus.entities import NO_NAME
 from rbxcompose.cli.bus.messages import to_json
@@ -11,11 +13,12 @@ from rbxcompose.cli.bus.parameter_nodes import ParameterNodes
 from rbxcompose.cli.output.console import tell
 from rbxcompose.cli.parameters.changed_values import changes_of
 from rbxcompose.cli.parameters.listed_values import listed
-from rbxcompose.cli.parameters.saved_values import changed_since_up, files_with, require_unedited, write
+from rbxcompose.cli.parameters.saved_values import Compiled, changed_since_up, files_with, require_unedited, write
 from rbxcompose.cli.parameters.texts import exact_text
-from rbxcompose.cli.robots.live_settings import LiveChange, LiveSettings, live_settings
+from rbxcompose.cli.robots.live_settings import LiveChange, LiveSettings, compiled_as_it_runs, live_settings
 from rbxcompose.cli.robots.lookup import NO_ANSWER, NotDoneError, find_robot, known_state
 from rbxcompose.composition.value_edits import value_text
+from rbxcompose.config import leaves
 from rbxcompose.findings import Span, kind
 from rbxcompose.inspection.origin import origin_of
 from rbxcompose.manifest.tree import at
@@ -56,6 +59,11 @@ def manifest_of(nodes: ParameterNodes, arguments: argparse.Namespace) -> tuple[L
 def param_diff(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
     """Show what is not as in the manifest; the exit code is 1 if there is anything."""
     live, _, _ = manifest_of(nodes, arguments)
+    return tell_differences(live, arguments)
+
+
+def tell_differences(live: LiveSettings, arguments: argparse.Namespace) -> int:
+    """Tell what is not as in the manifest, and return the exit code."""
     found = list(live.changes)
     if arguments.json:
         tell(json.dumps([{**_data(one), "place": str(place(live, one))} for one in found]))
@@ -98,12 +106,21 @@ def param_save(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
     changes = chosen(changed_since_up(live, folder, history), live, arguments.names)
     if changes:
         require_unedited(live, changes, folder, history)
-        texts = files_with(live, changes, state)
+    return save(live, changes, partial(compiled_as_it_runs, state), arguments)
+
+
+def save(live: LiveSettings, changes: Sequence[LiveChange], compiled: Compiled, arguments: argparse.Namespace) -> int:
+    """Write changes into the files of the robot, and tell them.
+
+    Raises:
+        NotDoneError: if one cannot be written, or something else would change by it.
+    """
+    places: list[str] = []
+    if changes:
+        texts = files_with(live, changes, compiled)
         if not arguments.dry_run:
             write(texts)
         places = sorted(str(edit.span) for edit in texts.fix.edits)
-    else:
-        places = []
     if arguments.json:
         tell(json.dumps({"saved": [_data(one) for one in changes], "places": places, "dry_run": arguments.dry_run}))
         return 0
@@ -120,7 +137,7 @@ def chosen(changes: list[LiveChange], live: LiveSettings, names: list[str]) -> l
     Raises:
         NotDoneError: if the robot has no such component or setting.
     """
-    known = {f"{name}.{one}" for name, config in live.now.items() for one in type(config).model_fields}
+    known = {f"{name}.{one}" for name, config in live.now.items() for one, _ in leaves(config)}
     for name in names:
         if name not in known and name not in live.now:
             message = f"the robot has no setting '{name}'"

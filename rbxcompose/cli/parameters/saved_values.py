@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from rbxcompose.atomic_files import replace_file
-from rbxcompose.cli.robots.live_settings import LiveChange, LiveSettings, compiled_as_it_runs
+from rbxcompose.cli.robots.live_settings import LiveChange, LiveSettings
 from rbxcompose.cli.robots.lookup import NotDoneError, answer_of
+from rbxcompose.compiler import Compilation
 from rbxcompose.composition.value_edits import UnsavableError, edit_of, is_same, merged
-from rbxcompose.config import Config
+from rbxcompose.config import Config, key_of, value_at, with_values
 from rbxcompose.dataclass import dataclass
 from rbxcompose.edits import apply
 from rbxcompose.findings import Finding, Fix, Related, kind
@@ -21,7 +22,7 @@ from rbxcompose.plan.diff import Difference, difference
 from rbxcompose.plan.dump import dump
 from rbxcompose.plan.model import Plan
 from rbxcompose.regular_files import read_regular
-from rbxcompose.runtime.folder import RobotFolder, RobotState
+from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.runtime.plan_requests import ComparePlan
 
 NOT_SAVED = kind(
@@ -47,6 +48,7 @@ Bad: an editor changes `runtime:` of the battery, then `rbxcompose param set bat
 Good: one of the two.
 """,
 )
+Compiled = Callable[[Mapping[Path, str]], Compilation]
 _COMPARE = 10.0  # [s] for the supervisor to read a plan
 
 
@@ -59,15 +61,15 @@ class NewTexts:
     fix: Fix
 
 
-def files_with(live: LiveSettings, changes: Sequence[LiveChange], state: RobotState) -> NewTexts:
-    """Return the files of a robot with values written into them.
+def files_with(live: LiveSettings, changes: Sequence[LiveChange], compiled: Compiled) -> NewTexts:
+    """Return the files of a robot with values written into them; `compiled` returns the robot with other texts.
 
     Raises:
         NotDoneError: if one of the values cannot be written, or something else would change by it.
     """
     edits = []
     for change in changes:
-        path = live.robot.components[change.component].place(_key(live, change))
+        path = live.robot.components[change.component].place(key_of(live.now[change.component], change.name))
         try:
             edits.append(edit_of(live.robot.manifest, live.sources, path, change.live, change.dimension))
         except UnsavableError as error:
@@ -77,7 +79,7 @@ def files_with(live: LiveSettings, changes: Sequence[LiveChange], state: RobotSt
     except UnsavableError as error:
         raise NotDoneError(NOT_SAVED.at(error.span, f"nothing is saved: {error.reason}")) from error
     texts = _edited(live, fix)
-    _require_nothing_else(live, changes, texts, state)
+    _require_nothing_else(live, changes, texts, compiled)
     return texts
 
 
@@ -140,11 +142,6 @@ def _keys_changed(plan: Plan, folder: RobotFolder) -> dict[str, tuple[str, str]]
     return {f"{name}.{one.key}": (one.before or "nothing", one.after or "nothing") for name, one in each}
 
 
-def _key(live: LiveSettings, change: LiveChange) -> str:
-    field = type(live.now[change.component]).model_fields[change.name]
-    return field.alias or change.name
-
-
 def _unsavable(change: LiveChange, error: UnsavableError) -> Finding:
     return NOT_SAVED.at(error.span, f"'{change.path}' cannot be saved: {error.reason}", help=error.help)
 
@@ -168,11 +165,11 @@ def _edited(live: LiveSettings, fix: Fix) -> NewTexts:
 
 
 def _require_nothing_else(
-    live: LiveSettings, changes: Sequence[LiveChange], texts: NewTexts, state: RobotState
+    live: LiveSettings, changes: Sequence[LiveChange], texts: NewTexts, compiled: Compiled
 ) -> None:
     """Compile what would be written: it must say the new values, and nothing else may be another one."""
     unsaved = {path: data.decode("utf-8") for path, data in texts.after.items()}
-    found = compiled_as_it_runs(state, unsaved)
+    found = compiled(unsaved)
     if found.plan is None or found.robot is None:
         error = next(one for one in found.report if one.severity == "error")
         related = (Related(error.span, "here"),) if error.span else ()
@@ -181,8 +178,8 @@ def _require_nothing_else(
     wanted: dict[str, Config] = {}
     for one in changes:
         config = wanted.get(one.component, live.robot.components[one.component].config)
-        said = getattr(found.robot.components[one.component].config, one.name)
-        wanted[one.component] = config.model_copy(update={one.name: said if is_same(said, one.live) else one.live})
+        said = value_at(found.robot.components[one.component].config, one.name)
+        wanted[one.component] = with_values(config, {one.name: said if is_same(said, one.live) else one.live})
     side_effects = difference(live.plan_with(wanted), found.plan)
     if not side_effects.is_empty:
         message = f"nothing is saved: {_told(side_effects)} would change, too, which is written at the same place"

@@ -35,7 +35,7 @@ def param_set(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
     wanted: dict[str, list[Parameter]] = {}
     for component, name, text in pairs:
         wanted.setdefault(nodes.find(component), []).append(Parameter(name, value_of(text)))
-    change(nodes, wanted, arguments, "set")
+    change(nodes, wanted, "set")
     return _told(nodes, wanted, arguments, [written_unit(text) for _, _, text in pairs])
 
 
@@ -47,7 +47,7 @@ def param_load(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
         tell_report(report, sources)
         return 1
     wanted = {nodes.find(name): list(each) for name, each in found.items() if each}
-    change(nodes, wanted, arguments, "load")
+    change(nodes, wanted, "load")
     return _told(nodes, wanted, arguments)
 
 
@@ -62,7 +62,7 @@ def param_reset(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
     if not wanted:
         tell("[]" if arguments.json else "all values are those of the manifest")
         return 0
-    change(nodes, wanted, arguments, "reset")
+    change(nodes, wanted, "reset")
     return _told(nodes, wanted, arguments)
 
 
@@ -75,9 +75,12 @@ def param_undo(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
     except NothingToUndoError as error:
         return refuse(NO_NAME.at(None, str(error), help="'rbxcompose param history' lists the changes"))
     wanted: dict[str, list[Parameter]] = {}
-    for one in found:
+    for one in sorted(found, key=lambda each: each.component):  # processes tell of a change in any order
         wanted.setdefault(homes[one.component], []).append(Parameter(one.name, one.before))
-    change(nodes, wanted, arguments, "undo", {homes[one.component]: _first(one, found) for one in found})
+    expected: dict[str, list[Parameter]] = {}
+    for one in found:
+        expected.setdefault(homes[one.component], []).append(Parameter(one.name, one.after))
+    change(nodes, wanted, "undo", {homes[one.component]: _first(one, found) for one in found}, expected)
     return _told(nodes, wanted, arguments)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 from rbxcompose.composition.value_edits import value_text
@@ -33,6 +34,7 @@ battery:
 ```
 """,
 )
+PIPED = "-"
 _ROS = "ros__parameters"
 
 
@@ -51,8 +53,12 @@ def exact_text(value: object, dimension: Dimension | None) -> str:
 
 
 def file_values(path: Path, report: Report, sources: dict[str, str]) -> dict[str, tuple[Parameter, ...]]:
-    """Return the parameters in a file, by component; mistakes go into `report`."""
-    root, findings = read_file(path, shown_name(path), sources)
+    """Return the parameters in a file, by component, or `-` in what is piped in; mistakes go into `report`."""
+    if str(path) == PIPED:
+        sources[PIPED] = sys.stdin.read()
+        root, findings = read_text(sources[PIPED], PIPED)
+    else:
+        root, findings = read_file(path, shown_name(path), sources)
     report.extend(findings)
     found: dict[str, tuple[Parameter, ...]] = {}
     if root is None:

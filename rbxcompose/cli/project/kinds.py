@@ -24,3 +24,11 @@ def kind_of(path: Path) -> str:
 def is_system(written: str) -> bool:
     """Return whether a command-line path names the file of a system."""
     return Path(written).is_file() and kind_of(Path(written)) == "System"
+
+
+def system_and_robot(written: str) -> tuple[str, str] | None:
+    """Return the system's file and the robot that `FILE` or `FILE:ROBOT` names; without a robot, all are meant."""
+    if is_system(written):
+        return written, ""
+    path, _, robot = written.rpartition(":")
+    return (path, robot) if path and is_system(path) else None

@@ -99,6 +99,11 @@ def systems_of(folder: Path) -> list[str]:
     return sorted(shown_name(path.resolve()) for path in files if kind_of(path) == SYSTEM)
 
 
+def systems_here() -> list[str]:
+    """Return the systems of the project around the current folder."""
+    return systems_of(Path())
+
+
 def tests_below(folder: Path) -> list[str]:
     """Return the tests of missions in a folder, at any depth."""
     files = (path for pattern in _MANIFESTS for path in folder.rglob(pattern))

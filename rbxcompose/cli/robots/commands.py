@@ -7,13 +7,15 @@ import json
 
 from rbxcompose.cli.output.console import refuse, tell
 from rbxcompose.cli.robots.lookup import NotDoneError, add_robot_option, answer_of, find_robot
+from rbxcompose.cli.systems.options import add_system_options
 from rbxcompose.requests import Command
 from rbxcompose.runtime.folder import RobotFolder
 
 
 def add_asking_options(parser: argparse.ArgumentParser) -> None:
-    """Declare `--robot NAME` and `--json`."""
+    """Declare `--robot NAME`, which may be a robot of a system, and `--json`."""
     add_robot_option(parser)
+    add_system_options(parser)
     parser.add_argument("--json", action="store_true", help="answer in JSON")
 
 

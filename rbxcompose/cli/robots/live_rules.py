@@ -2,59 +2,67 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Mapping, Sequence
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from types import MappingProxyType
 
-from rbxcompose.cli.bus.parameter_nodes import ParameterNodes
-from rbxcompose.cli.robots.live_settings import live_settings, nodes_of
-from rbxcompose.compiler import check_settings
-from rbxcompose.config import Config
-from rbxcompose.findings import Finding, kind
+from rbxcompose.compiler import Compilation, check_settings, compile_robot
+from rbxcompose.dataclass import dataclass
+from rbxcompose.findings import Finding, Span
+from rbxcompose.model.outside import NOTHING
 from rbxcompose.model.robot import Robot
-from rbxcompose.msgs.rcl_interfaces import Parameter
-from rbxcompose.params.core import UnsettableError, changed
-from rbxcompose.runtime.folder import RobotState
+from rbxcompose.params.change import ChangeRefusal, Configs
+from rbxcompose.runtime.options import ChosenLayers
+from rbxcompose.systems.reader import compile_system
 
-BREAKS_RULE = kind(
-    "RBX9030",
-    """A live value would break a rule of the robot
-
-`param set` checks values as `check` does, together with all values that components have now: what is refused in the
-manifest is refused while the robot runs. Warnings count as well, since a robot that moves gives no time to read them.
-
-Bad: `rbxcompose param set go_to speed "0.8 m/s"`, for a base that can do 0.5 m/s.
-Good: `rbxcompose param set go_to speed "0.4 m/s"`
-""",
-)
+Broken = frozenset[tuple[str, Span | None]]
 
 
-def why_not(nodes: ParameterNodes, wanted: Mapping[str, Sequence[Parameter]], state: RobotState) -> Finding | None:
-    """Return why values, by node, would break a rule of a robot that runs; None if they break none that held before.
+@dataclass(slots=True)
+class LiveRules:
+    """The rules of a compiled robot; a supervisor's judge asks them in a process of its own."""
 
-    The robot is compiled as its files are now, with the layers that it runs with. What its components have set
-    meanwhile, they are asked.
-    """
-    live = live_settings(nodes, state)
-    if live is None:
-        sys.stderr.write("the rules of the robot are not checked: its files have errors now\n")
-        return None
-    names = nodes_of(live.robot)
-    new = {}
-    try:
-        for node, parameters in wanted.items():
-            if (name := names.get(node)) in live.now and name is not None:
-                new[name] = changed(live.now[name], parameters)
-    except UnsettableError:
-        return None  # the component refuses it, with the reason
-    return next((_refusal(one) for one in broken_rules(live.robot, live.now, new)), None)
+    robot: Robot
+    _looked: tuple[Configs, Broken] = ({}, frozenset())  # what was broken when it looked last, with these settings
 
+    def remade(self, file: str, layers: ChosenLayers) -> LiveRules | None:
+        """Return the rules of the robot as its files are now, with these layers; None if they have errors."""
+        found = compiled_with(file, layers)
+        return None if found.robot is None or found.plan is None else LiveRules(found.robot)
 
-def broken_rules(robot: Robot, now: Mapping[str, Config], new: Mapping[str, Config]) -> list[Finding]:
-    """Return the findings that `new` configurations of components bring, where others have those of `now`."""
-    known = {(one.code, one.span) for one in check_settings(robot, now)}
-    return [one for one in check_settings(robot, {**now, **new}) if (one.code, one.span) not in known]
+    def why_not(self, now: Configs, new: Configs) -> ChangeRefusal | None:
+        """Return the first rule that `new` configurations break, where others have those of `now`."""
+        written = {name: one.config for name, one in self.robot.components.items()}
+        before, after = {**written, **now}, {**written, **now, **new}
+        known = self._looked[1] if self._looked[0] == before else _broken(check_settings(self.robot, before))
+        found = list(check_settings(self.robot, after))
+        broken = next((one for one in found if (one.code, one.span) not in known), None)
+        if broken is None:
+            self._looked = after, _broken(found)  # most likely what there is when it looks next
+            return None
+        return ChangeRefusal(f"{broken.message} ({broken.code})", broken.help, breaks_rule=True)
 
 
-def _refusal(broken: Finding) -> Finding:
-    """Return why a value is not set, in the words of the rule that it would break."""
-    return BREAKS_RULE.at(None, f"{broken.message} ({broken.code})", help=broken.help)
+def compiled_with(file: str, layers: ChosenLayers, unsaved: Mapping[Path, str] = MappingProxyType({})) -> Compilation:
+    """Compile a robot's file with layers that were chosen before."""
+    outside = NOTHING
+    if layers.system:
+        system = compile_system(
+            layers.system, environment=os.environ, real=layers.real, profiles=layers.system_profiles
+        )
+        outside = system.robots[layers.member].robot.outside if layers.member in system.robots else NOTHING
+    return compile_robot(
+        file,
+        profiles=layers.profiles,
+        overlays=layers.overlays,
+        sets=layers.sets,
+        real=layers.real,
+        environment=os.environ,
+        unsaved=unsaved,
+        outside=outside,
+    )
+
+
+def _broken(found: Iterable[Finding]) -> Broken:
+    return frozenset((one.code, one.span) for one in found)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
@@ -11,9 +10,10 @@ from types import MappingProxyType
 
 from rbxcompose.bus.names import resolve
 from rbxcompose.cli.bus.parameter_nodes import ParameterNodes
-from rbxcompose.compiler import Compilation, compile_robot
+from rbxcompose.cli.robots.live_rules import compiled_with
+from rbxcompose.compiler import Compilation
 from rbxcompose.composition.value_edits import is_same
-from rbxcompose.config import Config
+from rbxcompose.config import Config, leaves, value_at
 from rbxcompose.dataclass import dataclass
 from rbxcompose.model.robot import Robot
 from rbxcompose.msgs.rcl_interfaces import GetParameters, Parameter
@@ -53,8 +53,8 @@ class LiveSettings:
         """Yield what is not as in the manifest."""
         for name, config in self.now.items():
             written = self.robot.components[name].config
-            for one, field in type(config).model_fields.items():
-                old, new = getattr(written, one), getattr(config, one)
+            for one, field in leaves(config):
+                old, new = value_at(written, one), value_at(config, one)
                 if not is_same(old, new):
                     yield LiveChange(name, one, old, new, dimension_of(field))
 
@@ -73,16 +73,7 @@ def compiled_as_it_runs(state: RobotState, unsaved: Mapping[Path, str] = Mapping
 
     `unsaved` are texts in place of those of files, by their real paths.
     """
-    layers = state.layers
-    return compile_robot(
-        state.file,
-        profiles=layers.profiles,
-        overlays=layers.overlays,
-        sets=layers.sets,
-        real=layers.real,
-        environment=os.environ,
-        unsaved=unsaved,
-    )
+    return compiled_with(state.file, state.layers, unsaved)
 
 
 def live_settings(nodes: ParameterNodes, state: RobotState) -> LiveSettings | None:

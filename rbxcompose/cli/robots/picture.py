@@ -14,8 +14,9 @@ from rbxcompose.runtime.records import Record
 MOST_WARNINGS = 5
 _GAP = "  "
 _RESET = "\x1b[0m"
-_BOLD, _FAINT, _YELLOW, _RED, _MAGENTA = "\x1b[1m", "\x1b[2m", "\x1b[33m", "\x1b[31m", "\x1b[35m"
-_COLOURS = {Level.OK: "", Level.WARN: _YELLOW, Level.ERROR: _RED, Level.STALE: _MAGENTA}
+BOLD, FAINT, YELLOW, RED, _MAGENTA = "\x1b[1m", "\x1b[2m", "\x1b[33m", "\x1b[31m", "\x1b[35m"
+COLOURS = {Level.OK: "", Level.WARN: YELLOW, Level.ERROR: RED, Level.STALE: _MAGENTA}
+ALARMS = {level.name: text for level, text in COLOURS.items()}
 _FAILED = frozenset({"failed", "dead", "lost"})
 _MOST_OF_NAMES = 24  # columns
 
@@ -94,7 +95,9 @@ def _component_data(one: ComponentPicture) -> dict[str, Any]:
 
 
 @dataclass(frozen=True, slots=True)
-class _Line:
+class PictureLine:
+    """A line, and the colour that it has on a terminal."""
+
     text: str
     colour: str = ""
 
@@ -105,26 +108,26 @@ def lines_of(picture: RobotPicture, width: int, height: int, *, colour: bool = F
     Missions get the room that all else leaves; components go last.
     """
     head = _head(picture)
-    loads = [_Line(""), *_loads(picture.loads)]
+    loads = [PictureLine(""), *_loads(picture.loads)]
     tail = [*_health(picture.health), *_warnings(picture.warnings)]
     room = max(2, height - len(head) - len(loads) - len(tail))
-    components = _shortened(_components(picture.components), room)
+    components = shortened(_components(picture.components), room)
     left = height - len(head) - len(components) - len(loads) - len(tail)
     shown = [*head, *components, *loads, *_trees(picture.trees, left), *tail][:height]
-    return [_painted(line, width, colour) for line in shown]
+    return [painted(line, width, colour) for line in shown]
 
 
-def _head(picture: RobotPicture) -> list[_Line]:
+def _head(picture: RobotPicture) -> list[PictureLine]:
     supervisor = "" if picture.is_supervised else "; its supervisor is dead, 'rbxcompose down' ends what is left"
-    lines = [_Line(f"{plain(picture.robot)}: router {plain(picture.router or 'none')}{supervisor}", _BOLD)]
+    lines = [PictureLine(f"{plain(picture.robot)}: router {plain(picture.router or 'none')}{supervisor}", BOLD)]
     if picture.mission:
-        lines.append(_Line(f"mission: {plain(picture.mission)}"))
+        lines.append(PictureLine(f"mission: {plain(picture.mission)}"))
     if picture.batteries:
-        lines.append(_Line(_GAP.join(f"{plain(name)}: {plain(text)}" for name, text in picture.batteries)))
-    return [*lines, _Line("")]
+        lines.append(PictureLine(_GAP.join(f"{plain(name)}: {plain(text)}" for name, text in picture.batteries)))
+    return [*lines, PictureLine("")]
 
 
-def _components(components: Sequence[ComponentPicture]) -> list[_Line]:
+def _components(components: Sequence[ComponentPicture]) -> list[PictureLine]:
     rows = [
         (
             one.name,
@@ -137,61 +140,66 @@ def _components(components: Sequence[ComponentPicture]) -> list[_Line]:
         )
         for one in components
     ]
-    head, *lines = _table([("component", "type", "state", "process", "restarts", "msg/s", ""), *rows])
-    return [_Line(head, _FAINT), *(_Line(line, _alarm(one)) for line, one in zip(lines, components, strict=True))]
+    head, *lines = table_of([("component", "type", "state", "process", "restarts", "msg/s", ""), *rows])
+    return [
+        PictureLine(head, FAINT),
+        *(PictureLine(line, _alarm(one)) for line, one in zip(lines, components, strict=True)),
+    ]
 
 
 def _alarm(component: ComponentPicture) -> str:
     if component.state in _FAILED:
-        return _RED
-    return _YELLOW if component.state != "active" else _COLOURS[component.level or Level.OK]
+        return RED
+    return YELLOW if component.state != "active" else COLOURS[component.level or Level.OK]
 
 
-def _loads(loads: Sequence[Load]) -> list[_Line]:
+def _loads(loads: Sequence[Load]) -> list[PictureLine]:
     rows = [
         (one.process, str(one.pid), "-" if one.cpu is None else f"{one.cpu:.1%}", f"{one.memory / 1e6:.0f} MB")
         for one in loads
     ]
-    head, *lines = _table([("process", "pid", "cpu", "memory"), *rows])
-    return [_Line(head, _FAINT), *map(_Line, lines)]
+    head, *lines = table_of([("process", "pid", "cpu", "memory"), *rows])
+    return [PictureLine(head, FAINT), *map(PictureLine, lines)]
 
 
-def _trees(trees: Sequence[Tree], room: int) -> list[_Line]:
+def _trees(trees: Sequence[Tree], room: int) -> list[PictureLine]:
     lines = [line for one in trees for line in _tree(one)]
-    return [_Line(""), *_shortened(lines, room - 1)] if lines and room > 1 else []
+    return [PictureLine(""), *shortened(lines, room - 1)] if lines and room > 1 else []
 
 
-def _tree(tree: Tree) -> list[_Line]:
-    head = _Line(f"mission {plain(tree.mission)}: {plain(tree.state)}", _FAINT)
-    return [head, *(_Line(plain(line)) for line in tree.running)]
+def _tree(tree: Tree) -> list[PictureLine]:
+    head = PictureLine(f"mission {plain(tree.mission)}: {plain(tree.state)}", FAINT)
+    return [head, *(PictureLine(plain(line)) for line in tree.running)]
 
 
-def _health(health: Sequence[tuple[str, Level, str]]) -> list[_Line]:
+def _health(health: Sequence[tuple[str, Level, str]]) -> list[PictureLine]:
     fine = [plain(name) for name, level, _ in health if level is Level.OK]
     lines = [
-        _Line(f"{level.name} {plain(name)}: {plain(text)}", _COLOURS[level])
+        PictureLine(f"{level.name} {plain(name)}: {plain(text)}", COLOURS[level])
         for name, level, text in health
         if level is not Level.OK
     ]
-    lines += [_Line(f"OK {', '.join(fine)}")] if fine else []
-    return [_Line(""), *lines] if lines else []
+    lines += [PictureLine(f"OK {', '.join(fine)}")] if fine else []
+    return [PictureLine(""), *lines] if lines else []
 
 
-def _warnings(warnings: Sequence[Record]) -> list[_Line]:
+def _warnings(warnings: Sequence[Record]) -> list[PictureLine]:
     lines = [
-        _Line(f"{one.time:8.1f}  {plain(one.source)}: {plain(one.text)}", _COLOURS[one.level])
+        PictureLine(f"{one.time:8.1f}  {plain(one.source)}: {plain(one.text)}", COLOURS[one.level])
         for one in warnings[-MOST_WARNINGS:]
     ]
-    return [_Line(""), *lines] if lines else []
+    return [PictureLine(""), *lines] if lines else []
 
 
-def _shortened(lines: Sequence[_Line], room: int) -> list[_Line]:
+def shortened(lines: Sequence[PictureLine], room: int) -> list[PictureLine]:
+    """Return at most `room` lines; the last one counts those that do not fit."""
     if len(lines) <= room:
         return list(lines)
-    return [*lines[: room - 1], _Line(f"... and {len(lines) - room + 1} more", _FAINT)]
+    return [*lines[: room - 1], PictureLine(f"... and {len(lines) - room + 1} more", FAINT)]
 
 
-def _table(rows: Sequence[Iterable[str]]) -> list[str]:
+def table_of(rows: Sequence[Iterable[str]]) -> list[str]:
+    """Return rows as lines whose columns stand below each other; the last cell of each may be long."""
     cells = [[fitted(plain(cell), _MOST_OF_NAMES) for cell in row[:-1]] + [plain(row[-1])] for row in map(list, rows)]
     widths = [max(map(columns, column)) for column in zip(*cells, strict=True)]
     return [
@@ -200,6 +208,7 @@ def _table(rows: Sequence[Iterable[str]]) -> list[str]:
     ]
 
 
-def _painted(line: _Line, width: int, colour: bool) -> str:
+def painted(line: PictureLine, width: int, colour: bool) -> str:
+    """Return the text of a line that fits into `width` columns, in its `colour` if that is wanted."""
     text = fitted(line.text, width)
     return f"{line.colour}{text}{_RESET}" if colour and line.colour and text else text

@@ -18,7 +18,7 @@ from rbxcompose.runtime.supervision.plan_change import LONGEST
 from rbxcompose.typed_json import to_data
 
 _COMPARE = 10.0  # [s] for the supervisor to read a plan
-_APPLY = LONGEST + _COMPARE  # [s]
+LONGEST_CHANGE = LONGEST + _COMPARE  # [s]
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +46,8 @@ class Proposal:
     @property
     def is_empty(self) -> bool:
         """Return whether nothing would change."""
-        return not self.found.impossible and all(one.fate is Fate.KEPT for one in self.found.components)
+        found = self.found
+        return not (found.impossible or found.shares_change) and all(one.fate is Fate.KEPT for one in found.components)
 
     @property
     def why_not(self) -> str:
@@ -63,4 +64,4 @@ class Proposal:
         Raises:
             NotDoneError: if the robot refuses, applies them only in part, or does not answer.
         """
-        return answer_of(self.folder, ApplyPlan(self.plan, self.found.generation, self.layers), timeout=_APPLY)
+        return answer_of(self.folder, ApplyPlan(self.plan, self.found.generation, self.layers), timeout=LONGEST_CHANGE)

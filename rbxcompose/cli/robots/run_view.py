@@ -7,6 +7,7 @@ from collections.abc import Iterable
 
 from rbxcompose.cli.output.console import good, has_colour, refuse, tell
 from rbxcompose.cli.robots.live_reload import LiveReload
+from rbxcompose.cli.robots.live_rules import LiveRules
 from rbxcompose.cli.robots.lookup import ALREADY_UP, UNSAFE
 from rbxcompose.cli.robots.story import StoryWriter, summary
 from rbxcompose.levels import Level
@@ -31,13 +32,13 @@ from rbxcompose.runtime.supervision.launch import (
 _LOOK = 0.05  # [s] between checks of the log
 
 
-def run_plan(plan: Plan, options: RunOptions, reload: LiveReload | None = None) -> int:
+def run_plan(plan: Plan, options: RunOptions, rules: LiveRules | None = None, reload: LiveReload | None = None) -> int:
     """Run a robot to its end, or if detached until it is up, and return the exit code.
 
-    Meanwhile, `reload` follows its files.
+    Its live settings keep `rules`. Meanwhile, `reload` follows its files.
     """
     plan = plan.in_one_process() if options.is_stepped else plan
-    started = start_supervisor(plan, options)
+    started = start_supervisor(plan, options, rules)
     return _Watch(plan, options, started, reload).run()
 
 

@@ -17,7 +17,7 @@ NO_EXTRA = kind(
     """A component needs a package that is not installed
 
 Some drivers need packages that robots without them do without. They come with an extra of rbxcompose; simulated
-devices often need none.
+devices often need none. `rbxcompose needs` lists the extras of a robot, and `make up` installs them.
 
 Bad: `pip install rbxcompose`, then `rbxcompose up --real` of a robot with servos.
 Good: `pip install 'rbxcompose[servos]'`

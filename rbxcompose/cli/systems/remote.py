@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import shlex
 import subprocess
 import sys
 import threading
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 from rbxcompose import __version__
 from rbxcompose.cli.output.console import tell
@@ -40,6 +43,7 @@ Bad: a host with rbxcompose 0.1 and a desk with 0.2.
 Good: `pip install rbxcompose==0.2` on the host, or `command: /home/pi/venv/bin/rbxcompose`.
 """,
 )
+AT_ONCE = 16  # commands whose answers are awaited, so that a fleet does not need a machine of its own
 CONNECT = 10  # [s] to reach a host
 _UNPACK = """set -e
 d="${XDG_CACHE_HOME:-$HOME/.cache}/rbxcompose/systems/DIGEST"
@@ -101,13 +105,11 @@ def _last(stderr: bytes) -> str:
     return plain(lines[-1]) if lines else "no reason is told"
 
 
-def send_all(remotes: Iterable[Remote], bundle: Bundle) -> dict[str, str] | list[Finding]:
-    """Bring a bundle to all hosts at once; return its folder on each, or all findings."""
+def send_all(remotes: Iterable[Remote], bundle: Bundle) -> dict[str, str | Finding]:
+    """Bring a bundle to all hosts at once; return its folder on each, or why it is not there."""
     away = [one for one in remotes if not one.is_here]
     with ThreadPoolExecutor() as pool:
-        results = dict(zip((one.name for one in away), pool.map(lambda one: send(one, bundle), away), strict=True))
-    problems = [one for one in results.values() if isinstance(one, Finding)]
-    return problems or {name: one for name, one in results.items() if isinstance(one, str)}
+        return dict(zip((one.name for one in away), pool.map(lambda one: send(one, bundle), away), strict=True))
 
 
 class Running:
@@ -133,6 +135,8 @@ class Running:
             self.lines.append(text := line.rstrip("\r\n"))
             if self._shows:
                 tell(f"{self._label} | {plain(text)}")
+        if self._process.stdout is not None:
+            self._process.stdout.close()
 
     def poll(self) -> int | None:
         """Return the exit code if it has ended."""
@@ -144,6 +148,14 @@ class Running:
         self._thread.join()
         return code
 
+    @property
+    def answer(self) -> Any:
+        """Return the last line that is JSON, as data; None if there is none. Others are told beside it."""
+        for line in reversed(self.lines):
+            with suppress(ValueError):
+                return json.loads(line)
+        return None
+
     def end(self) -> None:
         """Ask it to end: a command over ssh loses its terminal, which brings what it runs down."""
         if self._process.poll() is None:
@@ -151,8 +163,12 @@ class Running:
 
 
 def on_all(commands: Mapping[str, Sequence[str]]) -> dict[str, Running]:
-    """Run commands at once, each by its label, and wait for all; nothing is shown."""
-    running = {label: Running(label, command, shows=False) for label, command in commands.items()}
-    for one in running.values():
-        one.wait()
-    return running
+    """Run commands, each by its label, some at once, and wait for all; nothing is shown."""
+
+    def run(label: str) -> Running:
+        running = Running(label, commands[label], shows=False)
+        running.wait()
+        return running
+
+    with ThreadPoolExecutor(AT_ONCE) as pool:
+        return dict(zip(commands, pool.map(run, commands), strict=True))

@@ -8,15 +8,18 @@ import socket
 import sys
 from dataclasses import replace
 
-from rbxcompose.cli.output.console import FINDINGS, refuse, tell_report
+from rbxcompose.cli.output.console import FINDINGS, misused, refuse, tell_report
+from rbxcompose.cli.robots.live_rules import LiveRules
 from rbxcompose.cli.robots.run_view import run_plan
 from rbxcompose.cli.robots.this_machine import is_fit
 from rbxcompose.cli.systems.everywhere import up_everywhere
-from rbxcompose.findings import Finding, kind
+from rbxcompose.cli.systems.own_certificate import certificate_findings
+from rbxcompose.findings import Finding, Report, kind
 from rbxcompose.model.robot import Robot
 from rbxcompose.plan.model import Plan
-from rbxcompose.runtime.options import RunOptions
-from rbxcompose.systems.certificates import NO_SECURITY, folder_of, missing, tls_of
+from rbxcompose.runtime.options import ChosenLayers, RunOptions
+from rbxcompose.systems.certificates import NO_SECURITY, common_name, folder_of, tls_of
+from rbxcompose.systems.exchange import exchange_of
 from rbxcompose.systems.model import PlacedRobot, System
 from rbxcompose.systems.reader import compile_system
 from rbxcompose.systems.share import robots_on, share_of
@@ -44,18 +47,6 @@ Bad: `rbxcompose up systems/two_hosts.yaml --host robot`, on the desk.
 Good: `rbxcompose up systems/two_hosts.yaml --host desk`, on the desk.
 """,
 )
-NO_CERTIFICATE = kind(
-    "RBX6117",
-    """The host has no certificate
-
-With `security: tls` or `mtls`, each host needs a certificate of the system, its key, and the certificate of the
-authority. They are in `~/.config/rbxcompose/systems/SYSTEM/HOST` of the user that runs it. `security init` makes them
-and brings them to hosts that have `ssh`.
-
-Bad: `rbxcompose up systems/two_hosts.yaml --host robot`, on a robot that never got its files.
-Good: `rbxcompose security init systems/two_hosts.yaml` on the desk, then the same.
-""",
-)
 WHICH_ROBOT = kind(
     "RBX6112",
     """The host runs several robots
@@ -70,36 +61,55 @@ Good: `rbxcompose up systems/fleet.yaml --host hall -d`
 
 def run_share(path: str, arguments: argparse.Namespace, options: RunOptions) -> int:
     """Compile a system and run what one host of it runs; return the exit code."""
-    for word, given in (("--profile", arguments.profile), ("-f", arguments.overlays), ("--set", arguments.sets)):
-        if given:
-            sys.stderr.write(f"rbxcompose up: {word} is for a robot; a system says itself what its robots are\n")
-            return USAGE
     if options.is_stepped or arguments.watch:
         sys.stderr.write("rbxcompose up: a system runs in real time, without --rate and --watch\n")
         return USAGE
-    system = compile_system(path, environment=os.environ, real=arguments.real)
-    tell_report(system.report, system.sources)
-    if system.report.has_errors:
-        return FINDINGS
+    system = compiled_for(path, arguments, "up")
+    if isinstance(system, int):
+        return system
     if arguments.host is None and any(one.ssh for one in system.hosts.values()):
         return up_everywhere(path, system, arguments)
-    chosen = _chosen(system, arguments)
+    chosen = chosen_robots(system, arguments)
     if isinstance(chosen, Finding):
         return refuse(chosen)
+    if len(chosen) > 1 and not arguments.detach:
+        names = ", ".join(one.name for one in chosen)
+        message = f"'{arguments.host}' runs several robots: {names}"
+        return refuse(WHICH_ROBOT.at(None, message, help="add -d, or --robot NAME"))
     for robot in chosen:
-        plan = share_of(system, robot, arguments.host)
+        plan = planned(system, robot, arguments.host)
         if not is_fit(_here(robot, arguments.host), system.sources):
             return FINDINGS
-        plan = _secured(plan, system)
-        problem = _certificate_problem(plan, path) or _address_problem(plan, arguments.host)
-        if problem is not None:
+        tell_report(found := _certificate_findings(plan, system, arguments.host, path), {})
+        if found.has_errors:
+            return FINDINGS
+        if (problem := _address_problem(plan, arguments.host)) is not None:
             return refuse(problem)
-        if (exit_code := run_plan(plan, options)) or not options.is_detached:
+        own = replace(options, layers=layers_of(system, robot, real=arguments.real))
+        if (exit_code := run_plan(plan, own, LiveRules(robot.robot))) or not options.is_detached:
             return exit_code
     return 0
 
 
-def _chosen(system: System, arguments: argparse.Namespace) -> list[PlacedRobot] | Finding:
+def compiled_for(path: str, arguments: argparse.Namespace, verb: str) -> System | int:
+    """Return a system without errors, with the layers of a `verb`; the exit code after telling what is wrong."""
+    for word, given in (("-f", arguments.overlays), ("--set", arguments.sets)):
+        if given:
+            return misused(verb, f"{word} is for a robot; a system says itself what its robots are")
+    system = compile_system(path, environment=os.environ, real=arguments.real, profiles=arguments.profile)
+    tell_report(system.report, system.sources)
+    return FINDINGS if system.report.has_errors else system
+
+
+def layers_of(system: System, robot: PlacedRobot, *, real: bool) -> ChosenLayers:
+    """Return the layers that a robot of a system is compiled with, for its supervisor to remember."""
+    layers = ChosenLayers(profiles=(robot.model.profile,) if robot.model.profile else (), real=real)
+    if system.path is None or not robot.robot.outside.skills:
+        return layers
+    return replace(layers, system=str(system.path.resolve()), system_profiles=system.profiles, member=robot.name)
+
+
+def chosen_robots(system: System, arguments: argparse.Namespace) -> list[PlacedRobot] | Finding:
     """Return the robots to run on this host."""
     host = arguments.host
     if host is None:
@@ -111,9 +121,6 @@ def _chosen(system: System, arguments: argparse.Namespace) -> list[PlacedRobot] 
     if not there:
         what = f"'{arguments.robot}'" if arguments.robot else "any robot"
         return WHICH_HOST.at(None, f"'{host}' does not run anything of {what}")
-    if len(there) > 1 and not arguments.detach:
-        names = ", ".join(one.name for one in there)
-        return WHICH_ROBOT.at(None, f"'{host}' runs several robots: {names}", help="add -d, or --robot NAME")
     return there
 
 
@@ -123,23 +130,26 @@ def _here(robot: PlacedRobot, host: str) -> Robot:
     return replace(robot.robot, components=here)
 
 
-def _secured(plan: Plan, system: System) -> Plan:
-    """Return the plan with the certificates of its host."""
-    if plan.share is None or system.security == NO_SECURITY:
-        return plan
-    tls = tls_of(folder_of(system.name, os.environ), plan.share.host, system.security)
-    return replace(plan, share=replace(plan.share, tls=tls))
+def planned(system: System, robot: PlacedRobot, host: str) -> Plan:
+    """Return what a host runs of a robot, with what it carries between robots, and with its certificates."""
+    plan, exchange = share_of(system, robot, host), exchange_of(system, robot, host)
+    tls = None
+    if system.security != NO_SECURITY:
+        tls = tls_of(folder_of(system.name, os.environ), host, system.security)
+    share = replace(plan.share, tls=tls) if plan.share else None
+    return replace(plan, share=share, exchange=replace(exchange, tls=tls) if exchange else None)
 
 
-def _certificate_problem(plan: Plan, path: str) -> Finding | None:
-    if plan.share is None or plan.share.tls is None or not (lacking := missing(plan.share.tls)):
-        return None
-    return NO_CERTIFICATE.at(None, f"'{lacking[0]}' cannot be read", help=f"rbxcompose security init {path}")
+def _certificate_findings(plan: Plan, system: System, host: str, path: str) -> Report:
+    report = Report()
+    if tls := (plan.share and plan.share.tls) or (plan.exchange and plan.exchange.tls):
+        report.extend(certificate_findings(tls, common_name(system.name, host), path))
+    return report
 
 
 def _address_problem(plan: Plan, host: str) -> Finding | None:
     """Return the finding if this machine cannot listen where the other hosts dial it."""
-    for endpoint in plan.share.listen if plan.share else ():
+    for endpoint in (*(plan.share.listen if plan.share else ()), *(plan.exchange.listen if plan.exchange else ())):
         address, _, port = endpoint.partition("/")[2].rpartition(":")
         try:
             found = socket.getaddrinfo(address.strip("[]"), int(port), type=socket.SOCK_STREAM)

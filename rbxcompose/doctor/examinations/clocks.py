@@ -35,6 +35,18 @@ Good: `timedatectl set-ntp true` on both
 """,
     Severity.WARNING,
 )
+HOSTS_DIFFER = kind(
+    "RBX6129",
+    """The clocks of two hosts of a robot differ
+
+The hosts of a robot tell each other the time with their reports. Whatever compares stamps of both, such as transforms
+and recordings, is wrong by the difference. Deadlines are not: they count from the arrival of a message.
+
+Bad: a desk and a robot that is 0.3 s ahead of it.
+Good: `timedatectl set-ntp true` on both, or one that follows the other by NTP.
+""",
+    Severity.WARNING,
+)
 _HELP = "let a time server set it: timedatectl set-ntp true"
 
 
@@ -60,6 +72,9 @@ def clocks(facts: HostFacts) -> Iterator[str | Finding]:
             yield OTHER_CLOCK.at(None, f"the stamps of '{node}' of '{one.name}' are {words}", help=_HELP)
         if ages and not wrong:
             yield f"{one.name}: the stamps of {len(ages)} nodes agree with this clock"
+        for host, offset in sorted(one.state.clocks.items()) if one.state else ():
+            told = f"{one.name}: the clock of host '{host}' is {offset.words}"
+            yield HOSTS_DIFFER.at(None, told, help=_HELP) if offset.is_too_far else told
 
 
 def _server(is_synchronised: bool | None) -> str:

@@ -15,8 +15,8 @@ PORT_TAKEN = kind(
     "RBX9402",
     """The port of the bus is taken
 
-A robot that starts uses the next free port instead, one of twenty; `rbxcompose ps` shows which. A program that looks
-for the robot at its usual port then finds something else.
+A robot that starts uses the next free port instead; `rbxcompose ps` shows which. A program that looks for the robot
+at its usual port then finds something else.
 
 Bad: a router of ROS 2 at 7447, and a robot with `bus: {port: 7447}` beside it.
 Good: `bus: {port: 7460}`, or `bus: {router: tcp/127.0.0.1:7447}` to use that router.

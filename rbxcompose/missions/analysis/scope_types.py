@@ -67,6 +67,14 @@ class View:
         return findings_of(expression, wanted, scalar, self.scope, kind)
 
 
+def _named_twice(program: Program, robot: RobotNames) -> set[str]:
+    """Return the names that the mission gives to something of another type than what the robot has under it."""
+    of_robot = {**robot.values, POSE_NAME: POSE}
+    own = {name: one.type for name, one in program.inputs.items()}
+    own |= {name: datum.type for name, datum in program.data.items()}
+    return {name for name, found in own.items() if name in of_robot and found != of_robot[name]}
+
+
 def base_names(program: Program, robot: RobotNames) -> dict[str, Type]:
     """Return the names in scope throughout a mission, with their types."""
     return {
@@ -74,6 +82,7 @@ def base_names(program: Program, robot: RobotNames) -> dict[str, Type]:
         POSE_NAME: POSE,
         **{name: one.type for name, one in program.inputs.items()},
         **{name: datum.type for name, datum in program.data.items()},
+        **dict.fromkeys(_named_twice(program, robot), UNKNOWN),  # that is told, and not what follows from it
         **{name: map_of(UNKNOWN, _entries(program, robot, name)) for name in program.saved - program.data.keys()},
     }
 

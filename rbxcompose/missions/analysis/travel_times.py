@@ -47,6 +47,7 @@ class Ways:
     places: Mapping[str, Place]
     short: dict[int, TooShort] = field(default_factory=dict)  # the worst case of each node
     visited: dict[str, Place] = field(default_factory=dict)
+    late: dict[int, TooShort] = field(default_factory=dict)  # loops whose rounds take longer than their period
     starts_at: dict[int, Place] = field(default_factory=dict)  # where the robot is when other skills begin
     leg: tuple[Place, Place] | None = None  # the last drive between two known places
     steps: int = 0
@@ -107,6 +108,9 @@ class Ways:
         for child in node.children:
             here, took = self.go(child, here, constants)
             takes += took
+        every = number_of(node.step.lasts, constants)
+        if every and takes > every:
+            self.late[node.number] = TooShort(node, every, takes)
         return here, takes
 
     def _loop(self, node: MissionNode, here: Here, constants: Constants) -> tuple[Here, float]:

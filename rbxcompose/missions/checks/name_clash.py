@@ -25,13 +25,18 @@ def name_clash(mission: Examined) -> Iterator[Finding]:
         yield from _item(view)
 
 
+_OTHER = "choose another name, here and where it is meant"
+
+
 def _declared(program: Program, robot: RobotNames) -> Iterator[Finding]:
     for section, entries in (("input", program.inputs), ("datum", program.data)):
         for name, entry in entries.items():
             if name in robot.skills:
-                yield NAME_CLASH.at(entry.span, f"the {section} '{name}' is named like a skill")
+                yield NAME_CLASH.at(entry.span, f"the {section} '{name}' is named like a skill", help=_OTHER)
             elif name in robot.values or name == POSE:
-                yield NAME_CLASH.at(entry.span, f"the {section} '{name}' is named like a value of the robot")
+                yield NAME_CLASH.at(
+                    entry.span, f"the {section} '{name}' is named like a value of the robot", help=_OTHER
+                )
     for name in program.inputs.keys() & program.data.keys():
         related = [Related(program.inputs[name].span, "the input")]
         yield NAME_CLASH.at(program.data[name].span, f"'{name}' is an input and a datum", related=related)
@@ -56,6 +61,8 @@ def _branches(node: MissionNode, program: Program, robot: RobotNames) -> Iterato
 def _item(view: View) -> Iterator[Finding]:
     item, node = view.node.item, view.node
     if item and item in view.scope.names:
-        yield NAME_CLASH.at(node.span, f"the item '{item}' has a name that the loop already uses")
+        taken = "a value of the robot has" if item in view.robot.values else "the loop already uses"
+        help_text = f"choose another name, such as '{item}_item'"
+        yield NAME_CLASH.at(node.span, f"the item '{item}' has a name that {taken}", help=help_text)
     elif item and (item in kinds() or item in view.robot.skills):
         yield NAME_CLASH.at(node.span, f"the item '{item}' is named like a kind or a skill")

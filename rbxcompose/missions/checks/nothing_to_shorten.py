@@ -43,4 +43,5 @@ def nothing_to_shorten(mission: Examined) -> Iterator[Finding]:
         is_read = isinstance(items, tuple) or (items is not None and items.text)
         if shortened is not None and shortened not in mission.program.data and is_read and not mission.program.is_open:
             help_text = "write the list under 'data', and its name after 'in'"
-            yield nothing_to_shorten.at(node.span, "'remove_done' needs an 'in' that names data", help=help_text)
+            span = node.asked[0].scalar.span if node.asked else node.span
+            yield nothing_to_shorten.at(span, "'remove_done' needs an 'in' that names data", help=help_text)

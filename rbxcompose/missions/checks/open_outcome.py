@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from rbxcompose.findings import Finding
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.examined import Examined
+from rbxcompose.missions.language.foreign_steps import OUTCOMES
 from rbxcompose.missions.program.look import Form
 from rbxcompose.missions.program.machines import Next
 from rbxcompose.missions.program.outcomes import FAILS, Outcomes
@@ -65,7 +66,8 @@ def _open(state: MissionNode, leads_to: Next | None, ends: Outcomes) -> Iterator
             message = f"the state '{state.name}' can fail, so one word after 'next' is not enough"
             yield open_outcome.at(leads_to.spans[""], message, help=ONE_WORD)
     else:
+        meant = {OUTCOMES.get(key.lower()) for key in leads_to.keys.keys() - ends.words.keys()}  # told there
         for word, counts_as in ends.words.items():
-            if word not in leads_to.to and counts_as not in leads_to.to:
+            if word not in meant and word not in leads_to.to and counts_as not in leads_to.to:
                 message = f"the state '{state.name}' can end with '{word}', which leads nowhere"
                 yield open_outcome.at(state.span, message, help=f"write '{word}: ...' under 'next'")

@@ -36,6 +36,10 @@ def unknown_channel(mission: Examined) -> Iterator[Finding]:
         for message in published(node):
             yield from _nowhere(message, "topic", mission.robot.topics)
         for message in called(node):
+            if (name := message.target.text) in mission.robot.skills and name not in mission.robot.services:
+                told = f"'{name}' is a skill, and no service"
+                yield unknown_channel.at(message.target.span, told, help=f"write it as a step of its own: '- {name}'")
+                continue
             yield from _nowhere(message, "service", mission.robot.services)
 
 

@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterator
 
 from rbxcompose.findings import DID_YOU_MEAN, Finding, nearest, replacement, surely_meant
+from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.examined import Examined
+from rbxcompose.missions.language.foreign_steps import FOREIGN
+from rbxcompose.missions.program.program import MissionNode
 from rbxcompose.missions.program.registry import kinds
 
-_OURS = {
-    "fallback": "selector sel priority_selector",
-    "sequence": "seq steps sequential",
-    "parallel": "par simultaneously together concurrently",
-    "repeat": "loop",
-    "for": "foreach for_each",
-    "wait": "sleep delay pause",
-    "wait_for": "wait_until await",
-    "choose": "switch match case",
-    "log": "print echo",
-    "use": "subtree sub_tree submission include",
-    "run": "exec script",
-}
-FOREIGN: Mapping[str, str] = {name: ours for ours, names in _OURS.items() for name in names.split()}
-"""Our word for each of another mission language or of a behaviour tree."""
+_WORD = re.compile(r"[a-zA-Z_].*")
+
+
+def _called(node: MissionNode) -> str:
+    """Return the word after a step, as in 'service: go_to'."""
+    words = (one.value.text for one in node.step.arguments if isinstance(one.value, ScalarNode))
+    return next(words, "")
 
 
 @mission_check("RBX4102", is_fixable=True)
@@ -55,6 +51,16 @@ def unknown_skill(mission: Examined) -> Iterator[Finding]:
             ours = FOREIGN.get(node.skill.casefold(), "")
             if mission.robot.is_complete or ours or surely_meant(node.skill, known):
                 message = f"mission '{mission.program.name}' uses a skill that the robot does not have: '{node.skill}'"
+                if not _WORD.fullmatch(node.skill):
+                    message = f"'{node.skill}' is no step"
+                    yield unknown_skill.at(
+                        node.span, message, help="write a step, or a list of steps, such as '- go_to: dock'"
+                    )
+                    continue
+                if (called := _called(node)) in skills:
+                    is_plain = f"a step is the name of its skill: '- {called}: ...'"
+                    yield unknown_skill.at(node.span, message, help=f"{is_plain}, with its arguments after the colon")
+                    continue
                 if ours in kinds():
                     fix = replacement(node.span, node.skill, ours, is_safe=False)  # what is below it may differ
                     yield unknown_skill.at(node.span, message, help=f"{DID_YOU_MEAN} '{ours}'?", fix=fix)

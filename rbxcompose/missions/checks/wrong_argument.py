@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
+from dataclasses import replace
 
-from rbxcompose.expressions.types import TypeKind
-from rbxcompose.findings import Finding, suggest
-from rbxcompose.manifest.tree import ScalarNode, SequenceNode, TreeNode
+from rbxcompose.expressions.types import UNKNOWN, Type, TypeKind
+from rbxcompose.findings import Finding, nearest, suggest
+from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.missions.analysis.scope_types import View
 from rbxcompose.missions.language.argument_types import check_written
 from rbxcompose.missions.language.asked import WrittenArgument
+from rbxcompose.missions.language.literals import WrongValue, typed
 from rbxcompose.missions.language.written_poses import help_with_place, is_pose, nodes_of
+from rbxcompose.missions.modifiers.registry import modifier_keys
 from rbxcompose.missions.program.program import Skill
 from rbxcompose.printable import plain
 from rbxcompose.units import example
@@ -109,15 +112,44 @@ def _argument(view: View, skill: Skill, argument: WrittenArgument) -> Iterator[F
         message = f"the skill '{skill.name}' has no argument '{name}'"
         taken = {one.name for one in view.node.step.arguments}
         arguments = skill.arguments
-        yield wrong_argument.misspelt(argument.span, message, name, arguments, "its arguments", taken=taken)
+        if name in modifier_keys() and not nearest(name, arguments):
+            help_text = f"'{name}' is a setting of the step: move it left, into the column of '{skill.name}'"
+            yield wrong_argument.at(argument.span, message, help=help_text)
+            return
+        finding = wrong_argument.misspelt(argument.span, message, name, arguments, "its arguments", taken=taken)
+        if skill.main and skill.main not in taken and "" not in taken and not nearest(name, arguments):
+            value = plain(argument.value.text, 60) if isinstance(argument.value, ScalarNode) else "..."
+            finding = replace(finding, help=f"{finding.help}; write '{skill.name}: {value}'".removeprefix("; "))
+        yield finding
     elif isinstance(argument.value, ScalarNode):
         if argument.value.plain and not argument.value.text:
             yield wrong_argument.at(argument.span, f"the argument '{name}' of '{skill.name}' has no value")
         else:
             yield from check_written(view, argument.value, skill.arguments[name], wrong_argument)
-    elif skill.arguments[name].kind not in STRUCTURED:
+    elif skill.arguments[name].kind in STRUCTURED:
+        yield from _inside(argument.value, skill.arguments[name], f"the argument '{name}' of '{skill.name}'")
+    else:
         message = f"the argument '{name}' of '{skill.name}' must be {skill.arguments[name].phrase}"
         help_text = _one_by_one(view, skill, argument.value)
         if not help_text and skill.arguments[name].kind in PLACED:
             help_text = help_with_place(nodes_of(argument.value))
         yield wrong_argument.at(argument.span, message, help=help_text)
+
+
+def _inside(node: TreeNode, wanted: Type, what: str) -> Iterator[Finding]:
+    """Yield what is wrong in a list or a map whose entries have types of their own."""
+    if wanted.kind is TypeKind.LIST and isinstance(node, SequenceNode):
+        for number, item in enumerate(node.items, 1):
+            yield from _inside(item, wanted.entry, f"item {number} of {what}")
+    elif wanted.parts and isinstance(node, MappingNode):
+        for key, entry in node.entries.items():
+            if key in wanted.parts:
+                yield from _inside(entry.value, wanted.parts[key], f"'{key}' of {what}")
+            else:
+                message, taken = f"{what} has no entry '{key}'", node.entries
+                yield wrong_argument.misspelt(entry.key.span, message, key, wanted.parts, "its entries", taken=taken)
+    elif wanted != UNKNOWN:
+        try:
+            typed(node, wanted)
+        except WrongValue as error:
+            yield wrong_argument.at(node.span, f"{what} {error.message}", label=error.label, help=error.help)

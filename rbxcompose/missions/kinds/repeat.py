@@ -116,6 +116,11 @@ class RepeatStep(Loop):
         until = reader.watched("until") if reader.has("until") else None
         return cls(rounds, until, reader.duration("every") if reader.has("every") else None)
 
+    @property
+    def lasts(self) -> Expression | None:
+        """Return `every`."""
+        return self.every
+
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return the outcomes; an endless loop can only fail."""
         body = endings.of(node.children[0]).plain if node.children else ANY

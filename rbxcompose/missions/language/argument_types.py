@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rbxcompose.expressions.text import TextSlot, parse_template
+from rbxcompose.expressions.text import TextSlot, parse_template, refuse_foreign
 from rbxcompose.expressions.tree import ExpressionError
 from rbxcompose.expressions.types import UNKNOWN, Type, TypeKind
 from rbxcompose.findings import Finding, FindingKind
@@ -20,6 +20,7 @@ def check_written(view: View, scalar: ScalarNode, wanted: Type, kind: FindingKin
         if wanted.kind is not TypeKind.TEXT:
             yield from view.typed(expression_of(scalar), wanted, scalar, kind)
             return
+        refuse_foreign(scalar.text)
         for slot in parse_template(scalar.text).parts:
             if isinstance(slot, TextSlot):
                 part = ScalarNode(slot.value.text, inner_span(scalar, slot.start, slot.end))

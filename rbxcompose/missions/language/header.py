@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from rbxcompose.expressions.types import TYPES, UNKNOWN, Type, choice_of
 from rbxcompose.findings import Report
+from rbxcompose.manifest.arguments import CHOICE, unknown_type
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions import codes
 from rbxcompose.missions.engine.value_text import show
@@ -16,7 +17,6 @@ from rbxcompose.missions.program.program import RATE
 from rbxcompose.missions.program.registry import kinds
 
 INPUT_KEYS = ("type", "default", "min", "max", "choices", "about")
-CHOICE = "choice"
 FASTEST = 1000.0  # [Hz]
 
 
@@ -74,6 +74,10 @@ def _input(name: str, entry: Entry, report: Report) -> Input:
     default, least, most = (_value(value.get(key), wanted, f"'{key}'", report) for key in ("default", "min", "max"))
     is_sound = value.entries.keys() <= {*INPUT_KEYS} and (default is not None or "default" not in value)
     read = Input(name, wanted, place, default, _number(least), _number(most), is_sound)
+    if least and read.least is not None and read.most is not None and read.least > read.most:
+        message = f"'min' of '{name}' is above its 'max' of {show(wanted, read.most)}: no value fits"
+        report.add(codes.WRONG_TYPE.at(least.span, message, help="exchange them"))
+        return replace(read, least=None, most=None)
     if default and (trouble := range_trouble(read, default)):
         report.add(codes.WRONG_TYPE.at(default.span, f"the default of '{name}' {trouble}"))
     return read
@@ -91,8 +95,7 @@ def _type(name: str, value: MappingNode, entry: Entry, report: Report) -> Type |
         report.add(codes.MISSING.at(entry.key.span, f"the input '{name}' needs 'choices': a list of words"))
         return None
     if word.text not in TYPES:
-        message = f"unknown type '{word.text}'"
-        report.add(codes.NOT_A_CHOICE.misspelt(word.span, message, word.text, (*TYPES, CHOICE), "types"))
+        report.add(unknown_type(codes.NOT_A_CHOICE, word.span, word.text))
         return None
     return TYPES[word.text]
 

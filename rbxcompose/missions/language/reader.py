@@ -282,7 +282,9 @@ class _Reader:
         if node is None:
             return ()
         if not isinstance(node, MappingNode):
-            self.add(codes.WRONG_SHAPE.at(node.span, "'interrupts' needs names below it, each with 'when' and 'do'"))
+            help_text = "give each a name instead of its dash: 'NAME: {when: ..., do: ...}'"
+            message = "'interrupts' needs names below it, each with 'when' and 'do'"
+            self.add(codes.WRONG_SHAPE.at(node.span, message, help=help_text))
             return ()
         read = [self.interrupt(name, entry) for name, entry in node.entries.items()]
         # A restart may name a node in the reaction of a later interrupt, which it may cut short: all are read by now.

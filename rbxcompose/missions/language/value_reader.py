@@ -6,7 +6,7 @@ import re
 from dataclasses import replace
 from typing import Protocol
 
-from rbxcompose.expressions.text import Template, TextSlot, parse_template
+from rbxcompose.expressions.text import Template, TextSlot, parse_template, refuse_foreign
 from rbxcompose.expressions.tree import Expression, ExpressionError, Number
 from rbxcompose.expressions.types import COUNT, FLAG, TEXT, UNKNOWN, Type, quantity_of
 from rbxcompose.expressions.written import quotes_needed
@@ -164,9 +164,12 @@ class ValueReader:
     def template_of(self, scalar: ScalarNode) -> Template:
         """Return the text of a scalar with its slots."""
         try:
+            refuse_foreign(scalar.text)
             template = parse_template(scalar.text)
         except ExpressionError as error:
-            self.nodes.add(codes.NO_EXPRESSION.at(inner_span(scalar, error.start, error.end), error.message))
+            self.nodes.add(
+                codes.NO_EXPRESSION.at(inner_span(scalar, error.start, error.end), error.message, help=error.help)
+            )
             return Template("", ())
         slots = (part for part in template.parts if isinstance(part, TextSlot))
         self.asked.extend(Asked(slot.value, UNKNOWN, _part_of(scalar, slot)) for slot in slots)

@@ -8,14 +8,26 @@ from types import MappingProxyType
 from typing import Any, TypeVar
 
 from rbxcompose.config import Place
-from rbxcompose.expressions.types import COUNT, FLAG, POSE, TEXT, Type, choice_of, quantity_of
+from rbxcompose.expressions.types import (
+    COUNT,
+    FLAG,
+    POSE,
+    TEXT,
+    UNKNOWN,
+    Type,
+    choice_of,
+    list_of,
+    quantity_of,
+    record_of,
+)
 from rbxcompose.expressions.values import Value
 from rbxcompose.geometry import Pose2
 from rbxcompose.missions.program.program import Skill
 from rbxcompose.msgs import registry
-from rbxcompose.msgs.definitions import INTEGERS, attribute, parse_type
+from rbxcompose.msgs.definitions import INTEGERS, FieldShape, attribute, parse_type
 from rbxcompose.msgs.entries import ArrayEntries
 from rbxcompose.msgs.geometry_msgs import Point, Pose, PoseStamped, Quaternion
+from rbxcompose.msgs.measures import Measures
 from rbxcompose.msgs.plain import from_plain, to_plain
 from rbxcompose.msgs.stamps import to_duration, to_seconds
 from rbxcompose.msgs.std_msgs import Header
@@ -49,14 +61,15 @@ def skill_of(
     pausable: bool = False,
     outcomes: Mapping[str, str] = MappingProxyType({}),
     entries: ArrayEntries | None = None,
-    measures: Mapping[str, Dimension] = MappingProxyType({}),
+    measures: Measures = MappingProxyType({}),
     choices: Mapping[str, Collection[str]] = MappingProxyType({}),
 ) -> Skill:
     """Return an action as a skill: the fields of its goal are the arguments, the first one is the main one.
 
     A field that is not a pose, time, text, flag or number is not an argument and keeps its zero value. `measures` are
-    the dimensions of numbers, `choices` the words that texts may be. A main argument that is a pose, a time or has a
-    dimension is required. With `entries`, those are arguments, too, and only a text with choices is the main one.
+    the dimensions of numbers, also of those in nested messages, which become arguments by that: maps, or lists of maps.
+    `choices` are the words that texts may be. A main argument that is a pose, a time or has a dimension is required.
+    With `entries`, those are arguments, too, and only a text with choices is the main one.
     """
     asked, results = _asked(action.Goal, entries, measures, choices), typed_fields(action.Result)
     return Skill(name, *asked, claims, restartable, pausable, dict(outcomes), results, entries)
@@ -92,11 +105,11 @@ def service_skill(service: type[Service[Any, Any]], name: str) -> Skill | None:
 def _asked(
     message: type[Message],
     entries: ArrayEntries | None = None,
-    measures: Mapping[str, Dimension] = MappingProxyType({}),
+    measures: Measures = MappingProxyType({}),
     choices: Mapping[str, Collection[str]] = MappingProxyType({}),
 ) -> tuple[dict[str, Type], str, frozenset[str]]:
     """Return the arguments that a message has fields or entries for, the main one, and the required ones."""
-    arguments = typed_fields(message) | {name: quantity_of(one) for name, one in measures.items()}
+    arguments = _measured_fields(message, measures)
     arguments |= {name: choice_of(*words) for name, words in choices.items()}
     if entries is not None:
         main = next(iter(choices), "")
@@ -105,6 +118,27 @@ def _asked(
     is_needed = main in measures or (main and message.FIELDS[main] in (STAMPED, POSED, LASTING))
     needed = frozenset({main} if is_needed else ())
     return arguments, main, needed
+
+
+def _measured_fields(message: type[Message], measures: Measures) -> dict[str, Type]:
+    """Return the types of the fields that missions understand or that have measures, in order."""
+    known = typed_fields(message)
+    found = {
+        name: _measured(ros, measures[name]) if name in measures else known.get(name)
+        for name, ros in message.FIELDS.items()
+    }
+    return {name: one for name, one in found.items() if one is not None}
+
+
+def _measured(ros: str, measure: Dimension | Measures | None) -> Type:
+    """Return the type of a field: a nested message is a map, an array a list."""
+    field_type = parse_type(ros)
+    one = UNKNOWN
+    if isinstance(measure, Mapping):
+        one = record_of(_measured_fields(registry.message(field_type.base), measure))
+    elif measure is not None:
+        one = quantity_of(measure)
+    return one if field_type.shape is FieldShape.SINGLE else list_of(one)
 
 
 def typed_fields(message: type[Message]) -> dict[str, Type]:
@@ -130,7 +164,17 @@ def filled(message: type[Message], arguments: Mapping[str, Value], entries: Arra
     if entries is not None:
         names = [name for name in own if name in entries.each and name not in typed_fields(message)]
         own |= entries.arrays({name: own.pop(name) for name in names})
-    return message(**{attribute(name): _MAKERS[fields[name]](value) for name, value in own.items()})
+    return message(**{attribute(name): _made(fields[name], value) for name, value in own.items()})
+
+
+def _made(ros: str, value: Any) -> object:
+    if ros in _MAKERS:
+        return _MAKERS[ros](value)
+    field_type = parse_type(ros)
+    inner = registry.message(field_type.base)
+    if field_type.shape is FieldShape.SINGLE:
+        return message_of(inner, value)
+    return tuple(message_of(inner, one) for one in value)
 
 
 def message_of(message: type[M], fields: Mapping[str, Value]) -> M:

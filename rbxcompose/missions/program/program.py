@@ -217,7 +217,7 @@ class Step(ABC):
 
     @property
     def lasts(self) -> Expression | None:
-        """Return the time that it takes."""
+        """Return the time that it takes; of a loop, that from the start of one round to the start of the next."""
         return None
 
     @property

@@ -23,26 +23,33 @@ _OURS: Mapping[Takes, Mapping[str, str]] = {
     },
     Takes.INTERRUPT: {"when": "if condition on trigger", "do": "then action reaction"},
     Takes.STATE: {"next": "transitions", "do": "action", "on_enter": "on_entry entry", "on_exit": "exit"},
-    Takes.STEP: {"then": "do"},
+    Takes.STEP: {},  # see `_OF_STEPS`
+}
+_OF_STEPS: Mapping[str, Mapping[str, str]] = {
+    "if": {"then": "do steps"},
+    "repeat": {"do": "steps body then actions tasks"},
+    "for": {"do": "steps body then actions tasks", "in": "of over items"},
 }
 _WHAT: Mapping[Takes, str] = {
     Takes.MISSION: "in a mission",
     Takes.INTERRUPT: "in an interrupt",
     Takes.STATE: "in a state",
-    Takes.STEP: "beside 'if'",
 }
 
 
 @slip(*_OURS, before=(unknown_settings,))
 def foreign_keys(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise keys for which ours are known and not written."""
-    if not isinstance(node, MappingNode) or (place.takes is Takes.STEP and place.words.kind_of(node) != "if"):
+    if not isinstance(node, MappingNode):
         return None
-    meant = {theirs: ours for ours, names in _OURS[place.takes].items() if (theirs := _written(node, ours, names))}
+    kind = place.words.kind_of(node) if place.takes is Takes.STEP else ""
+    words = _OF_STEPS.get(kind, {}) if kind else _OURS[place.takes]
+    meant = {theirs: ours for ours, names in words.items() if (theirs := _written(node, ours, names))}
     if not meant:
         return None
     entries = {meant.get(name, name): _named(one, meant.get(name, name)) for name, one in node.entries.items()}
-    findings = tuple(_told(node.entries[theirs], ours, _WHAT[place.takes]) for theirs, ours in meant.items())
+    what = f"beside '{kind}'" if kind else _WHAT.get(place.takes, "")
+    findings = tuple(_told(node.entries[theirs], ours, what) for theirs, ours in meant.items())
     return Repair(MappingNode(entries, node.span), findings)
 
 

@@ -14,11 +14,19 @@ from rbxcompose.slips import Repair
 from rbxcompose.units import UnitError, parse_quantity
 
 FOREIGN: Mapping[str, str] = {
+    "alias": "name",
+    "condition": "only_if",
+    "continue-on-error": "optional",
+    "continue_on_error": "optional",
     "delay": "wait",
     "if": "only_if",
     "interval": "every",
     "limit": "timeout",
+    "ignore_errors": "optional",
+    "max_attempts": "attempts",
+    "max_duration": "timeout",
     "max_time": "timeout",
+    "on_error": "on_failure",
     "otherwise": "else",
     "period": "every",
     "retries": "attempts",
@@ -26,6 +34,8 @@ FOREIGN: Mapping[str, str] = {
     "sleep": "wait",
     "success_count": "succeed_when",
     "success_threshold": "succeed_when",
+    "timeout-minutes": "timeout",
+    "timeout_minutes": "timeout",
     "tries": "attempts",
     "unless": "skip_if",
     "when": "only_if",

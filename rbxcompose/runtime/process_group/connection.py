@@ -9,7 +9,7 @@ from rbxcompose.bus import shared_memory
 from rbxcompose.bus.bus import Bus
 from rbxcompose.bus.renewal import RenewableTransport
 from rbxcompose.bus.transport import Transport
-from rbxcompose.bus.zenoh_session import open_peer
+from rbxcompose.bus.zenoh_session import open_lone, open_peer
 from rbxcompose.bus.zenoh_transport import ZenohTransport
 from rbxcompose.clock import Clock
 from rbxcompose.dataclass import dataclass
@@ -45,7 +45,8 @@ def open_bus(
     """Open a Zenoh session that finds the robot's other processes at `router`, and the bus over it."""
 
     def opened() -> ZenohTransport:
-        return ZenohTransport(open_peer(router), inbox.put, turns)
+        session = open_lone(router) if plan.bus.links == "router" else open_peer(router)
+        return ZenohTransport(session, inbox.put, turns)
 
     if reason := shared_memory.problem():
         log("robot", f"large messages are sent without shared memory: {reason}")

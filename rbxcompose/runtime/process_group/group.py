@@ -17,12 +17,14 @@ from rbxcompose.clock import DISPUTE, ExternalClock, MonotonicClock, SteppedCloc
 from rbxcompose.levels import Level
 from rbxcompose.msgs.rosgraph_msgs import Clock as ClockMessage
 from rbxcompose.msgs.stamps import to_nanoseconds
+from rbxcompose.params.change import RobotRules
 from rbxcompose.plan.dump import load
 from rbxcompose.plan.model import Plan
 from rbxcompose.qos import Qos
 from rbxcompose.requests import Command, Refused
 from rbxcompose.robot_events import MissionOver, MissionWaits
 from rbxcompose.runtime import channel as say
+from rbxcompose.runtime import setting_messages as tell
 from rbxcompose.runtime.log import LogFile
 from rbxcompose.runtime.options import RunOptions
 from rbxcompose.runtime.process_group.capture import Capture, take_printed
@@ -31,6 +33,8 @@ from rbxcompose.runtime.process_group.driver import Driver, ExternalDriver, Real
 from rbxcompose.runtime.process_group.host import Host, Notice
 from rbxcompose.runtime.process_group.inbox import CallbackInbox
 from rbxcompose.runtime.process_group.lifeline import Lifeline
+from rbxcompose.runtime.process_group.parameters import Deciders
+from rbxcompose.runtime.process_group.setting_orders import change_settings
 from rbxcompose.runtime.process_group.stop_line import open_stop_line
 from rbxcompose.runtime.process_group.turns import Turns
 from rbxcompose.runtime.process_group.watchdog import HANG, Watchdog
@@ -72,11 +76,12 @@ class ProcessGroup:
         start: float,
         is_restart: bool = False,
         is_stopped: bool = False,
+        rules: RobotRules | None = None,
     ) -> None:
         """Take `start`, the robot's start on the monotonic clock [s]."""
         self.is_over = False
         self._plan, self._name, self._options, self._log, self._channel = plan, name, options, log, channel
-        self._is_restart, self._is_stopped = is_restart, is_stopped
+        self._is_restart, self._is_stopped, self._rules = is_restart, is_stopped, rules
         self._clock = self._made_clock(start)
         self._scheduler = Scheduler()
         self._inbox = CallbackInbox()
@@ -133,6 +138,10 @@ class ProcessGroup:
                 self._plan = load(plan)
             case say.Retire() | say.Prepare() | say.Reconfigure():
                 self._change(self._made_host(), message)
+            case (
+                tell.PrepareChange() | tell.CommitChange() | tell.UndoChange() | tell.EndChange() | tell.ChangeDecided()
+            ):
+                change_settings(self._made_host(), message, self._channel)
             case say.Blocked(causes):
                 self._made_host().statuses.block(causes)
             case say.Shutdown():
@@ -194,9 +203,12 @@ class ProcessGroup:
                 self._options.record, self._plan, self._clock, lambda text: self._complain("robot", text)
             )
         tape = self._taping.tape if self._taping else None
-        connection = open_bus(
-            self._plan, router, self._scheduler, self._clock, self._inbox, self._turns, self._complain, tape
-        )
+        loop = self._scheduler, self._clock, self._inbox, self._turns
+        try:
+            connection = open_bus(self._plan, router, *loop, self._complain, tape)
+        except ConnectionRefusedError as error:
+            self._channel.send(say.Failed("", str(error.strerror)))
+            return
         self._bus, self._lifeline = connection.bus, connection.lifeline
         open_stop_line(connection.transport, self._plan.robot, self._name, self._stop_by_bus, self._inbox.put)
         self._host = Host(
@@ -211,6 +223,7 @@ class ProcessGroup:
             is_restart=self._is_restart,
             **({"told": tape.order} if tape else {}),
             post=self._inbox.put if isinstance(self._clock, MonotonicClock) else None,
+            deciders=Deciders(rules=self._rules) if self._options.is_stepped else Deciders(self._channel.send),
         )
         if isinstance(self._driver, ExternalDriver):
             self._follow(self._driver, self._host)

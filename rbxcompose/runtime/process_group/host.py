@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 from rbxcompose.bus.bus import Bus
 from rbxcompose.clock import Clock
+from rbxcompose.config import leaves, value_at, with_values
 from rbxcompose.levels import Level
 from rbxcompose.plan.model import Instance, Plan
 from rbxcompose.requests import Command, Refused, Request, as_data
@@ -17,7 +18,7 @@ from rbxcompose.runtime.faults import RestartPolicy, explain
 from rbxcompose.runtime.process_group.deliveries import Deliveries
 from rbxcompose.runtime.process_group.frames import Frames
 from rbxcompose.runtime.process_group.hosted import Hosted, Lifecycle
-from rbxcompose.runtime.process_group.parameters import Parameters
+from rbxcompose.runtime.process_group.parameters import NOBODY_ELSE, Deciders, Parameters
 from rbxcompose.runtime.process_group.rosout import Rosout
 from rbxcompose.runtime.process_group.statuses import Statuses
 from rbxcompose.runtime.process_group.worker import Post, Worker
@@ -57,6 +58,7 @@ class Host:
         is_restart: bool = False,
         told: Told = _nobody,
         post: Post | None = None,
+        deciders: Deciders = NOBODY_ELSE,
     ) -> None:
         """Take `told`, which is called with each order carried out, so that a recording can be replayed.
 
@@ -75,10 +77,11 @@ class Host:
         self._wanted: set[str] = set()  # components to activate as soon as possible
         self.statuses = Statuses(self.owner, bus, scheduler, clock)
         self._deliveries = Deliveries(self.owner, bus, scheduler, clock, self.statuses)
-        self.parameters = Parameters(self.owner, bus, clock, plan.bus.namespace)
         self._rosout = Rosout(self.owner, bus, clock)
         self.frames = self._frames(instances)
         self.hosted = {one.name: Hosted(self, one) for one in instances}
+        namespace = plan.bus.namespace
+        self.parameters = Parameters(self.owner, bus, clock, namespace, self.hosted, self._fails_soon, deciders)
         self.statuses.is_active = self._is_active
         self._policies = {one.name: RestartPolicy(one.restart) for one in instances}
         self._retired: dict[str, Component[Any]] = {}  # those that another one may replace
@@ -242,8 +245,10 @@ class Host:
                 continue
             if one.restart != hosted.instance.restart:
                 self._policies[one.name] = RestartPolicy(one.restart)
-            settings = {key.partition(".")[0] for key in keys[one.name]} & type(one.config).model_fields.keys()
-            config = hosted.config.model_copy(update={name: getattr(one.config, name) for name in settings})
+            names = [
+                name for name, _ in leaves(one.config) for key in keys[one.name] if f"{key}.".startswith(f"{name}.")
+            ]
+            config = with_values(hosted.config, {name: value_at(one.config, name) for name in names})
             try:
                 self.parameters.change(hosted, config)
             except Refused as refusal:
@@ -351,6 +356,10 @@ class Host:
             self.scheduler.at(self.clock.now() + delay, self.owner, lambda: self._restart(name, hosted))
         elif not self.is_braking:
             self._give_up(name, text)
+
+    def _fails_soon(self, name: str, error: Exception) -> None:
+        """Handle an exception of a component after who asked for the call has got an answer."""
+        self.scheduler.post(self.owner, lambda: self.failed(name, error))
 
     def _give_up(self, name: str, text: str) -> None:
         """Leave a component failed; one that failed too often, unlike one that is never restarted, ends the robot."""

@@ -85,6 +85,7 @@ def subscribe(component: Component[Any], owner: str, topic: str, port: In[Any], 
         max_size=math.inf if port.max_size is None else port.max_size,
         waits=waits,
         is_light=is_light,
+        may_be_silent=port.may_be_silent,
     )
 
 

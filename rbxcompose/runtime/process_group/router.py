@@ -7,18 +7,23 @@ from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Iterator
+import socket
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import FrameType
+from typing import TypeVar
 
 from rbxcompose.bus.access_control import AllowedHost, access_control
 from rbxcompose.bus.names import topic_pattern
 from rbxcompose.bus.probe import probe_key
+from rbxcompose.bus.transport import Closable
 from rbxcompose.bus.zenoh_session import NO_LINK, RouterLink, open_router, tls_settings
 from rbxcompose.bus.zenoh_transport import ZenohTransport
 from rbxcompose.clock import MonotonicClock
-from rbxcompose.endpoints import tcp_endpoint, unix_endpoint
-from rbxcompose.plan.model import Plan, Share
+from rbxcompose.endpoints import LOOPBACK, tcp_endpoint, unix_endpoint
+from rbxcompose.levels import Level
+from rbxcompose.plan.dump import load
+from rbxcompose.plan.model import Exchange, Plan, Share
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.host_report import HostReport
 from rbxcompose.runtime.process_group.driver import RealTimeDriver
@@ -27,9 +32,11 @@ from rbxcompose.runtime.process_group.inbox import CallbackInbox
 from rbxcompose.runtime.process_group.lifeline import answer
 from rbxcompose.runtime.process_group.turns import Turns
 from rbxcompose.runtime.process_group.watchdog import Watchdog
+from rbxcompose.runtime.records import Record, WriteRecord
 from rbxcompose.scheduler import Scheduler
 
-TRIES = 20  # ports from `bus.port` on
+V = TypeVar("V")
+TRIES = 1000  # ports from `bus.port` on; each robot of a machine needs one
 
 
 class Router:
@@ -38,24 +45,36 @@ class Router:
     It ends when the supervisor says so or has gone.
     """
 
-    def __init__(self, plan: Plan, sockets: Path, clock: MonotonicClock, channel: say.Channel) -> None:
+    def __init__(
+        self, plan: Plan, sockets: Path, clock: MonotonicClock, channel: say.Channel, log: WriteRecord
+    ) -> None:
         self.is_over = False
         self._plan, self._sockets, self._clock, self._channel = plan, sockets, clock, channel
+        self._log = log
+        self._endpoint: str | None = None
         self._inbox = CallbackInbox()
         self._watchdog = Watchdog()
         self._transport: ZenohTransport | None = None
         self._hosts: HostLine | None = None
+        self._exchange: Closable | None = None
+        self._scheduler = Scheduler()
         self._link = _link(plan, plan.share) if plan.share else NO_LINK
 
     def run(self) -> None:
         """Run until it is over."""
         signal.signal(signal.SIGTERM, _end)
         signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGTERM])
-        scheduler = Scheduler()
+        scheduler = self._scheduler
         turns = Turns(scheduler, self._clock, self._inbox)
         RealTimeDriver(scheduler, self._clock, self._inbox, turns, self._channel, self).run()
+        self._close()
+
+    def _close(self) -> None:
+        if self._exchange is not None:
+            self._exchange.close()
         if self._transport is not None:
             self._transport.close()
+        self._exchange = self._transport = self._hosts = None
 
     def handle(self, message: say.ChannelMessage) -> None:
         """Open the router, or end."""
@@ -66,6 +85,8 @@ class Router:
                 self._hosts.tell(report)
             case say.ToHosts():
                 pass  # it is not open yet; the next report comes soon
+            case say.Adopt(plan):
+                self._adopt(load(plan))
             case say.Shutdown():
                 self.is_over = True
             case _:
@@ -87,22 +108,50 @@ class Router:
 
     def _open(self, endpoint: str | None) -> None:
         """Open a session, at `endpoint` if the others already know one."""
-        reason = ""
+        reason = f"the router cannot listen: the {TRIES} ports from {self._plan.bus.port} on are taken"
         for wanted in [endpoint] if endpoint else self._endpoints():
             try:
                 session = open_router(wanted, self._link)
             except OSError as error:  # taken: perhaps by another robot
                 reason = f"the router cannot listen: {error.strerror}"
                 continue
+            self._endpoint = wanted
             self._transport = ZenohTransport(session, self._inbox.put)
             self._transport.serve(probe_key(self._plan.robot), answer)
             if self._plan.share is not None:
-                self._hosts = HostLine(self._plan.robot, self._plan.share, self._transport, self._heard)
-            self._channel.send(say.Configured(wanted))
+                self._hosts = HostLine(
+                    self._plan.robot, self._plan.share, self._transport, self._heard, self._fail, self._clock.stamp
+                )
+            problem = self._share(self._plan.exchange, self._transport) if self._plan.exchange else ""
+            self._channel.send(say.Failed("", problem) if problem else say.Configured(wanted))
             return
         if endpoint is not None:
             raise OSError(reason)  # another try may find it free again
+        self._fail(reason)
+
+    def _fail(self, reason: str) -> None:
         self._channel.send(say.Failed("", reason))
+
+    def _share(self, exchange: Exchange, transport: ZenohTransport) -> str:
+        """Carry topics between this robot and others; return why this cannot be, or nothing."""
+        from rbxcompose.runtime.process_group.exchange import RobotExchange  # which few robots need
+
+        loop = self._scheduler, self._clock, self._inbox
+        try:
+            self._exchange = RobotExchange(exchange, self._plan.bus, transport, loop, self._warn)
+        except OSError as error:
+            return f"what is shared cannot be offered: {error.strerror}"
+        return ""
+
+    def _warn(self, owner: str, text: str) -> None:
+        self._log(Record(self._clock.now(), Level.WARN, owner, text))
+
+    def _adopt(self, plan: Plan) -> None:
+        """Follow another plan: open the session again, with its links, at the endpoint that all others know."""
+        self._plan, self._link = plan, _link(plan, plan.share) if plan.share else NO_LINK
+        if self._transport is not None:
+            self._close()
+            self._open(self._endpoint)
 
     def _heard(self, report: HostReport) -> None:
         self._channel.send(say.FromHost(report))
@@ -112,16 +161,35 @@ class Router:
         if bus.access == "user":
             yield unix_endpoint(self._sockets, "router")
         else:
-            yield from map(tcp_endpoint, range(bus.port, bus.port + TRIES))
+            yield from map(tcp_endpoint, free_ports(bus.port))
+
+
+def free_ports(first: int) -> Iterator[int]:
+    """Yield the ports from `first` on at which nothing listens now; to open a router in vain costs more."""
+    return filter(_is_free, range(first, min(first + TRIES, 65536)))
+
+
+def _is_free(port: int) -> bool:
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # as routers do: links that have ended take nothing
+        try:
+            probe.bind((LOOPBACK, port))
+        except OSError:
+            return False
+    return True
 
 
 def _link(plan: Plan, share: Share) -> RouterLink:
     own = share.tls
     tls = tls_settings(own.authority, own.certificate, own.key, mutual=own.mutual) if own else {}
-    rates = {topic_pattern(plan.bus.domain, topic): rate for topic, rate in share.downsample.items()}
     allowed = [AllowedHost(one.certificate, one.gives, one.takes, one.both) for one in share.access]
     access = access_control(plan.robot, plan.bus.domain, allowed) if allowed else {}
-    return RouterLink(share.listen, share.connect, tls, access, rates)
+    ways = (_by_key(plan, share.downsample), _by_key(plan, share.priorities), _by_key(plan, share.largest))
+    return RouterLink(share.listen, share.connect, tls, access, *ways, lease=share.lease)
+
+
+def _by_key(plan: Plan, by_topic: Mapping[str, V]) -> dict[str, V]:
+    return {topic_pattern(plan.bus.domain, topic): value for topic, value in by_topic.items()}
 
 
 def _end(number: int, frame: FrameType | None) -> None:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
+from dataclasses import replace
 from enum import StrEnum
 
-from rbxcompose.config import HIDDEN, Config, Secret, is_live
+from rbxcompose.config import HIDDEN, Config, Secret, is_live, leaves
 from rbxcompose.dataclass import dataclass
 from rbxcompose.plan.diff import BOUNDS, WHOLE, Change, difference
-from rbxcompose.plan.model import Instance, Plan
+from rbxcompose.plan.model import Instance, OtherHost, Plan
 from rbxcompose.runtime.supervision.dependents import is_commanding
 
 WORLD = "world"  # the process group of simulated truth, whose state a restart would lose
@@ -59,7 +60,18 @@ class Changes:
     @property
     def is_empty(self) -> bool:
         """Return whether the plans are equivalent."""
-        return not self.impossible and all(one.fate is Fate.KEPT for one in self.fated)
+        return not (self.impossible or self.shares_change) and all(one.fate is Fate.KEPT for one in self.fated)
+
+    @property
+    def shares_change(self) -> bool:
+        """Return whether anything changes that is known of other hosts, or carried to other robots."""
+        return (self.before.share, self.before.exchange) != (self.after.share, self.after.exchange)
+
+    @property
+    def links_change(self) -> bool:
+        """Return whether the router has to open its links again."""
+        before, after = map(_links, (self.before, self.after))
+        return before != after
 
     def names(self, fate: Fate) -> list[str]:
         """Return the components that share a fate."""
@@ -105,7 +117,25 @@ def changes(before: Plan, after: Plan, failed: Collection[str] = ()) -> Changes:
     old = {one.name: one for one in before.instances}
     fated = [_fated(old.get(one.name), one, found.changed.get(one.name, ()), failed) for one in after.instances]
     fated += [Fated(one, Fate.REMOVED) for one in found.removed]
-    return Changes(before, after, tuple(fated), tuple(_impossible(old, fated, found.plan)))
+    impossible = (*_impossible(old, fated, found.plan), *_moved(before, after))
+    return Changes(before, after, tuple(fated), impossible)
+
+
+def _links(plan: Plan) -> tuple[object, ...]:
+    share = plan.share and replace(plan.share, others=tuple(_named(one) for one in plan.share.others), version="")
+    return share, plan.exchange
+
+
+def _named(host: OtherHost) -> OtherHost:
+    return replace(host, instances=())
+
+
+def _moved(before: Plan, after: Plan) -> Iterator[str]:
+    """Yield why the shares of a robot cannot change while it is up."""
+    old, new = (plan.share.host if plan.share else "" for plan in (before, after))
+    if old != new:
+        here = [f"'{host}' beside others" if host else "one host alone" for host in (old, new)]
+        yield f"it ran on {here[0]} and would run on {here[1]}: it {DOWN_AND_UP}"
 
 
 def _fated(before: Instance | None, after: Instance, reasons: tuple[Change, ...], failed: Collection[str]) -> Fated:
@@ -127,8 +157,8 @@ def _is_live(one: Instance, key: str) -> bool:
         return True
     if head in _OPTIONS:
         return head in _TAKEN_OVER
-    field = type(one.config).model_fields.get(head)
-    return field is not None and is_live(field)
+    found = (field for name, field in leaves(one.config) if f"{key}.".startswith(f"{name}."))
+    return any(is_live(field) for field in found)
 
 
 def _secrets(value: object, path: str) -> Iterator[tuple[str, Secret]]:

@@ -52,14 +52,12 @@ class Conductor:
         self.generation = 0  # of the plan: how often it was changed
         self._changing: Changing | None = None
         self.kept = KeptWords()
-        self._options, self._router = options, router
-        self._scheduler, self._effects = scheduler, effects
-        names = [*([router] if router else []), *plan.groups]
-        self.members = {name: Member(name) for name in names}
+        self._options, self._router, self._scheduler, self._effects = options, router, scheduler, effects
+        self.members = {name: Member(name) for name in (*([router] if router else []), *plan.groups)}
         self.latch = StopLatch(effects, self._holding, lambda: scheduler.now if self.is_real_time else self.time)
         self._is_running = False  # everything has been active
         self._silence = Silence(effects, self._tell_lost, scheduler.now)
-        self._hosts = OtherHosts(plan.share, effects, self._to_configured)
+        self.hosts = OtherHosts(plan.share, effects, self._to_configured)
         self._closing: Closing | None = None  # set once the robot goes down
 
     @property
@@ -85,11 +83,10 @@ class Conductor:
 
     def _fork(self, name: str) -> None:
         member = self.members[name]
-        is_restart = member.restarts > 0
         member.forked(self._scheduler.now)
         member.is_stopped = self.is_stopped
-        self._effects.fork(name, is_restart=is_restart, is_stopped=self.is_stopped)
-        if self.generation and name != self._router:  # the pre-fork parent knows only the first plan
+        self._effects.fork(name, is_restart=member.restarts > 0, is_stopped=self.is_stopped)
+        if self.generation:  # the pre-fork parent knows only the first plan
             self._effects.send(name, say.Adopt(text_of(self.plan, self.plan.of_group(name))))
         if name == self._router or self.endpoint is not None:
             self._effects.send(name, say.Configure(self.endpoint, self.time))
@@ -102,7 +99,7 @@ class Conductor:
         fresh = [one for one in waiting if one.name not in self.members[one.process].requested]
         if self.phase is Phase.STARTING and waiting[:1] != fresh[:1]:
             return  # the answer of the first one is pending, or it is being restarted in place
-        fresh = list(self._hosts.reached(fresh))
+        fresh = list(self.hosts.reached(fresh))
         if fresh:
             group = fresh[0].process
             names = [one.name for one in takewhile(lambda one: one.process == group, fresh)]
@@ -110,7 +107,7 @@ class Conductor:
             self._effects.send(group, say.Activate(names))
             return
         if self.phase is Phase.STARTING:
-            if waiting or not self._hosts.is_complete():
+            if waiting or not self.hosts.is_complete():
                 return
             self._is_running = True
             self._effects.is_up()  # before anything that starts can report
@@ -264,7 +261,7 @@ class Conductor:
         self._tell_hosts()
         if self._options.is_stepped:  # there it would be received at another instant in each run
             return
-        self.blocked.look(self.plan, self.states, self._hosts.failed, self.members)
+        self.blocked.look(self.plan, self.states, self.hosts.failed, self.members)
         commanding = [one.name for one in self.plan.instances if one.name in new and is_commanding(one)]
         if commanding and not self.is_stopped and self.phase is Phase.RUNNING:
             text = f"'{commanding[0]}' failed on the path of commands"
@@ -280,20 +277,20 @@ class Conductor:
     def _look_for_silence(self) -> None:
         now = self._scheduler.now
         is_excused = self._silence.look_at_all(self.members.values(), now, is_going_down=self.is_going_down)
-        self._hosts.look(now, is_excused=is_excused)
+        self.hosts.look(now, is_excused=is_excused)
         self._tell_hosts()
 
     def _heard_host(self, report: HostReport) -> None:
-        if (end := self._hosts.heard(report, self._scheduler.now)) is not None:
+        if (end := self.hosts.heard(report, self._scheduler.now)) is not None:
             self.go_down(end.exit_code, f"{end.reason} (host '{report.host}')")
         self.latch.heard_host(report)
-        self.blocked.look(self.plan, self.states, self._hosts.failed, self.members)
+        self.blocked.look(self.plan, self.states, self.hosts.failed, self.members)
         self._proceed()
 
     def _tell_hosts(self) -> None:
         is_of_all = self.is_going_down and self.exit_code != INTERRUPTED  # a signal is for this host alone
         end = RobotEnd(self.exit_code, self.reason) if is_of_all else None
-        self._hosts.report(self.states, self.latch.shared, end, is_going_down=self.is_going_down)
+        self.hosts.report(self.states, self.latch.shared, end, is_going_down=self.is_going_down)
 
     def _alive(self, member: Member) -> None:
         if member.is_told_lost and member.is_configured:
@@ -358,6 +355,9 @@ class Conductor:
         """Apply the new plan, now that everything that stops has stopped."""
         self.plan, self.generation = changes.after, self.generation + 1
         fresh = {one.name: ("unconfigured", 0) for one in self.plan.instances if one.name in changes.starting}
+        self.hosts.adopt(self.plan.share)
+        if self._router and changes.links_change and self.members[self._router].is_there:
+            self._effects.send(self._router, say.Adopt(text_of(self.plan, ())))
         self.latch.forget([one.name for one in self.plan.instances])
         self.states = {one.name: fresh.get(one.name) or self.states[one.name] for one in self.plan.instances}
 

@@ -27,6 +27,7 @@ from rbxcompose.runtime.options import RunOptions
 from rbxcompose.runtime.processes import Process, boot_id, end_with
 from rbxcompose.runtime.records import Record
 from rbxcompose.runtime.supervision.conductor import ROBOT_FAILED
+from rbxcompose.runtime.supervision.judge import FiledRules
 from rbxcompose.runtime.supervision.leftovers import end_leftovers
 from rbxcompose.runtime.supervision.prefork import Launch
 from rbxcompose.runtime.supervision.supervisor import Supervisor
@@ -119,10 +120,11 @@ class Started:
         os.kill(self.pid, number)  # it has not been reaped yet, so the pid is still its own
 
 
-def start_supervisor(plan: Plan, options: RunOptions) -> Started:
+def start_supervisor(plan: Plan, options: RunOptions, rules: FiledRules | None = None) -> Started:
     """Fork the supervisor of a robot. Call it from the main thread, before any other thread exists.
 
-    If the run is not detached, the supervisor brings the robot to rest and ends when this process ends.
+    Live settings keep `rules`. If the run is not detached, the supervisor brings the robot to rest and ends when this
+    process ends.
     """
     clock = MonotonicClock()
     ours, theirs = os.pipe2(os.O_CLOEXEC)
@@ -131,14 +133,16 @@ def start_supervisor(plan: Plan, options: RunOptions) -> Started:
     pid = os.fork()
     if pid == 0:
         os.close(ours)
-        _become_supervisor(plan, options, clock, theirs, caller)
+        _become_supervisor(plan, options, rules, clock, theirs, caller)
     os.close(theirs)
     started = Started(pid, ours)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDINGS)
     return started
 
 
-def _become_supervisor(plan: Plan, options: RunOptions, clock: MonotonicClock, pipe: int, caller: int) -> NoReturn:
+def _become_supervisor(
+    plan: Plan, options: RunOptions, rules: FiledRules | None, clock: MonotonicClock, pipe: int, caller: int
+) -> NoReturn:
     exit_code = ROBOT_FAILED
     collect_as_usual()
     try:
@@ -148,7 +152,7 @@ def _become_supervisor(plan: Plan, options: RunOptions, clock: MonotonicClock, p
         setproctitle.setproctitle(title(plan.robot, "supervisor"))
         _leave_the_terminal()
         with os.fdopen(pipe, "w", buffering=1) as reports:
-            exit_code = _supervise(plan, options, clock, reports)
+            exit_code = _supervise(plan, options, rules, clock, reports)
     finally:
         os._exit(exit_code)
 
@@ -160,7 +164,9 @@ def _leave_the_terminal() -> None:
     os.close(nothing)
 
 
-def _supervise(plan: Plan, options: RunOptions, clock: MonotonicClock, reports: TextIO) -> int:
+def _supervise(
+    plan: Plan, options: RunOptions, rules: FiledRules | None, clock: MonotonicClock, reports: TextIO
+) -> int:
     folder = RobotFolder.of(plan.robot)
     try:
         folder.make()
@@ -180,7 +186,7 @@ def _supervise(plan: Plan, options: RunOptions, clock: MonotonicClock, reports: 
     _report(reports, Begun())
     for text in told:
         log.write(Record(0.0, Level.WARN, "robot", text))
-    ended = _run(Launch(plan, options, log, folder, clock), folder, lock, reports)
+    ended = _run(Launch(plan, options, log, folder, clock, rules), folder, lock, reports)
     shared_memory.remove_orphans(waits=True)
     folder.clear()
     _report(reports, ended)

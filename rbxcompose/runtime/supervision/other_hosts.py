@@ -13,6 +13,7 @@ from rbxcompose.dataclass import dataclass
 from rbxcompose.levels import Level
 from rbxcompose.plan.model import Instance, OtherHost, Share
 from rbxcompose.runtime import channel as say
+from rbxcompose.runtime.clock_offset import ClockOffset
 from rbxcompose.runtime.host_report import HostReport, RobotEnd, SharedStop
 from rbxcompose.runtime.supervision.members import ConductorEffects
 
@@ -38,7 +39,15 @@ class OtherHosts:
         self._own = HostReport(share.host, share.version, effects.run_id) if share else None
         self._others = {one.name: one for one in share.others} if share else {}
         self._known: dict[str, _Known] = {}
+        self._wrong_clocks: set[str] = set()  # hosts whose clocks are too far from ours
         self._told_waiting = ""
+
+    def adopt(self, share: Share | None) -> None:
+        """Take what a new plan knows of the other hosts."""
+        if share is not None and self._own is not None:
+            self._share, self._own = share, replace(self._own, version=share.version)
+            self._others = {one.name: one for one in share.others}
+            self._known = {name: known for name, known in self._known.items() if name in self._others}
 
     def report(
         self, states: Mapping[str, tuple[str, int]], stop: SharedStop, end: RobotEnd | None, *, is_going_down: bool
@@ -65,10 +74,31 @@ class OtherHosts:
             self._effects.log(Level.WARN, f"host '{host.name}' answers again")
         elif known is not None and not known.is_lost and report.is_going_down and report.end is None:
             self._lose(host, "goes down")
+        self._look_at_clock(report)
         return report.end
 
+    @property
+    def clocks(self) -> dict[str, ClockOffset]:
+        """Return how far the clocks of the hosts that answer are from ours."""
+        reports = (known.report for known in self._known.values() if not known.is_lost)
+        return {one.host: one.clock for one in reports if one.clock is not None}
+
+    def _look_at_clock(self, report: HostReport) -> None:
+        """Log when the clock of a host is found too far from ours, and when it no longer is."""
+        if report.clock is None or report.clock.is_too_far is (report.host in self._wrong_clocks):
+            return
+        self._effects.states_changed()
+        told = f"the clock of host '{report.host}' is {report.clock.words}"
+        if report.clock.is_too_far:
+            self._wrong_clocks.add(report.host)
+            self._effects.log(Level.WARN, f"{told}: stamps of both do not fit; let both follow one time server")
+        else:
+            self._wrong_clocks.remove(report.host)
+            self._effects.log(Level.OK, told)
+
     def _greet(self, host: OtherHost, report: HostReport, *, is_back: bool) -> None:
-        self._effects.log(Level.OK, f"host '{host.name}' {'was started again' if is_back else 'is there'}")
+        tried = ", and what access control denies to it does not arrive" if self._share and self._share.access else ""
+        self._effects.log(Level.OK, f"host '{host.name}' {'was started again' if is_back else 'is there'}{tried}")
         if self._own is not None and report.version != self._own.version:
             text = f"host '{host.name}' runs other files of this robot, or another version of rbxcompose"
             self._effects.log(Level.WARN, f"{text}: give all hosts the same and start them again")

@@ -15,9 +15,7 @@ import os
 import selectors
 import signal
 import socket
-import sys
-import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -30,7 +28,8 @@ from rbxcompose.runtime.channel import Channel
 from rbxcompose.runtime.folder import RobotFolder, title
 from rbxcompose.runtime.log import LogFile
 from rbxcompose.runtime.options import RunOptions
-from rbxcompose.runtime.processes import Process, end_with, give_back_large_memory
+from rbxcompose.runtime.processes import Process, close_all, end_with, give_back_large_memory, in_child
+from rbxcompose.runtime.supervision.judge import FiledRules
 from rbxcompose.sdk.registry import component_type
 from rbxcompose.typed_json import Family
 
@@ -41,13 +40,14 @@ _HELD_BACK = [signal.SIGTERM]  # until a child has installed its handlers
 
 @dataclass(frozen=True, slots=True)
 class Launch:
-    """What every process of a run shares: plan, options, log, folder for output, start [s, monotonic]."""
+    """What every process of a run shares: plan, options, log, folder for output, start [s, monotonic], rules."""
 
     plan: Plan
     options: RunOptions
     log: LogFile
     folder: RobotFolder
     clock: MonotonicClock
+    rules: FiledRules | None = None
 
     def title(self, process: str) -> str:
         """Return the title of a process in the system's `ps`."""
@@ -102,7 +102,7 @@ class Parent:
         signal.pthread_sigmask(signal.SIG_BLOCK, _HELD_BACK)
         pid = os.fork()
         if pid == 0:
-            _in_child(lambda: _run_parent(launch, theirs, supervisor))
+            in_child(lambda: _run_parent(launch, theirs, supervisor))
         signal.pthread_sigmask(signal.SIG_UNBLOCK, _HELD_BACK)
         theirs.close()
         self.process = Process.of(pid)
@@ -153,7 +153,7 @@ def _run_parent(launch: Launch, connection: socket.socket, supervisor: int) -> N
     signal.set_wakeup_fd(-1)
     for number in (signal.SIGINT, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)  # the supervisor decides what they mean
-    _close_all(keep=[connection.fileno(), launch.log.fileno()])
+    close_all(keep=[connection.fileno(), launch.log.fileno()])
     os.setpgid(0, 0)
     setproctitle.setproctitle(launch.title("parent"))
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
@@ -194,13 +194,13 @@ class _Forking:
         signal.pthread_sigmask(signal.SIG_BLOCK, _HELD_BACK)
         pid = os.fork()
         if pid == 0:
-            _in_child(lambda: self._run_group(order, channel, parent))
+            in_child(lambda: self._run_group(order, channel, parent))
         signal.pthread_sigmask(signal.SIG_UNBLOCK, _HELD_BACK)
         return pid
 
     def _run_group(self, order: Fork, channel: int, parent: int) -> None:
         end_with(parent, signal.SIGTERM)
-        _close_all(keep=[channel, self._launch.log.fileno()])
+        close_all(keep=[channel, self._launch.log.fileno()])
         os.setpgid(0, 0)
         setproctitle.setproctitle(self._launch.title(order.group))
         _redirect_output(self._launch.output(order.group))
@@ -224,7 +224,7 @@ def run_process(launch: Launch, order: Fork, channel: Channel) -> None:
     if order.group == ROUTER:
         from rbxcompose.runtime.process_group.router import Router
 
-        Router(launch.plan, launch.folder.sockets, launch.clock, channel).run()
+        Router(launch.plan, launch.folder.sockets, launch.clock, channel, launch.log.write).run()
         return
     from rbxcompose.runtime.process_group.group import ProcessGroup
 
@@ -237,6 +237,7 @@ def run_process(launch: Launch, order: Fork, channel: Channel) -> None:
         start=launch.clock.start,
         is_restart=order.is_restart,
         is_stopped=order.is_stopped,
+        rules=launch.rules,
     ).run()
 
 
@@ -251,31 +252,8 @@ def _import_what_is_common(plan: Plan) -> None:
         component_type(name)
 
 
-def _close_all(keep: Sequence[int]) -> None:
-    """Close all descriptors but the standard ones and `keep`: a lock held by mistake would be held for ever."""
-    lowest = 3
-    for descriptor in sorted(set(keep)):
-        os.closerange(lowest, descriptor)
-        lowest = descriptor + 1
-    os.closerange(lowest, os.sysconf("SC_OPEN_MAX"))
-
-
 def _redirect_output(path: Path) -> None:
     descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_APPEND | os.O_NOFOLLOW, 0o600)
     os.dup2(descriptor, 1)
     os.dup2(descriptor, 2)
     os.close(descriptor)
-
-
-def _in_child(main: Callable[[], None]) -> None:
-    """Run `main` in a process that was just forked and end it there, bypassing all that the parent has registered."""
-    status = 1
-    try:
-        main()
-        status = 0
-    except BaseException:
-        traceback.print_exc()
-    finally:
-        sys.stdout.flush()
-        sys.stderr.flush()
-        os._exit(status)

@@ -6,18 +6,20 @@ from typing import Any, Protocol
 
 from rbxcompose.levels import Level
 from rbxcompose.plan.dump import PlanTextError, load
-from rbxcompose.plan.model import Instance
+from rbxcompose.plan.model import Instance, Plan
 from rbxcompose.requests import Command, Refused, Request, as_data, requests
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.folder import RobotState
-from rbxcompose.runtime.plan_requests import ApplyPlan, ComparePlan, PlanComparison
+from rbxcompose.runtime.options import ChosenLayers
+from rbxcompose.runtime.plan_requests import ApplyPlan, ComparePlan, PlanComparison, RevertPlan
 from rbxcompose.runtime.requests import ROBOT, BringDown, ReleaseRobot, RobotStatus, StopRobot
 from rbxcompose.runtime.supervision.changes import Changes, changes
 from rbxcompose.runtime.supervision.conductor import FINE, Conductor
+from rbxcompose.runtime.supervision.setting_changes import SettingChanges
 from rbxcompose.sdk.registry import component_type
 from rbxcompose.typed_json import UnreadableError, name_in, to_data
 
-OWN = requests(RobotStatus, StopRobot, ReleaseRobot, ComparePlan, ApplyPlan, BringDown)
+OWN = requests(RobotStatus, StopRobot, ReleaseRobot, ComparePlan, ApplyPlan, RevertPlan, BringDown)
 
 
 class Supervised(Protocol):
@@ -49,9 +51,10 @@ class Supervised(Protocol):
 class RequestHandler:
     """Carries out the requests of the command line and of any other program of this user."""
 
-    def __init__(self, supervisor: Supervised, *, is_stepped: bool) -> None:
+    def __init__(self, supervisor: Supervised, settings: SettingChanges, *, is_stepped: bool) -> None:
         """On a stepped clock the process group logs what came from outside, at its own time."""
-        self._supervisor, self._is_stepped = supervisor, is_stepped
+        self._supervisor, self._settings, self._is_stepped = supervisor, settings, is_stepped
+        self._before: tuple[Plan, ChosenLayers, int] | None = None  # what the last change can be reverted to
 
     def handle(self, data: object, number: int) -> None:
         """Carry out a request; it is answered now or later."""
@@ -73,6 +76,8 @@ class RequestHandler:
         match request:
             case ApplyPlan():
                 self._apply(request, number)
+            case RevertPlan():
+                self._revert(request, number)
             case _:
                 self._supervisor.answer(number, to_data(self._answer(request)))
 
@@ -145,30 +150,41 @@ class RequestHandler:
 
     def _compare(self, plan: str) -> PlanComparison:
         """Report what another plan would change, and what prevents it now; change nothing."""
-        found, conductor = self._changes(plan), self._supervisor.conductor
+        found, conductor = self._changes(_loaded(plan)), self._supervisor.conductor
         why_not = "" if found.is_empty else conductor.why_not(found)
         return PlanComparison.of(found, conductor.generation, why_not)
 
     def _apply(self, request: ApplyPlan, number: int) -> None:
-        found, conductor = self._changes(request.plan), self._supervisor.conductor
+        found, conductor = self._changes(_loaded(request.plan)), self._supervisor.conductor
         if request.generation != conductor.generation:
             raise Refused("it was changed by someone else meanwhile: look at the difference again")
+        self._change(found, request.layers, number)
+
+    def _revert(self, request: RevertPlan, number: int) -> None:
+        if self._before is None or request.generation not in (None, self._before[2]):
+            raise Refused("there is no such change to take back")
+        plan, layers, _ = self._before
+        self._change(self._changes(plan), layers, number)
+
+    def _change(self, found: Changes, layers: ChosenLayers, number: int) -> None:
+        conductor = self._supervisor.conductor
         if why_not := conductor.why_not(found):
             raise Refused(why_not)
+        if self._settings.is_busy:
+            raise Refused("settings of the robot are just being changed: try again")
+        self._settings.hold()
+        self._before = conductor.plan, conductor.layers, conductor.generation
 
         def applied(text: str, is_refused: bool) -> None:
+            self._settings.go_on()
             if not is_refused:
-                conductor.layers = request.layers
+                conductor.layers = layers
             self._applied(number, text, is_refused=is_refused)
 
         conductor.change(found, applied)
 
-    def _changes(self, plan: str) -> Changes:
+    def _changes(self, after: Plan) -> Changes:
         conductor = self._supervisor.conductor
-        try:
-            after = load(plan)
-        except PlanTextError as error:
-            raise Refused(str(error)) from error
         failed = [name for name, (state, _) in conductor.states.items() if state == "failed"]
         return changes(conductor.plan, after, failed)
 
@@ -179,3 +195,10 @@ class RequestHandler:
     def _tell(self, text: str) -> None:
         if not self._is_stepped:
             self._supervisor.log(Level.OK, text)
+
+
+def _loaded(plan: str) -> Plan:
+    try:
+        return load(plan)
+    except PlanTextError as error:
+        raise Refused(str(error)) from error

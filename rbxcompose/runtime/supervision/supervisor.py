@@ -29,9 +29,11 @@ from rbxcompose.runtime.service_manager import ALIVE, READY, of_this_process
 from rbxcompose.runtime.supervision import silence
 from rbxcompose.runtime.supervision.conductor import INTERRUPTED, ROBOT_FAILED, Conductor
 from rbxcompose.runtime.supervision.gauges import gauges_of
+from rbxcompose.runtime.supervision.judge import Judge
 from rbxcompose.runtime.supervision.members import Phase
 from rbxcompose.runtime.supervision.prefork import ROUTER, Exited, Fork, Forked, Launch, Parent
 from rbxcompose.runtime.supervision.request_handler import RequestHandler
+from rbxcompose.runtime.supervision.setting_line import SettingLine
 from rbxcompose.runtime.supervision.shutdown import rest_time
 from rbxcompose.runtime.supervision.silence import DEAD, LOOK
 from rbxcompose.runtime.supervision.teleoperation import teleoperated
@@ -72,6 +74,8 @@ class Supervisor:
         self._complained = ""
         router = None if launch.plan.bus.router else ROUTER
         self.conductor = Conductor(launch.plan, launch.options, self._scheduler, self, router=router)
+        judge = Judge(launch.rules, launch.title("rules"), self._selector, self._scheduler)
+        self.settings = SettingLine(self, judge)
         self._wake, self._wakened = socket.socketpair()
         for end in (self._wake, self._wakened):
             end.setblocking(False)
@@ -90,7 +94,8 @@ class Supervisor:
         self._selector.register(self._parent, selectors.EVENT_READ, self._hear_parent)
         self._selector.register(self._wakened, selectors.EVENT_READ, self._hear_signals)
         self._control = ControlServer(self._folder, self._selector)
-        self._control.handle = RequestHandler(self, is_stepped=self._launch.options.is_stepped).handle
+        is_stepped = self._launch.options.is_stepped
+        self._control.handle = RequestHandler(self, self.settings.changes, is_stepped=is_stepped).handle
         self._write_state()
         try:
             self.conductor.begin()
@@ -112,6 +117,7 @@ class Supervisor:
 
     def _close(self) -> None:
         self._control.close()
+        self.settings.close()
         if self._parent is not None:
             self._parent.end()
         signal.set_wakeup_fd(-1)
@@ -216,6 +222,7 @@ class Supervisor:
             self._selector.unregister(channel)
         for message in messages:
             self.conductor.heard(name, message)  # type: ignore[arg-type]
+            self.settings.changes.heard(name, message)  # type: ignore[arg-type]
 
     def _hear_parent(self) -> None:
         try:
@@ -252,6 +259,7 @@ class Supervisor:
         if printed and self.conductor.is_going_down:
             self.log(Level.OK, f"process '{name}' {how}; what it had printed is in the log file", printed)
         self.conductor.exited(name, how, printed)
+        self.settings.changes.gone(name)
 
     def _printed(self, name: str) -> str:
         try:
@@ -354,6 +362,7 @@ class Supervisor:
             layers=self.conductor.layers,
             stop=self.conductor.latch.state,
             rest_time=rest_time(plan),
+            clocks=self.conductor.hosts.clocks,
         )
 
     def _component(self, name: str, type_name: str, process: str) -> ComponentState:

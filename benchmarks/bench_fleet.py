@@ -1,0 +1,249 @@
+"""What a robot of a fleet costs, by the number of robots: `nice python -m benchmarks.bench_fleet own 1 3 10 30 100`.
+
+Each robot is the patrol robot with an ideal simulator, in a system on this machine. A further robot, the watcher,
+subscribes to the odometry of each. The first word says how they are linked: by routers of their `own`, as robots of
+systems are, so the watcher takes what they share; as `domains` of one router, so that nobody can watch; or by `names`,
+namespaces of one domain and router. With `links`, processes are linked with that one router only.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import psutil
+import zenoh
+
+from benchmarks.measuring import COMMAND, ROOT, memory_of, processor_time, program
+from rbxcompose.bus.zenoh_session import open_client, open_router
+from rbxcompose.runtime.folder import RobotFolder, RobotState
+
+SETTLED, WATCHED, COUNTED = 5.0, 10.0, 4.0  # [s]
+NEEDED, LINK, KEPT = 0.13e9, 0.35e6, 2e9  # [bytes] of a robot, of each end of a link between processes, for all else
+PROCESSES, TRIES = 3, 20  # of a robot on the bus; of a visitor to get in
+OWN, DOMAINS, NAMES, LINKS = "own", "domains", "names", "links"
+ROUTER = "tcp/127.0.0.1:7440"
+SYSTEM = """
+rbx: 1
+kind: System
+name: fleet
+hosts: {{here: {{}}}}
+robots:
+{bots}
+"""
+WATCHER = "rbx: 1\nkind: Robot\nname: watcher\n{bus}components:\n{seen}"
+BUS = {
+    DOMAINS: "bus: {{router: " + ROUTER + ", {links}domain: {number}}}\n",
+    NAMES: "bus: {{router: " + ROUTER + ", {links}namespace: {name}}}\n",
+}
+SEEN = "  seen_{0}: {{type: topic_monitor, topic: /bot_{0}/odom, message: nav_msgs/Odometry, rate: 5 Hz}}\n"
+
+
+@dataclass(frozen=True, slots=True)
+class FleetFigures:
+    """Medians of the robots of a fleet, and what the watcher costs; shares of one core, messages as they are sent."""
+
+    robots: int
+    start: float  # [s] until all are up
+    memory: float  # [bytes] of a robot, proportional set size
+    processor: float
+    messages: float  # [1/s] of a robot that leave a process
+    tokens: float  # on its bus
+    links: float  # of its processes
+    discovery: float  # [s] for a visitor to learn of all nodes on the bus of a robot
+    router_memory: float  # [bytes] of the one router; 0 if each robot has its own
+    router_processor: float
+    watcher_memory: float  # [bytes]; 0 if there is none
+    watcher_processor: float
+
+    def line(self) -> str:
+        """Return a row of the table."""
+        cells = (
+            f"{self.robots}",
+            f"{self.start:.1f} s",
+            f"{self.memory / 1e6:.0f} MB",
+            f"{self.processor:.1%}",
+            f"{self.messages:.0f}",
+            f"{self.tokens:.0f}",
+            f"{self.links:.0f}",
+            f"{self.discovery * 1e3:.0f} ms",
+            f"{self.router_memory / 1e6:.0f} MB",
+            f"{self.router_processor:.1%}",
+            f"{self.watcher_memory / 1e6:.0f} MB",
+            f"{self.watcher_processor:.1%}",
+        )
+        return f"| {' | '.join(cells)} |"
+
+
+def measured(number: int, how: str = OWN, *options: str) -> FleetFigures:
+    """Run a fleet and return its figures.
+
+    Raises:
+        MemoryError: if this machine has not enough for it.
+    """
+    links = 0 if how == OWN or LINKS in options else (PROCESSES * number) ** 2
+    if psutil.virtual_memory().available < (needed := number * NEEDED + links * LINK + KEPT):
+        raise MemoryError(f"{number} robots need {needed / 1e9:.0f} GB of memory")
+    with TemporaryDirectory() as folder:
+        path, environment = Path(folder), {"XDG_RUNTIME_DIR": folder}
+        _write(path, number, how, options)
+        system, began = str(path / "system.yaml"), time.perf_counter()
+        with contextlib.nullcontext() if how == OWN else _one_router() as router:
+            try:
+                program([*COMMAND, "up", system, "--host", "here", "-d"], environment)()
+                return _looked_at(path, how, time.perf_counter() - began, router)
+            except subprocess.CalledProcessError as error:
+                sys.stderr.write(f"{error.output}{error.stderr}")
+                raise
+            finally:
+                program([*COMMAND, "down", system], environment)()
+
+
+def _write(folder: Path, number: int, how: str, options: Collection[str]) -> None:
+    """Write the manifests of a fleet."""
+    text = (ROOT / "robots/turtlebot/robot.yaml").read_text(encoding="utf-8")
+    text = text.replace("../../missions", f"{ROOT}/missions")
+    links = "links: router, " if LINKS in options else ""
+    bots = []
+    for one in range(1, number + 1):
+        bus = BUS[how].format(links=links, number=one, name=f"bot_{one}") if how in BUS else ""
+        (folder / f"robot_{one}.yaml").write_text(text + bus, encoding="utf-8")
+        share = ", share: [odom]" if how == OWN else ""
+        bots.append(f"  bot_{one}: {{robot: robot_{one}.yaml{share}}}")
+    if how != DOMAINS:
+        bus = BUS[how].format(links=links, name="watcher") if how in BUS else ""
+        seen = "".join(SEEN.format(one) for one in range(1, number + 1))
+        (folder / "watcher.yaml").write_text(WATCHER.format(bus=bus, seen=seen), encoding="utf-8")
+        bots.append("  watcher: {robot: watcher.yaml}")
+    (folder / "system.yaml").write_text(SYSTEM.format(bots="\n".join(bots)), encoding="utf-8")
+
+
+@contextlib.contextmanager
+def _one_router() -> Iterator[int]:
+    """Run the router of all robots; yield its process."""
+    words = [sys.executable, "-m", "benchmarks.bench_fleet", ROUTER]
+    process = subprocess.Popen(words, cwd=ROOT, stdin=subprocess.PIPE)
+    try:
+        yield process.pid
+    finally:
+        process.terminate()
+        process.wait()
+
+
+def _looked_at(folder: Path, how: str, start: float, router: int | None) -> FleetFigures:
+    time.sleep(SETTLED)
+    states = {path.parent.name: _state(path.parent) for path in (folder / "rbxcompose").glob("*/state.json")}
+    pids = {name: _pids(one) for name, one in states.items()} | {"": [router] if router else []}
+    before = {name: _processor(some) for name, some in pids.items()}
+    time.sleep(WATCHED)
+    used = {name: (_processor(some) - before[name]) / WATCHED for name, some in pids.items()}
+    bots = [name for name in states if name != "watcher"]
+    sent = _messages({name: states[name] for name in bots}, how)  # for a visitor, they take the way by the router
+    memory = {name: float(sum(map(memory_of, some))) for name, some in pids.items()}
+    found = [_tokens(states[name]) for name in bots]
+    return FleetFigures(
+        len(bots),
+        start,
+        statistics.median(memory[name] for name in bots),
+        statistics.median(used[name] for name in bots),
+        statistics.median(sent[name] for name in bots),
+        statistics.median(count for count, _ in found),
+        statistics.median(sum(map(_links, pids[name])) for name in bots),
+        statistics.median(seconds for _, seconds in found),
+        memory[""],
+        used[""],
+        memory.get("watcher", 0.0),
+        used.get("watcher", 0.0),
+    )
+
+
+def _state(folder: Path) -> RobotState:
+    state = RobotFolder(folder).read_state()
+    if state is None:
+        raise RuntimeError(f"'{folder.name}' went down")
+    return state
+
+
+def _pids(state: RobotState) -> list[int]:
+    return [state.supervisor.pid, *(process.pid for process in state.processes.values())]
+
+
+def _processor(pids: list[int]) -> float:
+    """Return the processor time of some processes so far [s]."""
+    return sum(map(processor_time, pids))
+
+
+def _links(pid: int) -> int:
+    found = psutil.Process(pid).net_connections("tcp")
+    return sum(1 for one in found if one.status == psutil.CONN_ESTABLISHED)
+
+
+def _messages(states: dict[str, RobotState], how: str) -> dict[str, float]:
+    """Return how many messages per second pass the bus of each robot."""
+    counts: dict[str, int] = dict.fromkeys(states, 0)
+    sessions = []
+    for name, one in states.items():
+
+        def count(sample: zenoh.Sample, name: str = name) -> None:
+            counts[name] += 1
+
+        session = _visitor(one)
+        session.declare_subscriber(f"{one.domain}/{name}/**" if how == NAMES else f"{one.domain}/**", count)
+        sessions.append(session)
+    time.sleep(COUNTED)
+    found = {name: number / COUNTED for name, number in counts.items()}
+    for session in sessions:
+        session.close()  # type: ignore[no-untyped-call]
+    return found
+
+
+def _visitor(state: RobotState) -> zenoh.Session:
+    """Return a session at the router of a robot; a loaded machine may need several tries."""
+    for _ in range(TRIES):
+        with contextlib.suppress(ConnectionRefusedError):
+            return open_client(state.router or "")
+    raise RuntimeError(f"no router answers at {state.router}")
+
+
+def _tokens(state: RobotState) -> tuple[int, float]:
+    """Return how many tokens a visitor finds on the bus of a robot, and how long this takes [s]."""
+    began = time.perf_counter()
+    session = _visitor(state)
+    replies = session.liveliness().get(f"@ros2_lv/{state.domain}/**")
+    found = sum(1 for reply in replies if reply.ok is not None)
+    seconds = time.perf_counter() - began
+    session.close()  # type: ignore[no-untyped-call]
+    return found, seconds
+
+
+COLUMNS = (
+    "robots, start, memory, processor, messages/s, tokens, links, discovery, router, processor, watcher, processor"
+)
+HEAD = f"| {COLUMNS.replace(', ', ' | ')} |\n|{' --- |' * 12}"
+
+
+def main(words: list[str]) -> None:
+    """Print a table with a row for each number of robots; or be the one router, until the end of the input."""
+    if words[:1] == [ROUTER]:
+        session = open_router(ROUTER)
+        sys.stdin.read()
+        session.close()  # type: ignore[no-untyped-call]
+        return
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # all robots go down first
+    how = next((word for word in words if word in (OWN, DOMAINS, NAMES)), OWN)
+    sys.stdout.write(f"{HEAD}\n")
+    for count in [int(word) for word in words if word.isdigit()] or [1, 3]:
+        sys.stdout.write(f"{measured(count, how, *words).line()}\n")
+        sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

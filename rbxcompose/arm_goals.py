@@ -1,0 +1,148 @@
+"""The goals of an arm: from messages to what its tasks take."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from typing import Any
+
+from rbxcompose.geometry import Quaternion, Transform3, quaternion_from_rpy
+from rbxcompose.motion.arm_task import ArmGoal
+from rbxcompose.motion.inverse_kinematics import SOLVER, PoseTarget, SolverSettings
+from rbxcompose.motion.kept import Keep
+from rbxcompose.motion.parametrisation import Trajectory
+from rbxcompose.motion.sight import ANGLE as SIGHT_ANGLE
+from rbxcompose.motion.sight import RADIUS, KeptSight
+from rbxcompose.motion.tip_path import WayPoint
+from rbxcompose.motion.trace_planner import ANY_SPEED, TraceWish
+from rbxcompose.msgs.control_msgs import FollowJointTrajectory
+from rbxcompose.msgs.measures import Measures
+from rbxcompose.msgs.moveit_msgs import ExecuteTrajectory, MoveGroup
+from rbxcompose.msgs.rbxcompose_msgs import (
+    MoveArm,
+    PathConstraints,
+    PickObject,
+    PlaceObject,
+    ReachPose,
+    Sight,
+    TipPoint,
+    TraceArm,
+)
+from rbxcompose.msgs.stamps import to_duration
+from rbxcompose.msgs.trajectory_msgs import JointTrajectory, JointTrajectoryPoint
+from rbxcompose.units import ANGLE, LENGTH, RATIO, SPEED
+
+POSE_MEASURES = {**dict.fromkeys(("x", "y", "z"), LENGTH), **dict.fromkeys(("roll", "pitch", "yaw"), ANGLE)}
+SIGHT_MEASURES: Measures = {**dict.fromkeys(("x", "y", "z", "radius"), LENGTH), "angle": ANGLE}
+KEEP_MEASURES: Measures = {**POSE_MEASURES, "joints": {"lower": None, "upper": None}, "sight": SIGHT_MEASURES}
+SHARES = {"speed": RATIO, "acceleration": RATIO}
+MOVE_MEASURES: Measures = {**SHARES, "tolerance": ANGLE, "keep": KEEP_MEASURES}
+REACH_MEASURES: Measures = {
+    **POSE_MEASURES,
+    **SHARES,
+    "tolerance": LENGTH,
+    "angle_tolerance": ANGLE,
+    "keep": KEEP_MEASURES,
+}
+TRACE_MEASURES: Measures = {
+    "points": POSE_MEASURES,
+    "speed": SPEED,
+    "acceleration": RATIO,
+    "blend": LENGTH,
+    "least": RATIO,
+}
+ACTIONS = (MoveArm, ReachPose, TraceArm, PickObject, PlaceObject, MoveGroup, ExecuteTrajectory)
+STATES = {"planning": "PLANNING", "moving": "MONITOR"}  # as clients of MoveIt know stages
+ArmMessage = MoveArm.Goal | ReachPose.Goal | TraceArm.Goal
+
+
+def action_of(message: Any) -> Any:
+    """Return the action that a goal belongs to."""
+    return next(one for one in ACTIONS if isinstance(message, one.Goal))
+
+
+def feedback_of(message: Any, stage: str) -> Any:
+    """Return what the client of a goal is told of its stage."""
+    action = action_of(message)
+    if action in (MoveGroup, ExecuteTrajectory):
+        return action.Feedback(state=STATES.get(stage, stage))
+    return action.Feedback(stage=stage)
+
+
+def follow_goal(names: tuple[str, ...], trajectory: Trajectory) -> FollowJointTrajectory.Goal:
+    """Return a trajectory as its controller takes it; where the arm is now is not among its points."""
+    rows = zip(trajectory.times[1:].tolist(), trajectory.positions[1:], trajectory.velocities[1:], strict=True)
+    points = tuple(
+        JointTrajectoryPoint(positions=positions, velocities=velocities, time_from_start=to_duration(time))
+        for time, positions, velocities in rows
+    )
+    return FollowJointTrajectory.Goal(trajectory=JointTrajectory(joint_names=names, points=points))
+
+
+def goal_of(message: ArmMessage, solver: SolverSettings = SOLVER) -> ArmGoal:
+    """Return a goal as the task takes it: a share, a speed or a tolerance of 0 is the usual one, that of the solver."""
+    acceleration = message.acceleration or 1.0
+    if isinstance(message, TraceArm.Goal):
+        wish = TraceWish(
+            tuple(map(_point, message.points)),
+            message.relative,
+            message.keep_orientation,
+            message.any_orientation,
+            message.speed or ANY_SPEED,
+            message.blend,
+            message.least or 1.0,
+            acceleration,
+        )
+        return ArmGoal(trace=wish, frame=message.frame, acceleration=acceleration)
+    ask = partial(
+        ArmGoal,
+        speed=message.speed or 1.0,
+        acceleration=acceleration,
+        keep=_keep(message.keep),
+        replans=message.replan,
+    )
+    if isinstance(message, MoveArm.Goal):
+        positions = dict(zip(message.joints, message.positions.tolist(), strict=False))
+        return ask(message.pose, positions, tolerance=message.tolerance)
+    target = PoseTarget(
+        Transform3((message.x, message.y, message.z), _turn(message)),
+        message.any_orientation,
+        message.tolerance or solver.tolerance,
+        message.angle_tolerance or solver.angle_tolerance,
+    )
+    return ask(target=target, frame=message.frame)
+
+
+def _keep(message: PathConstraints) -> Keep:
+    x, y, z = (_range(one.tolist()) for one in (message.x, message.y, message.z))
+    joints = {one.name: (one.lower, one.upper) for one in message.joints}
+    sight = _sight(message.sight)
+    return Keep((message.roll, message.pitch, message.yaw), (x, y, z), joints, message.frame, sight)
+
+
+def _sight(message: Sight) -> KeptSight | None:
+    """Return what is to be seen; None if nothing is asked for."""
+    if message == Sight():
+        return None
+    return KeptSight(
+        message.sensor,
+        message.target,
+        (message.x, message.y, message.z),
+        message.radius or RADIUS,
+        message.angle or SIGHT_ANGLE,
+        message.along,
+        tuple(message.through),
+    )
+
+
+def _range(numbers: list[float]) -> tuple[float, float] | None:
+    """Return a range; one that does not consist of two numbers goes nowhere."""
+    return None if not numbers else (numbers[0], numbers[1]) if len(numbers) == 2 else (math.nan, math.nan)
+
+
+def _point(message: TipPoint) -> WayPoint:
+    return WayPoint(Transform3((message.x, message.y, message.z), _turn(message)), message.via)
+
+
+def _turn(message: ReachPose.Goal | TipPoint) -> Quaternion:
+    return quaternion_from_rpy(message.roll, message.pitch, message.yaw)

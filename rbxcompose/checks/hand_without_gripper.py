@@ -1,0 +1,27 @@
+"""Keys of an arm about picking and placing, although it has no gripper."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.check_runner import check
+from rbxcompose.findings import Finding
+from rbxcompose.model.robot import Robot
+from rbxcompose.sections.arms import arms
+
+
+@check("RBX2341")
+def hand_without_gripper(robot: Robot) -> Iterator[Finding]:
+    """An arm without a gripper can neither pick nor place
+
+    `grasp`, `squeeze`, `grasps` and `spots` are for the skills `pick_NAME` and `place_NAME`, which an arm has only if
+    `gripper` names the controller of its gripper.
+
+    Bad: `right_arm: {controller: right_arm_controller, spots: {left: {x: 20 cm, y: 10 cm, z: 70 cm}}}`
+    Good: the same with `gripper: right_gripper_controller`.
+    """
+    for name, arm in robot.manifest.contents.of(arms).items():
+        for key in ("grasp", "squeeze", "grasps", "spots"):
+            if getattr(arm.model, key) and arm.model.gripper is None:
+                message = f"'{key}' of the arm '{name}' has no effect: the arm has no 'gripper'"
+                yield hand_without_gripper.at(robot.key("arms", name, key), message)

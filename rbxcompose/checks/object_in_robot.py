@@ -1,0 +1,78 @@
+"""A thing of the planning scene that is where the robot is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from rbxcompose.body.model import Body, BodyJoint, Geometry
+from rbxcompose.check_runner import check
+from rbxcompose.findings import Finding, Related, Severity
+from rbxcompose.geometry import Vector3
+from rbxcompose.model.arm_goals import length_of
+from rbxcompose.model.robot import Robot
+from rbxcompose.sections.arms import arms
+from rbxcompose.sections.scene import scene
+
+_ON_AXIS = 0.001  # [m]
+_TIMES = 10.0  # as large as the longest arm is long: a unit is wrong
+_UNIT = "is a unit wrong? A number without a unit counts in metres: for centimetres, write '20 cm'"
+_FARTHER = "place it farther away, or name the link below 'touches'"
+_SOLID = ("box", "cylinder", "capsule", "sphere")
+
+
+@check("RBX2246", Severity.WARNING, closed=())
+def object_in_robot(robot: Robot) -> Iterator[Finding]:
+    """A thing of the scene is where the robot is
+
+    The middle of a link is inside of the thing, however the joints stand. An arm that collides at its start goes
+    nowhere. A thing with a box stands with its middle where `at` says.
+
+    Bad: `wall: {box: [2 cm, 1 m, 1 m], at: {z: 50 cm}}`, around the arm itself.
+    Good: `wall: {box: [2 cm, 1 m, 1 m], at: {x: 60 cm, z: 50 cm}}`
+    """
+    contents, description = robot.manifest.contents, robot.manifest.body
+    if description is None or not contents.of(arms):
+        return
+    body = description.body
+    points = list(_fixed_points(body))
+    longest = max(length_of(robot, body, one) for one in contents.of(arms).values())
+    poses = body.poses({})
+    for one in contents.of(scene).objects:
+        into = poses[one.link].compose(one.pose).inverse() if one.link == body.root else None
+        for link, point in points if into and one.shape.kind in ("box", "sphere", "cylinder") else ():
+            if into and link not in one.touches and _contains(one.shape, into.apply(point)):
+                yield object_in_robot.at(
+                    robot.key("scene", "objects", one.name),
+                    f"'{one.name}' is where '{link}' always is, so every arm with this link collides at its start",
+                    help=_UNIT if max(one.shape.size) > _TIMES * longest else _FARTHER,
+                    related=[Related(body.links[link].span, "the link")],
+                )
+                break
+
+
+def _fixed_points(body: Body) -> Iterator[tuple[str, Vector3]]:
+    """Yield points of solid links that a joint turns and yet leaves in place, in the frame of the root [m]."""
+    poses, still = body.poses({}), {body.root}
+    for joint in body.joints_downwards:
+        if joint.parent not in still:
+            continue
+        if not joint.moves:
+            still |= {joint.child} if joint.kind == "fixed" else set()
+        elif not joint.slides:
+            for shape in body.links[joint.child].collisions:
+                if shape.geometry.kind in _SOLID and _is_on_axis(joint, shape.origin.translation):
+                    yield joint.child, poses[joint.child].apply(shape.origin.translation)
+
+
+def _is_on_axis(joint: BodyJoint, point: Vector3) -> bool:
+    (x, y, z), (ax, ay, az) = point, joint.axis
+    return math.hypot(y * az - z * ay, z * ax - x * az, x * ay - y * ax) < _ON_AXIS
+
+
+def _contains(shape: Geometry, point: Vector3) -> bool:
+    if shape.kind == "sphere":
+        return math.hypot(*point) < shape.size[0]
+    if shape.kind == "cylinder":
+        return math.hypot(*point[:2]) < shape.size[0] and abs(point[2]) < shape.size[1] / 2.0
+    return all(abs(at) < size / 2.0 for at, size in zip(point, shape.size, strict=True))

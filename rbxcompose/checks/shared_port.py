@@ -1,0 +1,44 @@
+"""Two components at one serial port."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.check_runner import check
+from rbxcompose.findings import Finding, Related
+from rbxcompose.model.flow import setting_span
+from rbxcompose.model.robot import Robot
+from rbxcompose.sdk.capabilities import ConnectedBy
+
+
+@check("RBX2247", closed=())
+def shared_port(robot: Robot) -> Iterator[Finding]:
+    """Two components use the same serial port
+
+    A serial port belongs to one program: a second one would take replies that are not meant for it, or cannot open the
+    port at all.
+
+    Bad:
+    ```yaml
+    buses:
+      arm: {type: dynamixel, port: /dev/ttyUSB0}
+      neck: {type: dynamixel, port: /dev/ttyUSB0}
+    ```
+    Good:
+    ```yaml
+    buses:
+      arm: {type: dynamixel, port: /dev/ttyUSB0}
+      neck: {type: dynamixel, port: /dev/ttyUSB1}
+    ```
+    """
+    first: dict[str, tuple[str, str]] = {}
+    for component, connected in robot.declared(ConnectedBy):
+        port, field = connected.port.value, connected.port.field
+        other, place = first.setdefault(port, (component.name, field))
+        if other != component.name:
+            yield shared_port.at(
+                setting_span(robot, (component, field)),
+                f"'{component.name}' and '{other}' use the same port, {port}",
+                help="give each its own port, or put what is on one cable into one of them",
+                related=[Related(setting_span(robot, (robot.components[other], place)), f"'{other}'")],
+            )

@@ -1,0 +1,1 @@
+"""What `arm` does without a robot that runs."""

@@ -1,0 +1,87 @@
+"""`arm setup --check`: what only the shapes of a body tell of the poses of its arms."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+
+import numpy as np
+
+from rbxcompose.arm_config import ArmConfig, ArmWorks
+from rbxcompose.cli.arms.told_pairs import told_pairs
+from rbxcompose.cli.output.console import FINDINGS, tell, tell_report
+from rbxcompose.compiler import Compilation
+from rbxcompose.findings import Finding, Report, Severity, kind
+from rbxcompose.model.robot import Robot
+from rbxcompose.motion.collisions import MeshChecker, adjacent_pairs
+from rbxcompose.sections.arms import arms
+from rbxcompose.sections.scene import scene
+
+COLLIDES = kind(
+    "RBX9423",
+    """A pose of an arm is in collision
+
+Two links are within each other there, or a link and an object of the scene, so no motion ends or begins there. Joints
+that the pose does not name, and those of the rest of the body, count as at rest.
+
+Bad: `poses: {down: {lift_joint: 0 deg}}`, where the gripper is in the pedestal.
+Good: `poses: {down: {lift_joint: -20 deg}}`
+""",
+)
+UNWATCHED = kind(
+    "RBX9424",
+    """Links collide in a pose, and their pair is in the file of those that need not be watched
+
+The pair is there because no position that was tried had them collide: try more, with `arm setup --samples`. Or a person
+wrote `user`, and arms let them pass through each other.
+
+Bad: `- [gripper_link, pedestal_link, never]`, which collide in the pose `down`.
+Good: the file that `rbxcompose arm setup --samples 1000000` writes.
+""",
+    Severity.WARNING,
+)
+
+
+def run_check(robot: Robot, compilation: Compilation, *, is_json: bool) -> int:
+    """Examine all poses; tell what collides."""
+    found = list(_findings(robot))
+    report = Report([one for _, _, _, one in found])
+    if is_json:
+        keys = ("arm", "pose", "pairs", "code")
+        tell(
+            json.dumps([dict(zip(keys, (arm, pose, pairs, one.code), strict=True)) for arm, pose, pairs, one in found])
+        )
+    else:
+        tell_report(report, compilation.sources)
+    if not found and not is_json:
+        count = sum(len(one.model.poses) for one in robot.manifest.contents.of(arms).values())
+        tell(f"{count} poses, none of them in collision")
+    return FINDINGS if report.has_errors else 0
+
+
+def _findings(robot: Robot) -> Iterator[tuple[str, str, list[tuple[str, str]], Finding]]:
+    contents, description = robot.manifest.contents, robot.manifest.body
+    if description is None:
+        return
+    things = contents.of(scene)
+    matrix = description.matrix.pairs if description.matrix is not None else {}
+    for name, arm in contents.of(arms).items():
+        config = robot.components[name].config
+        if not isinstance(config, ArmConfig):
+            continue
+        works = ArmWorks(config, lambda: 0.0, things.on(description.body), things.paddings, is_fast=False)
+        every = MeshChecker(works.kinematics, description.meshes, adjacent_pairs(description.body))
+        rest = [description.body.joints[joint].rest for joint in works.space.names]
+        for pose in arm.model.poses:
+            at = config.poses[pose]
+            values = np.array([at.get(joint, still) for joint, still in zip(works.space.names, rest, strict=True)])
+            span = robot.value("arms", name, "poses", pose)
+            if pairs := works.planner.checker.colliding(values):
+                message = f"the pose '{pose}' of '{name}' is in collision: {told_pairs(pairs)}"
+                yield name, pose, pairs, COLLIDES.at(span, message)
+            if hidden := [one for one in every.colliding(values) if matrix.get(one) in ("never", "user")]:
+                reasons = " and ".join(sorted({f"'{matrix[one]}'" for one in hidden}))
+                message = (
+                    f"links collide in the pose '{pose}' of '{name}' that are there as {reasons}: {told_pairs(hidden)}"
+                )
+                yield name, pose, hidden, UNWATCHED.at(span, message)

@@ -1,0 +1,213 @@
+"""`arm setup`: tries random positions of a whole body, and writes which pairs of links need not be watched."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+from rbxcompose.atomic_files import replace_file
+from rbxcompose.body.description import Description
+from rbxcompose.body.link_pairs import CollisionMatrix, read_matrix
+from rbxcompose.cli.arms.told_pairs import told_pairs
+from rbxcompose.cli.bodies.source import bare_body, is_description
+from rbxcompose.cli.output.console import refuse, tell, tell_report
+from rbxcompose.cli.project.robot_choice import robot_path
+from rbxcompose.cli.project.robot_options import compiled
+from rbxcompose.cli.robots.this_machine import missing_extras
+from rbxcompose.compiler import Compilation
+from rbxcompose.findings import Finding, Report, Severity, Sources, kind
+from rbxcompose.manifest.files import find, shown_name
+from rbxcompose.manifest.library import PREFIX
+from rbxcompose.manifest.reader import read_source
+from rbxcompose.manifest.tree import ScalarNode, at
+from rbxcompose.model.robot import Robot
+from rbxcompose.printable import plain
+from rbxcompose.sections.arms import arms
+
+NO_SETUP = kind(
+    "RBX9420",
+    """An arm cannot be set up
+
+`arm setup` needs a body whose shapes can be read, the extra `arm`, and a folder that it may write to.
+
+Bad: `rbxcompose arm setup robots/turtlebot`, without `pip install 'rbxcompose[arm]'`.
+Good: `rbxcompose arm setup robots/pi_robot`
+""",
+)
+TOUCH_AT_REST = kind(
+    "RBX9421",
+    """Links collide at rest
+
+With all joints at 0, or at the nearest position within their limits, two links are within each other, and elsewhere
+they are not. Arms go on watching such a pair: either a shape is too large, or the arm must not go there. If they may
+touch, change the reason of the pair to `user` in the file.
+
+Bad: `- [pedestal_link, gripper_link, default]`, where the arm is as long as the pedestal is high.
+Good: `- [tilt_link, bracket_link, user]`, where the shape of a bracket is a plain box.
+""",
+    Severity.WARNING,
+)
+SAMPLES, LEAST = 50_000, 100
+_BAR = 30
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `arm setup`."""
+    parser.add_argument(
+        "--samples", type=_samples, default=SAMPLES, metavar="N", help=f"positions (default: {SAMPLES})"
+    )
+    parser.add_argument("--seed", type=_count, default=1, metavar="S", help="the same one gives the same file")
+    words = "the file (default: the one under 'collisions', or ROBOT.collisions.yaml; a profile has its own)"
+    parser.add_argument("--out", metavar="FILE", help=words)
+    words = "examine all poses on the shapes of the body instead, and tell what collides"
+    parser.add_argument("--check", action="store_true", help=words)
+    words = "print a robot with the arms that a .urdf file seems to have, or write it to the file of --out"
+    parser.add_argument("--propose", action="store_true", help=words)
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or len(text) > 9:
+        raise argparse.ArgumentTypeError(f"must be a whole number of at least 0, not '{text}'")
+    return int(text)
+
+
+def _samples(text: str) -> int:
+    count = _count(text)
+    if count < LEAST:  # else what collides at rest by chance would be left out for ever
+        raise argparse.ArgumentTypeError(f"must be at least {LEAST}, not {count}")
+    return count
+
+
+def run_setup(arguments: argparse.Namespace) -> int:
+    """Try positions and write the file."""
+    path = robot_path(arguments.path, may_run=False)
+    if path is None:
+        return 1
+    if arguments.propose or is_description(path):
+        return _propose(path, arguments)
+    compilation = compiled(path, arguments)
+    report = Report([one for one in compilation.report if one.severity is Severity.ERROR])
+    tell_report(report, compilation.sources)
+    description = compilation.robot.manifest.body if compilation.robot is not None else None
+    found = find(path)
+    if report.has_errors or isinstance(found, Finding) or compilation.robot is None:
+        return 1
+    if description is None:
+        return refuse(NO_SETUP.at(None, "this robot has no body", help="describe it under 'body'"))
+    if arguments.check:
+        return _checked(compilation.robot, compilation, is_json=arguments.json)
+    if path.startswith(PREFIX) and arguments.out is None:
+        return refuse(NO_SETUP.at(None, f"'{plain(path)}' is of the library", help="name a file of yours with '--out'"))
+    file = _file(found, compilation.robot, arguments)
+    made = _sampled(description, arguments)
+    if isinstance(made, Finding):
+        return refuse(made)
+    matrix = _with_users(file, description, made)
+    if isinstance(matrix, Finding):
+        return refuse(matrix)
+    try:
+        replace_file(file.resolve(), matrix.text().encode())
+    except OSError as error:
+        return refuse(NO_SETUP.at(None, f"'{plain(str(file))}' cannot be written: {error.strerror}"))
+    _tell(file, matrix, compilation.sources, is_json=arguments.json)
+    if not arguments.json and shown_name(file) not in compilation.sources:
+        if not compilation.robot.manifest.contents.of(arms):
+            tell("this robot has no arms: 'rbxcompose arm setup FILE.urdf --propose' proposes some for its body")
+        tell(f"for arms to use it, the robot says\nbody:\n  collisions: {os.path.relpath(file, found.parent)}")
+    return 0
+
+
+def _file(robot_file: Path, robot: Robot, arguments: argparse.Namespace) -> Path:
+    """Return the file to write: the one that the robot names, unless a profile changes the body."""
+    if arguments.out is not None:
+        return Path(arguments.out)
+    named = at(robot.manifest.root, ("body", "collisions"))
+    if isinstance(named, ScalarNode) and not arguments.profile:
+        return robot_file.parent / named.text
+    return robot_file.with_name(".".join((robot.manifest.name, *arguments.profile, "collisions", "yaml")))
+
+
+def _propose(path: str, arguments: argparse.Namespace) -> int:
+    from rbxcompose.cli.arms.propose import NO_ARM, run_proposal  # only needed for proposals
+
+    if not is_description(path):
+        words = f"'{plain(path)}' is a robot, and --propose makes one of a .urdf file"
+        return refuse(NO_ARM.at(None, words, help="give the file of its body"))
+    described = bare_body(path)
+    file = find(path)
+    report = Report([one for one in described.report if one.severity is Severity.ERROR])
+    if described.description is None or isinstance(file, Finding):
+        tell_report(report, described.sources)
+        return 1
+    return run_proposal(arguments, described.description, file)
+
+
+def _checked(robot: Robot, compilation: Compilation, *, is_json: bool) -> int:
+    lacking = Report([*missing_extras(robot)])
+    if lacking.has_errors:
+        tell_report(lacking, compilation.sources)
+        return 1
+    from rbxcompose.cli.arms.pose_check import run_check  # imports numpy and planning
+
+    return run_check(robot, compilation, is_json=is_json)
+
+
+def _sampled(description: Description, arguments: argparse.Namespace) -> CollisionMatrix | Finding:
+    from rbxcompose.motion.sampled_pairs import sampled_matrix  # its libraries are an extra
+
+    try:
+        sampling = sampled_matrix(description, arguments.samples, arguments.seed)
+        while True:
+            _show_progress(next(sampling), arguments.samples)
+    except StopIteration as ended:
+        found: CollisionMatrix = ended.value
+        _show_progress(None, arguments.samples)
+        return found
+    except ModuleNotFoundError as error:
+        return NO_SETUP.at(None, f"it needs the package '{error.name}'", help="pip install 'rbxcompose[arm]'")
+    except ValueError as error:
+        return NO_SETUP.at(None, str(error))
+
+
+def _show_progress(count: int | None, samples: int) -> None:
+    """Draw a bar on a terminal; without a count, remove it."""
+    if not sys.stderr.isatty():
+        return
+    full = _BAR * (count or 0) // max(1, samples)
+    bar = f"{'#' * full}{'.' * (_BAR - full)} {count} of {samples} positions" if count is not None else "\x1b[K"
+    sys.stderr.write(f"\r{bar}" + ("" if count is not None else "\r"))
+    sys.stderr.flush()
+
+
+def _with_users(file: Path, description: Description, made: CollisionMatrix) -> CollisionMatrix | Finding:
+    """Return the matrix with the pairs that the file has by the word of a person."""
+    if not file.is_file():
+        return made
+    text, _ = read_source(file, shown_name(file), {}, what="a file of pairs of links")
+    old, _ = read_matrix(text, shown_name(file), description.body, "") if text is not None else (None, [])
+    if old is None:
+        words = f"'{plain(shown_name(file))}' is no file of pairs of links, so it is not replaced"
+        return NO_SETUP.at(None, words, help="give another one with '--out', or remove it")
+    kept = {pair: reason for pair, reason in old.pairs.items() if reason == "user"}
+    there = {pair for pair in kept if set(pair) <= description.body.links.keys()}
+    return replace(made, pairs={**made.pairs, **{pair: kept[pair] for pair in there}})
+
+
+def _tell(file: Path, matrix: CollisionMatrix, sources: Sources, *, is_json: bool) -> None:
+    """Tell what was written."""
+    if is_json:
+        pairs = [{"pair": list(pair), "reason": reason} for pair, reason in sorted(matrix.pairs.items())]
+        tell(json.dumps({"file": shown_name(file), "samples": matrix.samples, "seed": matrix.seed, "pairs": pairs}))
+        return
+    words = ", ".join(f"{count} {reason}" for reason, count in matrix.counts().items())
+    tell(f"wrote {shown_name(file)}: {words or 'no pairs'}")
+    for reason in ("always", "user"):
+        if found := matrix.having(reason):
+            tell(f"not watched, {reason}: {told_pairs(found)}")
+    if resting := matrix.having("default"):
+        message = f"these collide at rest and stay watched: {told_pairs(resting)}"
+        tell_report(Report([TOUCH_AT_REST.at(None, message)]), sources)

@@ -1,0 +1,41 @@
+"""Texts on the command line as data: goals of arms."""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+from rbxcompose.cli.robots.lookup import NotDoneError
+from rbxcompose.findings import Report, kind
+from rbxcompose.manifest.reader import read_text
+from rbxcompose.manifest.tree import MappingNode
+from rbxcompose.manifest.validate import validate
+
+NO_MOTION = kind(
+    "RBX2310",
+    """An arm does not get to where a command wants it
+
+The text begins with the reason: [the page on arms](../arms.md#when-it-does-not-move) lists all of them.
+
+Bad: `rbxcompose arm plan '{right_arm_shoulder_pan_joint: -115 deg, right_arm_shoulder_lift_joint: 69 deg}'
+robots/pi_robot`, which is in the torso.
+Good: `rbxcompose arm plan straight_forward robots/pi_robot`
+""",
+)
+_SHOWN = "GOAL"  # name of a text on the command line in findings
+T = TypeVar("T")
+
+
+def read_written(model: type[T], text: str) -> T:
+    """Return a text on the command line as data.
+
+    Raises:
+        NotDoneError: if it cannot be read.
+    """
+    root, findings = read_text(text, _SHOWN)
+    report = Report()
+    report.extend(findings)
+    read = validate(model, root, (), report) if isinstance(root, MappingNode) and not findings else None
+    if read is None:
+        first = next(iter(report), None)
+        raise NotDoneError(NO_MOTION.at(None, first.message if first else f"'{text}' is no map"))
+    return read

@@ -1,0 +1,182 @@
+"""A search for a path in code that numba compiles, and its shortening: RRT-Connect on the spheres of `CompiledModel`.
+
+The same arguments give the same path, on any machine with the same arithmetic: random numbers are our own. Source of
+the search: Kuffner and LaValle, RRT-Connect (2000); of random numbers: Steele, Lea, Flood, Fast splittable pseudorandom
+number generators (2014); of shortcuts: Geraerts and Overmars, Creating high-quality paths for motion planning (2007).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbxcompose.motion.compiled_collisions import CompiledModel, Workspace, is_line_free
+from rbxcompose.motion.numba_cache import compiled, inlined
+
+Array = NDArray[np.float64]
+Whole = NDArray[np.int64]
+
+PAUSED, FOUND, FULL = 0, 1, 2
+"""How a slice of a search ends."""
+EXAMINED, LEFT, RIGHT, TURN = 0, 1, 2, 3
+"""What stands in `SearchTrees.about`: examined positions, where both trees meet, and whose turn it is."""
+
+
+class SearchTrees(NamedTuple):
+    """Two trees of positions, from the start and from the goal."""
+
+    nodes: Array
+    """Of shape (2, k, n)."""
+    parents: Whole
+    """The node before each one, of shape (2, k)."""
+    counts: Whole
+    """How many nodes each tree has."""
+    about: Whole
+    seed: NDArray[np.uint64]
+    """The state of the random numbers, of shape (1,)."""
+
+
+@inlined
+def random(seed: NDArray[np.uint64]) -> float:
+    """Return a random number from 0 to 1."""
+    seed[0] += np.uint64(0x9E3779B97F4A7C15)
+    mixed = seed[0]
+    mixed = (mixed ^ (mixed >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    mixed = (mixed ^ (mixed >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    mixed = mixed ^ (mixed >> np.uint64(31))
+    return np.float64(mixed >> np.uint64(11)) / 9007199254740992.0
+
+
+@compiled
+def grow(
+    model: CompiledModel,
+    trees: SearchTrees,
+    low: Array,
+    high: Array,
+    reach: float,
+    step: float,
+    budget: int,
+    work: Workspace,
+) -> int:
+    """Search until both trees meet, a tree is full, or `budget` more positions are examined; return which.
+
+    Samples are between `low` and `high`; a branch is at most `reach` long, and examined every `step`.
+    """
+    about, wanted = trees.about, np.empty(len(low))
+    until = about[EXAMINED] + budget
+    while about[EXAMINED] < until:
+        if max(trees.counts[0], trees.counts[1]) + 1 >= trees.nodes.shape[1]:
+            return FULL
+        own = about[TURN]
+        about[TURN] = 1 - own
+        for index in range(len(low)):
+            wanted[index] = low[index] + (high[index] - low[index]) * random(trees.seed)
+        if not extend(model, trees, own, wanted, reach, step, work):
+            continue
+        new = trees.counts[own] - 1
+        for index in range(len(low)):
+            wanted[index] = trees.nodes[own, new, index]
+        while trees.counts[1 - own] < trees.nodes.shape[1] and extend(model, trees, 1 - own, wanted, reach, step, work):
+            last, is_same = trees.counts[1 - own] - 1, True
+            for index in range(len(low)):
+                is_same = is_same and trees.nodes[1 - own, last, index] == wanted[index]
+            if is_same:
+                about[LEFT + own], about[LEFT + 1 - own] = new, last
+                return FOUND
+    return PAUSED
+
+
+@inlined
+def extend(
+    model: CompiledModel, trees: SearchTrees, own: int, wanted: Array, reach: float, step: float, work: Workspace
+) -> bool:
+    """Grow one tree towards a position by one branch; return whether that was free."""
+    nodes, count = trees.nodes[own], trees.counts[own]
+    nearest, least = 0, np.inf
+    for node in range(count):
+        total = 0.0
+        for index in range(len(wanted)):
+            total += (nodes[node, index] - wanted[index]) ** 2
+        if total < least:
+            nearest, least = node, total
+    length = np.sqrt(least)
+    share = 1.0 if length <= reach else reach / length
+    for index in range(len(wanted)):
+        begin = nodes[nearest, index]
+        nodes[count, index] = wanted[index] if share == 1.0 else begin + (wanted[index] - begin) * share
+    examined = is_line_free(model, nodes[nearest], nodes[count], step, work)
+    trees.about[EXAMINED] += abs(examined)
+    if examined < 0:
+        return False
+    trees.parents[own, count] = nearest
+    trees.counts[own] = count + 1
+    return True
+
+
+@compiled
+def shorten(
+    model: CompiledModel,
+    path: Array,
+    count: int,
+    tries: int,
+    step: float,
+    seed: NDArray[np.uint64],
+    about: Whole,
+    work: Workspace,
+) -> int:
+    """Shorten a path of `count` points in place; return how many there are then. It has room for `tries` more."""
+    count = reduce(model, path, count, step, about, work)
+    size = path.shape[1]
+    one, other = np.empty(size), np.empty(size)
+    for _ in range(tries):
+        if count < 3:
+            break
+        first, second = random(seed) * (count - 1), random(seed) * (count - 1)
+        if first > second:
+            first, second = second, first
+        begin, end = int(first), int(second)
+        if begin == end:
+            continue
+        for index in range(size):
+            one[index] = path[begin, index] + (path[begin + 1, index] - path[begin, index]) * (first - begin)
+            other[index] = path[end, index] + (path[end + 1, index] - path[end, index]) * (second - end)
+        examined = is_line_free(model, one, other, step, work)
+        about[EXAMINED] += abs(examined)
+        if examined < 0:
+            continue
+        rest = count - end - 1  # points after the shortcut
+        to = begin + 3
+        for place in range(rest):  # backwards where points move up, so that none is lost
+            point = rest - 1 - place if to > end + 1 else place
+            copy(path[end + 1 + point], path[to + point])
+        copy(one, path[begin + 1])
+        copy(other, path[begin + 2])
+        count = to + rest
+    return reduce(model, path, count, step, about, work)
+
+
+@inlined
+def reduce(model: CompiledModel, path: Array, count: int, step: float, about: Whole, work: Workspace) -> int:
+    """Leave out points of a path in place where the straight line past them is free; return how many are left."""
+    kept, here = 1, 0
+    while here < count - 1:
+        there = count - 1
+        while there > here + 1:
+            examined = is_line_free(model, path[here], path[there], step, work)
+            about[EXAMINED] += abs(examined)
+            if examined > 0:
+                break
+            there -= 1
+        copy(path[there], path[kept])
+        kept += 1
+        here = there
+    return kept
+
+
+@inlined
+def copy(one: Array, other: Array) -> None:
+    """Write an array over another one."""
+    for index in range(len(one)):
+        other[index] = one[index]

@@ -1,0 +1,154 @@
+"""A body and the things around it as arrays for compiled code: the shapes that coal examines, covered by spheres."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbxcompose.body.model import Geometry
+from rbxcompose.geometry import Transform3
+from rbxcompose.motion.arm_kinematics import ArmKinematics
+from rbxcompose.motion.collisions import CheckedPart, MeshChecker
+from rbxcompose.motion.compiled_chain import Chain, chain_of, matrix_of
+from rbxcompose.motion.compiled_collisions import BOX, CYLINDER, HALF_SPACE, TREE, CompiledModel
+from rbxcompose.motion.groups import leader_of
+from rbxcompose.motion.kept_trees import kept_mesh_tree
+from rbxcompose.motion.octree_files import read_cells
+from rbxcompose.motion.sphere_trees import SphereTree, ball_tree, box_tree, cells_tree, cylinder_tree
+
+Array = NDArray[np.float64]
+Coal = Any  # of an extra, without types
+NONE = SphereTree(np.zeros((1, 3)), np.full(1, np.inf), np.full(1, -1))  # of a half space, which no spheres cover
+
+
+class Trees:
+    """Spheres of shapes, each fitted once, and forgotten when it is not among those that are asked for."""
+
+    def __init__(self) -> None:
+        self._made: dict[Geometry, SphereTree] = {}
+
+    def of(self, parts: Iterable[CheckedPart]) -> list[SphereTree]:
+        """Return the spheres that cover each of some shapes, in its own frame."""
+        before, self._made, found = self._made, {}, []
+        for one in parts:
+            if (tree := self._made.get(one.geometry)) is None:
+                tree = before.get(one.geometry) or _tree(one.geometry, one.coal)
+                self._made[one.geometry] = tree
+            found.append(tree)
+        return found
+
+
+def compiled_model(checker: MeshChecker, trees: Trees) -> CompiledModel:
+    """Return what a checker examines, for where the other joints of the body are now; pairs keep their places."""
+    parts, kinematics = checker.parts, checker.kinematics
+    chain, carriers = _chain(kinematics, {one.link for one in parts})
+    owners = np.array([carriers[one.link][0] for one in parts], dtype=np.int64)
+    poses = [matrix_of(carriers[one.link][1].compose(one.origin)) for one in parts]
+    fitted = trees.of(parts)
+    starts = np.cumsum([0, *(len(one.radii) for one in fitted)], dtype=np.int64)
+    solids = [_solid(one.geometry) for one in parts]
+    kinds = np.array([kind for kind, _ in solids], dtype=np.int64)
+    centres = [one.centres @ pose[:, :3].T + pose[:, 3] for one, pose in zip(fitted, poses, strict=True)]
+    extents = np.zeros(len(chain.parents))
+    for owner, middles, tree in zip(owners, centres, fitted, strict=True):
+        if tree is not NONE:
+            extents[owner] = max(extents[owner], float(np.linalg.norm(middles[0]) + tree.radii[0]))
+    pairs = [_ordered(first, second, kinds, fitted, margin) for first, second, margin in checker.watched_parts]
+    return CompiledModel(
+        chain=chain,
+        groups=owners,
+        poses=np.array(poses).reshape(-1, 3, 4),
+        kinds=kinds,
+        sizes=np.array([size for _, size in solids]).reshape(-1, 4),
+        roots=starts[:-1],
+        centres=np.concatenate((np.zeros((0, 3)), *centres)),
+        radii=np.concatenate((np.zeros(0), *(one.radii for one in fitted))),
+        children=_children(fitted, starts),
+        firsts=np.array([one for one, _, _ in pairs], dtype=np.int64),
+        seconds=np.array([other for _, other, _ in pairs], dtype=np.int64),
+        margins=np.array([margin for _, _, margin in pairs], dtype=np.float64),
+        reaches=np.array([fitted[a].radii[0] + fitted[b].radii[0] + m for a, b, m in pairs], dtype=np.float64),
+        extents=extents,
+    )
+
+
+def _chain(kinematics: ArmKinematics, links: Iterable[str]) -> tuple[Chain, Mapping[str, tuple[int, Transform3]]]:
+    """Return the chain of what moves, and for each link its frame in the chain and where it is in that."""
+    body, group, positions = kinematics.body, kinematics.group, kinematics.positions
+
+    def carrier(link: str) -> str:
+        """Return the link that moves as this one does, and that a joint of the arm moves."""
+        while (above := body.joint_above.get(link)) is not None:
+            if above.moves and leader_of(above, body.joints)[0] in group.joints:
+                break
+            link = above.parent
+        return link
+
+    carriers = {link: carrier(link) for link in links}
+    chain, index = chain_of(body, group, positions, {body.root, *carriers.values()})
+    poses = body.poses(positions)
+    return chain, {one: (index[by], poses[by].inverse().compose(poses[one])) for one, by in carriers.items()}
+
+
+def _ordered(
+    first: int, second: int, kinds: NDArray[np.int64], fitted: Sequence[SphereTree], margin: float
+) -> tuple[int, int, float]:
+    """Return a pair so that the spheres of its first shape are tested: the smaller solid, which they fit better.
+
+    What may be a little within each other is called near as soon as it touches, if it is no box: how deep unions of
+    spheres are within each other says nothing about what they cover.
+    """
+    worth = [(kinds[one] == HALF_SPACE, kinds[one] != TREE, fitted[one].radii[0], one) for one in (first, second)]
+    one, other = (first, second) if worth[0] <= worth[1] else (second, first)
+    is_exact = kinds[first] == kinds[second] == BOX
+    return one, other, margin if is_exact else max(margin, 0.0)
+
+
+def _solid(geometry: Geometry) -> tuple[int, tuple[float, float, float, float]]:
+    """Return what a shape is beside its spheres, and its sizes; a cone and a capsule are within a cylinder."""
+    size = geometry.size
+    match geometry.kind:
+        case "box":
+            return BOX, (size[0] / 2, size[1] / 2, size[2] / 2, 0.0)
+        case "cylinder" | "cone":
+            return CYLINDER, (size[0], size[1] / 2, 0.0, 0.0)
+        case "capsule":
+            return CYLINDER, (size[0], size[1] / 2 + size[0], 0.0, 0.0)
+        case "plane":
+            return HALF_SPACE, (size[0], size[1], size[2], size[3])
+    return TREE, (0.0, 0.0, 0.0, 0.0)
+
+
+def _tree(geometry: Geometry, coal: Coal) -> SphereTree:
+    size = geometry.size
+    match geometry.kind:
+        case "box":
+            return box_tree(size)
+        case "sphere":
+            return ball_tree(size[0])
+        case "cylinder" | "cone":
+            return cylinder_tree(size[0], size[1])
+        case "capsule":
+            return cylinder_tree(size[0], size[1] + 2 * size[0])
+        case "plane":
+            return NONE
+        case "octree":
+            cells = np.array(geometry.points).reshape(-1, 3), size[0]
+            return cells_tree(*(read_cells(Path(geometry.file), size[0]) if geometry.file else cells))
+    return kept_mesh_tree(triangles_of(coal))
+
+
+def triangles_of(mesh: Coal) -> Array:
+    """Return the triangles of a mesh as coal has it, of shape (t, 3, 3) [m]."""
+    each = map(mesh.tri_indices, range(mesh.num_tris))
+    corners = np.array([(one[0], one[1], one[2]) for one in each], dtype=np.int64).reshape(-1, 3)
+    return np.asarray(mesh.vertices(), dtype=np.float64)[corners]
+
+
+def _children(fitted: Sequence[SphereTree], starts: NDArray[np.int64]) -> NDArray[np.int64]:
+    found = [np.where(one.children < 0, -1, one.children + start) for one, start in zip(fitted, starts, strict=False)]
+    return np.concatenate([np.zeros(0, dtype=np.int64), *found])

@@ -1,0 +1,88 @@
+"""An arm with simulated servos picks and places, and the scene knows what it holds."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from rbxcompose.compiler import compile_robot
+from rbxcompose.msgs.rbxcompose_msgs import AttachObject, DetachObject, PickObject, PlaceObject
+from rbxcompose.plan.model import Plan
+from rbxcompose.sdk.bound import Outcome
+from rbxcompose.testing import Bench
+from tests.conftest import ROOT
+from tests.soak import Soak
+
+SEEDS = 20
+TYPES = ("arm", "servo_bus", "scene")
+
+
+@pytest.fixture(scope="module")
+def plan() -> Plan:
+    found = compile_robot(str(ROOT / "robots/pi_robot"), profiles=["table"], environment={}).plan
+    assert found
+    return found
+
+
+def robot(plan: Plan, seed: int) -> Bench:
+    """Return the arm, its servos and its scene."""
+    instances: dict[str, Any] = {one.type: one for one in plan.instances if one.type in TYPES}
+    config = instances["arm"].config
+    seeded = config.model_copy(update={"planner": config.planner.model_copy(update={"seed": seed})})
+    return Bench(*(instances | {"arm": replace(instances["arm"], config=seeded)}).values())
+
+
+def ended(bench: Bench, action: Any, topic: str, goal: Any) -> Any:
+    ends: list[Any] = []
+    bench.bus.action_client("me", topic, action)(goal, ends.append)
+    for _ in range(600):
+        bench.advance(0.1)
+        if ends:
+            return ends[0]
+    raise AssertionError("it does not end")
+
+
+@pytest.mark.timeout(900)
+def test_it_picks_and_places_with_every_seed(plan: Plan, soak: Soak) -> None:
+    if not soak.is_on:
+        pytest.skip("with --soak; a test of the mission `pick_and_place` does it once")
+    failures = []
+    for seed in range(SEEDS):
+        bench = robot(plan, seed)
+        bench.advance(1.0)
+        for action, topic, goal in (
+            (PickObject, "/right_arm/pick", PickObject.Goal(object="target")),
+            (PlaceObject, "/right_arm/place", PlaceObject.Goal(spot="table_right")),
+        ):
+            end = ended(bench, action, topic, goal)
+            if end.outcome is not Outcome.SUCCEEDED:
+                failures.append((seed, end.result))
+                break
+    soak.tell("pick and place on simulated servos", SEEDS, len(failures))
+    assert not failures
+
+
+def test_missions_attach_and_detach_objects_by_services(plan: Plan) -> None:
+    bench = Bench(*(one for one in plan.instances if one.type == "scene"))
+    replies: list[Any] = []
+
+    def told(service: Any, topic: str, request: Any) -> tuple[bool, str]:
+        bench.bus.client("me", topic, service)(request, replies.append)
+        bench.advance(0.1)
+        response = replies[-1].response
+        return response.success, response.message
+
+    attach, detach = "/scene/attach", "/scene/detach"
+    link = "right_gripper_link"
+    assert told(AttachObject, attach, AttachObject.Request(object="cup", link=link))[0] is False
+    assert told(AttachObject, attach, AttachObject.Request(object="target", link="nose")) == (
+        False,
+        "there is no link 'nose'",
+    )
+    assert told(AttachObject, attach, AttachObject.Request(object="target", link=link)) == (
+        True,
+        f"'target' moves with '{link}'",
+    )
+    assert told(DetachObject, detach, DetachObject.Request(object="target"))[0] is True

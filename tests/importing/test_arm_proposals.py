@@ -1,0 +1,63 @@
+"""Arms are proposed for a body that has nothing else, and the robot that is made of them passes `check`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from rbxcompose.cli import main as command
+from rbxcompose.compiler import compile_robot
+from rbxcompose.importing.arm_proposals import proposed_arms
+from tests.body.kinematics import description_of
+from tests.conftest import ROOT
+from tests.importing.imports import EXAMPLES
+from tests.motion.test_inverse_kinematics import six_joints
+from tests.motion.toy_arm import urdf
+
+LIFTER = (EXAMPLES / "srdf/lifter.urdf").read_text()
+
+
+def pi_robot() -> str:
+    robot = compile_robot(str(ROOT / "robots/pi_robot"), environment={}).robot
+    assert robot is not None
+    assert robot.manifest.body is not None
+    return robot.manifest.body.text
+
+
+@pytest.mark.parametrize(
+    ("text", "arms"),
+    [
+        (urdf, {"arm": ("turn", "lift", "bend")}),
+        (six_joints, {"j": ("j1", "j2", "j3", "j4", "j5", "j6")}),
+        (lambda: LIFTER, {"arm": ("lift", "shoulder", "elbow")}),
+    ],
+)
+def test_a_row_of_joints_is_an_arm_and_fingers_are_not_of_it(text: object, arms: dict[str, tuple[str, ...]]) -> None:
+    assert callable(text)
+    assert {one.name: one.joints for one in proposed_arms(description_of(text()).body)} == arms
+
+
+def test_a_head_an_arm_and_its_gripper_are_told_apart() -> None:
+    found = {one.name: one for one in proposed_arms(description_of(pi_robot()).body)}
+    assert set(found) == {"head", "right_arm"}
+    assert len(found["right_arm"].joints) == 6
+    assert found["right_arm"].gripper is not None
+    assert found["right_arm"].gripper.joint == "right_gripper_finger_joint"
+
+
+@pytest.mark.parametrize("text", [urdf, six_joints, lambda: LIFTER], ids=["toy", "six", "lifter"])
+def test_what_is_proposed_passes_check(text: object, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert callable(text)
+    (tmp_path / "arm.urdf").write_text(text())
+    words = ["arm", "setup", str(tmp_path / "arm.urdf"), "--propose", "--out", str(tmp_path / "robot.yaml")]
+    assert command.main(words) == 0
+    errors = [one for one in compile_robot(str(tmp_path), environment={}).report if one.severity == "error"]
+    assert errors == []
+    assert command.main(words) == 1
+    assert "already exists" in capsys.readouterr().err
+
+
+def test_a_body_without_a_row_of_joints_has_no_arm(capsys: pytest.CaptureFixture[str]) -> None:
+    assert command.main(["arm", "setup", str(ROOT / "robots/rover/rover.urdf"), "--propose"]) == 1
+    assert "RBX9422" in capsys.readouterr().err

@@ -1,0 +1,51 @@
+"""Pictures of an arm among things: what can be seen in them."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rbxcompose.body import picture
+from rbxcompose.body.model import Geometry
+from rbxcompose.geometry import Transform3
+from rbxcompose.motion.picture import ArmPicture, draw_arm
+from rbxcompose.motion.scene import PlacedObject
+from tests.motion.scenes import FLOOR, MESH, OCTREE
+from tests.motion.toy_arm import kinematics
+
+BODY = kinematics().body
+SHOWN = ArmPicture(BODY, {}, {"turn": 0.8}, told="at rest to up")
+BALL = PlacedObject("ball", Geometry("sphere", (0.1,)), "ground", Transform3((0.3, -0.4, 0.3)))
+
+
+@pytest.fixture(autouse=True)
+def small(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(picture, "SIZE", 200)
+
+
+def share(shown: ArmPicture, channel: int) -> float:
+    """Return how much of a picture is of a colour: red, green or blue."""
+    from PIL import Image
+
+    pixels = np.asarray(Image.open(io.BytesIO(draw_arm(shown))).convert("RGB")).astype(int)
+    others = np.delete(pixels, channel, axis=2).max(axis=2)
+    return float(np.mean(pixels[:, :, channel] > others + 40))
+
+
+def test_what_collides_is_red_the_goal_green_and_the_way_blue() -> None:
+    plain = replace(SHOWN, objects=(BALL,))
+    assert [share(plain, channel) for channel in (1, 2)] == [0.0, 0.0]
+    assert share(replace(plain, colliding={"ball"}), 0) > share(plain, 0) + 0.005
+    goal = replace(plain, goal={"lift": 1.0}, moved=("upper", "fore"), way=((0.4, 0.0, 0.3), (0.4, 0.4, 0.6)))
+    assert share(goal, 1) > 0.005
+    assert share(goal, 2) > 0.0005
+    assert share(replace(goal, problem="goal_in_collision: 'ball' and 'fore' " * 9), 0) > share(goal, 0)
+
+
+@pytest.mark.parametrize("shape", [FLOOR, MESH, OCTREE, Geometry("cone", (0.1, 0.2))], ids=lambda shape: shape.kind)
+def test_things_of_all_shapes_are_seen_in_their_colour(shape: Geometry) -> None:
+    one = replace(BALL, shape=shape, colour=(0.1, 0.2, 0.9, 1.0))
+    assert share(replace(SHOWN, objects=(one,)), 2) > 0.0005

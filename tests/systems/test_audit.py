@@ -1,0 +1,80 @@
+"""What others can reach, and whether they will accept a certificate, is told before they try."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from rbxcompose.cli.main import main
+from rbxcompose.cli.systems.own_certificate import certificate_findings
+from rbxcompose.plan.model import LinkTls
+from rbxcompose.systems.audit import NETWORK, ReachableKey, listeners, reachable_keys
+from rbxcompose.systems.certificates import common_name, make_authority, make_certificate, tls_of
+from tests.systems.test_shares import SYSTEM
+
+needs_openssl = pytest.mark.skipif(shutil.which("openssl") is None, reason="needs openssl")
+
+
+def test_with_certificates_a_key_is_for_the_hosts_that_declare_it_and_else_for_everybody() -> None:
+    def keys(security: str) -> dict[tuple[str, str], ReachableKey]:
+        return {(one.host, one.name): one for one in reachable_keys(replace(SYSTEM, security=security))}
+
+    open_, closed = keys("tls"), keys("mtls")
+    assert closed["robot", "/cmd_vel"].written_by == ("host 'desk'",)
+    assert ("desk", "/cmd_vel") not in closed
+    assert closed["robot", "/set_battery_level"].written_by == ("host 'desk'",)
+    assert closed["desk", "/battery_level"].written_by == ("host 'robot'",)
+    assert open_.keys() == closed.keys()
+    assert {one.written_by for one in open_.values()} == {(NETWORK,)}
+    assert not any(one.is_open for one in closed.values())
+    assert not any(one.is_open for one in listeners(replace(SYSTEM, security="mtls")))
+
+
+def certified(folder: Path, host: str = "desk", days: int = 100) -> LinkTls:
+    """Return a new certificate of a system `lab` that is valid for some days."""
+    make_authority(folder, "lab")
+    make_certificate(folder, "lab", host, None, days=days)
+    return tls_of(folder, host, "mtls")
+
+
+@needs_openssl
+def test_a_certificate_is_examined_as_the_other_hosts_will(tmp_path: Path) -> None:
+    fine = certified(tmp_path / "one")
+    files = {
+        "": fine,
+        "RBX6117": replace(fine, key="/nowhere"),
+        "RBX6143: 'other.lab'": certified(tmp_path / "one", "other"),
+        "RBX6143: expired": certified(tmp_path / "two", days=-1),
+        "RBX6143: issuer": replace(fine, authority=certified(tmp_path / "three").authority),
+        "RBX6143: belong together": replace(fine, key=certified(tmp_path / "four").key),
+        "RBX6144: in 20 days": certified(tmp_path / "five", days=20),
+    }
+    for expected, tls in files.items():
+        code, _, words = expected.partition(": ")
+        found = [f"{one.code}: {one.message}" for one in certificate_findings(tls, common_name("lab", "desk"), "x")]
+        assert [one[: len(code)] for one in found] == ([code] if code else []), expected
+        assert all(words in one for one in found), (expected, found)
+
+
+@needs_openssl
+def test_the_command_lists_all_and_tells_of_a_certificate_that_others_will_refuse(
+    repository: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
+    for folder in ("robots/turtlebot", "missions"):
+        shutil.copytree(repository / folder, tmp_path / folder)
+    path = tmp_path / "systems/lab.yaml"
+    path.parent.mkdir()
+    text = (repository / "systems/patrol_two_hosts.yaml").read_text(encoding="utf-8")
+    path.write_text(text.replace("name: patrol_two_hosts", "name: lab\nsecurity: mtls"), encoding="utf-8")
+    assert main(["security", "audit", str(path)]) == 0
+    assert "written, called or answered by host 'desk' and programs there: /cmd_vel" in capsys.readouterr().out
+    assert main(["security", "init", str(path)]) == 0
+    assert main(["security", "audit", str(path)]) == 0
+    made = tmp_path / "config/rbxcompose/systems/lab"
+    shutil.copytree(made / "desk", made / "robot", dirs_exist_ok=True)
+    assert main(["security", "audit", str(path)]) == 1
+    assert "it is that of 'desk.lab'" in capsys.readouterr().err

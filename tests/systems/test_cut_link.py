@@ -1,0 +1,43 @@
+"""How long a base moves on after a link is cut: a bound that the base itself keeps, found wherever commands cross."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rbxcompose.geometry import Velocity2
+from rbxcompose.sim.diff_drive import DiffDriveCore, DiffDriveSettings
+from rbxcompose.systems.cut_link import CYCLES, stops_after_cut
+from tests.systems.test_shares import ROBOT, SHARES, spread
+
+CYCLE = 0.02  # [s]
+BASE = ROBOT.robot.components["base"].config
+
+
+@settings(deadline=None)  # the first one reads what all robots have in common
+@given(SHARES)
+def test_a_base_has_a_bound_exactly_if_its_commands_cross(hosts: dict[str, str]) -> None:
+    _, robot = spread(hosts)
+    way = {hosts[name] for name in ("base", "cmd_vel", "go_to")}
+    assert [(one.base, one.host) for one in stops_after_cut(robot)] == ([("base", hosts["base"])] * (len(way) > 1))
+
+
+@given(st.floats(-1, 1), st.floats(-1, 1), st.floats(0, CYCLE))
+def test_the_base_stands_still_within_it_whatever_the_last_command_was(
+    linear: float, angular: float, phase: float
+) -> None:
+    (bound,) = stops_after_cut(ROBOT)
+    settings = {name: getattr(BASE, name) for name in DiffDriveSettings.__annotations__}
+    core, now = DiffDriveCore(DiffDriveSettings(**settings)), 0.0
+    while now < 2.0:
+        now += CYCLE
+        core.command(Velocity2(linear * settings["max_speed"], angular * settings["max_turn_rate"]), now - phase)
+        core.step(now, CYCLE)
+    last = now - phase
+    while not core.at_rest:
+        now += CYCLE
+        core.step(now, CYCLE)
+    assert bound.time is not None
+    assert now - last <= bound.time + 1e-9
+    assert bound.time == pytest.approx(0.25 + CYCLES * CYCLE + 0.3)

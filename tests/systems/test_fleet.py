@@ -1,0 +1,108 @@
+"""`fleet`: robots are chosen by labels, asked where they run, and each is told, also one that is down."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from rbxcompose.cli.main import main
+from rbxcompose.cli.systems import fleet
+from rbxcompose.cli.systems.everywhere import Shares, shares_of
+from rbxcompose.cli.systems.remote import Remote
+from rbxcompose.manifest.system_file import HostModel
+from rbxcompose.systems.model import System
+from rbxcompose.testing.golden import Golden
+from tests.conftest import ROOT
+
+SYSTEM = """
+rbx: 1
+kind: System
+name: fleet
+hosts: {one: {address: 10.0.0.1, labels: [floor]}, two: {address: 10.0.0.2, ssh: two, labels: [floor]}}
+robots:
+  scout: {robot: ROOT/robots/turtlebot/robot.yaml, instances: 3, on: floor, labels: [indoor]}
+  other: {robot: ROOT/robots/turtlebot/robot.yaml, on: one, place: {battery: two}}
+"""
+_HOST = """
+import json, sys
+host, *words = sys.argv[1:]
+if words[0] == "logs" or words[0] == "mission":
+    print(" ".join(words))
+elif words[1] == "scout_2":
+    print("error[RBX9002]: no robot is up"); raise SystemExit(1)
+elif words[1] == "scout_3":
+    print("ssh: connect: refused"); raise SystemExit(255)
+else:
+    state = "failed" if host == "two" else "active"
+    part = {"name": "battery", "state": state}
+    print(json.dumps({"mission": "running patrol", "batteries": {"battery": "80 %"}, "components": [part]}))
+"""
+
+
+class _Host(Remote):
+    """A host whose rbxcompose is a script."""
+
+    def rbxcompose(self, words: Sequence[str], *, folder: str = "", has_terminal: bool = False) -> list[str]:
+        return [sys.executable, "-c", _HOST, self.name, *words]
+
+
+@pytest.fixture
+def path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    def shares(system: System, config: Path | None) -> Shares:
+        return {key: _Host(key[0], HostModel()) for key in shares_of(system, config)}
+
+    monkeypatch.setattr(fleet, "shares_of", shares)
+    file = tmp_path / "fleet.yaml"
+    file.write_text(SYSTEM.replace("ROOT", str(ROOT)), encoding="utf-8")
+    return str(file)
+
+
+def test_each_robot_is_a_row_with_what_is_wrong(path: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["fleet", "ls", path, "--json"]) == 1
+    rows = {one["robot"]: one for one in json.loads(capsys.readouterr().out)["robots"]}
+    assert rows["scout_1"] == {
+        "robot": "scout_1",
+        "host": "one",
+        "state": "up",
+        "mission": "running patrol",
+        "battery": "80 %",
+    }
+    assert (rows["scout_2"]["state"], rows["scout_3"]["state"]) == ("down", "unreachable")
+    assert (rows["other"]["host"], rows["other"]["state"]) == ("one, two", "two battery not active")
+
+
+@pytest.mark.parametrize(
+    ("labels", "robots"),
+    [
+        (["indoor"], {"scout_1", "scout_2", "scout_3"}),
+        (["scout"], {"scout_1", "scout_2", "scout_3"}),
+        (["indoor", "scout_2"], {"scout_2"}),
+        (["other"], {"other"}),
+    ],
+)
+def test_a_mission_starts_on_the_robots_that_have_all_labels(
+    path: str, capsys: pytest.CaptureFixture[str], labels: list[str], robots: set[str]
+) -> None:
+    options = [word for one in labels for word in ("--label", one)]
+    assert main(["fleet", "run", "patrol", path, "--set", "rounds=3", *options]) == 0
+    told = capsys.readouterr().out
+    lines = [line for line in told.splitlines() if "mission run patrol --set rounds=3" in line]
+    assert {line.rpartition(" ")[2] for line in lines} == robots
+
+
+def test_the_logs_of_all_are_shown_with_their_robots(path: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["fleet", "logs", path, "--label", "scout", "-n", "3"]) == 0
+    assert "two scout_2 | logs scout_2 --level info -n 3" in capsys.readouterr().out
+
+
+def test_an_unknown_label_is_a_finding_with_those_that_exist(
+    path: str, capsys: pytest.CaptureFixture[str], golden: Golden
+) -> None:
+    assert main(["fleet", "ls", path, "--label", "indor"]) == 1
+    golden.check("RBX6130.txt", capsys.readouterr().err)
+    assert main(["fleet", "ls", path, path]) == 1
+    assert "RBX6121" in capsys.readouterr().err
