@@ -26,6 +26,13 @@ THREADS = "(rx: (worker_threads: 2), acc: (handover: rx), net: (handover: rx), a
 By default there are six, and a message passes three of them: one sees it, one reads it, one watches meanwhile. Those
 that send must not be those that receive, or Zenoh waits for itself.
 """
+_THREADS_WITH_LINKS = "(rx: (worker_threads: 2))"
+"""Which threads a router has that is linked with others: those of Zenoh's defaults.
+
+What computes the ways between routers must not run where messages are received. A link's end wakes it on the thread
+that then waits for that link. Until the ways are computed, a link that is made again counts as known, and its routers
+do not tell each other what they subscribe to and serve.
+"""
 _RETRY = {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 2}
 _PRIORITIES = {"high": "interactive_high", "medium": "data", "low": "background"}
 _TAKEN = ("os error 98", "Unable to acquire lock")  # what Zenoh says of an endpoint in use
@@ -213,7 +220,7 @@ def open_router(endpoint: str, link: RouterLink = NO_LINK) -> zenoh.Session:
         OSError: if `endpoint` is taken.
     """
     try:
-        return _opened(router_settings(endpoint, link))
+        return _opened(router_settings(endpoint, link), _THREADS_WITH_LINKS if link.listen or link.connect else THREADS)
     except zenoh.ZError as error:
         if not any(cause in str(error) for cause in _TAKEN):
             raise
@@ -232,8 +239,8 @@ def open_exchange(link: RouterLink) -> zenoh.Session:
         raise OSError(errno.EADDRINUSE, f"{' and '.join(link.listen)} cannot be opened: {error}") from error
 
 
-def _opened(settings: Mapping[str, object]) -> zenoh.Session:
-    os.environ.setdefault("ZENOH_RUNTIME", THREADS)  # read once, when the first session of a process opens
+def _opened(settings: Mapping[str, object], threads: str = THREADS) -> zenoh.Session:
+    os.environ.setdefault("ZENOH_RUNTIME", threads)  # read once, when the first session of a process opens
     return zenoh.open(_config(settings))
 
 

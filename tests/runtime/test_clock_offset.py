@@ -94,7 +94,8 @@ def test_hosts_learn_how_far_their_clocks_are_apart_and_strangers_are_ignored() 
 
     def line(host: str, other: str, ahead: int) -> HostLine:
         share = Share(host, (OtherHost(other, ()),))
-        return HostLine("bot", share, _Wire(listeners), lambda one: heard.update({host: one}), print, stamp(ahead))
+        told = lambda one: heard.update({host: one})  # noqa: E731
+        return HostLine("bot", share, _Wire(listeners), told, print, stamp(ahead), lambda *_: None)
 
     desk, robot = line("desk", "robot", 0), line("robot", "desk", ahead)
     for _ in range(2):

@@ -143,14 +143,16 @@ class PatrolOnHosts:
         """Return when it first stood still after `since`, if it did."""
         return next((at for at, moves in self.motion() if at > since and not moves), None)
 
-    @staticmethod
-    def wait_until(holds: Callable[[], bool], within: float = LONGEST) -> None:
+    def wait_until(self, holds: Callable[[], bool], within: float = LONGEST) -> None:
         """Wait until something holds.
 
         Raises:
-            AssertionError: if it takes longer.
+            AssertionError: if it takes longer; it shows how the log of each host ends.
         """
         deadline = time.monotonic() + within
         while not holds():
-            assert time.monotonic() < deadline, "it did not happen in time"
+            assert time.monotonic() < deadline, f"it did not happen in time\n{self._ends_of_logs()}"
             time.sleep(0.02)
+
+    def _ends_of_logs(self) -> str:
+        return "\n".join(line for host in self.hosts.addresses for line in [host, *self.log(host).splitlines()[-30:]])

@@ -32,7 +32,8 @@ class Line:
         self.transport = ZenohTransport(open_router(tcp_endpoint(free_port()), link), lambda owner, call: call())
         share = Share(host, (OtherHost(other, (), False),), access=(HostAccess(other, (), (), ()),))
         heard = self.heard.append
-        self.line = HostLine(ROBOT, share, self.transport, lambda report: heard(report.host), heard, time_ns)
+        told = lambda report: heard(report.host)  # noqa: E731
+        self.line = HostLine(ROBOT, share, self.transport, told, heard, time_ns, lambda *_: None)
         self.report = HostReport(host, "1", f"run of {host}")
 
 

@@ -8,7 +8,7 @@ would let all pass as silently.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 
@@ -55,7 +55,8 @@ class HostLine:
     """Sends the reports of this host; `heard` is called with those of the others, in the scheduler's thread.
 
     `passed` is called with the reason if a message of another host came through that is denied. `stamp` is wall-clock
-    time [ns]; reports both ways tell how far the clocks of two hosts are apart.
+    time [ns]; reports both ways tell how far the clocks of two hosts are apart. `judge` takes of each report its host,
+    when it was sent, and what that host had heard.
     """
 
     def __init__(
@@ -66,8 +67,9 @@ class HostLine:
         heard: Callable[[HostReport], None],
         passed: Callable[[str], None],
         stamp: Callable[[], int],
+        judge: Callable[[str, int, Mapping[str, Echo]], None],
     ) -> None:
-        self._heard, self._passed, self._transport = heard, passed, transport
+        self._heard, self._passed, self._transport, self._judge = heard, passed, transport, judge
         self._stamp, self._host = stamp, share.host
         self._echoes: dict[str, Echo] = {}
         self._filters: dict[str, OffsetFilter] = {}
@@ -103,3 +105,4 @@ class HostLine:
         own = told.heard.get(self._host)
         clock = self._filters.setdefault(host, OffsetFilter()).feed(own, answer) if own else None
         self._heard(replace(told.report, clock=clock))
+        self._judge(host, told.sent, told.heard)

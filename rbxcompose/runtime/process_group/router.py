@@ -25,6 +25,8 @@ from rbxcompose.levels import Level
 from rbxcompose.plan.dump import load
 from rbxcompose.plan.model import Exchange, Plan, Share
 from rbxcompose.runtime import channel as say
+from rbxcompose.runtime.clock_offset import Echo
+from rbxcompose.runtime.deaf_links import DeafLinks
 from rbxcompose.runtime.host_report import HostReport
 from rbxcompose.runtime.process_group.driver import RealTimeDriver
 from rbxcompose.runtime.process_group.host_line import HostLine
@@ -59,6 +61,8 @@ class Router:
         self._exchange: Closable | None = None
         self._scheduler = Scheduler()
         self._link = _link(plan, plan.share) if plan.share else NO_LINK
+        self._deaf_links = DeafLinks(plan.share.host if plan.share else "", clock.now())
+        self._must_reopen = False
 
     def run(self) -> None:
         """Run until it is over."""
@@ -83,6 +87,7 @@ class Router:
                 self._open(endpoint)
             case say.ToHosts(report) if self._hosts is not None:
                 self._hosts.tell(report)
+                self._deaf_links.tell(self._clock.now())
             case say.ToHosts():
                 pass  # it is not open yet; the next report comes soon
             case say.Adopt(plan):
@@ -99,6 +104,8 @@ class Router:
     def beat(self) -> None:
         """Report to the supervisor and the watchdog that the loop runs."""
         self._watchdog.feed()
+        if self._must_reopen:
+            self._reopen()
         self._channel.flush()
         if not self._channel.is_behind:
             self._channel.send(say.Alive(self._clock.now()))
@@ -119,9 +126,8 @@ class Router:
             self._transport = ZenohTransport(session, self._inbox.put)
             self._transport.serve(probe_key(self._plan.robot), answer)
             if self._plan.share is not None:
-                self._hosts = HostLine(
-                    self._plan.robot, self._plan.share, self._transport, self._heard, self._fail, self._clock.stamp
-                )
+                told = self._heard, self._fail, self._clock.stamp, self._judge
+                self._hosts = HostLine(self._plan.robot, self._plan.share, self._transport, *told)
             problem = self._share(self._plan.exchange, self._transport) if self._plan.exchange else ""
             self._channel.send(say.Failed("", problem) if problem else say.Configured(wanted))
             return
@@ -150,8 +156,19 @@ class Router:
         """Follow another plan: open the session again, with its links, at the endpoint that all others know."""
         self._plan, self._link = plan, _link(plan, plan.share) if plan.share else NO_LINK
         if self._transport is not None:
-            self._close()
-            self._open(self._endpoint)
+            self._reopen()
+
+    def _reopen(self) -> None:
+        self._must_reopen = False
+        self._close()
+        self._open(self._endpoint)
+
+    def _judge(self, host: str, sent: int, heard: Mapping[str, Echo]) -> None:
+        """Have the links opened again if another host and this one do not hear each other though there is a way."""
+        deaf = self._deaf_links.hear(host, sent, heard, self._clock.now())
+        if deaf is not None:
+            self._warn("robot", f"host '{deaf}' is there, but does not answer; the links are opened again")
+            self._must_reopen = True
 
     def _heard(self, report: HostReport) -> None:
         self._channel.send(say.FromHost(report))
