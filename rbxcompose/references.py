@@ -92,8 +92,13 @@ class Refers:
 
     def _unknown(self, name: str, there: Mapping[str, object]) -> PydanticCustomError:
         valid = there if self.kind in (LINK, JOINT) else list(there)  # theirs are known, others may be being read
-        _, kind = PREFIXED.get(self.kind, ("", self.kind))
-        context = {"kind": kind, "name": name, "valid": valid, "what": f"{plural(kind)} of this robot"}
+        prefix, kind = PREFIXED.get(self.kind, ("", self.kind))
+        context: dict[str, object] = {"kind": kind, "name": name}
+        if prefix and not there:
+            own = name.removeprefix(prefix)
+            context["help"] = f"add '{own}' below '{plural(kind)}', or write a path such as '/dev/ttyUSB0'"
+        else:
+            context |= {"valid": valid, "what": f"{plural(kind)} of this robot"}
         return PydanticCustomError(self.kind, "there is no {kind} '{name}'", context)
 
 

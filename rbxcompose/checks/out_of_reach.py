@@ -80,7 +80,16 @@ def _place(one: DrivenJoint, *, is_shifted: bool) -> Span:
 
 def _remedy(one: DrivenJoint, least: float, greatest: float) -> str:
     if least >= greatest:
-        return "check 'neutral', 'offset' and 'invert': no position is within both"
+        return _beyond_the_ticks(one) or "check 'neutral', 'offset' and 'invert': no position is within both"
     unit, per = ("mm", 0.001) if one.slides else ("deg", math.pi / 180)
     lower, upper = math.ceil(least / per - 1e-6), math.floor(greatest / per + 1e-6)
     return f"limit it: 'position: [{lower} {unit}, {upper} {unit}]' below its 'limits'"
+
+
+def _beyond_the_ticks(one: DrivenJoint) -> str:
+    for servo in one.joint.servos:
+        first, last = servo.ends
+        if not first <= servo.neutral <= last:
+            middle = f"the middle, 'neutral: {servo.model.family.centre}', is the default"
+            return f"the ticks of servo {servo.id}, {servo.model.name}, go from {first} to {last}: {middle}"
+    return ""

@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
 import yaml
 
-from rbxcompose.findings import Finding, Related, Severity, Span, kind
+from rbxcompose.findings import Finding, Related, Severity, Span, kind, replacement
 from rbxcompose.manifest.limits import ALIAS_NODES, DEPTH, KEY, KEYS, TEXT
 from rbxcompose.manifest.parser_error import QUOTE_HELP, QUOTES_NEEDED
 from rbxcompose.manifest.scalars import number_trouble
@@ -145,6 +146,7 @@ about: "Room #3"
 REMOVE, REPLACE = "!remove", "!replace"
 _MOST_FINDINGS = 100  # of one file: nobody makes more of these mistakes by hand
 _SWALLOWED = re.compile(r" +(#[^\s#].*)")
+_TIGHT = re.compile(r"([a-z][a-z0-9_]*:)(?!//)(?=\S)")  # `x:1`, without the space that makes x a key
 
 
 def span_of(node: yaml.Node, file: str) -> Span:
@@ -323,14 +325,26 @@ class Walk:
             key = self._key(key_node)
             if key is None:
                 continue
+            entry = Entry(key, value)
             if node.flow_style and not is_cut and self._is_missing(value) and not self._has_colon(key_node):
-                message = f"'{plain(key.text, 60)}' has no value"
-                alone = f"; for the value of a name in a mission, write '${key.text}'" if len(node.value) == 1 else ""
-                help_text = f"inside {{}}, each key needs a value: 'key: value'{plain(alone, 120)}"
-                self.add(NOT_A_KEY.at(key.span, message, help=help_text))
-            self._check_comment(value)
-            self._enter(own, Entry(key, value))
+                entry = self._without_value(key, value, is_alone=len(node.value) == 1)
+            self._check_comment(entry.value)
+            self._enter(own, entry)
         return MappingNode({**merged, **own}, span_of(node, self.file), tag), size + len(merged), height + 1
+
+    def _without_value(self, key: ScalarNode, value: TreeNode, *, is_alone: bool) -> Entry:
+        """Report a key inside `{}` that has no value; return what was meant: of `x:1`, the key and its value."""
+        if key.plain and (tight := _TIGHT.match(key.text)):
+            middle = key.span.column + tight.end(1)
+            before = key.span._replace(end_line=key.span.line, end_column=middle)
+            fix = replacement(before, tight[1], f"{tight[1]} ")
+            self.add(NOT_A_KEY.at(before, "a space is missing after this colon", help="write 'key: value'", fix=fix))
+            meant = replace(key, text=key.text[tight.end(1) :], span=key.span._replace(column=middle))
+            return Entry(replace(key, text=tight[1][:-1], span=before), meant)
+        alone = f"; for the value of a name in a mission, write '${key.text}'" if is_alone else ""
+        help_text = f"inside {{}}, each key needs a value: 'key: value'{plain(alone, 120)}"
+        self.add(NOT_A_KEY.at(key.span, f"'{plain(key.text, 60)}' has no value", help=help_text))
+        return Entry(key, value)
 
     def _has_colon(self, key: yaml.Node) -> bool:
         """Return whether a colon follows a key, so that its value was left out on purpose."""

@@ -117,3 +117,22 @@ def test_a_start_mission_of_the_command_line_is_to_be_named_in_the_robot(tmp_pat
 def test_a_start_mission_that_lies_nowhere_is_told_as_before(tmp_path: Path) -> None:
     found = list(check_text(HEAD + "start: delivery\n", tmp_path).compilation.report)
     assert [one.help for one in found if one.code == "RBX3009"] == [""]
+
+
+def test_a_port_of_a_device_without_devices_is_told_how_to_declare_it(tmp_path: Path) -> None:
+    finding = only(HEAD + "buses:\n  servos: {type: dynamixel, port: 'dev:u2d2'}\n", tmp_path)
+    assert finding.help == "add 'u2d2' below 'devices', or write a path such as '/dev/ttyUSB0'"
+
+
+def test_a_neutral_tick_beyond_those_of_the_servo_is_told_its_range(tmp_path: Path) -> None:
+    (tmp_path / "body.urdf").write_text(
+        '<robot name="x"><link name="a"/><link name="b"/><joint name="pan" type="revolute"><parent link="a"/>'
+        '<child link="b"/><axis xyz="0 0 1"/><limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>',
+        encoding="utf-8",
+    )
+    servo = "actuators:\n  pan: {bus: servos, id: 1, model: AX-12A, neutral: 2048}\njoints:\n  pan: {actuator: pan}\n"
+    bus = "body: {urdf: body.urdf}\nbuses:\n  servos: {type: dynamixel, port: /dev/ttyUSB0}\n"
+    codes = {one.code: one.help for one in check_text(HEAD + bus + servo, tmp_path).compilation.report}
+    assert codes["RBX2225"] == (
+        "the ticks of servo 1, AX-12, go from 0 to 1023: the middle, 'neutral: 512', is the default"
+    )

@@ -23,7 +23,7 @@ from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.analysis.effects import written
 from rbxcompose.missions.language.spans import expression_of
 from rbxcompose.missions.program.answers import Skipped
-from rbxcompose.missions.program.program import MissionNode, Program
+from rbxcompose.missions.program.program import MissionNode, Program, RobotNames
 
 Constants = Mapping[str, Value]  # values of `$names` that never change
 
@@ -111,10 +111,11 @@ def is_simple(node: MissionNode) -> bool:
     return not any(isinstance(part, Index | FieldAccess | Arithmetic) for tree in trees for part, _ in walk(tree))
 
 
-def is_sure(node: MissionNode, program: Program) -> bool:
+def is_sure(node: MissionNode, program: Program, robot: RobotNames) -> bool:
     """Return whether a node reads only what exists from the start, in ways that cannot fail."""
     read = {name.name for asked in node.asked for name in asked.expression.names}
-    others = read - program.inputs.keys() - program.data.keys()
+    states = robot.values.keys() - robot.events  # a mission begins once they have arrived
+    others = read - program.inputs.keys() - program.data.keys() - states
     if not others <= program.items:
         return False
     parts = (part for asked in node.asked for part, _ in walk(asked.expression.tree))

@@ -41,22 +41,23 @@ def after_forever(mission: Examined) -> Iterator[Finding]:
     """
     for node in mission.program.nodes:
         if found := _barrier(mission.program, node, mission.ending):
-            barrier, following, why = found
+            barrier, following, why, cure = found
             yield after_forever.at(
                 following.span,
                 f"this step is never reached: the one before it {why}",
+                help=cure,
                 related=[Related(barrier.span, "this one")],
             )
 
 
-def _barrier(program: Program, node: MissionNode, ending: Ending) -> tuple[MissionNode, MissionNode, str] | None:
+def _barrier(program: Program, node: MissionNode, ending: Ending) -> tuple[MissionNode, MissionNode, str, str] | None:
     """Return the first step after which none can run, the next step, and why."""
     steps = [program.nodes[child] for child in node.children]
     for step, following in pairwise(steps) if node.step.goes_on_after else ():
         if ending.of(step.number).counting_as(node.step.goes_on_after):
             continue
         if node.step.goes_on_after == SUCCEEDS:
-            return step, following, "never ends in success"
+            return step, following, "never ends in success", "put this one before it, or let that one end in success"
         if never_skipped(program, step):
-            return step, following, "never fails"
+            return step, following, "never fails", "put this one before it: a fallback goes on after a failure"
     return None

@@ -56,4 +56,4 @@ class LogStep(Deed):
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return that it fails only if it cannot read a value."""
-        return ALWAYS_SUCCEEDS if is_sure(node, endings.program) else ANY
+        return ALWAYS_SUCCEEDS if is_sure(node, endings.program, endings.robot) else ANY

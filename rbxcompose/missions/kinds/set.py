@@ -57,7 +57,7 @@ class SetStep(Deed):
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return that it fails only if it cannot read a value."""
-        return ALWAYS_SUCCEEDS if is_sure(node, endings.program) else ANY
+        return ALWAYS_SUCCEEDS if is_sure(node, endings.program, endings.robot) else ANY
 
     def text(self, node: MissionNode) -> str:
         """Return the assignments as text."""
