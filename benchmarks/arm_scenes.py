@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, files
 from pathlib import Path
@@ -19,6 +19,7 @@ from rbxcompose.body.model import Geometry
 from rbxcompose.geometry import Transform3, quaternion_from_rpy
 from rbxcompose.motion.arm_figures import ended
 from rbxcompose.motion.inverse_kinematics import PoseTarget, solved
+from rbxcompose.motion.problem_sets import MotionProblem
 from rbxcompose.motion.scene import PlacedObject
 
 Array = NDArray[np.float64]
@@ -47,6 +48,11 @@ class BoxProblem:
             PlacedObject(f"box{number}", Geometry("box", size), ROOT_LINK, Transform3(middle))
             for number, (size, middle) in enumerate(self.boxes)
         )
+
+    def problem(self, joints: Sequence[str]) -> MotionProblem:
+        """Return it in the form of published ones."""
+        start, goal = (dict(zip(joints, one.tolist(), strict=True)) for one in (self.start, self.goal))
+        return MotionProblem(self.scenario, "", start, goal, self.objects)
 
 
 def described(file: str) -> Path | None:

@@ -7,28 +7,34 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.arm_scenes import PANDA, ROOT_LINK, BoxProblem, described, panda, problems
+from benchmarks.arm_scenes import PANDA, described, panda, problems
 from benchmarks.measuring import ROOT, Row, Samples
 from rbxcompose.arm_config import ArmConfig, ArmWorks
 from rbxcompose.body.description import Description
+from rbxcompose.body.link_pairs import pair_of
 from rbxcompose.body.urdf import read_body
 from rbxcompose.body.xml_reader import XmlElement, read_urdf
 from rbxcompose.compiler import compile_robot
 from rbxcompose.control.limits import MotionLimits
 from rbxcompose.motion.arm_figures import NO_TRIES, Tries, call_time, free_pairs, inverse_tries, motion_tries
 from rbxcompose.motion.arm_kinematics import ArmKinematics
+from rbxcompose.motion.compiled_chain import matrix_of
 from rbxcompose.motion.groups import chain
 from rbxcompose.motion.inverse_kinematics import SolverSettings
 from rbxcompose.motion.joint_space import ArmJoint, JointSpace, interpolated
+from rbxcompose.motion.problem_sets import MotionProblem, problem_files, read_problem
+from rbxcompose.motion.second_checker import SecondChecker
 
-TARGETS, MOTIONS, PROBLEMS, EXACT, STEP = 1000, 40, 10, 1e-4, 0.005
+TARGETS, MOTIONS, PROBLEMS, SOME, EXACT, STEP = 1000, 40, 10, 30, 1e-4, 0.005
 PEER = "RBXCOMPOSE_ROBOPLAN"  # names a Python that has RoboPlan, if this one has not
+PUBLISHED = "RBXCOMPOSE_PROBLEMS"  # names the folder of a robot with an arm, and of published problems below it
 ARMS = {
     "Panda": (PANDA, "panda_link0", "panda_hand"),
     "UR5": ("ur_description/urdf/ur5_robot.urdf", "base_link", "tool0"),
@@ -46,7 +52,7 @@ def rows() -> list[Row]:
             found += _kinematics(name, *_arm(path, base, tip))
     works = _works("porter")
     found += _kinematics("porter, as Fetch", works.kinematics, works.space)
-    return [*found, *_motions(), *_problems()]
+    return [*found, *_motions(), *_problems(), *_published()]
 
 
 def _kinematics(name: str, arm: ArmKinematics, space: JointSpace) -> list[Row]:
@@ -100,7 +106,7 @@ def _motions() -> list[Row]:
     works = _works("pi_robot")
     second = works.second_checker(())
     tries = motion_tries(works.planner, free_pairs(works.planner, MOTIONS, 3), second.is_free_along, time.process_time)
-    how = "searched, timed and examined every 0.005 rad on the shapes of the whole body"
+    how = "searched, timed and examined every 0.0015 rad on the shapes of the whole body"
     return _told("a motion of pi_robot's arm between random positions", how, tries, 150)
 
 
@@ -108,16 +114,69 @@ def _problems() -> list[Row]:
     """Return the rows of our own problems for the Panda, by us and by RoboPlan."""
     if (path := described(PANDA)) is None:
         return []
-    works, total = panda(path), NO_TRIES
-    given = list(problems(works, PROBLEMS))
+    works = panda(path)
+    given = [one.problem(works.space.names) for one in problems(works, PROBLEMS)]
+    mine, theirs = _tried(works, path.read_text(encoding="utf-8"), given)
+    return _told("a motion of the Panda into boxes", f"{OWN}; searched, timed and examined", mine, None, theirs)
+
+
+def _published() -> list[Row]:
+    """Return the rows of published problems, by us and by RoboPlan, of each scenario in a folder that is named."""
+    if not (folder := os.environ.get(PUBLISHED)):
+        return []
+    made = compile_robot(folder, environment={}).robot
+    config = next(one.config for one in made.components.values() if isinstance(one.config, ArmConfig)) if made else None
+    if not isinstance(config, ArmConfig):
+        raise ValueError(f"{folder} has no arm")
+    works, given = ArmWorks(config, time.process_time), dict[str, list[MotionProblem]]()
+    for files in problem_files(Path(folder), SOME):
+        one = read_problem(*files, works.kinematics.body.root)
+        given.setdefault(one.scenario, []).append(one)
+    found = []
+    for scenario, some in given.items():
+        mine, theirs = _tried(works, config.urdf, some)
+        found += _told(f"{scenario} of MotionBenchMaker", f"{SOME}; searched, timed and examined", mine, 20.0, theirs)
+    return found
+
+
+def _tried(works: ArmWorks, urdf: str, given: Sequence[MotionProblem]) -> tuple[Tries, Tries | None]:
+    """Return how we do, and how RoboPlan does, if it is installed, with the same shapes and pairs."""
+    names, total, asked, seconds = works.space.names, NO_TRIES, list[object](), list[SecondChecker]()
     for one in given:
+        others = {name: at for name, at in one.start.items() if name not in names}
+        works.kinematics.place(others)
         works.place_objects(one.objects)
-        second = works.second_checker(one.objects)
-        total = total.with_(
-            motion_tries(works.planner, [(one.start, one.goal)], second.is_free_along, time.process_time)
-        )
-    peer = _roboplan(path, works, given)
-    return _told("a motion of the Panda into boxes", f"{OWN}; searched, timed and examined", total, None, peer)
+        second = works.second_checker(one.objects, others)
+        ends = [np.array([at[name] for name in names]) for at in (one.start, one.goal)]
+        total = total.with_(motion_tries(works.planner, [(ends[0], ends[1])], second.is_free_along, time.process_time))
+        seconds.append(second)
+        asked.append(_asked(works, one, others, [end.tolist() for end in ends]))
+    for name, file in works.meshes.items():
+        urdf = urdf.replace(f'"{name}"', f'"{file.absolute()}"')
+    return total, _roboplan({"urdf": urdf, "joints": names, "step": 0.02, "problems": asked}, seconds)
+
+
+def _asked(works: ArmWorks, one: MotionProblem, others: Mapping[str, float], ends: list[list[float]]) -> object:
+    """Return a problem for RoboPlan: pieces of objects are `NAME/NUMBER`; it watches the pairs that we do."""
+    pieces = {
+        f"{each.name}/{number}": (each.name, piece)
+        for each in one.objects
+        for number, piece in enumerate(each.all_pieces)
+    }
+    owners = {name: owner for name, (owner, _) in pieces.items()}
+    owners |= {name: name for name, link in works.kinematics.body.links.items() if link.collisions}
+    watched = works.checker(one.objects).watched_pairs
+    return {
+        "scenario": one.scenario,
+        "shapes": [
+            (name, piece.shape.kind, piece.shape.size, matrix_of(piece.pose).tolist())
+            for name, (_, piece) in pieces.items()
+        ],
+        "off": [pair for pair in combinations(owners, 2) if pair_of(*(owners[side] for side in pair)) not in watched],
+        "others": dict(others),
+        "start": ends[0],
+        "goal": ends[1],
+    }
 
 
 def _told(what: str, how: str, tries: Tries, most: float | None, peer: Tries | None = None) -> list[Row]:
@@ -140,24 +199,11 @@ def _told(what: str, how: str, tries: Tries, most: float | None, peer: Tries | N
     ]
 
 
-def _roboplan(path: Path, works: ArmWorks, given: Sequence[BoxProblem]) -> Tries | None:
-    """Return how RoboPlan does; None if it is not installed."""
+def _roboplan(asked: Mapping[str, object], seconds: Sequence[SecondChecker]) -> Tries | None:
+    """Return how RoboPlan does, whose paths are examined as ours are; None if it is not installed."""
     python = os.environ.get(PEER) or (sys.executable if find_spec("roboplan") is not None else "")
     if not python:
         return None
-    asked = {
-        "urdf": str(path),
-        "srdf": (path.parents[1] / "srdf/panda.srdf").read_text(encoding="utf-8"),
-        "packages": str(path.parents[4]),
-        "group": "arm",
-        "root": ROOT_LINK,
-        "joints": works.space.names,
-        "step": 0.02,
-        "problems": [
-            {"scenario": one.scenario, "boxes": one.boxes, "start": one.start.tolist(), "goal": one.goal.tolist()}
-            for one in given
-        ],
-    }
     done = subprocess.run(
         [python, str(Path(__file__).with_name("roboplan_ends.py"))],
         input=json.dumps(asked),
@@ -167,13 +213,12 @@ def _roboplan(path: Path, works: ArmWorks, given: Sequence[BoxProblem]) -> Tries
         check=True,
     )
     total = NO_TRIES
-    for one, answer in zip(given, json.loads(done.stdout), strict=True):
+    for second, answer in zip(seconds, json.loads(done.stdout), strict=True):
         path_found = np.array(answer["path"])
         if not len(path_found):
             total = total.with_(Tries(1, 0, (answer["time"],)))
             continue
         length = float(np.linalg.norm(np.diff(path_found, axis=0), axis=1).sum())
-        second = works.second_checker(one.objects)
         is_free = all(map(second.is_free, interpolated(path_found, STEP)))
         total = total.with_(Tries(1, 1, (answer["time"],), (length,), int(not is_free)))
     return total

@@ -1,14 +1,20 @@
-"""What a robot of a fleet costs, by the number of robots: `nice python -m benchmarks.bench_fleet own 1 3 10 30 100`.
+"""What a robot of a fleet costs, by the number of robots: `python -m benchmarks.bench_fleet fleet domains links 100`.
 
-Each robot is the patrol robot with an ideal simulator, in a system on this machine. A further robot, the watcher,
-subscribes to the odometry of each. The first word says how they are linked: by routers of their `own`, as robots of
-systems are, so the watcher takes what they share; as `domains` of one router, so that nobody can watch; or by `names`,
-namespaces of one domain and router. With `links`, processes are linked with that one router only.
+Each robot is the patrol robot with an ideal simulator, in a system on this machine, which patrols until it goes down;
+with `waiting`, it has no mission yet. With `fleet`, it has that profile: one process. A further robot, the watcher,
+subscribes to the odometry of each.
+One word says how they are linked: by routers of their `own`, as robots of systems are, so the watcher takes what they
+share; as `domains` of one router, so that nobody can watch; or by `names`, namespaces of one domain and router. With
+`links`, processes are linked with that one router only.
+
+A line below a row tells if this machine has too much to do: then processor and messages are what it has left for each.
+Each number of robots has eight minutes, and whatever happens, all robots go down.
 """
 
 from __future__ import annotations
 
 import contextlib
+import math
 import signal
 import statistics
 import subprocess
@@ -25,11 +31,15 @@ import zenoh
 from benchmarks.measuring import COMMAND, ROOT, memory_of, processor_time, program
 from rbxcompose.bus.zenoh_session import open_client, open_router
 from rbxcompose.runtime.folder import RobotFolder, RobotState
+from rbxcompose.runtime.processes import longest_wait, wait_until_ended, waits_of
 
-SETTLED, WATCHED, COUNTED = 5.0, 10.0, 4.0  # [s]
+SETTLED, WATCHED, COUNTED, LIMIT, ENDED = 5.0, 10.0, 4.0, 480, 60.0  # [s]
 NEEDED, LINK, KEPT = 0.13e9, 0.35e6, 2e9  # [bytes] of a robot, of each end of a link between processes, for all else
 PROCESSES, TRIES = 3, 20  # of a robot on the bus; of a visitor to get in
-OWN, DOMAINS, NAMES, LINKS = "own", "domains", "names", "links"
+VISITED = 10  # robots whose messages and tokens are counted
+WEIGHT = "-10"  # niceness of the one router among robots, some nine times the share of a processor
+LATE = 0.1  # share of the time that robots wait for a processor, from which on they are late
+OWN, DOMAINS, NAMES, LINKS, FLEET, WAITING = "own", "domains", "names", "links", "fleet", "waiting"
 ROUTER = "tcp/127.0.0.1:7440"
 SYSTEM = """
 rbx: 1
@@ -63,6 +73,9 @@ class FleetFigures:
     router_processor: float
     watcher_memory: float  # [bytes]; 0 if there is none
     watcher_processor: float
+    busy: float  # the share of this machine's processors that is in use, by whatever
+    late: float  # the share of the time in which a thread of a robot waits for a processor
+    restarted: int  # robots of which a process ended meanwhile; their figures are left out
 
     def line(self) -> str:
         """Return a row of the table."""
@@ -79,8 +92,22 @@ class FleetFigures:
             f"{self.router_processor:.1%}",
             f"{self.watcher_memory / 1e6:.0f} MB",
             f"{self.watcher_processor:.1%}",
+            f"{self.busy:.0%}",
+            f"{self.late:.0%}",
+            f"{self.restarted}",
         )
         return f"| {' | '.join(cells)} |"
+
+    @property
+    def warning(self) -> str:
+        """Return what to think of the figures if this machine has too much to do, else nothing."""
+        if self.late < LATE:
+            return ""
+        cores = psutil.cpu_count()
+        return (
+            f"Too much for {cores} processors: {self.busy:.0%} in use, robots wait {self.late:.0%} of the time. "
+            "Memory, tokens and links hold; times and shares of the processor do not.\n"
+        )
 
 
 def measured(number: int, how: str = OWN, *options: str) -> FleetFigures:
@@ -97,6 +124,7 @@ def measured(number: int, how: str = OWN, *options: str) -> FleetFigures:
         _write(path, number, how, options)
         system, began = str(path / "system.yaml"), time.perf_counter()
         with contextlib.nullcontext() if how == OWN else _one_router() as router:
+            signal.alarm(LIMIT)
             try:
                 program([*COMMAND, "up", system, "--host", "here", "-d"], environment)()
                 return _looked_at(path, how, time.perf_counter() - began, router)
@@ -104,20 +132,37 @@ def measured(number: int, how: str = OWN, *options: str) -> FleetFigures:
                 sys.stderr.write(f"{error.output}{error.stderr}")
                 raise
             finally:
-                program([*COMMAND, "down", system], environment)()
+                signal.alarm(0)
+                _bring_down(path)
+
+
+def _bring_down(folder: Path) -> None:
+    """End all robots at once, as a service manager would: `down` takes a program for each.
+
+    Raises:
+        RuntimeError: if one does not end.
+    """
+    deadline = time.monotonic() + ENDED
+    while supervisors := [one.supervisor for one in _states(folder).values() if one.is_supervised]:
+        for one in supervisors:
+            one.send_signal(signal.SIGTERM)
+        if wait_until_ended(supervisors, max(0.0, deadline - time.monotonic())):
+            raise RuntimeError(f"robots in {folder} do not go down")
 
 
 def _write(folder: Path, number: int, how: str, options: Collection[str]) -> None:
     """Write the manifests of a fleet."""
     text = (ROOT / "robots/turtlebot/robot.yaml").read_text(encoding="utf-8")
-    text = text.replace("../../missions", f"{ROOT}/missions")
+    mission = f"{{file: {ROOT}/missions/patrol.yaml, with: {{rounds: 1000}}}}"
+    text = text.replace("../../missions/patrol.yaml", mission)
+    text = text.replace("start: patrol\n", "") if WAITING in options else text
     links = "links: router, " if LINKS in options else ""
     bots = []
     for one in range(1, number + 1):
         bus = BUS[how].format(links=links, number=one, name=f"bot_{one}") if how in BUS else ""
         (folder / f"robot_{one}.yaml").write_text(text + bus, encoding="utf-8")
-        share = ", share: [odom]" if how == OWN else ""
-        bots.append(f"  bot_{one}: {{robot: robot_{one}.yaml{share}}}")
+        more = f"{', share: [odom]' if how == OWN else ''}{', profile: fleet' if FLEET in options else ''}"
+        bots.append(f"  bot_{one}: {{robot: robot_{one}.yaml{more}}}")
     if how != DOMAINS:
         bus = BUS[how].format(links=links, name="watcher") if how in BUS else ""
         seen = "".join(SEEN.format(one) for one in range(1, number + 1))
@@ -130,7 +175,9 @@ def _write(folder: Path, number: int, how: str, options: Collection[str]) -> Non
 def _one_router() -> Iterator[int]:
     """Run the router of all robots; yield its process."""
     words = [sys.executable, "-m", "benchmarks.bench_fleet", ROUTER]
-    process = subprocess.Popen(words, cwd=ROOT, stdin=subprocess.PIPE)
+    process = subprocess.Popen(words, cwd=ROOT, stdin=subprocess.PIPE, start_new_session=True)
+    with contextlib.suppress(OSError):  # only root may; Linux shares processors between sessions, of which it is one
+        Path(f"/proc/{process.pid}/autogroup").write_text(WEIGHT, encoding="ascii")
     try:
         yield process.pid
     finally:
@@ -140,45 +187,83 @@ def _one_router() -> Iterator[int]:
 
 def _looked_at(folder: Path, how: str, start: float, router: int | None) -> FleetFigures:
     time.sleep(SETTLED)
-    states = {path.parent.name: _state(path.parent) for path in (folder / "rbxcompose").glob("*/state.json")}
+    states = _states(folder)
     pids = {name: _pids(one) for name, one in states.items()} | {"": [router] if router else []}
-    before = {name: _processor(some) for name, some in pids.items()}
+    psutil.cpu_percent()
+    before = {name: _taken(some) for name, some in pids.items()}
     time.sleep(WATCHED)
-    used = {name: (_processor(some) - before[name]) / WATCHED for name, some in pids.items()}
+    busy = psutil.cpu_percent() / 100
+    after = {name: _taken(some) for name, some in pids.items()}
     bots = [name for name in states if name != "watcher"]
-    sent = _messages({name: states[name] for name in bots}, how)  # for a visitor, they take the way by the router
-    memory = {name: float(sum(map(memory_of, some))) for name, some in pids.items()}
-    found = [_tokens(states[name]) for name in bots]
+    steady = [name for name in bots if before[name] and after[name] and _pids_now(folder, name) == pids[name]]
+    if not steady:
+        raise RuntimeError("no robot kept its processes")
+    taken = {name: _between(before[name], after[name]) for name in (*steady, "watcher", "") if name in pids}
+    memory = {name: _memory(pids[name]) for name in taken}
+    visited = steady[:: math.ceil(len(steady) / VISITED)]
+    sent = _messages({name: states[name] for name in visited}, how)  # for a visitor, they take the way by the router
+    found = [_tokens(states[name]) for name in visited]
     return FleetFigures(
         len(bots),
         start,
-        statistics.median(memory[name] for name in bots),
-        statistics.median(used[name] for name in bots),
-        statistics.median(sent[name] for name in bots),
+        statistics.median(memory[name] for name in steady),
+        statistics.median(taken[name][0] for name in steady),
+        statistics.median(sent.values()),
         statistics.median(count for count, _ in found),
-        statistics.median(sum(map(_links, pids[name])) for name in bots),
+        statistics.median(sum(map(_links, pids[name])) for name in visited),
         statistics.median(seconds for _, seconds in found),
         memory[""],
-        used[""],
+        taken[""][0],
         memory.get("watcher", 0.0),
-        used.get("watcher", 0.0),
+        taken["watcher"][0] if "watcher" in taken else 0.0,
+        busy,
+        statistics.median(taken[name][1] for name in steady),
+        len(bots) - len(steady),
     )
 
 
-def _state(folder: Path) -> RobotState:
-    state = RobotFolder(folder).read_state()
-    if state is None:
-        raise RuntimeError(f"'{folder.name}' went down")
-    return state
+def _states(folder: Path) -> dict[str, RobotState]:
+    """Return the states of all robots that are up, by name."""
+    folders = sorted((folder / "rbxcompose").glob("*/state.json"))
+    found = {path.parent.name: RobotFolder(path.parent).read_state() for path in folders}
+    return {name: state for name, state in found.items() if state is not None}
 
 
 def _pids(state: RobotState) -> list[int]:
     return [state.supervisor.pid, *(process.pid for process in state.processes.values())]
 
 
-def _processor(pids: list[int]) -> float:
-    """Return the processor time of some processes so far [s]."""
-    return sum(map(processor_time, pids))
+def _pids_now(folder: Path, name: str) -> list[int]:
+    state = RobotFolder(folder / "rbxcompose" / name).read_state()
+    return _pids(state) if state is not None else []
+
+
+Taken = tuple[float, list[dict[str, float]]]  # processor time [s], and waits for a processor by thread [s]
+
+
+def _taken(pids: list[int]) -> Taken | None:
+    """Return what some processes have had so far; None if one has ended."""
+    try:
+        return sum(map(processor_time, pids)), list(map(waits_of, pids))
+    except FileNotFoundError:
+        return None
+
+
+def _between(before: Taken | None, after: Taken | None) -> tuple[float, float]:
+    """Return the shares of a processor that were had, and of the time that was waited; 0 for what has ended."""
+    if before is None or after is None:
+        return 0.0, 0.0
+    waited = max(map(longest_wait, before[1], after[1]), default=0.0)
+    return (after[0] - before[0]) / WATCHED, waited / WATCHED
+
+
+def _memory(pids: list[int]) -> float:
+    """Return the memory of some processes [bytes]; those that have ended have none."""
+    found = 0
+    for pid in pids:
+        with contextlib.suppress(FileNotFoundError, ProcessLookupError):
+            found += memory_of(pid)
+    return float(found)
 
 
 def _links(pid: int) -> int:
@@ -225,9 +310,10 @@ def _tokens(state: RobotState) -> tuple[int, float]:
 
 
 COLUMNS = (
-    "robots, start, memory, processor, messages/s, tokens, links, discovery, router, processor, watcher, processor"
+    "robots, start, memory, processor, messages/s, tokens, links, discovery, router, processor, watcher, processor, "
+    "busy, waits, restarted"
 )
-HEAD = f"| {COLUMNS.replace(', ', ' | ')} |\n|{' --- |' * 12}"
+HEAD = f"| {COLUMNS.replace(', ', ' | ')} |\n|{' --- |' * 15}"
 
 
 def main(words: list[str]) -> None:
@@ -238,10 +324,12 @@ def main(words: list[str]) -> None:
         session.close()  # type: ignore[no-untyped-call]
         return
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # all robots go down first
+    signal.signal(signal.SIGALRM, lambda *_: sys.exit(f"not measured within {LIMIT} s"))
     how = next((word for word in words if word in (OWN, DOMAINS, NAMES)), OWN)
     sys.stdout.write(f"{HEAD}\n")
     for count in [int(word) for word in words if word.isdigit()] or [1, 3]:
-        sys.stdout.write(f"{measured(count, how, *words).line()}\n")
+        figures = measured(count, how, *words)
+        sys.stdout.write(f"{figures.line()}\n{figures.warning}")
         sys.stdout.flush()
 
 

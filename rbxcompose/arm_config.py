@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
@@ -20,7 +20,8 @@ from rbxcompose.control.limits import MotionLimits
 from rbxcompose.geometry import Vector3
 from rbxcompose.hand_config import HandConfig
 from rbxcompose.motion.arm_kinematics import ArmKinematics
-from rbxcompose.motion.collisions import Checker, MeshChecker, SearchingChecker, Shapes
+from rbxcompose.motion.coal_shapes import Shapes
+from rbxcompose.motion.collisions import Checker, MeshChecker, SearchingChecker
 from rbxcompose.motion.groups import ArmGroup
 from rbxcompose.motion.inverse_kinematics import ANGLE_TOLERANCE, RESTARTS, TOLERANCE, SolverSettings
 from rbxcompose.motion.joint_space import ArmJoint, JointSpace, interpolated
@@ -30,6 +31,7 @@ from rbxcompose.motion.planner_types import AUTOMATIC, FAST
 from rbxcompose.motion.scene import PairDistance, PlacedObject
 from rbxcompose.motion.second_checker import SecondChecker
 from rbxcompose.motion.setting_up import always_colliding, load_libraries
+from rbxcompose.motion.ways_ahead import PlanningHelper
 from rbxcompose.units import ANGLE, LENGTH, Dimension
 
 WAY_STEP, MOST_OF_WAY = 0.05, 200  # [rad or m] between points that are shown of a way, and how many there are
@@ -46,6 +48,8 @@ class ArmJointConfig(Config):
     """Greatest speed."""
     acceleration: float | None = None
     """Greatest acceleration."""
+    jerk: float | None = None
+    """Greatest jerk of planned motions."""
     is_continuous: bool = False
     """Whether it turns without an end."""
     slides: bool = False
@@ -65,6 +69,8 @@ class ArmPlannerConfig(Config):
     """The same seed gives the same path."""
     simplify: bool = True
     """Whether a path that was found is shortened."""
+    processes: int = 1
+    """How many plan to several ways to or from an object at once."""
 
 
 class ArmSolverConfig(Config):
@@ -78,11 +84,13 @@ class ArmSolverConfig(Config):
     """How far the tip may be off [m], if a goal does not say."""
     angle_tolerance: float = ANGLE_TOLERANCE
     """How far it may be turned [rad], if a goal does not say."""
+    prefer: str | None = None
+    """The pose that joints should be near to where several positions do, if a goal does not say."""
 
     @property
     def settings(self) -> SolverSettings:
         """Return them for the search."""
-        return SolverSettings(self.restarts, self.time, self.tolerance, self.angle_tolerance)
+        return SolverSettings(self.restarts, self.time, self.tolerance, self.angle_tolerance, self.prefer or "")
 
 
 class LinkPairsConfig(Config):
@@ -139,7 +147,10 @@ def space_of(config: ArmConfig) -> JointSpace:
     return JointSpace(
         tuple(
             ArmJoint(
-                name, MotionLimits(one.lower, one.upper, one.velocity, one.acceleration), one.is_continuous, one.slides
+                name,
+                MotionLimits(one.lower, one.upper, one.velocity, one.acceleration, jerk=one.jerk),
+                one.is_continuous,
+                one.slides,
             )
             for name, one in config.joints.items()
         )
@@ -152,6 +163,13 @@ def description_of(config: ArmConfig) -> Description:
     if not isinstance(root, XmlElement):
         raise ValueError(root.message)
     return Description(config.urdf, read_body(root)[0], {name: Path(path) for name, path in config.meshes.items()})
+
+
+def mesh_bytes(config: ArmConfig) -> int:
+    """Return how large the files of the meshes are [bytes] that an arm plans with."""
+    links = description_of(config).body.links.values()
+    used = {shape.geometry.file for link in links for shape in link.collisions} & config.meshes.keys()
+    return sum(Path(config.meshes[name]).stat().st_size for name in used)
 
 
 class ArmWorks:
@@ -191,9 +209,11 @@ class ArmWorks:
         """Those that it plans among."""
         self.paddings = paddings
         """By which links keep away from them [m]."""
-        self._checker = self.checker(self.objects)
+        self._checker = self._checker_among(self.objects)
         type_ = config.planner.type
         is_compiled = type_ == FAST or (type_ == AUTOMATIC and is_fast and is_installed())
+        self.helpers: Sequence[PlanningHelper] = ()
+        """Those that plan elsewhere meanwhile."""
         self._fast = _hastened() if is_compiled else _as_it_is
         unlikely = frozenset(pairs.unlikely if pairs is not None else ())
         self.solver, one = config.kinematics.settings, config.planner
@@ -213,11 +233,15 @@ class ArmWorks:
         self.objects, self.paddings = tuple(objects), paddings
         own = (shape.geometry for link in self.kinematics.body.links.values() for shape in link.collisions)
         self._shapes.keep((*own, *(piece.shape for one in self.objects for piece in one.own_pieces)))
-        self._checker = self.checker(self.objects)
+        self._checker = self._checker_among(self.objects)
         self.planner.checker = self._fast(self._checker)
 
     def checker(self, objects: Iterable[PlacedObject]) -> MeshChecker:
         """Return what examines positions of the arm among some objects; raises as `place_objects` does."""
+        there = tuple(objects)
+        return self._checker if there == self.objects else self._checker_among(there)  # asked for each grasp
+
+    def _checker_among(self, objects: Iterable[PlacedObject]) -> MeshChecker:
         return MeshChecker(
             self.kinematics, self._description.meshes, self._allowed, objects, self.paddings, shapes=self._shapes
         )

@@ -7,7 +7,8 @@ from functools import partial
 from typing import Any
 
 from rbxcompose.geometry import Quaternion, Transform3, quaternion_from_rpy
-from rbxcompose.motion.arm_task import ArmGoal
+from rbxcompose.motion.arm_goal import ArmGoal
+from rbxcompose.motion.arm_task import ArmTask
 from rbxcompose.motion.inverse_kinematics import SOLVER, PoseTarget, SolverSettings
 from rbxcompose.motion.kept import Keep
 from rbxcompose.motion.parametrisation import Trajectory
@@ -103,14 +104,28 @@ def goal_of(message: ArmMessage, solver: SolverSettings = SOLVER) -> ArmGoal:
     )
     if isinstance(message, MoveArm.Goal):
         positions = dict(zip(message.joints, message.positions.tolist(), strict=False))
-        return ask(message.pose, positions, tolerance=message.tolerance)
+        return ask(message.remembered or message.pose, positions, tolerance=message.tolerance)
     target = PoseTarget(
         Transform3((message.x, message.y, message.z), _turn(message)),
         message.any_orientation,
         message.tolerance or solver.tolerance,
         message.angle_tolerance or solver.angle_tolerance,
+        message.any_position,
+        message.approximate,
     )
-    return ask(target=target, frame=message.frame)
+    return ask(target=target, frame=message.frame, prefer=message.prefer)
+
+
+def ended_as(message: Any, task: ArmTask) -> Any:
+    """Return the result of a goal, whose action is one of those that such a task carries out."""
+    failed, missed = task.failure, task.missed
+    words: dict[str, Any] = {"outcome": failed.reason, "message": failed.text} if failed is not None else {}
+    if isinstance(message, TraceArm.Goal):
+        words["fraction"] = task.share
+    if isinstance(message, ReachPose.Goal) and failed is None and missed is not None:
+        text = f"approximate: the tip is {missed[0] * 100:.1f} cm and {math.degrees(missed[1]):.1f} deg from the pose"
+        words = {"message": text, "approximate": True, "away": missed[0], "angle": missed[1]}
+    return action_of(message).Result(**words)
 
 
 def _keep(message: PathConstraints) -> Keep:

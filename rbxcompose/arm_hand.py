@@ -11,7 +11,7 @@ from typing import Any
 from rbxcompose.arm_config import ArmConfig, ArmWorks
 from rbxcompose.geometry import Quaternion, Transform3, quaternion_from_rpy
 from rbxcompose.hand_config import GraspModel, HandConfig
-from rbxcompose.motion.arm_task import ArmGoal
+from rbxcompose.motion.arm_goal import ArmGoal
 from rbxcompose.motion.grasps import Grasp
 from rbxcompose.motion.hand_task import Gripped, Hand, HandSite, HandTask
 from rbxcompose.motion.pick_task import PickGoal, PickTask

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import Field, WithJsonSchema
 
-from rbxcompose.config import Angle, Config, Length, LinkName, Time
+from rbxcompose.config import Angle, Config, Length, LinkName, Name, Time
 from rbxcompose.motion.planner_types import AUTOMATIC, PLANNERS
 
 PlannerName = Annotated[str, WithJsonSchema({"type": "string", "enum": list(PLANNERS)})]
@@ -36,6 +36,9 @@ class PlannerModel(Config):
     """The same seed gives the same path."""
     simplify: bool = True
     """Whether a path that was found is shortened."""
+    processes: int = Field(1, ge=1, le=8)
+    """How many processes plan to the next ways to an object, or to where it is put, while the first one is not found;
+    each beside the arm's own takes 170 MB."""
 
 
 class SolverModel(Config):
@@ -49,3 +52,5 @@ class SolverModel(Config):
     """How far the tip may be off, if a goal does not say."""
     angle_tolerance: Angle = Field(math.radians(0.5), gt=0)
     """How far it may be turned, if a goal does not say."""
+    prefer: Name | None = None
+    """The pose of the arm that its joints should be near to where several positions do, if a goal does not name one."""

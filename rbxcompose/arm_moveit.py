@@ -86,6 +86,18 @@ def inverse(arm: ProgrammedArm, request: GetPositionIK.Request) -> GetPositionIK
     return GetPositionIK.Response(error_code=late(most))
 
 
+class AnswersPrograms:
+    """Answers what programs for MoveIt ask about the kinematics of an arm."""
+
+    def on_forward(self: ProgrammedArm, request: GetPositionFK.Request) -> GetPositionFK.Response:
+        """Tell where links are."""
+        return forward(self, request)
+
+    def on_inverse(self: ProgrammedArm, request: GetPositionIK.Request) -> GetPositionIK.Response:
+        """Tell positions of joints that bring the tip to a pose."""
+        return inverse(self, request)
+
+
 def is_turned_away(goal: ServedGoal[Any, Any, Any]) -> bool:
     """Return whether a goal that comes while another one is carried out only wants a plan; then it has ended."""
     if not isinstance(goal.request, MoveGroup.Goal) or not goal.request.planning_options.plan_only:

@@ -292,6 +292,9 @@ def nearest(name: str, valid: Iterable[str], *, most: int = 1, cutoff: float = S
     return _closest(name, sorted(names), most, cutoff)
 
 
+_LOOK_ALIKE = str.maketrans("1I0O", "lloo")
+
+
 def _closest(name: str, names: list[str], most: int, cutoff: float) -> list[str]:
     """Do what `difflib.get_close_matches` does, but count the work."""
     may_guess(_PER_LOOKUP + _PER_NAME * len(names))
@@ -304,8 +307,13 @@ def _closest(name: str, names: list[str], most: int, cutoff: float) -> list[str]
         if matcher.quick_ratio() < cutoff or not may_guess(_PER_RATIO + len(one) * len(name)):
             continue
         if (ratio := matcher.ratio()) >= cutoff:
-            near.append((ratio, one))
-    return [one for _, one in heapq.nlargest(most, near)]
+            near.append((ratio, _seen(one) == _seen(name), one))
+    return [one for *_, one in heapq.nlargest(most, near)]
+
+
+def _seen(name: str) -> str:
+    """Return a name as it looks: `corner_l` is `corner_1`."""
+    return name.translate(_LOOK_ALIKE)
 
 
 @lru_cache(maxsize=8)

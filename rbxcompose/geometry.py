@@ -101,6 +101,18 @@ def quaternion_from_rpy(roll: float, pitch: float, yaw: float) -> Quaternion:
     return multiply(quaternion_from_yaw(yaw), multiply(about_y, about_x))
 
 
+def rpy_from_quaternion(rotation: Quaternion) -> tuple[float, float, float]:
+    """Return roll, pitch and yaw [rad] of a unit quaternion, as `quaternion_from_rpy` takes them.
+
+    Straight up or down, where only a sum of roll and yaw counts, roll is 0.
+    """
+    x, y, z, w = rotation
+    sine = 2 * (w * y - z * x)
+    if abs(sine) > 1 - 1e-12:
+        return 0.0, math.copysign(math.pi / 2, sine), wrap_angle(2 * math.atan2(z, w))
+    return math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)), math.asin(sine), yaw_of(rotation)
+
+
 def yaw_of(rotation: Quaternion) -> float:
     """Return the yaw [rad] of a unit quaternion: the direction of its x axis seen from above."""
     x, y, z, w = rotation

@@ -318,6 +318,17 @@ def _shortened(text: str) -> str:
     return text if len(text) <= 20 else f"{text[:20]}..."
 
 
+_LEAST = 1e-9  # [s or Hz]: what is less, or more than its inverse, is no rate of anything
+
+
+def _turned_round(wanted: Dimension, read: Quantity) -> str:
+    """Return a period as a rate, or a rate as a period, if one is written for the other."""
+    if not _LEAST < read.value < 1.0 / _LEAST or {wanted, read.dimension} != {TIME, FREQUENCY}:
+        return ""
+    shown = format_quantity(float(f"{1.0 / read.value:.6g}"), wanted)
+    return f"once every {shown}: write '{shown}'" if wanted == TIME else f"a period as a rate: write '{shown}'"
+
+
 def to_si(value: object, dimension: Dimension) -> float:
     """Return the SI value of a text, a bare number (already SI) or a quantity, which must be of this dimension.
 
@@ -338,7 +349,7 @@ def to_si(value: object, dimension: Dimension) -> float:
     if read.dimension == NUMBER and (fix := bare_number_help(dimension, read.value)):
         raise UnitError(f"must be {dimension.phrase}", detail="the unit is missing", help=fix)
     if read.dimension not in (dimension, NUMBER):
-        help_text = minutes_help(value) if dimension == TIME else ""
+        help_text = _turned_round(dimension, read) or (minutes_help(value) if dimension == TIME else "")
         raise UnitError(_must_be(dimension), detail=f"this is {read.dimension.phrase}", help=help_text)
     _require_moderate(read.value)
     return read.value

@@ -41,19 +41,39 @@ class BodyFile:
 
     def meshes(self, root: XmlElement) -> dict[str, Path]:
         """Return the mesh files that exist, by their names in the URDF; they lie in the project or in a package."""
-        roots = [project_of(self.path), library_root(), *self.packages.values()]
         found = {name: mesh for name in set(mesh_names(root)) if (mesh := self._mesh(name)) is not None}
-        return {name: mesh for name, mesh in found.items() if any(mesh.is_relative_to(one) for one in roots)}
+        return {name: mesh for name, mesh in found.items() if self._is_ours(mesh)}
+
+    def meant_meshes(self, root: XmlElement) -> dict[str, str]:
+        """Return, for each mesh that is not there, the name of a file that differs only in its capitals."""
+        missing = set(mesh_names(root)) - self.meshes(root).keys()
+        return {name: near for name in missing if (near := self._in_other_letters(name))}
+
+    def _in_other_letters(self, name: str) -> str:
+        place, _, own = name.rpartition("/")
+        try:
+            beside = self._place(f"{place}/x" if place else "x")
+            files = sorted(beside.parent.iterdir()) if beside and self._is_ours(beside) else []
+        except (OSError, ValueError):
+            return ""
+        near = next((one.name for one in files if one.name.casefold() == own.casefold()), "")
+        return f"{place}/{near}" if near and place else near
+
+    def _is_ours(self, path: Path) -> bool:
+        return any(path.is_relative_to(one) for one in (project_of(self.path), library_root(), *self.packages.values()))
 
     def _mesh(self, name: str) -> Path | None:
-        package, _, inside = name.removeprefix(PACKAGE).partition("/")
-        is_packaged = name.startswith(PACKAGE)
-        folder = {LIBRARY: library_root(), **self.packages}.get(package) if is_packaged else self.path.parent
         try:
-            path = (folder / (inside if is_packaged else name.removeprefix("file://"))).resolve() if folder else None
+            path = self._place(name)
             return path if path is not None and path.is_file() else None
         except (OSError, ValueError):  # a name too long for the system, a zero byte
             return None
+
+    def _place(self, name: str) -> Path | None:
+        package, _, inside = name.removeprefix(PACKAGE).partition("/")
+        is_packaged = name.startswith(PACKAGE)
+        folder = {LIBRARY: library_root(), **self.packages}.get(package) if is_packaged else self.path.parent
+        return (folder / (inside if is_packaged else name.removeprefix("file://"))).resolve() if folder else None
 
 
 @dataclass(frozen=True, slots=True)

@@ -110,10 +110,12 @@ def read_matrix(text: str, shown: str, body: Body, digest: str) -> tuple[Collisi
 def digest_of(body: Body, meshes: Mapping[str, Path]) -> str:
     """Return a short text that differs for bodies whose joints or shapes of collisions differ.
 
-    Colours, masses and comments do not count; `meshes` are the files of meshes by their names in the URDF.
+    Colours, masses, comments and virtual joints do not count; `meshes` are the files of meshes by their names in the
+    URDF.
     """
     found = sha256()
-    for row in (*sorted(map(_joint, body.joints.values())), *sorted(_shapes(body))):
+    joints = (one for one in body.joints.values() if one.parent != body.frame)
+    for row in (*sorted(map(_joint, joints)), *sorted(_shapes(body))):
         found.update(f"{row}\n".encode())
     used = {shape.geometry.file for link in body.links.values() for shape in link.collisions}
     for name in sorted(used & meshes.keys()):

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
+from types import MappingProxyType
 
 from rbxcompose.body.masses import mass_mistakes
 from rbxcompose.body.model import Body, BodyJoint, BodyLink, JointLimits, Shape
 from rbxcompose.body.urdf import rpy_of
 from rbxcompose.body.xml_reader import XmlElement
-from rbxcompose.findings import Finding, Severity, kind
+from rbxcompose.findings import DID_YOU_MEAN, Finding, Severity, kind
 from rbxcompose.printable import plain
 
 NO_MOTION = kind(
@@ -147,11 +148,14 @@ _TURN = math.tau + 0.01  # [rad]
 _WITH_ORIGINS = ("link", "joint", "visual", "collision", "inertial")
 
 
-def lint(body: Body, meshes: Collection[str]) -> Iterator[Finding]:
-    """Yield what is wrong with a body; `meshes` are the names of the mesh files that exist."""
+def lint(body: Body, meshes: Collection[str], meant: Mapping[str, str] = MappingProxyType({})) -> Iterator[Finding]:
+    """Yield what is wrong with a body; `meshes` are the names of the mesh files that exist.
+
+    `meant` has names of files that exist, for those that differ only in their capitals.
+    """
     yield from mass_mistakes(body)
     for link in body.links.values():
-        yield from _shapes(link, meshes)
+        yield from _shapes(link, meshes, meant)
     for joint in body.joints.values():
         if (away := math.hypot(*joint.origin.translation)) > LARGEST:
             message = f"joint '{plain(joint.name, _SHOWN)}' is {away:g} m away from the link that carries it"
@@ -203,15 +207,17 @@ def _be(words: list[str]) -> str:
     return "is" if len(words) == 1 else "are"
 
 
-def _shapes(link: BodyLink, meshes: Collection[str]) -> Iterator[Finding]:
+def _shapes(link: BodyLink, meshes: Collection[str], meant: Mapping[str, str]) -> Iterator[Finding]:
     for shape in (*link.visuals, *link.collisions):
         geometry = shape.geometry
         if geometry.kind == "mesh" and geometry.file not in meshes:
             message = f"the mesh '{plain(geometry.file)}' does not exist"
-            yield NO_MESH.at(shape.span, message, help=_where_meshes_are(geometry.file))
+            near = meant.get(geometry.file, "")
+            help_text = f"{DID_YOU_MEAN} '{near}'? Capitals count" if near else _where_meshes_are(geometry.file)
+            yield NO_MESH.at(shape.size_span or shape.span, message, help=help_text)
         if largest := _extent(shape):
             message = f"a {geometry.kind} of link '{plain(link.name, _SHOWN)}' is {largest:g} m long"
-            yield MILLIMETRES.at(shape.span, message, help=_LACKS_UNIT)
+            yield MILLIMETRES.at(shape.size_span or shape.span, message, help=_LACKS_UNIT)
 
 
 def _where_meshes_are(file: str) -> str:

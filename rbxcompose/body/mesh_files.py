@@ -38,7 +38,9 @@ def mesh_mistakes(body: Body, meshes: Mapping[str, Path]) -> Iterator[Finding]:
         for shape in (*link.visuals, *link.collisions):
             path = meshes.get(shape.geometry.file)
             if path is not None and (words := problem(path)):
-                yield BAD_MESH.at(shape.span, f"the mesh '{plain(shape.geometry.file, _SHOWN)}' {words}")
+                yield BAD_MESH.at(
+                    shape.size_span or shape.span, f"the mesh '{plain(shape.geometry.file, _SHOWN)}' {words}"
+                )
 
 
 def mesh_problem(path: Path, most: int = LARGEST) -> str:

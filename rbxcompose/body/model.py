@@ -44,6 +44,8 @@ class Shape:
     origin: Transform3
     span: Span
     colour: tuple[float, float, float, float] | None = None
+    size_span: Span | None = None
+    """The place of its size, or of the mesh that has it, if that is known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,6 +163,8 @@ class Body:
     name: str
     links: Mapping[str, BodyLink] = field(default_factory=dict)
     joints: Mapping[str, BodyJoint] = field(default_factory=dict)
+    frame: str = ""
+    """The root, if a fixed virtual joint brings it and not the URDF."""
 
     @cached_property
     def joint_above(self) -> Mapping[str, BodyJoint]:
@@ -184,6 +188,20 @@ class Body:
     def root(self) -> str:
         """Return the link that no joint places."""
         return next(name for name in self.links if name not in self.joint_above)
+
+    @cached_property
+    def still(self) -> Mapping[str, Transform3]:
+        """Return the links that never move in the frame of the root, with their poses in it."""
+        found = {self.root: Transform3()}
+        for joint in self.joints_downwards:
+            if joint.parent in found and joint.kind == "fixed":
+                found[joint.child] = found[joint.parent].compose(joint.origin)
+        return found
+
+    @property
+    def own_root(self) -> str:
+        """Return the root of the URDF, without the frame of a virtual joint."""
+        return self.joints_below[self.frame][0].child if self.frame else self.root
 
     @property
     def moving(self) -> list[BodyJoint]:

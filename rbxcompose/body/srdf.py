@@ -39,6 +39,17 @@ class EndEffector:
 
 
 @dataclass(frozen=True, slots=True)
+class OuterJoint:
+    """A virtual joint: `kind` is as it is written, `child` should be the root of the URDF."""
+
+    name: str
+    kind: str
+    frame: str
+    child: str
+    span: Span | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
 class Semantics:
     """What an SRDF says; `poses` are positions of joints [rad or m] by group and name."""
 
@@ -48,6 +59,7 @@ class Semantics:
     effectors: tuple[EndEffector, ...] = ()
     passive: tuple[str, ...] = ()
     pairs: Mapping[LinkPair, PairReason] = field(default_factory=dict)
+    outer: tuple[OuterJoint, ...] = ()
     others: tuple[tuple[str, Span], ...] = field(default=(), compare=False)
     """What is understood by MoveIt alone, in words, with its places."""
 
@@ -55,7 +67,8 @@ class Semantics:
 def is_srdf(root: XmlElement) -> bool:
     """Return whether a robot in XML is an SRDF: links stand in groups, and no joint has a parent."""
     return root.first("link") is None and any(
-        child.name in ("group", "disable_collisions", "group_state", "end_effector") for child in root.children
+        child.name in ("group", "disable_collisions", "group_state", "end_effector", "virtual_joint")
+        for child in root.children
     )
 
 
@@ -76,7 +89,7 @@ def read_semantics(root: XmlElement) -> Semantics:
         pair_of(_text(one, "link1"), _text(one, "link2")): _reason(_text(one, "reason"))
         for one in root.all("disable_collisions")
     }
-    known = ("group", "group_state", "end_effector", "passive_joint", "disable_collisions")
+    known = ("group", "group_state", "end_effector", "passive_joint", "disable_collisions", "virtual_joint")
     others += [(f"the element '{one.name}'", one.span) for one in root.children if one.name not in known]
     return Semantics(
         root.attributes.get("name", ""),
@@ -85,6 +98,7 @@ def read_semantics(root: XmlElement) -> Semantics:
         tuple(map(_effector, root.all("end_effector"))),
         tuple(_text(one, "name") for one in root.all("passive_joint")),
         pairs,
+        tuple(map(_outer, root.all("virtual_joint"))),
         tuple(others),
     )
 
@@ -98,6 +112,11 @@ def _group(one: XmlElement) -> SemanticGroup:
 def _effector(one: XmlElement) -> EndEffector:
     values = [_text(one, key) for key in ("name", "group", "parent_link", "parent_group")]
     return EndEffector(values[0], values[1], values[2], values[3], one.span)
+
+
+def _outer(one: XmlElement) -> OuterJoint:
+    values = [_text(one, key).strip() for key in ("name", "type", "parent_frame", "child_link")]
+    return OuterJoint(values[0], values[1], values[2], values[3], one.span)
 
 
 def _text(one: XmlElement, key: str) -> str:
@@ -142,6 +161,9 @@ def _lines(said: Semantics) -> Iterator[str]:
         parent = f" parent_group={quoteattr(one.parent_group)}" if one.parent_group else ""
         words = f"name={quoteattr(one.name)} parent_link={quoteattr(one.parent_link)} group={quoteattr(one.group)}"
         yield f"    <end_effector {words}{parent}/>"
+    for each in said.outer:
+        words = f"name={quoteattr(each.name)} type={quoteattr(each.kind)} parent_frame={quoteattr(each.frame)}"
+        yield f"    <virtual_joint {words} child_link={quoteattr(each.child)}/>"
     for joint in said.passive:
         yield f"    <passive_joint name={quoteattr(joint)}/>"
     for first, second in sorted(said.pairs):

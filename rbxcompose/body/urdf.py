@@ -136,7 +136,9 @@ class _BodyReader:
         )
 
     def _shape(self, element: XmlElement) -> Shape:
-        return Shape(_geometry(needed(element, "geometry")), _origin(element), element.span, self._colour(element))
+        geometry = needed(element, "geometry")
+        size = next((one.span for one in geometry.children if one.name in _GEOMETRIES), None)
+        return Shape(_geometry(geometry), _origin(element), element.span, self._colour(element), size)
 
     def _colour(self, element: XmlElement) -> Colour | None:
         material = element.first("material")

@@ -15,7 +15,7 @@ def hand_without_gripper(robot: Robot) -> Iterator[Finding]:
     """An arm without a gripper can neither pick nor place
 
     `grasp`, `squeeze`, `grasps` and `spots` are for the skills `pick_NAME` and `place_NAME`, which an arm has only if
-    `gripper` names the controller of its gripper.
+    `gripper` names the controller of its gripper. So are further `processes` of its planner.
 
     Bad: `right_arm: {controller: right_arm_controller, spots: {left: {x: 20 cm, y: 10 cm, z: 70 cm}}}`
     Good: the same with `gripper: right_gripper_controller`.
@@ -25,3 +25,6 @@ def hand_without_gripper(robot: Robot) -> Iterator[Finding]:
             if getattr(arm.model, key) and arm.model.gripper is None:
                 message = f"'{key}' of the arm '{name}' has no effect: the arm has no 'gripper'"
                 yield hand_without_gripper.at(robot.key("arms", name, key), message)
+        if arm.model.planner.processes > 1 and arm.model.gripper is None:
+            message = f"'processes' of the arm '{name}' has no effect: the arm has no 'gripper'"
+            yield hand_without_gripper.at(robot.key("arms", name, "planner", "processes"), message)

@@ -6,11 +6,13 @@ import math
 from collections.abc import Iterator
 
 from rbxcompose.body.model import Body, BodyJoint, Geometry
+from rbxcompose.body.solid_boxes import box_within, penetration
 from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Related, Severity
 from rbxcompose.geometry import Vector3
 from rbxcompose.model.arm_goals import length_of
 from rbxcompose.model.robot import Robot
+from rbxcompose.motion.scene import PlacedObject
 from rbxcompose.sections.arms import arms
 from rbxcompose.sections.scene import scene
 
@@ -18,6 +20,7 @@ _ON_AXIS = 0.001  # [m]
 _TIMES = 10.0  # as large as the longest arm is long: a unit is wrong
 _UNIT = "is a unit wrong? A number without a unit counts in metres: for centimetres, write '20 cm'"
 _FARTHER = "place it farther away, or name the link below 'touches'"
+_INTO = 0.01  # [m]: what stands against the robot, or a little beside its place, is no mistake
 _SOLID = ("box", "cylinder", "capsule", "sphere")
 
 
@@ -25,8 +28,9 @@ _SOLID = ("box", "cylinder", "capsule", "sphere")
 def object_in_robot(robot: Robot) -> Iterator[Finding]:
     """A thing of the scene is where the robot is
 
-    The middle of a link is inside of the thing, however the joints stand. An arm that collides at its start goes
-    nowhere. A thing with a box stands with its middle where `at` says.
+    The middle of a link is inside of the thing, however the joints stand, or the thing reaches into a link that no
+    joint moves. An arm that collides at its start goes nowhere. A thing with a box stands with its middle where `at`
+    says.
 
     Bad: `wall: {box: [2 cm, 1 m, 1 m], at: {z: 50 cm}}`, around the arm itself.
     Good: `wall: {box: [2 cm, 1 m, 1 m], at: {x: 60 cm, z: 50 cm}}`
@@ -37,9 +41,8 @@ def object_in_robot(robot: Robot) -> Iterator[Finding]:
     body = description.body
     points = list(_fixed_points(body))
     longest = max(length_of(robot, body, one) for one in contents.of(arms).values())
-    poses = body.poses({})
     for one in contents.of(scene).objects:
-        into = poses[one.link].compose(one.pose).inverse() if one.link == body.root else None
+        into = body.still[one.link].compose(one.pose).inverse() if one.link in body.still else None
         for link, point in points if into and one.shape.kind in ("box", "sphere", "cylinder") else ():
             if into and link not in one.touches and _contains(one.shape, into.apply(point)):
                 yield object_in_robot.at(
@@ -49,17 +52,32 @@ def object_in_robot(robot: Robot) -> Iterator[Finding]:
                     related=[Related(body.links[link].span, "the link")],
                 )
                 break
+        else:
+            yield from _in_still_link(robot, body, one)
+
+
+def _in_still_link(robot: Robot, body: Body, one: PlacedObject) -> Iterator[Finding]:
+    """Yield the finding about a thing that reaches into a link that nothing moves."""
+    still = body.still
+    box = box_within(one.shape, still[one.link].compose(one.pose)) if one.link in still else None
+    for link in still if box else ():
+        for shape in body.links[link].collisions if link not in one.touches else ():
+            other = box_within(shape.geometry, still[link].compose(shape.origin))
+            if box and other and penetration(box, other) > _INTO:
+                yield object_in_robot.at(
+                    robot.key("scene", "objects", one.name),
+                    f"'{one.name}' reaches into '{link}', which nothing moves out of it",
+                    help=_FARTHER,
+                    related=[Related(body.links[link].span, "the link")],
+                )
+                return
 
 
 def _fixed_points(body: Body) -> Iterator[tuple[str, Vector3]]:
     """Yield points of solid links that a joint turns and yet leaves in place, in the frame of the root [m]."""
-    poses, still = body.poses({}), {body.root}
+    poses = body.poses({})
     for joint in body.joints_downwards:
-        if joint.parent not in still:
-            continue
-        if not joint.moves:
-            still |= {joint.child} if joint.kind == "fixed" else set()
-        elif not joint.slides:
+        if joint.parent in body.still and joint.moves and not joint.slides:
             for shape in body.links[joint.child].collisions:
                 if shape.geometry.kind in _SOLID and _is_on_axis(joint, shape.origin.translation):
                     yield joint.child, poses[joint.child].apply(shape.origin.translation)

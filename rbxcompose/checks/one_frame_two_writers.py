@@ -11,7 +11,7 @@ from rbxcompose.model.flow import is_written, setting_span
 from rbxcompose.model.robot import Robot, RobotComponent
 from rbxcompose.model.wires import PortEnd
 from rbxcompose.rules import NAMES, WIRING
-from rbxcompose.sdk.capabilities import Setting, WritesFrame
+from rbxcompose.sdk.capabilities import WritesFrame
 
 STATIC = "_static"  # suffix of the topic of static transforms; both topics describe one tree
 
@@ -65,14 +65,25 @@ def one_frame_two_writers(robot: Robot) -> Iterator[Finding]:
             yield one_frame_two_writers.at(
                 one.span(robot),
                 f"'{name}' and '{other.component.name}' both write the pose of the frame '{one.frame.child.value}'",
-                help=_of_body(robot, one.frame.child) or f"remove one of them{remedy}",
-                related=[Related(other.span(robot), "the other one")] if other.component.name in robot.written else [],
+                help=_of_body(robot, one.frame) or f"remove one of them{remedy}",
+                related=list(_related(robot, other)),
             )
 
 
-def _of_body(robot: Robot, child: Setting[str]) -> str:
+def _related(robot: Robot, other: FrameWriter) -> Iterator[Related]:
+    body = robot.manifest.body
+    if other.component.name in robot.written:
+        yield Related(other.span(robot), "the other one")
+    elif body is not None and body.virtual is not None and other.frame.parent.value == body.body.frame:
+        yield Related(body.virtual.frame_span, "the virtual joint")
+
+
+def _of_body(robot: Robot, written: WritesFrame) -> str:
     """Return what helps if a frame hangs on another one in the body: the root of the body is what moves."""
-    body = robot.manifest.body.body if robot.manifest.body else None
+    body, child = robot.manifest.body.body if robot.manifest.body else None, written.child
+    if body is not None and body.frame and child.value == body.own_root:
+        moving = f"write 'type: planar' and 'frame: {written.parent.value}' there, or leave it out"
+        return f"the virtual joint of the body fixes it in '{body.frame}': {moving}"
     if body is None or child.value not in body.joint_above or not child.field:
         return ""
     above = body.joint_above[child.value].parent

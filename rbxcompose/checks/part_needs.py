@@ -49,10 +49,17 @@ def part_needs(robot: Robot) -> Iterator[Finding]:
             if any(not answers or isinstance(end.port, answers) for end in fitting):
                 continue
             wrong = next((end for end in others if end.type_name and end not in fitting), None)
-            have = f"; '{wrong.instance}' has it as {short(wrong.type_name)}" if wrong else ""
+            if wrong:
+                yield part_needs.at(
+                    need.span,
+                    f"part '{part.name}' needs '{need.name}' as {short(need.type)}, and '{wrong.instance}' has it as "
+                    f"{short(wrong.type_name)}",
+                    help=f"write '{short(wrong.type_name)}', or connect the part to another topic with 'connect:'",
+                )
+                continue
             yield part_needs.at(
                 part.span,
-                f"part '{part.name}' needs '{need.name}' ({short(need.type)}) from outside, and nothing has it{have}",
+                f"part '{part.name}' needs '{need.name}' ({short(need.type)}) from outside, and nothing has it",
                 help=f"include a part with '{need.name}', or connect it to the right topic with 'connect:'",
                 related=[Related(need.span, "needed here")],
             )

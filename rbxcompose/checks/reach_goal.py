@@ -10,7 +10,7 @@ from rbxcompose.check_runner import check
 from rbxcompose.checks.goal_beyond_limits import known_value
 from rbxcompose.findings import Finding, Severity, suggest
 from rbxcompose.manifest.tree import ScalarNode
-from rbxcompose.model.arm_goals import WrittenReach, first_joint_in, length_of, written_reaches
+from rbxcompose.model.arm_goals import WrittenReach, first_joint_in, length_of, word_of, written_reaches
 from rbxcompose.model.charge import constants
 from rbxcompose.model.robot import Robot
 from rbxcompose.rules import WIRING
@@ -53,6 +53,8 @@ def _mistakes(robot: Robot, body: Body, reach: WrittenReach) -> Iterator[Finding
 
 
 def _too_far(robot: Robot, body: Body, reach: WrittenReach, frame: str) -> Finding | None:
+    if any(one in reach.arguments and word_of(reach, one)[0] != "false" for one in ("any_position", "approximate")):
+        return None
     known, shoulder = constants(reach.mission), first_joint_in(body, reach.arm, frame)
     at = [known_value(reach.arguments[axis], known) if axis in reach.arguments else 0.0 for axis in _AXES]
     x, y, z, slack = (*at, known_value(reach.arguments["tolerance"], known) if "tolerance" in reach.arguments else 0.0)
@@ -73,7 +75,7 @@ def _too_far(robot: Robot, body: Body, reach: WrittenReach, frame: str) -> Findi
 
 
 def _too_stiff(reach: WrittenReach) -> Finding | None:
-    asked = reach.arguments.keys() & {*_TURNS, "any_orientation", "angle_tolerance"}
+    asked = reach.arguments.keys() & {*_TURNS, "any_orientation", "any_position", "approximate", "angle_tolerance"}
     count = len(reach.arm.group.joints)
     if count > _FEW or asked:
         return None

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from rbxcompose.check_runner import OWN, all_checks, check
-from rbxcompose.checks.parameter_value import config_with
+from rbxcompose.checks.parameter_value import config_with, parameter_value
 from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.types import Type
 from rbxcompose.findings import Finding, Related, Severity
@@ -36,7 +36,10 @@ def setting_breaks_rule(robot: Robot) -> Iterator[Finding]:
     """
     written = list({(one.place, one.value.text): one for one in _written(robot)}.values())
     before = {(one.code, one.span) for one in _found(robot)} if written else set()
+    refused = {span for code, span in before if code == parameter_value.code}
     for one in written:
+        if one.value.span in refused:
+            continue
         new = [found for found in _found(_with(robot, one)) if (found.code, found.span) not in before]
         others = [other for other in written if other.place != one.place]
         helped = (_codes(_with(_with(robot, other), one)) for other in others)  # by what was set before
@@ -87,7 +90,7 @@ def _with(robot: Robot, change: _Change) -> Robot:
     try:
         config = config_with(old, change.parameter, change.value, change.wanted, change.known)
     except UnsettableError:
-        return robot  # RBX7011
+        return robot  # reported by RBX7011
     capabilities = old.cls.capabilities(config) if config is not None and old.is_sound else old.capabilities
     if config is None or capabilities == old.capabilities:
         return robot

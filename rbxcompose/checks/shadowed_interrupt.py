@@ -10,7 +10,7 @@ from rbxcompose.findings import Finding, Related, Severity
 from rbxcompose.missions.analysis.bounds import Bounds, Known, truth
 from rbxcompose.missions.program.program import END, Interrupt, Program
 from rbxcompose.model.charge import constants
-from rbxcompose.model.robot import Robot
+from rbxcompose.model.robot import Robot, RobotMission
 
 _ITS_OWN = ("new", "age")  # their answers depend on when the interrupt acted last
 
@@ -49,8 +49,7 @@ def shadowed_interrupt(robot: Robot) -> Iterator[Finding]:
     ```
     """
     for mission in robot.missions.values():
-        numbers = {name: value for name, value in constants(mission).items() if isinstance(value, float)}
-        known = {name: Bounds(value, value) for name, value in numbers.items()}
+        known = bounds_of(mission)
         for index, later in enumerate(mission.program.interrupts):
             for earlier in mission.program.interrupts[:index]:
                 if _keeps_out(robot, mission.program, earlier, later, known):
@@ -64,6 +63,12 @@ def shadowed_interrupt(robot: Robot) -> Iterator[Finding]:
                     break
 
 
+def bounds_of(mission: RobotMission) -> Known:
+    """Return the bounds of the numbers of a mission that nothing changes."""
+    numbers = {name: value for name, value in constants(mission).items() if isinstance(value, float)}
+    return {name: Bounds(value, value) for name, value in numbers.items()}
+
+
 def _keeps_out(robot: Robot, program: Program, earlier: Interrupt, later: Interrupt, known: Known) -> bool:
     one, other = earlier.when.expression, later.when.expression
     if one.text == other.text or _is_its_own(robot, one) or _is_its_own(robot, other):
@@ -71,7 +76,7 @@ def _keeps_out(robot: Robot, program: Program, earlier: Interrupt, later: Interr
     if truth(one.tree, known) is not None or truth(other.tree, known) is not None:
         return False  # decided by itself, which others tell
     takes_time = earlier.root is not None and any(below.step.waits for below in program.below(earlier.root))
-    return (takes_time or earlier.afterwards == END) and _implies(other, one, known)
+    return (takes_time or earlier.afterwards == END) and implies(other, one, known)
 
 
 def _is_its_own(robot: Robot, expression: Expression) -> bool:
@@ -80,7 +85,7 @@ def _is_its_own(robot: Robot, expression: Expression) -> bool:
     return any(call.function in _ITS_OWN for call in calls) or bool(names & robot.names.events)
 
 
-def _implies(narrow: Expression, wide: Expression, known: Known) -> bool:
+def implies(narrow: Expression, wide: Expression, known: Known) -> bool:
     """Return whether one condition surely holds whenever another one does."""
     all_of, any_of = _parts(narrow.tree, "and"), _parts(wide.tree, "or")
     if {narrow.text[one.start : one.end] for one in all_of} & {wide.text[one.start : one.end] for one in any_of}:

@@ -9,7 +9,7 @@ from rbxcompose.checks.mux_source import Wrong
 from rbxcompose.findings import DID_YOU_MEAN, Finding, correction, suggest
 from rbxcompose.model.robot import Robot
 from rbxcompose.rules import NAMES
-from rbxcompose.sdk.ports import Out
+from rbxcompose.sdk.ports import In, Out
 
 
 @check("RBX3005", is_fixable=True, closed=(NAMES,))
@@ -53,6 +53,11 @@ def _missing(robot: Robot, name: str, source: str) -> Wrong | None:
             message, suggest(component, robot.components, "components of this robot"), component, robot.components
         )
     outputs = [end.name for end in part.ends if isinstance(end.port, Out)]
+    taken = part.end(port)
+    if taken is not None and isinstance(taken.port, In):
+        writers = [f"{end.instance}.{end.name}" for end in robot.writers.get(taken.topic, ())]
+        words = f"{DID_YOU_MEAN} '{writers[0]}'?" if writers else suggest(port, outputs, "its outputs")
+        return Wrong(f"comes from '{source}', which takes messages, and sends none", words)
     if name in robot.values:
         return None  # the level of a diagnostics group is a value, too
     if not dot:

@@ -37,6 +37,6 @@ def wheel_sides(robot: Robot) -> Iterator[Finding]:
                 yield wheel_sides.at(
                     setting_span(robot, (component, wheel.setting.field)),
                     f"the axis of '{wheel.joint.name}' points to the right: its positive direction is backwards",
-                    help="turn the axis round in the URDF, and change 'invert' of its actuator",
+                    help="turn the axis round in the URDF; if it runs backwards then, change 'invert' of its actuator",
                     related=[Related(wheel.joint.axis_span or wheel.joint.span, "the axis")],
                 )

@@ -31,8 +31,8 @@ def wheel_speed(robot: Robot) -> Iterator[Finding]:
     for base in rolling_bases(robot):
         rolls, slowest = base.rolls, min(base.wheels, key=lambda one: _limit(robot, one))
         limit = _limit(robot, slowest)
-        if rolls.wheel_radius is None or math.isinf(limit):
-            continue
+        if rolls.wheel_radius is None or math.isinf(limit) or base.has_other_radius:
+            continue  # with the right radius, which RBX2281 asks for, the speeds are others, too
         fastest = limit * rolls.wheel_radius.value
         for drives in base.component.declared(Drives):
             rate = fastest / (rolls.wheel_distance.value / 2.0)

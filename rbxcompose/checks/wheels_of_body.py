@@ -6,13 +6,11 @@ from collections.abc import Iterator
 
 from rbxcompose.check_runner import check
 from rbxcompose.findings import Finding, Related, Severity
-from rbxcompose.model.base_wheels import rolling_bases
+from rbxcompose.model.base_wheels import differs, rolling_bases
 from rbxcompose.model.flow import setting_span
 from rbxcompose.model.robot import Robot
 from rbxcompose.rules import WIRING
 from rbxcompose.units import LENGTH, format_quantity
-
-TOLERANCE = 0.02  # of a length, within which two count as the same
 
 
 @check("RBX2281", Severity.WARNING, closed=(WIRING,))
@@ -31,7 +29,7 @@ def wheels_of_body(robot: Robot) -> Iterator[Finding]:
         if rolls.wheel_radius and left.radius is not None:
             lengths.append(("wheels have a radius of %s", rolls.wheel_radius, left.radius))
         for words, setting, length in lengths:
-            if abs(setting.value - length) > TOLERANCE * max(setting.value, length):
+            if differs(setting, length):
                 wanted, there = format_quantity(setting.value, LENGTH), format_quantity(length, LENGTH)
                 yield wheels_of_body.at(
                     setting_span(robot, (base.component, setting.field)),

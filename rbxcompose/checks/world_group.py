@@ -17,7 +17,7 @@ def world_group(robot: Robot) -> Iterator[Finding]:
 
     Simulated truth (where the robot is, how much charge it has) lives in the process group `world`, so that the death
     of any other process never changes it. A component of the robot itself does not belong there: if the process `world`
-    fails, the robot goes down.
+    fails, the robot goes down. Only a robot that has a single process, by `process: world`, has all of them there.
 
     Bad:
     ```yaml
@@ -36,8 +36,12 @@ def world_group(robot: Robot) -> Iterator[Finding]:
     for component in robot.components.values():
         if component.process == component.cls.process or WORLD not in (component.process, component.cls.process):
             continue
+        if component.process == WORLD == robot.manifest.process:
+            continue
         if component.cls.process == WORLD:
             message = f"'{component.name}' is simulated and belongs in the group 'world', not in '{component.process}'"
         else:
             message = f"'{component.name}' is not part of the simulated world, but runs in its group"
-        yield world_group.at(robot.value(*component.path, "process"), message, help="remove 'process'")
+        is_of_all = component.process == robot.manifest.process
+        place = robot.value("process") if is_of_all else robot.value(*component.path, "process")
+        yield world_group.at(place, message, help="write 'process: world'" if is_of_all else "remove 'process'")

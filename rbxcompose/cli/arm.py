@@ -1,8 +1,8 @@
 """Try an arm without a robot: where its tip is, how it gets to a pose; or move that of a robot.
 
 A GOAL is a pose of the arm by name, or positions of joints as in a mission: '{elbow_joint: 20 deg}'. Joints that it
-does not name are at rest. Objects of the manifest's scene are there. `go` sends the goal to a robot that runs. WAY and
-KEEP are as in missions.
+does not name are at rest. Objects of the manifest's scene are there. `go` sends the goal to a robot that runs, whose
+other joints stay where they are. WAY and KEEP are as in missions.
 
 Exit codes: 0 fine, 1 errors found, or no plan, 2 wrong usage.
 """
@@ -11,34 +11,30 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Mapping
 from time import perf_counter
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rbxcompose.arm_config import ArmConfig, ArmWorks
+from rbxcompose.arm_config import ArmWorks
 from rbxcompose.arm_goals import goal_of
-from rbxcompose.body.attachment import FramePose
 from rbxcompose.cli.arms.bench import add_bench_options, run_bench
+from rbxcompose.cli.arms.chosen import chosen_arm, chosen_robot, done, shown, values_of
+from rbxcompose.cli.arms.go import add_go_options
+from rbxcompose.cli.arms.inverse import add_inverse_options, run_inverse
 from rbxcompose.cli.arms.motion_picture import draw_motion
 from rbxcompose.cli.arms.reach_map import add_reach_options, run_reach
 from rbxcompose.cli.arms.setup import add_options, run_setup
 from rbxcompose.cli.arms.written import NO_MOTION, read_written
 from rbxcompose.cli.bodies.arm_models import KeepModel, TraceModel
-from rbxcompose.cli.bus.entities import add_json_option, add_timeout_option, table, visit
-from rbxcompose.cli.bus.place import add_bus_options
-from rbxcompose.cli.output.console import refuse, tell, tell_report
-from rbxcompose.cli.project.robot_choice import add_path_argument, robot_path
-from rbxcompose.cli.project.robot_options import add_layer_options, compiled
+from rbxcompose.cli.bus.entities import table
+from rbxcompose.cli.output.console import refuse, tell
+from rbxcompose.cli.project.robot_choice import add_path_argument
+from rbxcompose.cli.project.robot_options import add_layer_options
 from rbxcompose.cli.robots.lookup import NotDoneError
-from rbxcompose.cli.robots.this_machine import missing_extras
-from rbxcompose.findings import Report, suggest
 from rbxcompose.geometry import Transform3
-from rbxcompose.model.robot import Robot
-from rbxcompose.motion.inverse_kinematics import PoseTarget, solved
 from rbxcompose.motion.kept import KeptTip
 from rbxcompose.motion.planner import MotionPlan, MotionRequest, Planning
 from rbxcompose.motion.reasons import MotionFailure
@@ -46,8 +42,6 @@ from rbxcompose.motion.trace_planner import planned_trace
 from rbxcompose.msgs.plain import from_plain
 from rbxcompose.msgs.rbxcompose_msgs import MoveArm, TraceArm
 from rbxcompose.sections.arms import ArmOfRobot, arms
-from rbxcompose.sections.joints import JointPosition
-from rbxcompose.sections.scene import scene
 
 T = TypeVar("T")
 M = TypeVar("M", MoveArm.Goal, TraceArm.Goal)
@@ -61,9 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     fk = actions.add_parser("fk", help="print where the tip is (forward kinematics)")
     fk.add_argument("goal", metavar="GOAL", help="a pose by name, or '{JOINT: POSITION, ...}'")
     ik = actions.add_parser("ik", help="print positions of joints that bring the tip to a pose (inverse kinematics)")
-    ik.add_argument("target", metavar="POSE", help="of the tip: '{x: 20 cm, y: -10 cm, z: 55 cm, yaw: 90 deg}'")
-    ik.add_argument("--frame", metavar="LINK", default="", help="the link in whose frame it is (default: the root)")
-    ik.add_argument("--any-orientation", action="store_true", help="only the position counts")
+    add_inverse_options(ik)
     plan = actions.add_parser("plan", help="plan a motion and tell how long it takes, or why there is none")
     plan.add_argument("goal", metavar="GOAL", help="a pose by name, or '{JOINT: POSITION, ...}'")
     fk.add_argument("--picture", metavar="FILE", help="draw it among the things of the scene as PNG")
@@ -82,7 +74,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     for one, do in (
         (ls, _ls),
         (fk, _fk),
-        (ik, _ik),
+        (ik, run_inverse),
         (plan, _plan),
         (trace, _trace),
         (picture, _picture),
@@ -96,14 +88,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         one.add_argument("--json", action="store_true", help="answer in JSON")
         one.set_defaults(do=do)
     go = actions.add_parser("go", help="move an arm of a running robot, and print how that ends")
-    go.add_argument("arm", metavar="ARM", help="the arm")
-    go.add_argument("pose", metavar="POSE", help="one of its poses, or a way of its tip: '{points: [{x: 5 cm}]}'")
+    add_go_options(go)
     for one in (plan, go):
         one.add_argument("--keep", metavar="KEEP", default="", help="on the way: '{roll: 10 deg, pitch: 10 deg}'")
-    go.set_defaults(do=_go)
-    add_timeout_option(go, "5s")
-    add_json_option(go)
-    add_bus_options(go)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -115,33 +102,8 @@ def run(arguments: argparse.Namespace) -> int:
         return refuse(error.finding)
 
 
-def _go(arguments: argparse.Namespace) -> int:
-    from rbxcompose.cli.bus.action_send import send  # the imports for messages would slow down the others
-
-    if arguments.pose.startswith("{"):
-        port, goal = "trace", read_written(TraceModel, arguments.pose).message()
-    else:
-        port, goal = "move", {"pose": arguments.pose, "keep": read_written(KeepModel, arguments.keep or "{}").message()}
-    arguments.name, arguments.content = f"{arguments.arm}/{port}", json.dumps(goal)
-    return visit(arguments, lambda guest: send(guest, arguments))
-
-
-def _robot(arguments: argparse.Namespace) -> Robot | None:
-    """Return the robot; None after its errors."""
-    path = robot_path(arguments.path)
-    if path is None:
-        return None
-    compilation = compiled(path, arguments)
-    report = Report()
-    report.extend(one for one in compilation.report if one.severity.value == "error")
-    if compilation.robot is not None and not report.has_errors and arguments.action != "ls":
-        report.extend(missing_extras(compilation.robot))
-    tell_report(report, compilation.sources)
-    return None if report.has_errors else compilation.robot
-
-
 def _ls(arguments: argparse.Namespace) -> int:
-    robot = _robot(arguments)
+    robot = chosen_robot(arguments)
     if robot is None:
         return 1
     found = robot.manifest.contents.of(arms)
@@ -164,56 +126,16 @@ def _described(one: ArmOfRobot) -> dict[str, object]:
 
 
 def _bench(arguments: argparse.Namespace) -> int:
-    made = _works(arguments, is_fast=True)
+    made = chosen_arm(arguments, is_fast=True)
     return 1 if made is None else run_bench(arguments, made[1])
 
 
-def _works(arguments: argparse.Namespace, *, is_fast: bool = False) -> tuple[ArmOfRobot, ArmWorks] | None:
-    """Return the chosen arm, and what plans for it, for many motions if `is_fast`; None after errors."""
-    robot = _robot(arguments)
-    if robot is None:
-        return None
-    found = robot.manifest.contents.of(arms)
-    name = arguments.arm or (next(iter(found)) if len(found) == 1 else "")
-    if name not in found:
-        words = f"there is no arm '{name}'; {suggest(name, found, 'arms')}" if name else "name one with --arm"
-        raise NotDoneError(NO_MOTION.at(None, words if found else "this robot has no arms"))
-    config, description = robot.components[name].config, robot.manifest.body
-    if not isinstance(config, ArmConfig) or description is None:
-        return None
-    things = robot.manifest.contents.of(scene)
-    objects = things.on(description.body)
-    return found[name], ArmWorks(config, perf_counter, objects, things.paddings, is_fast=is_fast)
-
-
-def _values(works: ArmWorks, one: ArmOfRobot, written: str) -> NDArray[np.float64]:
-    """Return the positions of a goal, of shape (n,); joints that it does not name are at rest.
-
-    Raises:
-        NotDoneError: if it is no goal.
-    """
-    at: dict[str, float] = {}
-    if written in one.model.poses:
-        at = {joint: position.value for joint, position in one.model.poses[written].items()}
-    elif written.startswith("{"):
-        read = read_written(dict[str, JointPosition], written)
-        at = {name: position.value for name, position in read.items()}
-    elif written:
-        message = f"there is no pose '{written}'; {suggest(written, one.model.poses, 'poses')}"
-        raise NotDoneError(NO_MOTION.at(None, message))
-    if unknown := [name for name in at if name not in works.space.names]:
-        message = f"'{unknown[0]}' is no joint of this arm; {suggest(unknown[0], works.space.names, 'joints')}"
-        raise NotDoneError(NO_MOTION.at(None, message))
-    rest = {name: works.kinematics.body.joints[name].rest for name in works.space.names}
-    return np.array([at.get(name, rest[name]) for name in works.space.names])
-
-
 def _fk(arguments: argparse.Namespace) -> int:
-    made = _works(arguments)
+    made = chosen_arm(arguments)
     if made is None:
         return 1
     one, works = made
-    values = _values(works, one, arguments.goal)
+    values = values_of(works, one, arguments.goal)
     if arguments.picture and (failed := draw_motion(arguments, works, values, values, None)):
         return failed
     pose = works.kinematics.tip_pose(values)
@@ -227,60 +149,12 @@ def _fk(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _ik(arguments: argparse.Namespace) -> int:
-    made = _works(arguments)
-    if made is None:
-        return 1
-    one, works = made
-    start, pose = _values(works, one, arguments.start), read_written(FramePose, arguments.target).to_transform()
-    links = works.kinematics.poses(start)
-    if arguments.frame:
-        if arguments.frame not in links:
-            message = f"there is no link '{arguments.frame}'; {suggest(arguments.frame, links, 'links')}"
-            raise NotDoneError(NO_MOTION.at(None, message))
-        pose = links[arguments.frame].compose(pose)
-    solver, checker = works.solver, works.planner.checker
-    target = PoseTarget(pose, arguments.any_orientation, solver.tolerance, solver.angle_tolerance)
-    began, seed = perf_counter(), works.planner.settings.seed
-    found = _done(
-        solved(
-            works.kinematics,
-            works.space,
-            target,
-            start,
-            checker.is_free,
-            seed=seed,
-            restarts=solver.restarts,
-            is_late=lambda: perf_counter() - began >= solver.time,
-        )
-    )
-    each = [dict(zip(works.space.names, values.tolist(), strict=True)) for values in found.free]
-    if arguments.json:
-        tell(json.dumps({"solutions": each, "colliding": len(found.colliding), "attempts": found.attempts}))
-        return 0 if each else 1
-    for number, solution in enumerate(each, 1):
-        tell(f"solution {number}: {_shown(works, solution)}")
-    if each:
-        return 0
-    away, angle = found.nearest
-    words = f"the tip got within {away * 100:.1f} cm and {math.degrees(angle):.1f} deg of it"
-    if found.colliding:
-        words = f"all {len(found.colliding)} solutions collide"
-    raise NotDoneError(
-        NO_MOTION.at(None, f"{'goal_in_collision' if found.colliding else 'goal_out_of_reach'}: {words}")
-    )
-
-
-def _shown(works: ArmWorks, solution: Mapping[str, float]) -> str:
-    return ", ".join(f"{joint.name}: {joint.shown(solution[joint.name])}" for joint in works.space.joints)
-
-
 def _plan(arguments: argparse.Namespace) -> int:
-    made = _works(arguments)
+    made = chosen_arm(arguments)
     if made is None:
         return 1
     one, works = made
-    start, goal = _values(works, one, arguments.start), _values(works, one, arguments.goal)
+    start, goal = values_of(works, one, arguments.start), values_of(works, one, arguments.goal)
     keep = goal_of(_goal(MoveArm.Goal, {"keep": read_written(KeepModel, arguments.keep or "{}").message()})).keep
     if words := keep.mistake(works.kinematics):
         raise NotDoneError(NO_MOTION.at(None, f"unknown_goal: {words}"))
@@ -290,11 +164,11 @@ def _plan(arguments: argparse.Namespace) -> int:
 
 
 def _trace(arguments: argparse.Namespace) -> int:
-    made = _works(arguments)
+    made = chosen_arm(arguments)
     if made is None:
         return 1
     one, works = made
-    start, goal = _values(works, one, arguments.start), goal_of(_goal(TraceArm.Goal, _way(arguments.way)))
+    start, goal = values_of(works, one, arguments.start), goal_of(_goal(TraceArm.Goal, _way(arguments.way)))
     links, wish = works.kinematics.poses(start), goal.trace
     words = "" if not goal.frame or goal.frame in links else f"there is no link '{goal.frame}'"
     if wish is None or (words := words or wish.mistake):
@@ -305,8 +179,8 @@ def _trace(arguments: argparse.Namespace) -> int:
 
 
 def _picture(arguments: argparse.Namespace) -> int:
-    made = _works(arguments)
-    return 1 if made is None else run_reach(arguments, made[1], _values(made[1], made[0], arguments.start))
+    made = chosen_arm(arguments)
+    return 1 if made is None else run_reach(arguments, made[1], values_of(made[1], made[0], arguments.start))
 
 
 def _way(written: str) -> dict[str, object]:
@@ -333,7 +207,7 @@ def _tell_plan(
         NotDoneError: if there is none.
     """
     began = perf_counter()
-    found = _done(planning)
+    found = done(planning)
     took = perf_counter() - began
     if goal is None:
         goal = found.waypoints[-1] if isinstance(found, MotionPlan) else start
@@ -356,14 +230,5 @@ def _tell_plan(
         words = f"only {found.share:.1%} of the way; {words}"
     tell(f"a motion of {duration:.2f} s over {len(points)} points, planned in {took * 1000:.0f} ms ({words})")
     for point in points:
-        tell(f"  {_shown(works, point)}")
+        tell(f"  {shown(works, point)}")
     return 0
-
-
-def _done(work: Generator[None, None, T]) -> T:
-    while True:
-        try:
-            next(work)
-        except StopIteration as ended:
-            result: T = ended.value
-            return result

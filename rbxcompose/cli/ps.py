@@ -78,6 +78,7 @@ def _data(state: RobotState, supervisor: int | None) -> dict[str, Any]:
         "robot": state.robot,
         "supervisor": {"pid": supervisor},
         "router": {"endpoint": state.router},
+        "real": state.layers.real,
         "stop": None if state.stop is None else to_data(state.stop),
         "clocks": {host: to_data(one) for host, one in state.clocks.items()},
         "components": [_component(one) for one in state.components],

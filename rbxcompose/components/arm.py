@@ -8,22 +8,34 @@ from typing import Any
 
 import numpy as np
 
-from rbxcompose.arm_config import ArmConfig, ArmWorks, dimensions_of
+from rbxcompose.arm_config import ArmConfig, ArmWorks, dimensions_of, mesh_bytes
 from rbxcompose.arm_goals import (
     MOVE_MEASURES,
     REACH_MEASURES,
     TRACE_MEASURES,
     action_of,
+    ended_as,
     feedback_of,
     follow_goal,
     goal_of,
 )
 from rbxcompose.arm_hand import PICK, PLACE, PicksAndPlaces, hand_ports, hand_task, result_of
-from rbxcompose.arm_moveit import GIVEN, MOTION, around, forward, inverse, is_turned_away, moveit_ports, moveit_task
+from rbxcompose.arm_location import TellsWhereItIs, location_ports
+from rbxcompose.arm_moveit import (
+    GIVEN,
+    MOTION,
+    AnswersPrograms,
+    around,
+    is_turned_away,
+    moveit_ports,
+    moveit_task,
+)
+from rbxcompose.arm_processes import planning_processes
 from rbxcompose.arm_servo import PERIOD, ArmServo, servo_ports
 from rbxcompose.geometry import Vector3
 from rbxcompose.key_feed import KeyFeed, whole
 from rbxcompose.motion.arm_task import ArmTask
+from rbxcompose.motion.coal_shapes import readers_of
 from rbxcompose.motion.collisions import told
 from rbxcompose.motion.hand_task import HandTask
 from rbxcompose.motion.moveit_task import MoveItTask
@@ -39,8 +51,6 @@ from rbxcompose.msgs.geometry_msgs import PoseStamped, TwistStamped
 from rbxcompose.msgs.moveit_msgs import (
     DisplayTrajectory,
     ExecuteTrajectory,
-    GetPositionFK,
-    GetPositionIK,
     MoveGroup,
     RobotState,
     RobotTrajectory,
@@ -71,13 +81,14 @@ from rbxcompose.sdk import (
 
 MOVE, REACH, TRACE, FOLLOW = "move", "reach", "trace", "follow"  # its ports
 WAY, DISPLAY = "way", "display"
+LARGE = 4_000_000  # [bytes] of meshes, whose reading takes seconds
 MOST_PAIRS = 200  # that a view tells
 AnyGoal = ServedGoal[Any, Any, Any]
 AnyTask = ArmTask | HandTask | MoveItTask
 
 
 @component("arm")
-class Arm(PicksAndPlaces, Component[ArmConfig]):
+class Arm(PicksAndPlaces, TellsWhereItIs, AnswersPrograms, Component[ArmConfig]):
     """Moves an arm to poses by name, to positions of its joints, or its tip to a pose, on ways without collisions.
 
     The actions are `NAME/move`, `NAME/reach` and `NAME/trace`, with a gripper also `NAME/pick` and `NAME/place`; the
@@ -96,6 +107,7 @@ class Arm(PicksAndPlaces, Component[ArmConfig]):
     made_by = "Each entry of `arms` runs one."
     process = "arm"
     blocking = True
+    configures_within = 600.0  # for the first time, code is compiled, which is slow on a small or busy machine
     rate = 20.0
     steps_for_goals = True
     joint_states = In(JointState, "joint_states", is_open=True)
@@ -112,7 +124,7 @@ class Arm(PicksAndPlaces, Component[ArmConfig]):
                 claims=config.controller,
                 skill=f"move_{config.name}",
                 outcomes=outcomes,
-                entries=ArrayEntries("joints", "positions", dimensions_of(config)),
+                entries=ArrayEntries("joints", "positions", dimensions_of(config), instead="remembered"),
                 measures=MOVE_MEASURES,
                 choices={"pose": tuple(config.poses)} if config.poses else {},
             ).named(MOVE),
@@ -123,6 +135,8 @@ class Arm(PicksAndPlaces, Component[ArmConfig]):
                 skill=f"reach_{config.name}",
                 outcomes=outcomes,
                 measures=REACH_MEASURES,
+                choices={"prefer": tuple(config.poses)} if config.poses else {},
+                may_lack=True,
             ).named(REACH),
             WAY: Out(Path, f"{config.name}/plan", qos="latched").named(WAY),
             DISPLAY: Out(DisplayTrajectory, f"{config.name}/display_planned_path", qos="latched").named(DISPLAY),
@@ -136,6 +150,7 @@ class Arm(PicksAndPlaces, Component[ArmConfig]):
             ).named(TRACE),
             **servo_ports(config),
             **moveit_ports(config),
+            **location_ports(config),
             FOLLOW: CallsAction(FollowJointTrajectory, config.follow).named(FOLLOW),
             **hand_ports(config),
         }
@@ -145,24 +160,33 @@ class Arm(PicksAndPlaces, Component[ArmConfig]):
         """Declare what it imports."""
         needed = [(module, "arm") for module in ("pinocchio", "ompl", "toppra")]
         needed += [("numba", FAST)] if config.planner.type == FAST else []
+        needed += [(module, "arm") for module in readers_of(config.meshes.values())]
         return tuple(NeedsExtra(Setting(module), Setting(extra)) for module, extra in needed)
 
     def configure(self) -> None:
         """Build the model of the body, its shapes and the planner."""
+        if (size := mesh_bytes(self.config)) > LARGE:
+            self.info(f"reads {size / 1e6:.0f} MB of meshes; the first time on a machine takes longer")
         self.works = ArmWorks(self.config, lambda: self.now)
+        self.works.helpers = self.helpers = planning_processes(self.config, self.context.clock, self.warn)
         if self.works.always:
             words = told(self.works.always, len(self.works.always))
             self.info(f"links that always collide are not watched: {words}")
         self.problem = "nothing has told what is around the robot"  # with the scene, or nothing
         self.way: tuple[Vector3, ...] = ()  # of the tip, as last planned [m]
         self.measured: dict[str, tuple[float, float]] = {}  # position and velocity of all joints of the body
-        self.uprights = {}
+        self.uprights, self.remembered = {}, {}
         self.task: AnyTask | None = None
         self.goal: AnyGoal | None = None  # that of the task
         self.servo = ArmServo(self.works, self.bound) if self.config.stream else None
         self.is_stopped = False
         self.stage, self.ended, self.duration = "", dict[str, str](), 0.0  # for viewers
         self.due = -math.inf  # [s], when it goes on with what is commanded by hand
+
+    def cleanup(self) -> None:
+        """End the processes that plan."""
+        for one in self.helpers:
+            one.close()
 
     def activate(self) -> None:
         """Let viewers see it."""
@@ -293,7 +317,7 @@ class Arm(PicksAndPlaces, Component[ArmConfig]):
             return
         self.task = self.goal = None
         failure = task.failure
-        result = self.pictured(self.config.name, self.config.hand, failure, ended_as(goal.request, task))
+        result = self.pictured(self.config.name, self.config.hand, failure, self.result_of(task, goal.request))
         if isinstance(task, MoveItTask):
             task.end()
             if task.difference is not None and self.scene.value is not None:
@@ -307,6 +331,12 @@ class Arm(PicksAndPlaces, Component[ArmConfig]):
         else:
             words = failure.text if isinstance(task, MoveItTask) else result.message
             goal.aborted(f"{failure.reason}: {words}", result)
+
+    def result_of(self, task: AnyTask, message: Any) -> Any:
+        """Return how a goal has ended."""
+        if isinstance(task, MoveItTask):
+            return task.result(action_of(message))
+        return result_of(message, task) if isinstance(task, HandTask) else ended_as(message, task)
 
     @answers(ViewOfArm)
     def view(self, request: ViewOfArm) -> ArmView:
@@ -323,22 +353,7 @@ class Arm(PicksAndPlaces, Component[ArmConfig]):
         config, watched = self.config, tuple(sorted(self.works.watched))
         return ArmView(config.name, config.urdf, config.meshes, positions, self.works.objects, pairs, watched, self.way)
 
-    # What programs for MoveIt ask
-
-    def on_forward(self, request: GetPositionFK.Request) -> GetPositionFK.Response:
-        """Tell where links are."""
-        return forward(self, request)
-
-    def on_inverse(self, request: GetPositionIK.Request) -> GetPositionIK.Response:
-        """Tell positions of joints that bring the tip to a pose."""
-        return inverse(self, request)
-
     # What a task needs
-
-    @property
-    def poses(self) -> Mapping[str, Mapping[str, float]]:
-        """Return the poses by name."""
-        return self.config.poses
 
     def follow(self, names: tuple[str, ...], trajectory: Trajectory, ended: Callable[[str, bool], None]) -> None:
         """Send a trajectory to the controller."""
@@ -375,19 +390,6 @@ class Arm(PicksAndPlaces, Component[ArmConfig]):
             self.stage = words = stage if stage == within else f"{within}: {stage}"
             self.feed.tell(self.parts())
             self.goal.feedback(feedback_of(self.goal.request, words))
-
-
-def ended_as(message: Any, task: AnyTask) -> Any:
-    """Return how a goal has ended."""
-    if isinstance(task, MoveItTask):
-        return task.result(action_of(message))
-    if isinstance(task, HandTask):
-        return result_of(message, task)
-    failed = task.failure
-    words: dict[str, Any] = {"outcome": failed.reason, "message": failed.text} if failed is not None else {}
-    if isinstance(message, TraceArm.Goal):
-        words["fraction"] = task.share
-    return action_of(message).Result(**words)
 
 
 def problem_of(end: Ended[FollowJointTrajectory.Result]) -> str:

@@ -54,7 +54,7 @@ class BatterySim(Component[BatterySimConfig]):
     process = "world"
     simulated = True
     battery_level = Out(Float32, "battery_level", unit="%", rate=rate)
-    set_battery_level = Serves(SetBatteryLevel, "set_battery_level")
+    set_battery_level = Serves(SetBatteryLevel, "set_battery_level", unit="%")
 
     @classmethod
     def capabilities(cls, config: BatterySimConfig) -> tuple[Capability, ...]:

@@ -17,6 +17,7 @@ from rbxcompose.body.xml_reader import XmlElement, read_urdf
 from rbxcompose.diagnostics.updater import TaskStatus
 from rbxcompose.geometry import Transform3, rotate
 from rbxcompose.motion.cloud_points import CloudError, points_of
+from rbxcompose.motion.coal_shapes import readers_of
 from rbxcompose.motion.scene import PlacedObject
 from rbxcompose.motion.scene_messages import object_message, placed_object
 from rbxcompose.motion.seen_cells import SeenCells
@@ -108,7 +109,8 @@ class CloudMapper(Component[CloudMapperConfig]):
     @classmethod
     def capabilities(cls, config: CloudMapperConfig) -> tuple[Capability, ...]:
         """Declare what it imports."""
-        return (NeedsExtra(Setting("coal"), Setting("arm")),)
+        needed = ("coal", *readers_of(config.meshes.values()))
+        return tuple(NeedsExtra(Setting(module), Setting("arm")) for module in needed)
 
     def configure(self) -> None:
         """Measure the body."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import Field
 
@@ -22,9 +22,11 @@ from rbxcompose.sdk import (
     Component,
     Config,
     Drives,
+    Frequency,
     In,
     Live,
     Out,
+    Port,
     Setting,
     Speed,
     Time,
@@ -50,6 +52,8 @@ class DiffDriveSimConfig(Config):
     """Acceleration when starting and stopping to turn."""
     command_timeout: Annotated[Time, Live()] = Field(0.5, gt=0)
     """The base brakes when no command arrives for this long."""
+    rate: Frequency = Field(50.0, ge=1, le=1000)
+    """How often it moves and publishes; a low rate lets more robots run on a machine."""
 
 
 @component("diff_drive_sim")
@@ -60,12 +64,21 @@ class DiffDriveSim(Component[DiffDriveSimConfig]):
         base: {type: diff_drive_sim, max_speed: 0.5 m/s, max_turn_rate: 90 deg/s}
     """
 
-    rate = 50.0
     process = "world"
     simulated = True
     cmd_vel = In(geometry.Twist, "cmd_vel", qos="command")
-    odom = Out(Odometry, "odom", rate=rate)
+    odom = Out(Odometry, "odom")
     tf = Out(TFMessage, "/tf")
+
+    @classmethod
+    def rate_of(cls, config: DiffDriveSimConfig) -> float:
+        """Return how often it moves [Hz]."""
+        return config.rate
+
+    @classmethod
+    def ports(cls, config: DiffDriveSimConfig) -> dict[str, Port[Any]]:
+        """Return the ports, with the rate of the odometry."""
+        return super().ports(config) | {"odom": Out(Odometry, "odom", rate=config.rate).named("odom")}
 
     @classmethod
     def capabilities(cls, config: DiffDriveSimConfig) -> tuple[Capability, ...]:

@@ -18,7 +18,20 @@ from rbxcompose.msgs.stamps import to_nanoseconds
 from rbxcompose.msgs.std_msgs import Header, String
 from rbxcompose.msgs.vision_msgs import Detection3D, Detection3DArray
 from rbxcompose.printable import plain
-from rbxcompose.sdk import Component, Config, In, Length, Looks, Out, Port, Time, component
+from rbxcompose.sdk import (
+    Capability,
+    Component,
+    Config,
+    In,
+    Length,
+    Looks,
+    Out,
+    Port,
+    PutsThings,
+    Setting,
+    Time,
+    component,
+)
 
 DETECTIONS, LOOK = "detections", "look"  # ports that depend on the configuration
 SMALLEST, LARGEST = 1e-3, 10.0  # [m] of a side
@@ -70,6 +83,11 @@ class SeenObjects(Component[SeenObjectsConfig]):
             DETECTIONS: detections,
             LOOK: Looks(source=config.frame, target=config.stands_in).named(LOOK),
         }
+
+    @classmethod
+    def capabilities(cls, config: SeenObjectsConfig) -> tuple[Capability, ...]:
+        """Declare where things stand."""
+        return (PutsThings(Setting(config.stands_in, "stands_in")),)
 
     def configure(self) -> None:
         """Know nothing yet."""

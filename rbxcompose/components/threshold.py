@@ -41,6 +41,16 @@ class ThresholdConfig(Config):
     unit: str = ""
     """For people: the unit of the number."""
 
+    @field_validator("hysteresis")
+    @classmethod
+    def _comes_back(cls, hysteresis: float, info: ValidationInfo) -> float:
+        for level in ("warn", "error"):
+            low, high = info.data.get(f"{level}_below"), info.data.get(f"{level}_above")
+            if low is not None and high is not None and low + hysteresis > high - hysteresis:
+                most = (high - low) / 2.0
+                raise ValueError(f"no number comes back by it from both limits of '{level}': at most {most:g}")
+        return hysteresis
+
     @field_validator("field")
     @classmethod
     def _is_number(cls, path: str, info: ValidationInfo) -> str:

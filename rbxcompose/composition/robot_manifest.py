@@ -24,6 +24,7 @@ from rbxcompose.sections.diagnostics import diagnostics
 from rbxcompose.sections.missions import MissionEntry, missions
 from rbxcompose.sections.muxes import MuxModel, muxes
 from rbxcompose.sections.places import places
+from rbxcompose.sections.process import process
 from rbxcompose.sections.start import start
 from rbxcompose.sections.values import ValueModel, values
 
@@ -121,6 +122,11 @@ class RobotManifest:
     def bus(self) -> BusModel:
         """Return the settings of the bus."""
         return self.contents.of(bus)
+
+    @property
+    def process(self) -> str | None:
+        """Return the process group of components that do not name their own, if the robot has one."""
+        return self.contents.of(process)
 
     @property
     def body(self) -> Description | None:

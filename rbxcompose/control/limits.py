@@ -27,6 +27,8 @@ class MotionLimits:
     """Greatest acceleration, speeding up and braking [rad/s^2 or m/s^2], above 0."""
     effort: float | None = None
     """Greatest torque or force [Nm or N]."""
+    jerk: float | None = None
+    """Greatest jerk of planned motions [rad/s^3 or m/s^3], above 0."""
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -39,6 +41,8 @@ class MotionLimits:
             raise ValueError("limits of velocity and effort are not below 0")
         if self.acceleration is not None and self.acceleration <= 0.0:
             raise ValueError("a joint that cannot accelerate cannot stop: its limit is above 0")
+        if self.jerk is not None and self.jerk <= 0.0:
+            raise ValueError("an acceleration that cannot change stays 0: the limit of jerk is above 0")
 
     @property
     def least(self) -> float:
@@ -86,6 +90,7 @@ def tightened(outer: MotionLimits, inner: MotionLimits) -> Tightened:
         _smaller(outer.velocity, inner.velocity),
         _smaller(outer.acceleration, inner.acceleration),
         _smaller(outer.effort, inner.effort),
+        _smaller(outer.jerk, inner.jerk),
     )
     return Tightened(tight, tuple(wider))
 

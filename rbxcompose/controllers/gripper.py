@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 from pydantic import Field
@@ -27,7 +27,7 @@ from rbxcompose.msgs.control_msgs import GripperCommand
 from rbxcompose.msgs.rbxcompose_msgs import Grip
 from rbxcompose.msgs.types import Message
 from rbxcompose.sdk import BoundsGoals, Capability, Port, ServedGoal, ServesAction, Setting
-from rbxcompose.units import LENGTH
+from rbxcompose.units import ANGLE, LENGTH, format_quantity
 
 COMMAND, GRIP = "command", "grip"  # the ports
 _FINGERS = ("pad_width", "finger_length", "opening")
@@ -327,10 +327,24 @@ class GripperController(Controller[GripperConfig]):
             goal.aborted(outcome.message, result)
 
 
+def _turned_back(pairs: Sequence[tuple[float, float]]) -> str:
+    """Return where a servo turns back while its gripper opens, nothing if it does not; pairs are opening and angle."""
+    for one, middle, other in zip(pairs, pairs[1:], pairs[2:], strict=False):
+        if (middle[1] - one[1]) * (other[1] - middle[1]) < 0.0:
+            near, far = (
+                f"{format_quantity(at, ANGLE)} at {format_quantity(wide, LENGTH)}" for wide, at in (middle, other)
+            )
+            return f"as it opens, the servo turns one way only, but {far} follows {near}"
+    return ""
+
+
 def model_of(config: GripperConfig) -> GripperModel:
     """Return the model of a gripper. ValueError with the reason if it cannot be."""
     if config.calibration is not None:
-        return CalibratedGripper(Calibration(tuple(sorted((one.opening, one.angle) for one in config.calibration))))
+        pairs = sorted((one.opening, one.angle) for one in config.calibration)
+        if back := _turned_back(pairs):
+            raise ValueError(back)
+        return CalibratedGripper(Calibration(tuple(pairs)))
     least, greatest = config.opening or (0.0, 0.0)
     center, invert = config.center or 0.0, bool(config.invert)
     if config.travel is not None:

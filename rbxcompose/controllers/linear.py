@@ -40,7 +40,7 @@ class LinearConfig(ControllerConfig):
     """The joint that it leads."""
     speed: Speed = Field(gt=0)
     """How fast it goes."""
-    dead_band: Length = Field(0.01, gt=0)
+    dead_band: Length = Field(0.01, gt=0, le=0.1)
     """Within this of the wanted position it has arrived."""
     stall_after: Time = Field(2.0, gt=0)
     """Without progress for this long, it gives up."""

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
+from rbxcompose.body.description import Description
 from rbxcompose.body.model import Body
-from rbxcompose.body.srdf import EndEffector, SemanticGroup, Semantics, to_srdf
+from rbxcompose.body.srdf import EndEffector, OuterJoint, SemanticGroup, Semantics, to_srdf
 from rbxcompose.manifest.section import Contents
 from rbxcompose.sections.arms import ArmOfRobot, arms
 from rbxcompose.sections.body import body
@@ -17,7 +20,10 @@ def exported(contents: Contents, name: str) -> dict[str, str]:
     description = contents.of(body)
     if description is None:
         return {}
-    return {f"{name}.urdf": description.text, f"{name}.srdf": to_srdf(semantics_of(contents, description.body.name))}
+    return {
+        f"{name}.urdf": description.published,
+        f"{name}.srdf": to_srdf(semantics_of(contents, description.body.name)),
+    }
 
 
 def semantics_of(contents: Contents, name: str) -> Semantics:
@@ -33,18 +39,25 @@ def semantics_of(contents: Contents, name: str) -> Semantics:
             effectors.append(EndEffector(hand, hand, _palm(description.body, there.claimed[0]), arm))
     return Semantics(
         name,
-        {**{arm: _group(arm, one) for arm, one in found.items()}, **hands},
+        {**{arm: _group(arm, one, description) for arm, one in found.items()}, **hands},
         {arm: poses for arm, one in found.items() if (poses := _poses(one))},
         tuple(effectors),
         tuple(dict.fromkeys(joint for one in found.values() for joint in one.model.passive)),
         description.matrix.pairs if description is not None and description.matrix is not None else {},
+        tuple(_outer(description)) if description is not None else (),
     )
 
 
-def _group(name: str, one: ArmOfRobot) -> SemanticGroup:
-    chain = one.model.chain
-    chains = ((chain.from_, chain.to),) if chain is not None else ()
-    return SemanticGroup(name, chains, tuple(one.model.joints), groups=tuple(one.model.groups))
+def _outer(known: Description) -> Iterator[OuterJoint]:
+    if one := known.virtual:
+        yield OuterJoint(one.name, one.kind, one.frame, known.body.own_root)
+
+
+def _group(name: str, one: ArmOfRobot, known: Description | None) -> SemanticGroup:
+    chain, body = one.model.chain, known.body if known is not None else Body("")
+    top = body.own_root if body.frame else ""
+    chains = ((top if chain.from_ == body.frame else chain.from_, chain.to),) if chain is not None else ()
+    return SemanticGroup(name, chains, tuple(one.model.joints), tuple(one.model.links), tuple(one.model.groups))
 
 
 def _poses(one: ArmOfRobot) -> dict[str, dict[str, float]]:

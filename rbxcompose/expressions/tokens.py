@@ -49,6 +49,7 @@ _TOKEN = re.compile(
 # The longest unit wins; a letter after it makes it another word: `6 m/step` is a division by `step`.
 _LONGEST_FIRST = "|".join(re.escape(unit) for unit in sorted(UNITS, key=len, reverse=True))
 _UNIT = re.compile(rf"\s*({_LONGEST_FIRST})(?![A-Za-z0-9_])")
+_IN_BRACES = re.compile(rf"\{{{{1,2}}\s*\$?({NAME})\s*\}}")  # as templates and BehaviorTree.CPP write a name
 _NO_UNIT = re.compile(r"\s*(?!(?:and|or|in|not)\b)((?:[^\W\d]|°)[\w/^]*)")
 # `3 in $list` is a membership test, while `3 in` is a length: only in the first does a value follow the word.
 _VALUE = re.compile(r"""\s*(?!(?:and|or|in|not)\b)[$\w'"(\[]""")
@@ -121,4 +122,6 @@ def _unreadable(text: str, start: int) -> ExpressionError:
     foreign = next((symbol for symbol in _FOREIGN if text.startswith(symbol, start)), None)
     shown = foreign or text[start]
     fix = _FOREIGN[foreign] if foreign else ""
+    if braces := _IN_BRACES.match(text, start):
+        fix = f"write '${braces[1]}'"
     return ExpressionError(f"{shown!r} means nothing in an expression", start, start + len(shown), fix)

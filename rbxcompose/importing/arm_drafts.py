@@ -7,8 +7,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
 
 from rbxcompose.body.model import Body, BodyJoint
+from rbxcompose.body.srdf import OuterJoint
 from rbxcompose.dataclass import dataclass
-from rbxcompose.importing.manifest_text import Row, angle, flow, flow_list, key, length, row, section
+from rbxcompose.importing.manifest_text import Row, angle, flow, flow_list, key, length, row, section, word
 
 MODEL = "MX-28"
 """The servo that is guessed: it sees a whole turn."""
@@ -38,15 +39,20 @@ class ArmDraft:
     comment: str = ""
 
 
-def manifest_of(body: Body, drafts: Sequence[ArmDraft], file: str, pairs: str = "") -> str:
+def manifest_of(
+    body: Body, drafts: Sequence[ArmDraft], file: str, pairs: str = "", outer: OuterJoint | None = None
+) -> str:
     """Return the sections of a robot with arms; `file` is the URDF, `pairs` that of the pairs of links, if any."""
     own = {"urdf": key(file)} | ({"collisions": key(pairs)} if pairs else {})
+    if outer is not None:
+        names = {"name": word(outer.name), "type": outer.kind, "frame": word(outer.frame)}
+        own["virtual_joint"] = flow(names)
     grippers = {one.gripper.name: one.gripper for one in drafts if one.gripper is not None}
     joints = list(
         dict.fromkeys([*(joint for one in drafts for joint in one.joints), *(one.joint for one in grippers.values())])
     )
     parts = [
-        [row(0, f"body: {flow(own)}")],
+        [row(0, "body:"), *(row(1, f"{name}: {value}") for name, value in own.items())],
         [row(0, "buses:"), row(1, "servos: {type: dynamixel}")],
         [row(0, "actuators:"), *_actuators(joints)],
         [row(0, "joints:"), *(_joint(body.joints[joint]) for joint in joints)],

@@ -74,6 +74,11 @@ _CURES = {
     "joints are driven by the sections 'buses', 'actuators', 'joints' and 'controllers'": "ros2_control "
     "controller_manager hardware_interface transmission transmissions",
     "'rbx: 1' is the version of the file: remove it": "version",
+    "'rbx: 1' is the version of the language: write it instead": "apiVersion",
+    "the keys below it belong at the top of the file: move them there": "metadata spec",
+    "both ends belong to one key: 'position: [-90 deg, 90 deg]'": "lower upper min_position max_position",
+    "arguments are below 'args', each with its type and default": "substitutions launch_arguments",
+    "what is done only sometimes belongs in a profile: 'profiles: {NAME: {components: {...}}}'": "condition unless",
     "a component has a 'type' instead": "package pkg executable exec node_type command entrypoint",
     "diagnostics watch each component; a group of its own is an entry below 'analyzers'": "healthcheck",
     "one topic is renamed by 'connect: {PORT: TOPIC}', all of a robot by 'namespace' below 'bus'": "namespace ns",

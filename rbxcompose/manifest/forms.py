@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
+from rbxcompose.config import Secret
 from rbxcompose.manifest.key_help import about_key
 from rbxcompose.manifest.requirements import EXPECTED
 from rbxcompose.manifest.shapes import models_at
 from rbxcompose.manifest.tree import KeyPath, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.printable import plain
 from rbxcompose.units import NUMBER, UnitError, parse_quantity
+
+_NOTHING = ("", "~", "null", "Null", "NULL")  # as YAML writes it
 
 
 def help_of_form(model: Any, loc: KeyPath, value: TreeNode | None, error: str) -> str:
@@ -18,16 +21,19 @@ def help_of_form(model: Any, loc: KeyPath, value: TreeNode | None, error: str) -
         return _as_map(model, loc, value) or (_with_keys(model, loc) if loc else "")
     if EXPECTED.get(error) == EXPECTED["model_type"] and loc and not _is_empty(value):
         return _with_keys(model, loc)
+    if EXPECTED.get(error) == EXPECTED["model_type"] and _is_empty(value):
+        name = f"'{loc[-1]}: !remove'" if loc else "'!remove' behind the colon"
+        return f"write its keys below it; in a profile or an overlay, {name} removes it"
     if not isinstance(value, ScalarNode) or not loc:
         return ""
-    if EXPECTED[error] == EXPECTED["model_type"] and _is_empty(value):
-        return f"write its keys below it; in a profile or an overlay, '{loc[-1]}: !remove' removes it"
+    if isinstance(value.filled, Secret):
+        return "a secret may stand only in settings that hide it; what is not secret is '${env.NAME}', or written here"
     return _without_unit(model, loc, value) if error.startswith("int_") else ""
 
 
 def _is_empty(value: TreeNode | None) -> bool:
     """Return whether nothing is written there."""
-    return isinstance(value, ScalarNode) and value.plain and not value.text
+    return isinstance(value, ScalarNode) and value.plain and value.text in _NOTHING
 
 
 def _with_keys(model: Any, loc: KeyPath) -> str:

@@ -28,7 +28,7 @@ from rbxcompose.manifest.salvage import salvaged
 from rbxcompose.manifest.shapes import keys_at, with_references
 from rbxcompose.manifest.short_forms import Short, entry_type_of, short_type_of
 from rbxcompose.manifest.tree import Entry, KeyPath, MappingNode, ScalarNode, TreeNode, at
-from rbxcompose.manifest.validate import WRONG_TYPE, is_valid, label_of, validate
+from rbxcompose.manifest.validate import WRONG_TYPE, is_broken, is_valid, label_of, validate
 from rbxcompose.manifest.wanted_components import WantedComponent, Wiring
 from rbxcompose.references import COMPONENT
 
@@ -386,6 +386,8 @@ def named_entries(root: MappingNode, path: tuple[str, ...], report: Report) -> I
     """Yield the entries of a section by name, after a finding for each bad name."""
     node = at(root, path)
     if node is None or is_empty(node):
+        return
+    if is_broken(node):
         return
     if not isinstance(node, MappingNode):
         message = f"'{path[-1]}' must be a map of named entries"

@@ -14,10 +14,11 @@ from typing import Any
 import yaml
 
 from rbxcompose.findings import Finding, Related, Severity, Span, kind, replacement
+from rbxcompose.manifest.foreign_tags import help_for_tag
 from rbxcompose.manifest.limits import ALIAS_NODES, DEPTH, KEY, KEYS, TEXT
 from rbxcompose.manifest.parser_error import QUOTE_HELP, QUOTES_NEEDED
 from rbxcompose.manifest.scalars import number_trouble
-from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
+from rbxcompose.manifest.tree import BROKEN, Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.manifest.yaml_nodes import TOO_LARGE
 from rbxcompose.printable import FORBIDDEN, code_point, plain
 
@@ -144,6 +145,7 @@ about: "Room #3"
 )
 
 REMOVE, REPLACE = "!remove", "!replace"
+_UNKNOWN = "!"  # what a tag that was reported is taken for
 _MOST_FINDINGS = 100  # of one file: nobody makes more of these mistakes by hand
 _SWALLOWED = re.compile(r" +(#[^\s#].*)")
 _TIGHT = re.compile(r"([a-z][a-z0-9_]*:)(?!//)(?=\S)")  # `x:1`, without the space that makes x a key
@@ -235,13 +237,15 @@ class Walk:
         tag = self._tag(node) if self.may_tag else ""
         if tag == REMOVE:
             return MappingNode({}, span_of(node, self.file), REMOVE), 1, 1
+        kept = "" if tag == _UNKNOWN else tag
         match node:
             case yaml.ScalarNode():
-                return self._scalar(node), 1, 1
+                scalar = self._scalar(node)
+                return replace(scalar, filled=BROKEN) if tag == _UNKNOWN else scalar, 1, 1
             case yaml.SequenceNode():
-                return self._sequence(node, tag)
+                return self._sequence(node, kept)
             case yaml.MappingNode():
-                return self._mapping(node, tag)
+                return self._mapping(node, kept)
         raise AssertionError(f"PyYAML composes no {type(node).__name__}")
 
     def _tag(self, node: yaml.Node) -> str:
@@ -256,9 +260,9 @@ class Walk:
             message, help_text = "'!remove' takes no value", "remove the value after it"
         else:
             message = f"manifests have no tag '{plain(short, 60)}'"
-            help_text = "put quotes around it if it is text; the only tags are '!remove' and '!replace'"
+            help_text = help_for_tag(short, node.value if isinstance(node, yaml.ScalarNode) else "")
         self.add(TAG.at(span_of(node, self.file), message, help=help_text))
-        return ""
+        return _UNKNOWN
 
     def _scalar(self, node: yaml.ScalarNode) -> ScalarNode:
         scalar = ScalarNode(node.value, span_of(node, self.file), not node.style)
@@ -325,14 +329,15 @@ class Walk:
             key = self._key(key_node)
             if key is None:
                 continue
-            entry = Entry(key, value)
+            entry: Entry | None = Entry(key, value)
             if node.flow_style and not is_cut and self._is_missing(value) and not self._has_colon(key_node):
-                entry = self._without_value(key, value, is_alone=len(node.value) == 1)
-            self._check_comment(entry.value)
-            self._enter(own, entry)
+                entry = self._without_value(key, value, is_first=not own, is_alone=len(node.value) == 1)
+            if entry is not None:
+                self._check_comment(entry.value)
+                self._enter(own, entry)
         return MappingNode({**merged, **own}, span_of(node, self.file), tag), size + len(merged), height + 1
 
-    def _without_value(self, key: ScalarNode, value: TreeNode, *, is_alone: bool) -> Entry:
+    def _without_value(self, key: ScalarNode, value: TreeNode, *, is_first: bool, is_alone: bool) -> Entry | None:
         """Report a key inside `{}` that has no value; return what was meant: of `x:1`, the key and its value."""
         if key.plain and (tight := _TIGHT.match(key.text)):
             middle = key.span.column + tight.end(1)
@@ -341,6 +346,10 @@ class Walk:
             self.add(NOT_A_KEY.at(before, "a space is missing after this colon", help="write 'key: value'", fix=fix))
             meant = replace(key, text=key.text[tight.end(1) :], span=key.span._replace(column=middle))
             return Entry(replace(key, text=tight[1][:-1], span=before), meant)
+        if key.plain and not is_first and " " in key.text:  # no key of ours has a space
+            help_text = "inside {} and [] a comma ends a text: put quotes around the whole text"
+            self.add(QUOTES_NEEDED.at(key.span, "this was cut off from the text before it", help=help_text))
+            return None
         alone = f"; for the value of a name in a mission, write '${key.text}'" if is_alone else ""
         help_text = f"inside {{}}, each key needs a value: 'key: value'{plain(alone, 120)}"
         self.add(NOT_A_KEY.at(key.span, f"'{plain(key.text, 60)}' has no value", help=help_text))

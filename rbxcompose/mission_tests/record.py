@@ -85,16 +85,18 @@ class TrialRecord:
                 self._begin(node, Done(name, text, dict(arguments), self.now, len(self.lines) - 1))
             case NodeStarted(node=node, name=name):
                 self._begin(-1 - node, Done(name, name, {}, self.now, len(self.lines) - 1))
-            case SkillEnded(leaf=node, result=result):
+            case SkillEnded(leaf=node, result=result, message=told):
                 self._end(node, result)
+                self.reports += [told, text] if told else []
             case NodeEnded(node=node, result=result):
                 self._end(-1 - node, result)
             case Published(topic=topic, fields=fields):
                 self.published.append((topic, fields))
             case Logged(text=told) | Reported(message=told):
                 self.reports += [told, text]  # alone, and as the trace shows it
-            case MissionEnded():
+            case MissionEnded(message=told):
                 self.end = event
+                self.reports += [told, text] if told else []
 
     def _begin(self, key: int, step: Done) -> None:
         self._open[key] = step

@@ -10,6 +10,8 @@ from rbxcompose.geometry import Vector3, rotate
 from rbxcompose.model.robot import Robot, RobotComponent
 from rbxcompose.sdk.capabilities import RollsOn, Setting
 
+TOLERANCE = 0.02  # of a length, within which two count as the same
+
 
 @dataclass(frozen=True, slots=True)
 class BodyWheel:
@@ -40,6 +42,17 @@ class RollingBase:
     def wheel_distance(self) -> float:
         """Return how far the wheels are apart [m], to the left."""
         return self.left.centre[1] - self.right.centre[1]
+
+    @property
+    def has_other_radius(self) -> bool:
+        """Return whether its wheels have another radius than those of the body."""
+        radius = self.left.radius
+        return self.rolls.wheel_radius is not None and radius is not None and differs(self.rolls.wheel_radius, radius)
+
+
+def differs(setting: Setting[float], length: float) -> bool:
+    """Return whether a length is another one than that of the body."""
+    return abs(setting.value - length) > TOLERANCE * max(setting.value, length)
 
 
 def rolling_bases(robot: Robot) -> Iterator[RollingBase]:

@@ -166,7 +166,8 @@ def _component(manifest: RobotManifest, wanted: WantedComponent, given: Mapping[
     cls, options = component_type(wanted.type_name), wanted.options
     config = wanted.config if isinstance(wanted.config, Config) else cls.config_type()(**wanted.config)
     ends = ends_of(wanted.name, cls, config, manifest.bus.namespace or "", {**options.connect, **given})
-    process, log = options.process or cls.process, LOG_LEVELS[options.log]
+    process = options.process or manifest.process or cls.process
+    log = LOG_LEVELS[options.log]
     names = (end.name for end in ends)
     capable = cls.capabilities(config) if wanted.is_sound else ()
     capabilities = require_declared(wanted.type_name, capable, names, type(config))

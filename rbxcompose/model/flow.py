@@ -69,7 +69,8 @@ class MessageFlow:
 def period_of(component: RobotComponent) -> float | None:
     """Return the time between two messages of a component [s], None if it does not send at its own rate only."""
     listens = any(isinstance(end.port, In) for end in component.ends)
-    return None if listens or component.cls.rate <= 0 else 1 / component.cls.rate
+    rate = component.cls.rate_of(component.config)
+    return None if listens or rate <= 0 else 1 / rate
 
 
 def setting(component: RobotComponent, name: str) -> float | None:

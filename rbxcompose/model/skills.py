@@ -55,6 +55,7 @@ def _actions(components: Mapping[str, RobotComponent]) -> Iterable[SkillSource]:
                 entries=port.entries,
                 measures=port.measures,
                 choices=port.choices,
+                may_lack=port.may_lack,
             )
             yield SkillSource(skill, end.type_name, end.topic)
 

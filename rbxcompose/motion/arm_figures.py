@@ -16,12 +16,13 @@ from rbxcompose.motion.arm_kinematics import ArmKinematics
 from rbxcompose.motion.inverse_kinematics import PoseTarget, SolverSettings, solved
 from rbxcompose.motion.joint_space import JointSpace
 from rbxcompose.motion.parametrisation import Trajectory
-from rbxcompose.motion.planner import FINE, MotionPlan, MotionPlanner, MotionRequest
+from rbxcompose.motion.planner import MotionPlan, MotionPlanner, MotionRequest
 
 Array = NDArray[np.float64]
 Clock = Callable[[], float]
 T = TypeVar("T")
 CALLS, TURNS = 100, 15  # of something that takes microseconds
+AGAIN = 0.005  # [rad or m] between positions that are examined once more
 SHARE = 100  # random positions for each that is wanted and collides with nothing
 
 
@@ -116,7 +117,7 @@ def motion_tries(
             total = total.with_(Tries(1, 0, (took,), failures=(f"{found.reason}: {found.text}",)))
             continue
         length = float(np.linalg.norm(np.diff(found.waypoints, axis=0), axis=1).sum())
-        is_free = found.trajectory is None or is_free_along(found.trajectory, FINE)
+        is_free = found.trajectory is None or is_free_along(found.trajectory, AGAIN)
         total = total.with_(Tries(1, 1, (took,), (length,), int(not is_free)))
     return total
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Generator, Mapping
-from dataclasses import field, replace
+from dataclasses import replace
 from functools import partial
 from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rbxcompose.dataclass import dataclass
 from rbxcompose.geometry import Transform3
+from rbxcompose.motion.arm_goal import ArmGoal
 from rbxcompose.motion.arm_kinematics import ArmKinematics
 from rbxcompose.motion.collisions import told
 from rbxcompose.motion.inverse_kinematics import (
@@ -21,15 +21,16 @@ from rbxcompose.motion.inverse_kinematics import (
     PoseSolutions,
     PoseTarget,
     SolverSettings,
-    solved,
 )
 from rbxcompose.motion.joint_space import JointSpace
-from rbxcompose.motion.kept import Keep, KeptTip
+from rbxcompose.motion.kept import KeptTip
 from rbxcompose.motion.kept_goals import kept_solutions
 from rbxcompose.motion.parametrisation import Trajectory
 from rbxcompose.motion.planner import FINE, MotionPlan, MotionPlanner, MotionRequest, Planning
+from rbxcompose.motion.pose_search import searched
+from rbxcompose.motion.posture import Posture
 from rbxcompose.motion.reasons import MotionFailure, MotionReason
-from rbxcompose.motion.trace_planner import TraceWish, planned_trace
+from rbxcompose.motion.trace_planner import planned_trace
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
@@ -43,27 +44,6 @@ NEARBY = 200  # positions that are tried for a goal with a tolerance
 OTHER_AIMS = (MotionReason.NO_PATH_IN_TIME, MotionReason.PATH_IN_COLLISION, MotionReason.NOT_KEPT)  # may help
 SLICES = 16  # of planning in one call, so that the same goal takes the same time on a stepped clock
 LONGEST_CALL = 0.2  # [s] of planning in one call, after which others may run
-
-
-@dataclass(frozen=True, slots=True)
-class ArmGoal:
-    """What is asked for: a pose by name and positions of joints [rad or m] beside it, or a target for the tip."""
-
-    pose: str = ""
-    positions: Mapping[str, float] = field(default_factory=dict)
-    target: PoseTarget | None = None
-    frame: str = ""
-    """The link in whose frame the target is; without it, the root."""
-    speed: float = 1.0
-    acceleration: float = 1.0
-    trace: TraceWish | None = None
-    """A way of the tip, instead of the others."""
-    tolerance: float = 0.0
-    """By which joints may be elsewhere at the end if they cannot be there [rad or m]."""
-    keep: Keep = Keep()
-    """On the whole way."""
-    replans: int = 0
-    """How often it is planned again because the scene has changed on the way."""
 
 
 class ArmSite(Protocol):
@@ -116,8 +96,11 @@ class ArmTask:
         self.failure: MotionFailure | None = None
         self.is_over = self.is_canceled = False
         self.share = 0.0  # of the way that was asked for, for which there was a plan
-        self._site, self._kinematics, self._planner, self._goal = site, kinematics, planner, goal
-        self._solver = solver
+        self.missed: tuple[float, float] | None = None
+        """How far the tip ends from its target [m, rad], if that cannot be taken and was approximate."""
+        self._site, self._kinematics, self._planner, self._solver = site, kinematics, planner, solver
+        self._goal = replace(goal, prefer=goal.prefer or solver.prefer)
+        self._nearest: PoseTarget | None = None  # the target in the root's frame, if its aims are approximate
         self._trajectory: Trajectory | None = None
         self._obstacle = ""  # what the motion would hit, since the scene has changed
         self._aims: list[Array] = []  # positions that would do, the next one to try first
@@ -202,7 +185,7 @@ class ArmTask:
         self._obstacle = ""
         self._kinematics.place({name: one for name, (one, _) in measured.items() if name not in names})
         self._site.told("planning")
-        if problem := self._mistake():
+        if problem := self._goal.mistake(self._kinematics, self._site.poses):
             self._fail(MotionReason.UNKNOWN_GOAL, problem)
         elif self._goal.trace is not None:
             frame = self._frame()
@@ -213,32 +196,13 @@ class ArmTask:
             self._aims = self._nearby(self._aim())
             self._plan_next()
         else:
-            self._stage = partial(self._solve, self._solutions(self._goal.target))
+            frame = self._frame()
+            target = replace(self._goal.target, pose=frame.compose(self._goal.target.pose))
+            self._stage = partial(self._solve, target, self._solutions(target))
             self._stage()
 
     def _where(self) -> Array:
         return np.array([self._site.measured[name][0] for name in self.space.names])
-
-    def _mistake(self) -> str:
-        """Return what is wrong with the goal, or nothing."""
-        goal, poses = self._goal, self._site.poses
-        for word, share in (("speed", goal.speed), ("acceleration", goal.acceleration)):
-            if not (math.isfinite(share) and 0.0 < share <= 1.0):
-                return f"a {word} of {share:.0%} is none"
-        if problem := goal.keep.mistake(self._kinematics):
-            return problem
-        aim = goal.trace or goal.target
-        if aim is not None:
-            is_known = not goal.frame or goal.frame in self._kinematics.body.links
-            return aim.mistake if is_known else f"there is no link '{goal.frame}'"
-        if goal.pose and goal.pose not in poses:
-            return f"there is no pose '{goal.pose}'; the poses of this arm: {', '.join(poses) or 'none'}"
-        if not goal.tolerance >= 0.0:
-            return "a tolerance is below 0"
-        if not (goal.pose or goal.positions):
-            return "the goal has neither a pose nor positions of joints"
-        unknown = [name for name in goal.positions if name not in self.space.names]
-        return f"'{unknown[0]}' is no joint of this arm" if unknown else ""
 
     def _aim(self) -> Array:
         """Return where all joints should be; one that the goal leaves out stays, within its limits."""
@@ -262,32 +226,33 @@ class ArmTask:
         return self._kinematics.poses(self._start)[self._goal.frame] if self._goal.frame else Transform3()
 
     def _solutions(self, target: PoseTarget) -> Solving:
-        """Return the search for positions that bring the tip to the target."""
-        target = replace(target, pose=self._frame().compose(target.pose))
-        is_free, seed, kept = self._planner.checker.is_free, self._planner.settings.seed, self._kept
+        """Return the search for positions that bring the tip to a target in the root's frame."""
+        checker, seed, kept, prefer = self._planner.checker, self._planner.settings.seed, self._kept, self._goal.prefer
+        posture = Posture.of(self.space.names, self._site.poses[prefer]) if prefer else None
         if kept is not None and target.any_orientation:
-            first = self._start if self._first is None else self._first
-            keep, narrow = self._goal.keep, self._narrow
-            checker = self._planner.checker
-            return kept_solutions(self._kinematics, narrow, target, keep, self._start, first, checker, seed=seed)
+            keep, first = self._goal.keep, self._start if self._first is None else self._first
+            return kept_solutions(
+                self._kinematics, self._narrow, target, keep, self._start, first, checker, seed=seed, posture=posture
+            )
         ends, restarts = self._site.now + self._solver.time, self._solver.restarts
-        return solved(
+        return searched(
             self._kinematics,
             self._narrow,
             target,
             self._start,
-            is_free,
+            checker.is_free,
             seed=seed,
+            posture=posture,
             restarts=restarts,
             is_late=lambda: self._site.now >= ends,
         )
 
-    def _solve(self, solving: Solving) -> None:
+    def _solve(self, target: PoseTarget, solving: Solving) -> None:
         found = self._worked(solving)
         if found is None:
             return
         checker, colliding = self._planner.checker, found.colliding
-        self._aims = list(found.free)
+        self._aims, self._nearest = list(found.free), target if found.is_approximate else None
         if self._aims:
             self._plan_next()
         elif colliding:
@@ -301,6 +266,7 @@ class ArmTask:
         """Plan to the next of the positions that would do."""
         goal = self._goal
         aim = self._aims.pop(0)
+        self.missed = self._nearest.error(self._kinematics.tip_pose(aim)) if self._nearest is not None else None
         request = MotionRequest(self._start, aim, goal.speed, goal.acceleration, self._narrow, self._kept)
         self._stage = partial(self._continue_planning, self._planner.plan(request))
         self._stage()

@@ -17,17 +17,17 @@ from rbxcompose.body.model import Body, Geometry
 from rbxcompose.dataclass import dataclass
 from rbxcompose.geometry import Transform3
 from rbxcompose.motion.arm_kinematics import ArmKinematics
+from rbxcompose.motion.coal_shapes import Coal, Shapes, coal_shape
 from rbxcompose.motion.groups import moved_links
 from rbxcompose.motion.joint_space import JointSpace
-from rbxcompose.motion.octree_files import read_cells
 from rbxcompose.motion.scene import PairDistance, PlacedObject
 
 Array = NDArray[np.float64]
-Coal = Any  # of an extra, without types
 
 TOUCH = 1e-4
 """[m] by which shapes of the body may be within each other: those of a servo and its bracket touch, and whether faces
 that touch collide is decided by rounding."""
+FLAT = 1e-9  # [m], the thickness of the box around a mesh that is flat
 MOST_PAIRS = 5_000  # of shapes, whose distances are told
 _GEOM, _BVH = "OT_GEOM", "OT_BVH"  # coal's kinds of shapes
 
@@ -130,6 +130,7 @@ class MeshChecker:
         self._geometry: Any = pinocchio.GeometryModel()
         self._owners: list[str] = []
         self._parts: list[CheckedPart] = []
+        self._kinds: list[str] = []  # coal's kind of each shape
         self._moved = dict(moved_links(model.body, model.group.joints))
         self._paddings = dict(paddings)
         known = shapes if shapes is not None else Shapes(meshes)
@@ -262,11 +263,16 @@ class MeshChecker:
 
     def _prepare(self) -> None:
         self._data = self._geometry.createData()
-        self._apart: list[int] = []  # pairs with a plane: the tree overlooks some that are inclined, or keep a distance
+        # Pairs with a plane, of which the tree overlooks some that are inclined or keep a distance; and
+        # with a flat mesh, since it takes boxes without a thickness for empty.
+        self._apart: list[int] = []
+        # Asking coal for each pair takes long.
+        overlooked = [self._is_overlooked(one) for one in range(len(self._owners))]
         requests = zip(self._data.collisionRequests, self._geometry.collisionPairs, strict=True)
         for index, (request, pair) in enumerate(requests):
-            request.security_margin = self._margin(pair.first, pair.second)
-            if any(self._is_plane(one) for one in (pair.first, pair.second)):
+            first, second = pair.first, pair.second
+            request.security_margin = self._margin(first, second)
+            if overlooked[first] or overlooked[second]:
                 self._apart.append(index)
         self._manager = self._pinocchio.BroadPhaseManager_DynamicAABBTreeCollisionManager(
             self._model.whole.model, self._geometry, self._data
@@ -280,6 +286,7 @@ class MeshChecker:
         name = f"{owner}_{len(self._owners)}"
         self._owners.append(owner)
         self._parts.append(CheckedPart(geometry, link, origin, shape := known.of(geometry)))
+        self._kinds.append(str(shape.getObjectType()))
         self._geometry.addGeometryObject(
             self._pinocchio.GeometryObject(name, frame.parentJoint, frame.parentFrame, placement, shape)
         )
@@ -299,86 +306,15 @@ class MeshChecker:
                 pair = self._pinocchio.CollisionPair(min(first, second), max(first, second))
                 self._geometry.addCollisionPair(pair)
 
-    def _is_plane(self, shape: int) -> bool:
-        return str(self._geometry.geometryObjects[shape].geometry.getNodeType()) == "GEOM_HALFSPACE"
+    def _is_overlooked(self, shape: int) -> bool:
+        geometry = self._geometry.geometryObjects[shape].geometry
+        if self._kinds[shape] != _BVH:
+            return str(geometry.getNodeType()) == "GEOM_HALFSPACE"
+        return bool(np.min(geometry.aabb_local.max_ - geometry.aabb_local.min_) < FLAT)
 
     def _margin(self, first: int, second: int) -> float:
         """Return how far two shapes keep from each other [m]; coal lets meshes be within nothing but meshes."""
-        owners = [self._owners[one] for one in (first, second)]
-        is_of_body = not any(one in self._objects for one in owners)
-        margin = -TOUCH + (0.0 if is_of_body else sum(self._paddings.get(one, 0.0) for one in owners))
-        kinds = [str(self._geometry.geometryObjects[one].geometry.getObjectType()) for one in (first, second)]
-        return margin if all(kind == _GEOM for kind in kinds) or kinds == [_BVH, _BVH] else max(margin, 0.0)
-
-
-class Shapes:
-    """Shapes for coal, each made once; `meshes` are the files of meshes by their names."""
-
-    def __init__(self, meshes: Mapping[str, Path]) -> None:
-        self._meshes = meshes
-        self._made: dict[Geometry, Coal] = {}
-
-    def of(self, geometry: Geometry) -> Coal:
-        """Return a shape; its axes are those of URDF.
-
-        Raises:
-            ValueError: if it is a mesh that cannot be read.
-        """
-        if geometry not in self._made:
-            self._made[geometry] = coal_shape(geometry, self._meshes)
-        return self._made[geometry]
-
-    def keep(self, wanted: Iterable[Geometry]) -> None:
-        """Forget all other shapes: those of clouds of points are large, and come again and again."""
-        kept = set(wanted)
-        self._made = {geometry: made for geometry, made in self._made.items() if geometry in kept}
-
-
-def coal_shape(geometry: Geometry, meshes: Mapping[str, Path]) -> Coal:
-    """Return a shape for coal; a mesh that `meshes` does not name is a file of this name.
-
-    Raises:
-        ValueError: if its file cannot be read.
-    """
-    import coal
-
-    match geometry.kind:
-        case "box":
-            return coal.Box(*geometry.size)
-        case "sphere":
-            return coal.Sphere(*geometry.size)
-        case "cylinder":
-            return coal.Cylinder(*geometry.size)
-        case "cone":
-            return coal.Cone(*geometry.size)
-        case "capsule":
-            return coal.Capsule(*geometry.size)
-        case "plane":
-            return coal.Halfspace(np.array(geometry.size[:3]), -geometry.size[3])
-        case "octree":
-            cells, side = np.array(geometry.points).reshape(-1, 3), geometry.size[0]
-            return coal.makeOctree(*(read_cells(Path(geometry.file), side) if geometry.file else (cells, side)))
-    scale = np.array(geometry.size or (1.0, 1.0, 1.0))
-    if geometry.points:
-        return _triangles(np.array(geometry.points).reshape(-1, 3) * scale, geometry.triangles)
-    path = meshes.get(geometry.file, Path(geometry.file))
-    try:
-        if not path.is_file():
-            raise ValueError("there is no such file")
-        return coal.MeshLoader().load(str(path), scale)
-    except ValueError as error:
-        raise ValueError(f"the mesh '{geometry.file}' cannot be read: {error}") from error
-    except RuntimeError as error:  # its text is about coal's own files
-        raise ValueError(f"the mesh '{geometry.file}' cannot be read: it is none") from error
-
-
-def _triangles(corners: Array, triangles: tuple[int, ...]) -> Coal:
-    import coal
-
-    made = coal.BVHModelOBBRSS()
-    made.beginModel(len(triangles) // 3, len(corners))
-    made.addVertices(corners)
-    made.addTriangles(np.array(triangles, dtype=np.int64).reshape(-1, 3))
-    made.endModel()
-    made.computeLocalAABB()
-    return made
+        one, other, kind = self._owners[first], self._owners[second], self._kinds[first]
+        is_of_body = one not in self._objects and other not in self._objects
+        margin = -TOUCH + (0.0 if is_of_body else self._paddings.get(one, 0.0) + self._paddings.get(other, 0.0))
+        return margin if kind == self._kinds[second] and kind in (_GEOM, _BVH) else max(margin, 0.0)

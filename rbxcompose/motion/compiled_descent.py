@@ -24,8 +24,10 @@ class Aim(NamedTuple):
 
     wanted: Array
     """Of shape (3, 4): the rotation, then the translation [m]."""
-    rows: int
-    """3 if only the position counts, 6 if the orientation counts, too."""
+    top: int
+    """The first part of the error that counts, of three lengths and then three angles: 3 if any position will do."""
+    end: int
+    """The one behind the last: 3 if any orientation will do."""
     near: float
     """[m] at which a descent ends."""
     near_angle: float
@@ -48,12 +50,12 @@ class CompiledTip:
     def warm_up(self) -> None:
         """Have it compiled, or read what was compiled before."""
         values = np.zeros(self._size)
-        self.descend(self.aim(Transform3(), 6, (1.0, 4.0), (1.0, 4.0), (values, values)), values[None])
+        self.descend(self.aim(Transform3(), (0, 6), (1.0, 4.0), (1.0, 4.0), (values, values)), values[None])
 
     def aim(
         self,
         pose: Transform3,
-        rows: int,
+        rows: tuple[int, int],
         near: tuple[float, float],
         tolerances: tuple[float, float],
         bounds: tuple[Array, Array],
@@ -63,7 +65,7 @@ class CompiledTip:
         size = math.hypot(x, y, z, w)
         unit = Transform3(pose.translation, (x / size, y / size, z / size, w / size))
         one, other, most, largest = (float(each) for each in (*near, *tolerances))  # a whole number is another type
-        return Aim(matrix_of(unit), rows, one, other, most, largest, *bounds)
+        return Aim(matrix_of(unit), *rows, one, other, most, largest, *bounds)
 
     def descend(self, aim: Aim, firsts: Array) -> tuple[int, Array, Array]:
         """Descend from positions of shape (k, n), one after the other, until the tolerances are met.
@@ -96,12 +98,12 @@ def _descent(
 ) -> None:
     """Change the values until the tip is near its aim, or they are stuck."""
     frames, jacobian, error, square, solution, step = work
-    best, patience, rows = math.inf, PATIENCE, aim.rows
+    best, patience = math.inf, PATIENCE
     while True:
         place_links(chain, values, frames)
         _measure(frames[-1], aim.wanted, error)
-        away[0] = math.sqrt(error[0] * error[0] + error[1] * error[1] + error[2] * error[2])
-        away[1] = math.sqrt(error[3] * error[3] + error[4] * error[4] + error[5] * error[5]) if rows == 6 else 0.0
+        away[0] = math.sqrt(error[0] * error[0] + error[1] * error[1] + error[2] * error[2]) if aim.top == 0 else 0.0
+        away[1] = math.sqrt(error[3] * error[3] + error[4] * error[4] + error[5] * error[5]) if aim.end == 6 else 0.0
         size = away[0] * away[0] + away[1] * away[1]
         patience = PATIENCE if size < PROGRESS * best else patience - 1
         best = min(best, size)
@@ -122,17 +124,18 @@ def _descent(
 @compiled
 def _step(jacobian: Array, square: Array, error: Array, solution: Array, aim: Aim, size: float, step: Array) -> None:
     """Write the damped step; `size` is the square of the error."""
-    for row in range(aim.rows):
+    top, rows = aim.top, aim.end - aim.top
+    for row in range(rows):
         for column in range(row + 1):
             total = LEAST_DAMPING + DAMPING * size if row == column else 0.0
             for joint in range(len(step)):
-                total += jacobian[row, joint] * jacobian[column, joint]
+                total += jacobian[top + row, joint] * jacobian[top + column, joint]
             square[row, column] = total
-    _solve(square, error, aim.rows, solution)
+    _solve(square, error[top:], rows, solution)
     for joint in range(len(step)):
         step[joint] = 0.0
-        for row in range(aim.rows):
-            step[joint] += jacobian[row, joint] * solution[row]
+        for row in range(rows):
+            step[joint] += jacobian[top + row, joint] * solution[row]
 
 
 @compiled

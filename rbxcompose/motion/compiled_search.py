@@ -1,7 +1,8 @@
 """A search for a path in code that numba compiles, and its shortening: RRT-Connect on the spheres of `CompiledModel`.
 
 The same arguments give the same path, on any machine with the same arithmetic: random numbers are our own. Source of
-the search: Kuffner and LaValle, RRT-Connect (2000); of random numbers: Steele, Lea, Flood, Fast splittable pseudorandom
+the search: Kuffner and LaValle, RRT-Connect (2000); of samples that are left out: Yershova, Jaillet, Simeon, LaValle,
+Dynamic-Domain RRTs (2005); of random numbers: Steele, Lea, Flood, Fast splittable pseudorandom
 number generators (2014); of shortcuts: Geraerts and Overmars, Creating high-quality paths for motion planning (2007).
 """
 
@@ -12,16 +13,20 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rbxcompose.motion.borrowed_arrays import borrowed
 from rbxcompose.motion.compiled_collisions import CompiledModel, Workspace, is_line_free
 from rbxcompose.motion.numba_cache import compiled, inlined
 
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
 
+GAIN = 0.02  # of a piece of a path: a shortcut that saves less is not examined
+WIDE = 10_000  # examined positions, after which samples are from all of their ranges
+DOMAIN = 3.0  # longest branches: a sample farther away is no use to a node next to what collides
 PAUSED, FOUND, FULL = 0, 1, 2
 """How a slice of a search ends."""
-EXAMINED, LEFT, RIGHT, TURN = 0, 1, 2, 3
-"""What stands in `SearchTrees.about`: examined positions, where both trees meet, and whose turn it is."""
+EXAMINED, LEFT, RIGHT = 0, 1, 2
+"""What stands in `SearchTrees.about`: examined positions, and where both trees meet."""
 
 
 class SearchTrees(NamedTuple):
@@ -33,6 +38,8 @@ class SearchTrees(NamedTuple):
     """The node before each one, of shape (2, k)."""
     counts: Whole
     """How many nodes each tree has."""
+    domains: Array
+    """How far a sample may be from each node to be worth a branch, of shape (2, k); inf until one was not free."""
     about: Whole
     seed: NDArray[np.uint64]
     """The state of the random numbers, of shape (1,)."""
@@ -62,25 +69,29 @@ def grow(
 ) -> int:
     """Search until both trees meet, a tree is full, or `budget` more positions are examined; return which.
 
-    Samples are between `low` and `high`; a branch is at most `reach` long, and examined every `step`.
+    Samples are between `low` and `high`, of shape (2, n): in the first range to begin with, in the second one after
+    `WIDE` positions. A branch is at most `reach` long, and examined every `step`.
     """
-    about, wanted = trees.about, np.empty(len(low))
+    model, trees, work = borrowed(model), borrowed(trees), borrowed(work)
+    about, wanted = trees.about, np.empty(low.shape[1])
     until = about[EXAMINED] + budget
     while about[EXAMINED] < until:
         if max(trees.counts[0], trees.counts[1]) + 1 >= trees.nodes.shape[1]:
             return FULL
-        own = about[TURN]
-        about[TURN] = 1 - own
-        for index in range(len(low)):
-            wanted[index] = low[index] + (high[index] - low[index]) * random(trees.seed)
+        own = 0 if trees.counts[0] <= trees.counts[1] else 1  # the smaller tree
+        wide = min(1.0, about[EXAMINED] / WIDE)
+        for index in range(len(wanted)):
+            least = low[0, index] + wide * (low[1, index] - low[0, index])
+            most = high[0, index] + wide * (high[1, index] - high[0, index])
+            wanted[index] = least + (most - least) * random(trees.seed)
         if not extend(model, trees, own, wanted, reach, step, work):
             continue
         new = trees.counts[own] - 1
-        for index in range(len(low)):
+        for index in range(len(wanted)):
             wanted[index] = trees.nodes[own, new, index]
         while trees.counts[1 - own] < trees.nodes.shape[1] and extend(model, trees, 1 - own, wanted, reach, step, work):
             last, is_same = trees.counts[1 - own] - 1, True
-            for index in range(len(low)):
+            for index in range(len(wanted)):
                 is_same = is_same and trees.nodes[1 - own, last, index] == wanted[index]
             if is_same:
                 about[LEFT + own], about[LEFT + 1 - own] = new, last
@@ -102,6 +113,9 @@ def extend(
         if total < least:
             nearest, least = node, total
     length = np.sqrt(least)
+    if length > trees.domains[own, nearest]:
+        trees.about[EXAMINED] += 1  # so that a slice ends
+        return False
     share = 1.0 if length <= reach else reach / length
     for index in range(len(wanted)):
         begin = nodes[nearest, index]
@@ -109,8 +123,10 @@ def extend(
     examined = is_line_free(model, nodes[nearest], nodes[count], step, work)
     trees.about[EXAMINED] += abs(examined)
     if examined < 0:
+        trees.domains[own, nearest] = DOMAIN * reach
         return False
     trees.parents[own, count] = nearest
+    trees.domains[own, count] = np.inf
     trees.counts[own] = count + 1
     return True
 
@@ -127,6 +143,7 @@ def shorten(
     work: Workspace,
 ) -> int:
     """Shorten a path of `count` points in place; return how many there are then. It has room for `tries` more."""
+    model, path, about, work = borrowed(model), borrowed(path), borrowed(about), borrowed(work)
     count = reduce(model, path, count, step, about, work)
     size = path.shape[1]
     one, other = np.empty(size), np.empty(size)
@@ -142,6 +159,11 @@ def shorten(
         for index in range(size):
             one[index] = path[begin, index] + (path[begin + 1, index] - path[begin, index]) * (first - begin)
             other[index] = path[end, index] + (path[end + 1, index] - path[end, index]) * (second - end)
+        around = distance(one, path[begin + 1]) + distance(path[end], other)
+        for place in range(begin + 1, end):
+            around += distance(path[place], path[place + 1])
+        if around - distance(one, other) < GAIN * around:
+            continue
         examined = is_line_free(model, one, other, step, work)
         about[EXAMINED] += abs(examined)
         if examined < 0:
@@ -173,6 +195,15 @@ def reduce(model: CompiledModel, path: Array, count: int, step: float, about: Wh
         kept += 1
         here = there
     return kept
+
+
+@inlined
+def distance(one: Array, other: Array) -> float:
+    """Return how far two positions are from each other."""
+    total = 0.0
+    for index in range(len(one)):
+        total += (one[index] - other[index]) ** 2
+    return float(np.sqrt(total))
 
 
 @inlined

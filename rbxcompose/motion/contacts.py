@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Generator, Iterator
-from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
@@ -20,7 +19,7 @@ from rbxcompose.motion.inverse_kinematics import TOLERANCE, PoseTarget, solved
 from rbxcompose.motion.joint_space import JointSpace, interpolated
 from rbxcompose.motion.planner import RESOLUTION
 from rbxcompose.motion.reasons import GraspReason, MotionReason, StageFailure
-from rbxcompose.motion.straight_line import straight
+from rbxcompose.motion.straight_line import line_steps
 
 Array = NDArray[np.float64]
 RESTARTS, ENOUGH = 8, 2  # of the search for positions at one contact: there are many contacts
@@ -159,19 +158,23 @@ class ContactSearch:
         return _farthest(failed)
 
     def _line(self, stage: str, start: Array, goal: Transform3, checker: Checker) -> Array | StageFailure:
-        """Return as much of a line as is free, or why that is too short."""
-        line = straight(self.kinematics, self.space, start, goal)
-        failure = StageFailure(stage, GraspReason.LINE_OUT_OF_REACH, line.problem)
-        good = 1
-        for first, second in pairwise(line.positions):
-            hit = next((one for one in interpolated((first, second), RESOLUTION) if not checker.is_free(one)), None)
+        """Return as much of a line as is free, or why that is too short; behind what collides it is not followed."""
+        steps, free = line_steps(self.kinematics, self.space, start, goal), [start]
+        while True:
+            try:
+                values = next(steps)
+            except StopIteration as ended:
+                failure = StageFailure(stage, GraspReason.LINE_OUT_OF_REACH, ended.value.problem)
+                break
+            between = interpolated((free[-1], values), RESOLUTION)
+            hit = next((one for one in between if not checker.is_free(one)), None)
             if hit is not None:
                 failure = StageFailure(stage, MotionReason.PATH_IN_COLLISION, told(checker.colliding(hit)))
                 break
-            good += 1
-        here, end = (self.kinematics.tip_pose(one).translation for one in (start, line.positions[good - 1]))
+            free.append(values)
+        here, end = (self.kinematics.tip_pose(one).translation for one in (start, free[-1]))
         if math.dist(here, end) >= min(LEAST, math.dist(here, goal.translation) - TOLERANCE):
-            return line.positions[:good]
+            return np.array(free)
         return failure
 
 

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Generator
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rbxcompose.motion.compiled_collisions import CompiledModel, Workspace, is_free
+from rbxcompose.motion.compiled_collisions import CompiledModel, Workspace, near_pairs
 from rbxcompose.motion.compiled_search import EXAMINED, FOUND, FULL, LEFT, RIGHT, SearchTrees, grow, shorten
 from rbxcompose.motion.joint_space import JointSpace
+from rbxcompose.motion.search import MARGIN, sample_range
 
 Array = NDArray[np.float64]
 
 SLICE = 5_000  # examined positions, after which a search lets others run
 NODES, MOST_NODES = 1_024, 16_384  # of a tree at the beginning, and at most
-RANGE = 0.8  # [rad], the longest branch of a tree
+RANGE = 1.5  # [rad], the longest branch of a tree
 SHORTCUTS = 60  # attempts to shorten a path
 
 
@@ -35,9 +35,10 @@ def fast_path(
     It yields how many positions were examined, and goes on until it is closed. The same arguments give the same path.
     """
     for word, values in zip(("start", "goal"), ends, strict=True):
-        if not is_free(model, values, work):
+        if near_pairs(model, values[None], work.first, work):
             return f"spheres collide at the {word}"
-    low, high = _bounds(space, *ends)
+    near, whole = sample_range(space, *ends, MARGIN), sample_range(space, *ends)
+    low, high = np.stack((near[0], whole[0])), np.stack((near[1], whole[1]))
     trees = _trees(ends, seed)
     while (ended := grow(model, trees, low, high, RANGE, resolution, SLICE, work)) != FOUND:
         if ended == FULL:
@@ -58,15 +59,9 @@ def compile_search(model: CompiledModel, work: Workspace, size: int) -> None:
     """Compile what is not in the caches, for an arm of so many joints."""
     here = np.zeros(size)
     trees = _trees((here, here), 0)
-    grow(model, trees, here, here, RANGE, RANGE, 0, work)
+    ranges = np.stack((here, here))
+    grow(model, trees, ranges, ranges, RANGE, RANGE, 0, work)
     shorten(model, trees.nodes[0].copy(), 2, 0, RANGE, trees.seed, trees.about, work)
-
-
-def _bounds(space: JointSpace, start: Array, goal: Array) -> tuple[Array, Array]:
-    """Return the ranges of samples; joints without an end may turn half a turn beyond both ends."""
-    low, high = np.minimum(start, goal) - math.pi, np.maximum(start, goal) + math.pi
-    lower, upper = space.lower, space.upper
-    return np.where(np.isfinite(lower), lower, low), np.where(np.isfinite(upper), upper, high)
 
 
 def _trees(ends: tuple[Array, Array], seed: int) -> SearchTrees:
@@ -76,7 +71,8 @@ def _trees(ends: tuple[Array, Array], seed: int) -> SearchTrees:
         nodes,
         np.full((2, NODES), -1, dtype=np.int64),
         np.ones(2, dtype=np.int64),
-        np.zeros(4, dtype=np.int64),
+        np.full((2, NODES), np.inf),
+        np.zeros(3, dtype=np.int64),
         np.array([seed], dtype=np.uint64),
     )
 
@@ -85,7 +81,8 @@ def _larger(trees: SearchTrees) -> SearchTrees:
     """Return the same trees with room for twice as many nodes."""
     nodes = np.concatenate((trees.nodes, np.empty_like(trees.nodes)), axis=1)
     parents = np.concatenate((trees.parents, np.full_like(trees.parents, -1)), axis=1)
-    return trees._replace(nodes=nodes, parents=parents)
+    domains = np.concatenate((trees.domains, np.full_like(trees.domains, np.inf)), axis=1)
+    return trees._replace(nodes=nodes, parents=parents, domains=domains)
 
 
 def _path(trees: SearchTrees) -> Array:

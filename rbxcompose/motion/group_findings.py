@@ -9,8 +9,8 @@ NO_CHAIN = kind(
     """The chain of an arm is none
 
 A chain leads from a link that carries the arm to a link at its end, by joints of which at least one moves. So the end
-is below the beginning in the tree of links: `rbxcompose body tree` shows it. What is `passive` is on the chain, and
-arms that are made of other arms do not lead back to themselves.
+is below the beginning in the tree of links: `rbxcompose body tree` shows it. What is `passive` is on the chain, joints
+of `links` carry the last of them, and arms that are made of other arms do not lead back to themselves.
 
 Bad: `chain: {from: arm_tip, to: torso_link}`
 Good: `chain: {from: torso_link, to: arm_tip}`
@@ -69,5 +69,16 @@ leave what it holds behind, or two controllers would move one joint.
 
 Bad: `left_arm: {..., gripper: right_gripper_controller}`
 Good: `right_arm: {..., gripper: right_gripper_controller}`
+""",
+)
+NO_POSE = kind(
+    "RBX2357",
+    """An arm prefers a pose that it does not have
+
+Where several positions of joints bring the tip to a pose, those nearest to the pose under `kinematics: {prefer: ...}`
+are taken. It is one of the `poses` of the same arm.
+
+Bad: `arm: {..., poses: {ready: {...}}, kinematics: {prefer: redy}}`
+Good: `arm: {..., poses: {ready: {...}}, kinematics: {prefer: ready}}`
 """,
 )

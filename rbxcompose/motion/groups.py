@@ -38,6 +38,19 @@ def group_of(body: Body, joints: Iterable[str]) -> ArmGroup:
     return ArmGroup(tuple(one.name for one in found), found[0].parent, found[-1].child)
 
 
+def carrying(body: Body, links: Sequence[str]) -> ArmGroup | None:
+    """Return the joints of links, without those that are fixed or mimic; None if none of them carries the last link.
+
+    The last link is the tip.
+    """
+    above = [body.joint_above[link] for link in links if link in body.joint_above]
+    if not (joints := [one.name for one in above if one.moves and one.mimic is None]):
+        return None
+    found = group_of(body, joints)
+    is_carried = found.joints[-1] in moved_links(body, found.joints)[links[-1]]
+    return ArmGroup(found.joints, found.base, links[-1]) if is_carried else None
+
+
 def together(body: Body, parts: Sequence[ArmGroup]) -> ArmGroup:
     """Return the joints of several arms as one, in the order of the body; its tip is that of the last one."""
     whole = group_of(body, (joint for part in parts for joint in part.joints))

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterable, Iterator
+from contextlib import closing
 from dataclasses import replace
 from typing import ClassVar, Protocol, TypeVar
 
@@ -12,20 +13,22 @@ from numpy.typing import NDArray
 
 from rbxcompose.dataclass import dataclass
 from rbxcompose.geometry import Quaternion, Transform3
+from rbxcompose.motion.arm_goal import ArmGoal
 from rbxcompose.motion.arm_kinematics import ArmKinematics
-from rbxcompose.motion.arm_task import SETTLING, SLICES, ArmGoal, ArmSite, ArmTask
+from rbxcompose.motion.arm_task import LONGEST_CALL, SETTLING, ArmSite, ArmTask
 from rbxcompose.motion.collisions import Checker
 from rbxcompose.motion.contacts import Contact, ContactCheckers, ContactSearch, ContactWay, NearChecker
 from rbxcompose.motion.planner import MotionPlanner, MotionRequest, Planning
 from rbxcompose.motion.reasons import GraspReason, MotionFailure, MotionReason, StageFailure
 from rbxcompose.motion.scene import PlacedObject
+from rbxcompose.motion.ways_ahead import ATTEMPTS, HelpedPlanner, PlansWithHelp, WaysAhead
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
 Work = Generator[None, None, StageFailure | None]
 
 SPARE = 0.005  # [rad or m] to the limits of joints: curves through the poses of a line swing a little beyond them
-ATTEMPTS = 5  # ways that are planned to, before it gives up
+TRIES = 256  # slices of a search in one call, unless it takes long: each is a few milliseconds, and there are hundreds
 SLACK = 0.005  # [m] by which an opening may be less than it was told, or than the width of what is between the fingers
 GAP = 0.005  # [m] below an object within which it stands on something
 
@@ -73,11 +76,10 @@ class HandSite(ArmSite, Protocol):
         """Let an object stay where it is; `ended` gets why that cannot be, or nothing."""
 
 
-class HandWorks(Protocol):
+class HandWorks(PlansWithHelp, Protocol):
     """What plans for an arm."""
 
     kinematics: ArmKinematics
-    planner: MotionPlanner
 
     def checker(self, objects: Iterable[PlacedObject]) -> Checker:
         """Return a checker among these objects."""
@@ -110,7 +112,7 @@ class HandTask:
         self.site, self.works, self.hand, self._pace = site, works, hand, pace
         self.space, self.kinematics = works.planner.space, works.kinematics
         self._motion: ArmTask | None = None
-        self._line: AlongPath | None = None
+        self._line: MotionPlanner | None = None
         self._watch: Callable[[], Checker] | None = None  # makes the checker of the line that is being followed
         self._grips = False
         self._work = self._carry_out()
@@ -219,52 +221,57 @@ class HandTask:
         """Go to where the line to a contact begins, the first one that a motion is planned to, and return its way."""
         space = self.space.inside(SPARE)
         search = ContactSearch(self.kinematics, space, self.here, self.works.planner.settings.seed, lines)
-        rest, failure = iter(contacts), self.fail(MotionReason.GOAL_OUT_OF_REACH, "there is no way to it")
-        for attempt in range(ATTEMPTS):
-            found = yield from self._worked(search.next_way(rest, checkers))
-            if found is None or (attempt and isinstance(found, StageFailure)):
-                break
-            if isinstance(found, StageFailure):
-                return found
-            wanted = dict(zip(self.space.names, found.coming[0].tolist(), strict=True))
-            failed = yield from self._moved(self.works.planner, wanted)
-            if failed is None:
-                return found
-            failure = self.fail(failed.reason, failed.text)
-            if failed.reason not in (MotionReason.NO_PATH_IN_TIME, MotionReason.PATH_IN_COLLISION):
-                break
+        failure = self.fail(MotionReason.GOAL_OUT_OF_REACH, "there is no way to it")
+        with closing(WaysAhead(search, contacts, checkers, self.works)) as ways:
+            for attempt in range(ATTEMPTS):
+                found = yield from self._worked(ways.next_way())
+                if found is None or (attempt and isinstance(found, StageFailure)):
+                    break
+                if isinstance(found, StageFailure):
+                    return found
+                failed = yield from self._led(HelpedPlanner(self.works.planner, ways), found.coming[0], self._usual)
+                if failed is None:
+                    return found
+                failure = self.fail(failed.reason, failed.text)
+                if failed.reason not in (MotionReason.NO_PATH_IN_TIME, MotionReason.PATH_IN_COLLISION):
+                    break
         return failure
+
+    def _usual(self) -> Checker:
+        return self.works.planner.checker
 
     def _worked(self, work: Generator[None, None, T]) -> Generator[None, None, T | StageFailure]:
         """Go on with some work until it has a result, or the goal is cancelled."""
         while not self.is_canceled:
-            for _ in range(SLICES):
+            begin = self.site.now
+            for _ in range(TRIES):
                 try:
                     next(work)
                 except StopIteration as ended:
                     result: T = ended.value
                     return result
+                if self.site.now - begin >= LONGEST_CALL:
+                    break
             yield
         return self.fail(MotionReason.INTERRUPTED, "it was cancelled")
 
     def follow(self, path: Array, watch: Callable[[], Checker]) -> Work:
         """Follow a path, examined by the checker that `watch` makes."""
-        self._watch = watch
-        self._line = AlongPath(self.works.planner, watch(), path)
-        wanted = dict(zip(self.space.names, path[-1].tolist(), strict=True))
-        failed = yield from self._moved(self._line, wanted)
-        self._line = self._watch = None
+        failed = yield from self._led(AlongPath(self.works.planner, watch(), path), path[-1], watch)
         return self.fail(failed.reason, failed.text) if failed is not None else None
 
-    def _moved(
-        self, planner: MotionPlanner, wanted: Mapping[str, float]
+    def _led(
+        self, planner: MotionPlanner, end: Array, watch: Callable[[], Checker]
     ) -> Generator[None, None, MotionFailure | None]:
-        goal = replace(self._pace, positions=wanted)
+        """Move as a planner says; `watch` makes its checker again when something else is around the robot."""
+        self._line, self._watch = planner, watch
+        goal = replace(self._pace, positions=dict(zip(self.space.names, end.tolist(), strict=True)))
         self._motion = ArmTask(self.site, self.kinematics, planner, goal)
         while not self._motion.is_over:
             self._motion.advance()
             yield
         failure, self._motion = self._motion.failure, None
+        self._line = self._watch = None
         return failure
 
     def gripped(self, opening: float) -> Generator[None, None, Gripped]:

@@ -8,7 +8,7 @@ kinematics of the body, which know nothing of the Jacobian.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from typing import Any
 
 import numpy as np
@@ -38,6 +38,14 @@ class PoseTarget:
     any_orientation: bool = False
     tolerance: float = TOLERANCE
     angle_tolerance: float = ANGLE_TOLERANCE
+    any_position: bool = False
+    is_approximate: bool = False
+    """Whether the nearest pose that can be taken will do if this one cannot."""
+
+    @property
+    def rows(self) -> tuple[int, int]:
+        """Return which parts of an error count, of three lengths and then three angles: from the first to the last."""
+        return 3 if self.any_position else 0, 3 if self.any_orientation else 6
 
     @property
     def mistake(self) -> str:
@@ -47,12 +55,14 @@ class PoseTarget:
             return "the target is not a finite pose"
         if not 0.0 < math.hypot(*self.pose.rotation) < 2.0:
             return "the orientation of the target is no rotation"
+        if self.any_position and self.any_orientation:
+            return "neither the position nor the orientation of the target counts"
         sizes = (self.tolerance, self.angle_tolerance)
         return "" if all(math.isfinite(one) and one > 0.0 for one in sizes) else "a tolerance is not above 0"
 
     def error(self, pose: Transform3) -> tuple[float, float]:
-        """Return how far away a pose is [m, rad]; the angle is 0 if it does not count."""
-        away = math.dist(self.pose.translation, pose.translation)
+        """Return how far away a pose is [m, rad]; what does not count is 0."""
+        away = 0.0 if self.any_position else math.dist(self.pose.translation, pose.translation)
         if self.any_orientation:
             return away, 0.0
         x, y, z, w = self.pose.inverse().compose(pose).rotation
@@ -63,6 +73,11 @@ class PoseTarget:
         away, angle = self.error(pose)
         return away <= self.tolerance and angle <= self.angle_tolerance
 
+    def excess(self, pose: Transform3) -> float:
+        """Return how far away a pose is, counted in tolerances: those say how much a length weighs beside an angle."""
+        away, angle = self.error(pose)
+        return math.hypot(away / self.tolerance, angle / self.angle_tolerance)
+
 
 @dataclass(frozen=True, slots=True)
 class SolverSettings:
@@ -72,6 +87,8 @@ class SolverSettings:
     time: float = math.inf
     tolerance: float = TOLERANCE
     angle_tolerance: float = ANGLE_TOLERANCE
+    prefer: str = ""
+    """The pose of the arm that solutions should be near to, if a goal does not name one."""
 
 
 SOLVER = SolverSettings()
@@ -86,6 +103,8 @@ class PoseSolutions:
     nearest: tuple[float, float]
     """How far from the target the best attempt ended [m, rad]."""
     attempts: int
+    is_approximate: bool = False
+    """Whether the free ones are as near to the target as is possible, and not within its tolerances."""
 
 
 def solved(
@@ -99,14 +118,16 @@ def solved(
     restarts: int = RESTARTS,
     enough: int = ENOUGH,
     is_late: Callable[[], bool] = lambda: False,
+    guesses: Sequence[Array] = (),
 ) -> Generator[None, None, PoseSolutions]:
     """Return solutions within the limits of joints; it yields after some attempts. The same seed gives the same.
 
-    It ends with what it has when it `is_late`.
+    It begins from the start, then from `guesses`, then from random positions. It ends with what it has when it
+    `is_late`.
     """
     free: list[Array] = []
     colliding: list[Array] = []
-    nearest, attempts, bounds = (math.inf, math.inf), 0, _bounds(space)
+    nearest, attempts, bounds = (math.inf, math.inf), 0, bounds_of(space)
     firsts = space.clamped(start)[None]
     while True:
         tried, ending, each = _descents(kinematics, target, firsts, bounds)
@@ -115,19 +136,15 @@ def solved(
         if (
             away[0] <= target.tolerance
             and away[1] <= target.angle_tolerance
-            and _is_verified(kinematics, target, values)
+            and target.is_met(kinematics.tip_pose(values))
         ):
             (free if is_free(values) else colliding).append(values)
         if attempts == 1:
-            firsts = space.samples(restarts, seed)
+            firsts = np.concatenate((*(space.clamped(one)[None] for one in guesses), space.samples(restarts, seed)))
         if len(free) >= enough or is_late() or not len(firsts):
             break
         yield
     return PoseSolutions(_sorted(free, start), _sorted(colliding, start), nearest, attempts)
-
-
-def _is_verified(kinematics: ArmKinematics, target: PoseTarget, values: Array) -> bool:
-    return target.is_met(kinematics.tip_pose(values))
 
 
 def _sorted(found: list[Array], start: Array) -> tuple[Array, ...]:
@@ -138,11 +155,12 @@ def descended(
     kinematics: ArmKinematics, space: JointSpace, target: PoseTarget, first: Array
 ) -> tuple[Array, tuple[float, float]]:
     """Return where the descent from `first` ends, and how far from the target [m, rad]; it ends when it gets stuck."""
-    _, values, each = _descents(kinematics, target, first[None], _bounds(space))
+    _, values, each = _descents(kinematics, target, first[None], bounds_of(space))
     return values, each[-1]
 
 
-def _bounds(space: JointSpace) -> tuple[Array, Array]:
+def bounds_of(space: JointSpace) -> tuple[Array, Array]:
+    """Return the least and the greatest positions of solutions, each of shape (n,); infinite without a limit."""
     lower, upper = space.lower, space.upper
     edge = np.minimum(EDGE, (upper - lower) / 4)
     return lower + edge, upper - edge
@@ -155,7 +173,7 @@ def _descents(
 
     Return from how many, where the last one ended, and how far from the target [m, rad] each of them.
     """
-    rows, tolerances = 3 if target.any_orientation else 6, (target.tolerance, target.angle_tolerance)
+    rows, tolerances = target.rows, (target.tolerance, target.angle_tolerance)
     near = CLOSER * target.tolerance, CLOSER * target.angle_tolerance
     if (tip := kinematics.compiled) is not None:
         tried, values, away = tip.descend(tip.aim(target.pose, rows, near, tolerances, bounds), firsts[:TOGETHER])
@@ -168,18 +186,18 @@ def _descent(
     kinematics: ArmKinematics,
     wanted: Any,
     first: Array,
-    rows: int,
+    rows: tuple[int, int],
     near: tuple[float, float],
     bounds: tuple[Array, Array],
 ) -> tuple[Array, tuple[float, float]]:
-    values, (lower, upper) = first.copy(), bounds
-    identity, best, patience = np.eye(rows), math.inf, PATIENCE
+    values, (lower, upper), (top, end) = first.copy(), bounds, rows
+    identity, best, patience = np.eye(end - top), math.inf, PATIENCE
     while True:
         error, jacobian = kinematics.error(values, wanted)
-        if rows < len(error):
-            error, jacobian = error[:rows], jacobian[:rows]
         parts = error.tolist()
-        away = math.hypot(*parts[:3]), math.hypot(*parts[3:])
+        away = math.hypot(*parts[top:3]), math.hypot(*parts[3:end])
+        if end - top < len(error):
+            error, jacobian = error[top:end], jacobian[top:end]
         square = away[0] * away[0] + away[1] * away[1]
         patience = PATIENCE if square < PROGRESS * best else patience - 1
         best = min(best, square)

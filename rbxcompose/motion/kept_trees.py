@@ -18,10 +18,10 @@ from rbxcompose.regular_files import open_regular
 
 Array = NDArray[np.float64]
 
-FORM = f"1 {LEAVES} {FINEST} {SEGMENTS} {SLACK}"
+FORM = f"4 {LEAVES} {FINEST} {SEGMENTS} {SLACK}"
 """What the spheres depend on beside the mesh; its first number changes with how they are fitted."""
 MOST_FILES = 256
-LARGEST = 1_000_000  # [bytes]
+LARGEST = 64_000_000  # [bytes], as many as a mesh may have
 
 
 def kept_mesh_tree(triangles: Array) -> SphereTree:
@@ -33,7 +33,8 @@ def kept_mesh_tree(triangles: Array) -> SphereTree:
         return kept
     made = mesh_tree(triangles)
     file = io.BytesIO()
-    np.save(file, np.column_stack((made.centres, made.radii, made.children)), allow_pickle=False)
+    for array in (np.column_stack((made.centres, made.radii, made.children, made.spans)), made.corners):
+        np.save(file, array, allow_pickle=False)
     with suppress(OSError):  # without a folder that can be written, there is none to keep it in
         path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
         replace_file(path, file.getvalue(), mode=0o600)
@@ -50,12 +51,18 @@ def _read(path: Path) -> SphereTree | None:
             about = os.fstat(file.fileno())
             if about.st_uid != os.getuid() or about.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
                 return None
-            rows = np.load(io.BytesIO(file.read(LARGEST)), allow_pickle=False)
+            content = io.BytesIO(file.read(LARGEST))
+            rows, corners = (np.load(content, allow_pickle=False) for _ in range(2))
     except (OSError, ValueError, EOFError):
         return None
-    if rows.ndim != 2 or rows.shape[1] != 5 or not len(rows) or not np.all(np.isfinite(rows)):
+    if rows.ndim != 2 or rows.shape[1] != 7 or not len(rows) or corners.ndim != 2 or corners.shape[1] != 3:
         return None
-    children, own = rows[:, 4].astype(np.int64), np.arange(len(rows))
+    if not all(one.dtype == np.float64 and np.all(np.isfinite(one)) for one in (rows, corners)):
+        return None
+    (children, begins, ends), own = rows[:, 4:].T.astype(np.int64), np.arange(len(rows))
     if np.any((children >= 0) & ((children <= own) | (children + 1 >= len(rows)))):
         return None  # it would lead in circles, or out of the tree
-    return SphereTree(np.ascontiguousarray(rows[:, :3]), np.ascontiguousarray(rows[:, 3]), children)
+    if np.any((begins < 0) | (ends < begins) | (ends > len(corners))):
+        return None
+    spheres = (np.ascontiguousarray(rows[:, :3]), np.ascontiguousarray(rows[:, 3]), children)
+    return SphereTree(*spheres, np.stack((begins, ends), axis=1), corners)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import math
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,13 +12,17 @@ from rbxcompose.dataclass import dataclass
 from rbxcompose.geometry import Transform3
 from rbxcompose.motion.arm_kinematics import ArmKinematics
 from rbxcompose.motion.collisions import Checker, told
-from rbxcompose.motion.inverse_kinematics import PoseSolutions, PoseTarget, solved
+from rbxcompose.motion.inverse_kinematics import PoseSolutions, PoseTarget
 from rbxcompose.motion.joint_space import JointSpace
+from rbxcompose.motion.kept import Keep
+from rbxcompose.motion.pose_search import searched
+from rbxcompose.motion.posture import Posture
 from rbxcompose.motion.scene_messages import pose_message, pose_of
 from rbxcompose.msgs.geometry_msgs import PoseStamped
 from rbxcompose.msgs.moveit_msgs import (
     GetPositionFK,
     GetPositionIK,
+    JointConstraint,
     MoveItErrorCodes,
     PositionIKRequest,
     RobotState,
@@ -68,7 +73,10 @@ class KinematicsQuery:
         links = self.kinematics.poses(start)
         pose = PoseTarget((links[frame] if frame else Transform3()).compose(pose.pose))
         is_free = self.checker.is_free if request.avoid_collisions else _always
-        search = solved(self.kinematics, self.space, pose, start, is_free, seed=seed, restarts=TRIES, enough=1)
+        space, posture = self._constrained(request.constraints.joint_constraints)
+        search = searched(
+            self.kinematics, space, pose, start, is_free, seed=seed, posture=posture, restarts=TRIES, enough=1
+        )
         while True:
             try:
                 next(search)
@@ -76,6 +84,13 @@ class KinematicsQuery:
                 yield self._answer(ended.value)
                 return
             yield None
+
+    def _constrained(self, wanted: Sequence[JointConstraint]) -> tuple[JointSpace, Posture | None]:
+        """Return the joints within what is asked of them, and the positions that are preferred there."""
+        ranges = {one.joint_name: _range(one) for one in wanted}
+        at = {one.joint_name: one.position for one in wanted}
+        space = Keep(joints=ranges).narrowed(self.space)
+        return space, Posture.of(space.names, at) if at else None
 
     def _answer(self, found: PoseSolutions) -> GetPositionIK.Response:
         if found.free:
@@ -111,9 +126,23 @@ class KinematicsQuery:
         tip, one = self.kinematics.group.tip, request.constraints
         if request.ik_link_name not in ("", tip) or request.ik_link_names or request.pose_stamped_vector:
             return _code(MoveItErrorCodes.INVALID_LINK_NAME, f"poses are those of '{tip}' alone")
-        if any((one.joint_constraints, one.position_constraints, one.orientation_constraints)):
-            return _code(MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS, "constraints are not taken here")
-        return None
+        if any((one.position_constraints, one.orientation_constraints, one.visibility_constraints)):
+            text = "of constraints, those of joints are taken here: the pose is asked for as it is"
+            return _code(MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS, text)
+        wrong = next(filter(None, map(self._unfit_joint, one.joint_constraints)), "")
+        return _code(MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS, wrong) if wrong else None
+
+    def _unfit_joint(self, wanted: JointConstraint) -> str:
+        """Return why a joint cannot be where it is wanted, nothing if it can."""
+        name, (low, high) = wanted.joint_name, _range(wanted)
+        if name not in self.space.names:
+            return f"'{name}' is no joint of the arm '{self.name}'"
+        if not (low <= wanted.position <= high and math.isfinite(high - low)):
+            return f"'{name}' is wanted nowhere"
+        joint = self.space.joints[self.space.names.index(name)]
+        if not joint.is_continuous and (high < joint.limits.least or low > joint.limits.greatest):
+            return f"'{name}' is wanted at {joint.shown(wanted.position)}, beyond its limits"
+        return ""
 
 
 def busy() -> MoveItErrorCodes:
@@ -129,6 +158,10 @@ def late(seconds: float) -> MoveItErrorCodes:
 def _unknown(names: tuple[str, ...], known: Mapping[str, object]) -> MoveItErrorCodes | None:
     unknown = [name for name in names if name not in known]
     return _code(MoveItErrorCodes.INVALID_LINK_NAME, f"there is no link '{unknown[0]}'") if unknown else None
+
+
+def _range(wanted: JointConstraint) -> tuple[float, float]:
+    return wanted.position - wanted.tolerance_below, wanted.position + wanted.tolerance_above
 
 
 def _always(values: Array) -> bool:

@@ -10,8 +10,8 @@ import numpy as np
 
 from rbxcompose.dataclass import dataclass
 from rbxcompose.geometry import Transform3, conjugate, multiply
+from rbxcompose.motion.arm_goal import ArmGoal
 from rbxcompose.motion.arm_kinematics import ArmKinematics
-from rbxcompose.motion.arm_task import ArmGoal
 from rbxcompose.motion.inverse_kinematics import PoseTarget
 from rbxcompose.motion.kept import Keep, KeptRange
 from rbxcompose.motion.planner import PlannerSettings
@@ -116,10 +116,17 @@ class RequestReader:
         if joints and not (places or turns):
             tolerance = min(min(one.tolerance_above, one.tolerance_below) for one in joints)
             return ArmGoal(positions={one.joint_name: self._joint(one) for one in joints}, tolerance=tolerance)
-        if joints or len(places) != 1 or len(turns) > 1:
-            words = "a goal is made of positions of joints, or of one position of the tip and perhaps one orientation"
+        if joints or len(places) > 1 or len(turns) > 1 or not (places or turns):
+            words = "a goal is made of positions of joints, or of a position of the tip, an orientation, or both"
             raise RequestError(MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS, words)
-        return self._pose(places[0], turns[0] if turns else None)
+        return self._pose(places[0], turns[0] if turns else None) if places else self._turn(turns[0])
+
+    def _turn(self, turn: OrientationConstraint) -> ArmGoal:
+        """Return a goal that asks for an orientation alone."""
+        self._require_tip(turn.link_name)
+        pose = Transform3(rotation=_rotation(turn.orientation))
+        target = PoseTarget(pose, angle_tolerance=min(_tolerances(turn)), any_position=True)
+        return ArmGoal(target=target, frame=self._frame(turn.header.frame_id))
 
     def _joint(self, one: JointConstraint) -> float:
         """Return where a joint is wanted."""

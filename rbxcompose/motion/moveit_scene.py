@@ -11,7 +11,7 @@ from rbxcompose.body.model import Geometry
 from rbxcompose.geometry import Transform3
 from rbxcompose.motion.moveit_objects import collision_object, object_of, pieces_of
 from rbxcompose.motion.octree_files import cells_of_octomap
-from rbxcompose.motion.scene import PlacedObject, PlanningScene, SceneError, ScenePiece
+from rbxcompose.motion.scene import PlacedObject, PlanningScene, SceneError, ScenePiece, settled
 from rbxcompose.motion.scene_messages import pose_of
 from rbxcompose.msgs.moveit_msgs import (
     AllowedCollisionMatrix,
@@ -46,9 +46,9 @@ class MoveItScene:
         there = self.scene.objects.get(message.id)
         match message.operation:
             case CollisionObject.ADD:
-                self.scene.put(object_of(message, self.scene.body.root))
+                self.scene.put(self._placed(message))
             case CollisionObject.APPEND:
-                self.scene.put(self._extended(there, message) if there else object_of(message, self.scene.body.root))
+                self.scene.put(self._extended(there, message) if there else self._placed(message))
             case CollisionObject.REMOVE if not message.id:
                 self.scene.objects = {name: one for name, one in self.scene.objects.items() if self._is_held(one)}
             case CollisionObject.REMOVE:
@@ -59,7 +59,7 @@ class MoveItScene:
                 if any(pieces_of(message)):
                     raise SceneError(f"'{message.id}' is moved, so the message has no shapes")
                 link = message.header.frame_id or self.scene.body.root
-                self.scene.put(replace(there, link=link, pose=pose_of(message.pose)))
+                self.scene.put(settled(replace(there, link=link, pose=pose_of(message.pose)), self.scene.body))
             case unknown:
                 raise SceneError(f"there is no operation {unknown}")
 
@@ -123,16 +123,20 @@ class MoveItScene:
     def _is_held(self, one: PlacedObject) -> bool:
         return one.link in self.scene.body.links and one.link != self.scene.body.root
 
+    def _placed(self, message: CollisionObject) -> PlacedObject:
+        """Return the object of a message; a link that never moves does not hold it."""
+        return settled(object_of(message, self.scene.body.root), self.scene.body)
+
     def _extended(self, there: PlacedObject, message: CollisionObject) -> PlacedObject:
         """Return an object with further shapes; those of the message may be in another frame or at another pose.
 
         The object stays where it is, and so do the shapes.
         """
-        link = message.header.frame_id or self.scene.body.root
-        if link != there.link:
+        new = self._placed(message)
+        if new.link != there.link:
             raise SceneError(f"'{there.name}' is in the frame of '{there.link}', and so are its further shapes")
-        moved = there.pose.inverse().compose(pose_of(message.pose))
-        added = (ScenePiece(one.shape, moved.compose(one.pose)) for one in pieces_of(message))
+        moved = there.pose.inverse().compose(new.pose)
+        added = (ScenePiece(one.shape, moved.compose(one.pose)) for one in new.own_pieces)
         return replace(there, pieces=(*there.pieces, *added))
 
     def _pad(self, padding: LinkPadding) -> None:
@@ -152,7 +156,7 @@ class MoveItScene:
             raise SceneError(f"the octomap cannot be read: {error}") from error
         shape = Geometry("octree", (tree.resolution,), points=tuple(cells.flatten().tolist()))
         link = message.header.frame_id or self.scene.body.root
-        self.scene.put(PlacedObject(OCTOMAP, shape, link, pose_of(message.origin)))
+        self.scene.put(settled(PlacedObject(OCTOMAP, shape, link, pose_of(message.origin)), self.scene.body))
 
     def _colour(self, message: ObjectColor) -> None:
         if (one := self.scene.objects.get(message.id)) is None:

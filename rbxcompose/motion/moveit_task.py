@@ -7,8 +7,9 @@ from typing import Protocol
 
 import numpy as np
 
+from rbxcompose.motion.arm_goal import ArmGoal
 from rbxcompose.motion.arm_kinematics import ArmKinematics
-from rbxcompose.motion.arm_task import ArmGoal, ArmSite, ArmTask
+from rbxcompose.motion.arm_task import ArmSite, ArmTask
 from rbxcompose.motion.given_task import GivenTask
 from rbxcompose.motion.inverse_kinematics import SolverSettings
 from rbxcompose.motion.moveit_requests import MotionWish, RequestError

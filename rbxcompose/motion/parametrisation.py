@@ -9,19 +9,26 @@ from __future__ import annotations
 
 import logging
 import math
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rbxcompose.dataclass import dataclass
+from rbxcompose.motion.jerk_limits import PathTiming, jerks_between
 from rbxcompose.motion.joint_space import JointSpace
 
 Array = NDArray[np.float64]
+Spline = Any  # of an extra, without types
 
 MARGIN = 0.95
 """Share of the limits that is planned with: the rest is left to the limiter of each joint, to catch up."""
 DEFAULT_SPEED = 1.0  # [rad/s or m/s] of a joint without a limit
 SECONDS_TO_SPEED = 0.5  # [s] in which a joint without a limit of acceleration reaches its speed
+BEND, LONGEST, LEAST_GRID = 1e-3, 0.05, 100  # [rad or m] of a step of the grid, and how many there are at least
+LEAST_WINDOW, IN_WINDOW = 0.01, 4  # [s] over which speeds are averaged for limits of jerk; samples in this time
+WINDOWS = (1.0, 0.5, 0.25, 0.125)  # shares of the time that keeps them for sure: the one that is done first is taken
 SAMPLE, LEAST_SAMPLES = 0.05, 12  # [s] between samples, and how many there are at least
 
 
@@ -56,14 +63,17 @@ class Trajectory:
 
     def dense(self, step: float) -> Array:
         """Return positions on its curves, at most `step` [rad or m] apart in each joint, of shape (k, n)."""
-        h, slope = np.diff(self.times), np.diff(self.positions, axis=0)
-        reach = np.abs(slope) + h[:, None] * (np.abs(self.velocities[:-1]) + np.abs(self.velocities[1:]))
+        h, slope = np.diff(self.times)[:, None], np.diff(self.positions, axis=0)
+        first, second = self.velocities[:-1] * h, self.velocities[1:] * h
+        bend, twist = 3 * slope - 2 * first - second, first + second - 2 * slope
+        with np.errstate(divide="ignore", invalid="ignore"):
+            turn = np.clip(np.nan_to_num(-bend / (3 * twist)), 0.0, 1.0)  # where it is fastest within a curve
+        middle = first + turn * (2 * bend + 3 * turn * twist)
+        fastest = np.abs(np.stack((first, second, middle))).max(axis=(0, 2))
         found = [self.positions[:1]]
-        for index, count in enumerate(np.maximum(1, np.ceil(reach.max(axis=1) / step)).astype(int).tolist()):
+        for index, count in enumerate(np.maximum(1, np.ceil(fastest / step)).astype(int).tolist()):
             s = (np.arange(1, count + 1) / count)[:, None]
-            first, second = self.velocities[index] * h[index], self.velocities[index + 1] * h[index]
-            bend, twist = 3 * slope[index] - 2 * first - second, first + second - 2 * slope[index]
-            found.append(self.positions[index] + s * (first + s * (bend + s * twist)))
+            found.append(self.positions[index] + s * (first[index] + s * (bend[index] + s * twist[index])))
         return np.concatenate(found)
 
 
@@ -77,25 +87,88 @@ def speeds_of(space: JointSpace, speed: float, acceleration: float) -> tuple[Arr
     return fast * speed, np.array(hard) * acceleration
 
 
-def timed(waypoints: Array, velocities: Array, accelerations: Array) -> Trajectory | str:
-    """Return the fastest trajectory along waypoints of shape (m, n), at rest at both ends; or why there is none."""
-    import toppra
-    from toppra import algorithm, constraint
+def timed(waypoints: Array, velocities: Array, accelerations: Array, jerks: Array | None = None) -> Trajectory | str:
+    """Return the fastest trajectory along waypoints of shape (m, n), at rest at both ends; or why there is none.
+
+    With limits of jerks it is not quite the fastest one: see `jerk_limits`.
+    """
+    from toppra import algorithm
 
     logging.getLogger("toppra").setLevel(logging.CRITICAL)  # what it says is told in the result
     if np.any(velocities <= 0.0) or np.any(accelerations <= 0.0):
         return "a limit of speed or acceleration is 0"
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(waypoints, axis=0), axis=1))])
-    path = toppra.SplineInterpolator(way, waypoints, bc_type="natural")
-    bounds = [np.stack((-MARGIN * most, MARGIN * most), axis=1) for most in (velocities, accelerations)]
-    constraints = [constraint.JointVelocityConstraint(bounds[0]), constraint.JointAccelerationConstraint(bounds[1])]
-    found = algorithm.TOPPRA(constraints, path, parametrizer="ParametrizeConstAccel").compute_trajectory(0, 0)
+    way, path = _spline(waypoints)
+    constraints = _constraints(tuple(MARGIN * velocities), tuple(MARGIN * accelerations))
+    grid = _grid(way, np.asarray(path(way, 2)))
+    solver = algorithm.TOPPRA(constraints, path, gridpoints=grid, parametrizer="ParametrizeConstAccel")
+    found = solver.compute_trajectory(0, 0)
     if found is None or not math.isfinite(found.duration):
         return f"no velocities along {len(waypoints)} points keep the limits"
-    times = np.linspace(0.0, found.duration, max(LEAST_SAMPLES, math.ceil(found.duration / SAMPLE)) + 1)
-    positions, speeds = np.asarray(found(times)), np.asarray(found(times, 1))
+    if jerks is None:
+        times = np.linspace(0.0, found.duration, max(LEAST_SAMPLES, math.ceil(found.duration / SAMPLE)) + 1)
+        made = [Trajectory(times, np.asarray(found(times)), np.asarray(found(times, 1)))]
+    else:
+        timing = PathTiming(grid, np.asarray(solver.problem_data.sd_vec))
+        longest = max(LEAST_WINDOW, float(np.max(2.0 * accelerations / jerks)))
+        made = [_averaged(path, timing, longest * share) for share in WINDOWS]
+    limits = (velocities, accelerations, jerks)
+    kept = [one for each in made if (one := _kept(each, waypoints, *limits)) is not None]
+    return min(kept, key=lambda one: one.duration) if kept else "its velocities are not finite"
+
+
+def curve(waypoints: Array, step: float) -> Array:
+    """Return positions on the curve of `timed`, about `step` [rad or m] apart, of shape (k, n)."""
+    way, path = _spline(waypoints)
+    return np.asarray(path(np.linspace(0.0, way[-1], math.ceil(way[-1] / step) + 1)))
+
+
+def _spline(waypoints: Array) -> tuple[Array, Spline]:
+    """Return a spline along waypoints, and how far along it they are."""
+    import toppra
+
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(waypoints, axis=0), axis=1))])
+    return way, toppra.SplineInterpolator(way, waypoints, bc_type="natural")
+
+
+@lru_cache(maxsize=8)
+def _constraints(velocities: tuple[float, ...], accelerations: tuple[float, ...]) -> list[Any]:
+    """Return limits as toppra has them: it takes as long to make them as to search a path."""
+    from toppra import constraint
+
+    bounds = [np.array([(-most, most) for most in each]) for each in (velocities, accelerations)]
+    return [constraint.JointVelocityConstraint(bounds[0]), constraint.JointAccelerationConstraint(bounds[1])]
+
+
+def _averaged(path: Spline, timing: PathTiming, window: float) -> Trajectory:
+    """Return a trajectory whose pace is a mean over a window [s]."""
+    count = math.ceil((float(timing.times[-1]) + window) / min(SAMPLE, window / IN_WINDOW)) + 1
+    times, places, paces = timing.mean(window, count)
+    return Trajectory(times, np.asarray(path(places)), np.asarray(path(places, 1)) * paces[:, None])
+
+
+def _kept(
+    made: Trajectory, waypoints: Array, velocities: Array, accelerations: Array, jerks: Array | None
+) -> Trajectory | None:
+    """Return it from rest to rest, slowed down until it keeps all limits; None if it is no motion."""
+    times, positions, speeds = made.times, made.positions, made.velocities
     positions[0], positions[-1], speeds[0], speeds[-1] = waypoints[0], waypoints[-1], 0.0, 0.0
-    made = Trajectory(times, positions, speeds)
     if not all(np.all(np.isfinite(one)) for one in (times, positions, speeds)):
-        return "its velocities are not finite"
-    return made.slowed(max(1.0, made.excess(velocities, accelerations) * (1.0 + 1e-9)))
+        return None
+    excess = made.excess(velocities, accelerations)
+    if jerks is not None:
+        excess = max(excess, float(np.max(np.abs(jerks_between(times, speeds)) / jerks)) ** (1 / 3))
+    return made.slowed(max(1.0, excess * (1.0 + 1e-9)))
+
+
+def _grid(knots: Array, bends: Array) -> Array:
+    """Return where limits are regarded on a cubic spline, whose second derivatives at its knots have the shape (m, n).
+
+    As toppra itself does, half of the second derivative times the square of a step is at most `BEND` [rad or m]; but
+    toppra finds steps by trying, which took a third of the time of all the rest.
+    """
+    hardest = np.abs(bends).max(axis=1)
+    most = np.maximum(hardest[:-1], hardest[1:])  # they are linear between knots
+    dense = np.maximum(np.sqrt(most / (2 * BEND)), max(1 / LONGEST, LEAST_GRID / knots[-1]))
+    counts = np.ceil(np.diff(knots) * dense).astype(int).tolist()
+    parts = [np.linspace(knots[at], knots[at + 1], count, endpoint=False) for at, count in enumerate(counts)]
+    return np.concatenate((*parts, knots[-1:]))

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from rbxcompose.dataclass import dataclass
 from rbxcompose.geometry import rotate
-from rbxcompose.motion.arm_task import ArmGoal
+from rbxcompose.motion.arm_goal import ArmGoal
 from rbxcompose.motion.collisions import Checker
 from rbxcompose.motion.contacts import Contact
 from rbxcompose.motion.grasps import Grasp, grasps_of, least_width, solid_of

@@ -9,7 +9,7 @@ from itertools import product
 
 from rbxcompose.dataclass import dataclass
 from rbxcompose.geometry import Transform3, Vector3, conjugate, multiply, quaternion_from_yaw, rotate, yaw_of
-from rbxcompose.motion.arm_task import ArmGoal
+from rbxcompose.motion.arm_goal import ArmGoal
 from rbxcompose.motion.collisions import Checker
 from rbxcompose.motion.contacts import Contact
 from rbxcompose.motion.grasps import reach_of

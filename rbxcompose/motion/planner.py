@@ -11,25 +11,29 @@ from numpy.typing import NDArray
 from rbxcompose.body.link_pairs import LinkPair
 from rbxcompose.dataclass import dataclass
 from rbxcompose.motion.collisions import Checker, SearchingChecker, told
+from rbxcompose.motion.jerk_limits import jerks_of
 from rbxcompose.motion.joint_space import JointSpace, interpolated
 from rbxcompose.motion.kept import KeptTip
 from rbxcompose.motion.kept_search import kept_path
-from rbxcompose.motion.parametrisation import Trajectory, speeds_of, timed
+from rbxcompose.motion.parametrisation import Trajectory, curve, speeds_of, timed
 from rbxcompose.motion.planner_types import AUTOMATIC, FAST, ompl_planner
 from rbxcompose.motion.reasons import MotionFailure, MotionReason
 from rbxcompose.motion.recheck import Rejected, examined
-from rbxcompose.motion.search import searched
+from rbxcompose.motion.search import MARGIN, searched
 
 Array = NDArray[np.float64]
 
 RESOLUTION = 0.02  # [rad] between examined positions of a search
-FINE = 0.005  # [rad or m] between examined positions of a trajectory, in each joint
+FIRST_RESOLUTION = 0.03  # [rad] of the first by OMPL, for which each takes long: what is between is examined later
+FINE = 0.0015  # [rad or m] between examined positions of a trajectory, in each joint
 NEAR = 0.02  # [rad or m] by which a start may be outside of its limits: servos measure in ticks
+COARSE = 0.05  # [rad or m] between positions of a curve that is looked at before it is timed
 SAME = 1e-4  # [rad or m] between positions that are the same
 MOST_PER_SECOND = 50_000  # examined positions; more than any machine examines, and a limit where no time passes
 KEPT_SLICE = 200  # positions examined for what is to be kept, after which others may run
 FAST_TRIES = 3  # paths of the fast search that may collide on the shapes themselves
 FAST_SHARE = 0.25  # of the time, after which the fast search is given up
+NEAR_SHARE = 0.4  # of the time, after which OMPL no longer searches only near start and goal
 LINE = "a straight line"
 ROUNDS = 6  # of adding points to a path, so that its curve keeps closer to the straight lines that are free
 
@@ -221,28 +225,31 @@ class _Run:
         return None
 
     def _slow(self, attempt: int) -> Generator[None, None, Array | None]:
-        """Return a path by OMPL, None when the time is over."""
+        """Return a path by OMPL, near start and goal or else anywhere; None when the time is over."""
         settings = self._planner.settings
-        search = self._search(self._fitness(attempt), settings.seed + attempt)
         self._found_by = ompl_planner(settings.planner)
-        before = self._examined
-        while not self._is_late():
-            try:
-                self._examined = before + next(search)
-            except StopIteration as ended:
-                found: Array = ended.value
-                return found
-            yield
-        search.close()
+        whole = ((np.inf, 1.0),)  # also of what is kept on the way: to begin again there would only lose time
+        for margin, share in whole if self._kept is not None else ((MARGIN, NEAR_SHARE), *whole):
+            search = self._search(attempt, margin)
+            before = self._examined
+            while not self._is_late(share):
+                try:
+                    self._examined = before + next(search)
+                except StopIteration as ended:
+                    found: Array = ended.value
+                    return found
+                yield
+            search.close()
         return None
 
-    def _search(self, is_fit: Callable[[Array], bool], seed: int) -> Generator[int, None, Array]:
+    def _search(self, attempt: int, margin: float) -> Generator[int, None, Array]:
         """Return the search: by OMPL, whose constrained spaces find less (`kept_search` tells how much), or by ours."""
         space, kept, start, goal = self._space, self._kept, self.start, self.goal
+        one, is_fit = self._planner.settings, self._fitness(attempt)
+        seed = one.seed + attempt
         if kept is not None:
             project = partial(kept.projected, space=space)
             return kept_path(space, start, goal, is_fit, project, seed=seed, resolution=RESOLUTION)
-        one = self._planner.settings
         return searched(
             space,
             start,
@@ -250,7 +257,8 @@ class _Run:
             is_fit,
             planner=ompl_planner(one.planner),
             seed=seed,
-            resolution=RESOLUTION,
+            resolution=RESOLUTION if attempt else FIRST_RESOLUTION,
+            margin=margin,
             simplify=one.simplify,
         )
 
@@ -265,12 +273,15 @@ class _Run:
         limits = speeds_of(planner.space, request.speed, request.acceleration)
         last = Rejected(True, "", 0.0)
         for _ in range(ROUNDS):
-            made = timed(path, *limits)
-            if isinstance(made, str):
-                return MotionFailure(MotionReason.NO_TIMING, made)
-            rejected: Rejected | None = yield from self._examine(made)
+            # A look at the curve costs a tenth of its timing, which follows where nothing is seen.
+            rejected = yield from examined(curve(path, COARSE), self._space, planner.checker)
             if rejected is None:
-                return made
+                made = timed(path, *limits, jerks_of(planner.space))
+                if isinstance(made, str):
+                    return MotionFailure(MotionReason.NO_TIMING, made)
+                rejected = yield from self._examine(made)
+                if rejected is None:
+                    return made
             path, last = _with_middles(path), rejected
         reason = MotionReason.PATH_IN_COLLISION if last.is_collision or self._kept is None else MotionReason.NOT_KEPT
         return MotionFailure(reason, last.text)

@@ -98,7 +98,7 @@ def mistake_in(one: PlacedObject, body: Body, frames: Collection[str] = ()) -> s
 
 def _mistake_in_carrying(one: PlacedObject, link: str, body: Body) -> str:
     fixed = [piece.shape.kind for piece in one.all_pieces if piece.shape.kind in FIXED]
-    return f"no link but '{body.root}' can carry its {fixed[0]}" if fixed and link != body.root else ""
+    return f"no link that moves can carry its {fixed[0]}" if fixed and link not in body.still else ""
 
 
 def _mistake_in_pose(pose: Transform3) -> str:
@@ -108,6 +108,12 @@ def _mistake_in_pose(pose: Transform3) -> str:
         return "its orientation is no rotation"
     away = math.hypot(*pose.translation)
     return f"it is {away:g} m away from its frame: at most {FARTHEST:g} m" if away > FARTHEST else ""
+
+
+def settled(one: PlacedObject, body: Body) -> PlacedObject:
+    """Return an object that is in the frame of the root if that of its link never moves."""
+    at = body.still.get(one.link) if one.link != body.root else None
+    return one if at is None else replace(one, link=body.root, pose=at.compose(one.pose))
 
 
 class PlanningScene:
@@ -186,13 +192,15 @@ class PlanningScene:
         self.objects[name] = replace(one, link=frame, pose=pose, touches=())
 
     def on_body(self, poses: Mapping[str, Transform3]) -> tuple[PlacedObject, ...]:
-        """Return all objects in the frames of links: those of frames outside of the body in that of its root.
+        """Return all objects in the frames of links that move, and those of all other frames in that of the root.
 
         Raises:
             SceneError: if such a frame has no pose.
         """
         return tuple(
-            one if one.link in self.body.links else replace(one, link=self.body.root, pose=self._pose(one, poses))
+            settled(one, self.body)
+            if one.link in self.body.links
+            else replace(one, link=self.body.root, pose=self._pose(one, poses))
             for one in self.objects.values()
         )
 

@@ -20,6 +20,7 @@ Ompl = Any  # of an extra, without types
 SLICE = 2_000  # examined positions, after which a search lets others run
 SHORTCUTS = 60  # attempts to shorten a path
 RANGE = 0.8  # [rad], the longest step of a tree
+MARGIN = 0.8  # [rad or m] around start and goal, within which most ways are, and the short ones
 SEEDS = 2**31 - 1  # the largest seed that OMPL takes
 
 
@@ -32,17 +33,30 @@ def searched(
     planner: str,
     seed: int,
     resolution: float,
+    margin: float = math.inf,
     simplify: bool = True,
 ) -> Generator[int, None, Array]:
     """Search a path and shorten it; return its points, of shape (m, n). Yield how many positions were examined.
 
     It goes on until it has found one: close it to give up. The same arguments give the same path. Straight lines
-    between points are examined at least every `resolution` [rad or m] of the joints' Euclidean distance.
+    between points are examined at least every `resolution` [rad or m] of the joints' Euclidean distance. Each joint
+    stays within `margin` [rad or m] of its start and goal, and of what is between them.
     """
-    with closing(_Search(space, start, goal, is_free, planner, seed, resolution)) as search:
+    with closing(_Search(space, start, goal, is_free, planner, seed, resolution, margin)) as search:
         while not search.advance():
             yield search.examined
         return search.path(simplify=simplify)
+
+
+def sample_range(space: JointSpace, start: Array, goal: Array, margin: float = math.inf) -> tuple[Array, Array]:
+    """Return between which positions a search is, at most `margin` [rad or m] beyond both ends, each of shape (n,).
+
+    Joints without an end may turn half a turn beyond them.
+    """
+    first, last, lower, upper = np.minimum(start, goal), np.maximum(start, goal), space.lower, space.upper
+    low = np.where(np.isfinite(lower), lower, first - math.pi)
+    high = np.where(np.isfinite(upper), upper, last + math.pi)
+    return np.maximum(low, first - margin), np.minimum(high, last + margin)
 
 
 class _Examiner:
@@ -60,7 +74,15 @@ class _Search:
     """All objects of OMPL of one search. They refer to each other without owning each other, so they end together."""
 
     def __init__(
-        self, space: JointSpace, start: Array, goal: Array, is_free: IsFree, planner: str, seed: int, resolution: float
+        self,
+        space: JointSpace,
+        start: Array,
+        goal: Array,
+        is_free: IsFree,
+        planner: str,
+        seed: int,
+        resolution: float,
+        margin: float,
     ) -> None:
         from ompl import base, geometric, util
 
@@ -69,7 +91,7 @@ class _Search:
         self._size, self._examiner = len(start), _Examiner(is_free, len(start))
         self._base, self._geometric = base, geometric
         self._space = base.RealVectorStateSpace(self._size)
-        self._space.setBounds(self._bounds(space, start, goal))
+        self._space.setBounds(self._bounds(*sample_range(space, start, goal, margin)))
         self._information = base.SpaceInformation(self._space)
         self._information.setStateValidityChecker(self._examiner.is_valid)
         self._information.setStateValidityCheckingResolution(resolution / self._space.getMaximumExtent())
@@ -110,13 +132,11 @@ class _Search:
             if hasattr(self, name):
                 delattr(self, name)
 
-    def _bounds(self, space: JointSpace, start: Array, goal: Array) -> Any:
-        """Return the ranges; joints without an end may turn half a turn beyond both ends."""
+    def _bounds(self, low: Array, high: Array) -> Any:
         bounds = self._base.RealVectorBounds(self._size)
-        low, high = np.minimum(start, goal) - math.pi, np.maximum(start, goal) + math.pi
-        for index, (least, greatest) in enumerate(zip(space.lower, space.upper, strict=True)):
-            bounds.setLow(index, float(least if np.isfinite(least) else low[index]))
-            bounds.setHigh(index, float(greatest if np.isfinite(greatest) else high[index]))
+        for index, (least, greatest) in enumerate(zip(low.tolist(), high.tolist(), strict=True)):
+            bounds.setLow(index, least)
+            bounds.setHigh(index, greatest)
         return bounds
 
     def _state(self, values: Array) -> Any:

@@ -1,7 +1,8 @@
 """A second opinion on a motion: Pinocchio's own reading of the URDF and its own geometry, every pair tried by itself.
 
-It shares the shapes of objects and the pairs that may touch with the examination of a plan, and nothing else: neither
-its broad phase nor its samples. So what benchmarks call free does not rest on what the planner believes.
+It shares the shapes of objects, the meshes that are not STL, since it would misread them, and the pairs that may touch
+with the examination of a plan, and nothing else: neither its broad phase nor its samples. So what benchmarks call free
+does not rest on what the planner believes.
 """
 
 from __future__ import annotations
@@ -16,8 +17,11 @@ from numpy.typing import NDArray
 
 from rbxcompose.body.description import Description
 from rbxcompose.body.link_pairs import LinkPair, pair_of
+from rbxcompose.body.model import Geometry
 from rbxcompose.body.pinocchio_model import PinocchioModel
-from rbxcompose.motion.collisions import TOUCH, coal_shape
+from rbxcompose.motion.coal_shapes import STL, coal_shape
+from rbxcompose.motion.collisions import TOUCH
+from rbxcompose.motion.groups import leader_of
 from rbxcompose.motion.parametrisation import Trajectory
 from rbxcompose.motion.scene import PlacedObject
 
@@ -45,13 +49,17 @@ class SecondChecker:
         for name, path in description.meshes.items():
             text = text.replace(f'"{name}"', f'"{path.absolute()}"')
         self._geometry: Any = pinocchio.buildGeomFromUrdfString(model, text, pinocchio.COLLISION)
+        for one in self._geometry.geometryObjects:
+            is_mesh = str(one.geometry.getObjectType()) == "OT_BVH"
+            if is_mesh and not one.meshPath.lower().endswith(STL):
+                one.geometry = coal_shape(Geometry("mesh", tuple(one.meshScale), one.meshPath), {})
         owners = [model.frames[one.parentFrame].name for one in self._geometry.geometryObjects]
         touching, there = set(allowed), tuple(objects)
         for one in there:
             owners += [one.name] * self._add(one)
             touching |= {pair_of(one.name, other) for other in (*one.touches, *one.touches_objects)}
-        arm = {model.getJointId(name) for name in joints}
-        arm |= {model.getJointId(one.name) for one in description.body.joints.values() if one.mimic is not None}
+        every = description.body.joints
+        arm = {model.getJointId(name) for name, one in every.items() if leader_of(one, every)[0] in joints}
         moved = [arm & set(model.supports[one.parentJoint]) for one in self._geometry.geometryObjects]
         for first, second in combinations(range(len(owners)), 2):
             if moved[first] != moved[second] and pair_of(owners[first], owners[second]) not in touching:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rbxcompose.body.model import Body, Geometry
 from rbxcompose.dataclass import dataclass
 from rbxcompose.geometry import Transform3, rotate
-from rbxcompose.motion.collisions import Shapes
+from rbxcompose.motion.coal_shapes import Shapes
 from rbxcompose.motion.scene import PlacedObject
 from rbxcompose.motion.scene_shapes import OCTREE, PLANE
 

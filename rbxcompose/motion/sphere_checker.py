@@ -1,9 +1,10 @@
 """Examines positions in compiled code first, and by coal the pairs of shapes whose spheres are near to each other.
 
 **Why that is as safe as coal alone.** Coal examines every pair of shapes whose boxes along the axes overlap, and leaves
-out the others, since a shape is within its box. Here spheres take the place of the boxes: a shape is within its spheres
-by arithmetic (`sphere_trees`), so shapes whose spheres are apart are apart. All positions are examined, on all pairs;
-every pair that spheres call near is judged by coal, on the shapes themselves. Tests compare both on many positions.
+out the others, since a shape is within its box. Here spheres, and hulls in them, take the place of boxes: a shape is
+within these by arithmetic (`sphere_trees`), so shapes whose spheres are apart, or whose hulls have a plane between them
+(`compiled_convex`), are apart. All positions are examined, on all pairs; every pair that is called near is judged by
+coal, on the shapes themselves. Tests compare both on many positions.
 What spheres alone say decides only where the fast search goes: the last examination never relies on it.
 """
 
@@ -25,7 +26,7 @@ from rbxcompose.motion.sphere_model import Trees, compiled_model
 
 Array = NDArray[np.float64]
 ROOM = 4_096  # near pairs of one call, at least
-SAMPLES, SEED = 256, 1
+SAMPLES, SEED = 64, 1
 """Positions at which it is seen how well spheres tell pairs apart."""
 BLURRED = 0.1
 """A pair whose spheres are near in a greater share of positions, most of them free, is left out of the fast search."""
@@ -84,7 +85,13 @@ class SphereChecker:
         if self._clear is None:
             self._clear = self._without_blurred(space)
         return fast_path(
-            self._clear, self._work, space, (start, goal), seed=seed, resolution=resolution, simplify=simplify
+            self._clear,
+            workspace(self._clear),
+            space,
+            (start, goal),
+            seed=seed,
+            resolution=resolution,
+            simplify=simplify,
         )
 
     def _refresh(self) -> None:
@@ -107,5 +114,5 @@ class SphereChecker:
             if np.mean([self.mesh.collides(points[at], [pair]) for at in near[near[:, 1] == pair, 0]]) < 0.5
         ]
         kept = np.setdiff1d(np.arange(len(model.firsts)), blurred)
-        columns = ("firsts", "seconds", "margins", "reaches")
+        columns = ("firsts", "seconds", "margins", "reaches", "coupled")
         return model._replace(**{name: getattr(model, name)[kept] for name in columns})

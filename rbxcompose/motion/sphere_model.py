@@ -14,7 +14,8 @@ from rbxcompose.geometry import Transform3
 from rbxcompose.motion.arm_kinematics import ArmKinematics
 from rbxcompose.motion.collisions import CheckedPart, MeshChecker
 from rbxcompose.motion.compiled_chain import Chain, chain_of, matrix_of
-from rbxcompose.motion.compiled_collisions import BOX, CYLINDER, HALF_SPACE, TREE, CompiledModel
+from rbxcompose.motion.compiled_collisions import CompiledModel, Spheres
+from rbxcompose.motion.compiled_convex import BOX, CYLINDER, HALF_SPACE, TREE
 from rbxcompose.motion.groups import leader_of
 from rbxcompose.motion.kept_trees import kept_mesh_tree
 from rbxcompose.motion.octree_files import read_cells
@@ -22,7 +23,7 @@ from rbxcompose.motion.sphere_trees import SphereTree, ball_tree, box_tree, cell
 
 Array = NDArray[np.float64]
 Coal = Any  # of an extra, without types
-NONE = SphereTree(np.zeros((1, 3)), np.full(1, np.inf), np.full(1, -1))  # of a half space, which no spheres cover
+NONE = ball_tree(np.inf)  # of a half space, which no spheres cover
 
 
 class Trees:
@@ -53,11 +54,17 @@ def compiled_model(checker: MeshChecker, trees: Trees) -> CompiledModel:
     solids = [_solid(one.geometry) for one in parts]
     kinds = np.array([kind for kind, _ in solids], dtype=np.int64)
     centres = [one.centres @ pose[:, :3].T + pose[:, 3] for one, pose in zip(fitted, poses, strict=True)]
+    corners = [one.corners @ pose[:, :3].T + pose[:, 3] for one, pose in zip(fitted, poses, strict=True)]
+    ends = np.cumsum([len(one) for one in corners], dtype=np.int64)
+    spans = [one.spans + (end - len(one.corners)) for one, end in zip(fitted, ends, strict=True)]
     extents = np.zeros(len(chain.parents))
     for owner, middles, tree in zip(owners, centres, fitted, strict=True):
         if tree is not NONE:
             extents[owner] = max(extents[owner], float(np.linalg.norm(middles[0]) + tree.radii[0]))
-    pairs = [_ordered(first, second, kinds, fitted, margin) for first, second, margin in checker.watched_parts]
+    radii = np.array([one.radii[0] for one in fitted])
+    firsts, seconds, margins = _ordered(checker.watched_parts, kinds, radii)
+    frames = np.sort(np.stack((owners[firsts], owners[seconds]), axis=1), axis=1)
+    couples, coupled = np.unique(frames, axis=0, return_inverse=True)
     return CompiledModel(
         chain=chain,
         groups=owners,
@@ -65,14 +72,20 @@ def compiled_model(checker: MeshChecker, trees: Trees) -> CompiledModel:
         kinds=kinds,
         sizes=np.array([size for _, size in solids]).reshape(-1, 4),
         roots=starts[:-1],
-        centres=np.concatenate((np.zeros((0, 3)), *centres)),
-        radii=np.concatenate((np.zeros(0), *(one.radii for one in fitted))),
-        children=_children(fitted, starts),
-        firsts=np.array([one for one, _, _ in pairs], dtype=np.int64),
-        seconds=np.array([other for _, other, _ in pairs], dtype=np.int64),
-        margins=np.array([margin for _, _, margin in pairs], dtype=np.float64),
-        reaches=np.array([fitted[a].radii[0] + fitted[b].radii[0] + m for a, b, m in pairs], dtype=np.float64),
+        spheres=Spheres(
+            np.concatenate((np.zeros((0, 3)), *centres)),
+            np.concatenate((np.zeros(0), *(one.radii for one in fitted))),
+            _children(fitted, starts),
+            np.concatenate((np.zeros((0, 2), dtype=np.int64), *spans)),
+            np.concatenate((np.zeros((0, 3)), *corners)),
+        ),
+        firsts=firsts,
+        seconds=seconds,
+        margins=margins,
+        reaches=radii[firsts] + radii[seconds] + margins,
         extents=extents,
+        couples=couples,
+        coupled=coupled.reshape(-1).astype(np.int64),
     )
 
 
@@ -95,17 +108,20 @@ def _chain(kinematics: ArmKinematics, links: Iterable[str]) -> tuple[Chain, Mapp
 
 
 def _ordered(
-    first: int, second: int, kinds: NDArray[np.int64], fitted: Sequence[SphereTree], margin: float
-) -> tuple[int, int, float]:
-    """Return a pair so that the spheres of its first shape are tested: the smaller solid, which they fit better.
+    pairs: Sequence[tuple[int, int, float]], kinds: NDArray[np.int64], radii: Array
+) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
+    """Return pairs so that the spheres of their first shapes are tested: the smaller solids, which they fit better.
 
     What may be a little within each other is called near as soon as it touches, if it is no box: how deep unions of
     spheres are within each other says nothing about what they cover.
     """
-    worth = [(kinds[one] == HALF_SPACE, kinds[one] != TREE, fitted[one].radii[0], one) for one in (first, second)]
-    one, other = (first, second) if worth[0] <= worth[1] else (second, first)
-    is_exact = kinds[first] == kinds[second] == BOX
-    return one, other, margin if is_exact else max(margin, 0.0)
+    shapes = np.array([(one, other) for one, other, _ in pairs], dtype=np.int64).reshape(-1, 2)
+    margins = np.array([margin for _, _, margin in pairs], dtype=np.float64)
+    (kind, other_kind), (radius, other_radius) = kinds[shapes].T, radii[shapes].T
+    is_other = (kind > other_kind) | ((kind == other_kind) & (radius > other_radius))
+    is_exact = (kind == BOX) & (other_kind == BOX)
+    firsts, seconds = np.where(is_other[:, None], shapes[:, ::-1], shapes).T
+    return firsts.copy(), seconds.copy(), np.where(is_exact, margins, np.maximum(margins, 0.0))
 
 
 def _solid(geometry: Geometry) -> tuple[int, tuple[float, float, float, float]]:

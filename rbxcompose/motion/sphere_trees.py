@@ -1,9 +1,9 @@
 """Trees of spheres that cover shapes: coarse ones above finer ones, for tests of collisions in compiled code.
 
-**What is promised:** each sphere of a tree contains all of the shape that the spheres below it are for. A triangle is
-in a sphere if its corners are, since spheres are convex; so triangles of a mesh are covered by arithmetic, not by
-samples, and so are the cells into which a box or a cylinder is cut. Boxes, cylinders and spheres are covered as solids,
-meshes as the surfaces that coal examines, too. Every radius is greater by `SLACK`, which is far more than rounding.
+**What is promised:** each sphere of a tree contains all of the shape that the spheres below it are for, and so does the
+hull of its corners, if it has any. A triangle is in a sphere or a hull if its corners are, since both are convex; so
+triangles of a mesh are covered by arithmetic, not by samples. Boxes, cylinders and balls are covered as solids, by one
+sphere each. A convex mesh is its hull; others are divided. Every radius is greater by `SLACK`, far more than rounding.
 
 Source of the smallest balls: Badoiu and Clarkson, Smaller core-sets for balls (2003).
 """
@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Callable, Sequence
-from typing import TypeVar
+from collections.abc import Sequence
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,14 +23,15 @@ from rbxcompose.dataclass import dataclass
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
 Ball = tuple[Array, float]
-C = TypeVar("C")
 
 SLACK = 1e-6  # [m]
 LEAVES = 96  # spheres at the finest level of one shape, at most
 FINEST = 0.004  # [m], a sphere that is smaller is not divided
 AT_EDGE = 0.01  # of a cell from its edge, within which rounding decides in which cell a point is
 SEGMENTS = 12  # sides of triangles that are longer than this part of the whole are halved first
+MOST_SIDES = 4_000_000  # triangles by corners of a mesh of which it is tested whether it is convex
 MOST_TRIANGLES = 60_000  # of a mesh whose long triangles are halved
+SIDES = 16  # of the prism about a cylinder, which is 2 % thicker
 STEPS = 12  # towards the middle of the smallest ball
 
 
@@ -44,6 +45,10 @@ class SphereTree:
     centres: Array
     radii: Array
     children: Whole
+    spans: Whole
+    """The first corner of each sphere, and the one after its last, of shape (k, 2); not all spheres have any."""
+    corners: Array
+    """All that a sphere is for is in their hull, too, of shape (c, 3) [m]."""
 
     @property
     def leaves(self) -> tuple[Array, Array]:
@@ -52,44 +57,34 @@ class SphereTree:
         return self.centres[there], self.radii[there]
 
 
-NOTHING = SphereTree(np.zeros((1, 3)), np.full(1, -math.inf), np.full(1, -1))
-
-
 def ball_tree(radius: float) -> SphereTree:
     """Return a sphere about the origin as a tree."""
-    return SphereTree(np.zeros((1, 3)), np.array([radius + SLACK]), np.array([-1]))
+    return _one(np.zeros(3), radius, np.zeros((0, 3)))
 
 
 def box_tree(size: Sequence[float]) -> SphereTree:
-    """Return the tree of a solid box about the origin, of three lengths [m]."""
-    half = np.array(size[:3]) / 2
-    return _tree((-half, half), _box_ball, _halves)
+    """Return the tree of a solid box about the origin, of three lengths [m]: the sphere about its corners."""
+    corners = np.array(list(product((-0.5, 0.5), repeat=3))) * np.array(size[:3])
+    return _one(np.zeros(3), math.hypot(*size[:3]) / 2, corners)
 
 
 def cylinder_tree(radius: float, length: float) -> SphereTree:
-    """Return the tree of a solid cylinder about the origin along z [m]."""
-    half = np.array((radius, radius, length / 2))
-
-    def ball(cell: tuple[Array, Array]) -> Ball:
-        """Return the smaller one of a ball about the cell and one about the slice of the cylinder that it is in."""
-        low, high = cell
-        slice_ = (np.array((0.0, 0.0, (low[2] + high[2]) / 2)), math.hypot(radius, (high[2] - low[2]) / 2))
-        return min(_box_ball(cell), slice_, key=lambda one: one[1])
-
-    def parts(cell: tuple[Array, Array]) -> list[tuple[Array, Array]]:
-        halves = _halves(cell)
-        inside = [one for one in halves if math.hypot(*np.clip(0.0, one[0][:2], one[1][:2]).tolist()) <= radius]
-        return parts(inside[0]) if len(inside) == 1 else inside
-
-    return _tree((-half, half), ball, parts)
+    """Return the tree of a solid cylinder about the origin along z [m]: its sphere, with the corners of a prism."""
+    angles = np.arange(SIDES) * (math.tau / SIDES)
+    around = np.stack((np.cos(angles), np.sin(angles)), axis=1) * (radius / math.cos(math.pi / SIDES))
+    corners = [np.column_stack((around, np.full(SIDES, end * length / 2))) for end in (-1.0, 1.0)]
+    return _one(np.zeros(3), math.hypot(radius, length / 2), np.concatenate(corners))
 
 
 def mesh_tree(triangles: Array) -> SphereTree:
     """Return the tree of the surface of a mesh, whose triangles have the shape (t, 3, 3) [m]."""
     if not len(triangles):
-        return NOTHING
+        return _one(np.zeros(3), -math.inf, np.zeros((0, 3)))
+    if _is_convex(triangles):
+        corners = _corners(triangles)
+        return _one(*_ball(corners), corners)
     extent = float(np.max(np.ptp(triangles.reshape(-1, 3), axis=0)))
-    return _tree(_halved_sides(triangles, extent / SEGMENTS), lambda some: _ball(some.reshape(-1, 3)), _parted)
+    return _divided(_halved_sides(triangles, extent / SEGMENTS))
 
 
 def cells_tree(points: Array, side: float) -> SphereTree:
@@ -113,43 +108,71 @@ def cells_tree(points: Array, side: float) -> SphereTree:
         children.insert(0, 2 * np.arange(len(levels[0][1])))
     starts = np.cumsum([0, *(len(one) for _, one in levels)])
     found = [one if one[0] < 0 else one + start for one, start in zip(children, starts[1:], strict=True)]
-    return SphereTree(
+    return _without_corners(
         np.concatenate([one for one, _ in levels]), np.concatenate([one for _, one in levels]), np.concatenate(found)
     )
 
 
-def _tree(whole: C, ball: Callable[[C], Ball], parts: Callable[[C], Sequence[C]]) -> SphereTree:
-    """Divide the largest ball again and again."""
-    balls, children = [ball(whole)], [-1]
-    waiting = [(-balls[0][1], 0, whole)]
+def _one(centre: Array, radius: float, corners: Array) -> SphereTree:
+    """Return one sphere as a tree."""
+    span = np.array([[0, len(corners)]])
+    return SphereTree(centre[None], np.array([radius + SLACK]), np.array([-1]), span, corners)
+
+
+def _corners(triangles: Array) -> Array:
+    """Return the corners of the hull of triangles; all of theirs if they are too flat to have one."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    points = np.unique(triangles.reshape(-1, 3), axis=0)
+    try:
+        found: Array = points[ConvexHull(points).vertices]
+    except QhullError:
+        return points
+    return found
+
+
+def _is_convex(triangles: Array) -> bool:
+    """Return whether the hull of a mesh is little more than what its triangles enclose."""
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    length = np.linalg.norm(normals, axis=1)
+    normals = normals[length > 0.0] / length[length > 0.0, None]
+    starts, points = triangles[length > 0.0, 0], np.unique(triangles.reshape(-1, 3), axis=0)
+    if len(normals) * len(points) > MOST_SIDES:
+        return False
+    heights = normals @ points.T - np.einsum("ij,ij->i", normals, starts)[:, None]
+    return bool(np.all(np.minimum(heights.max(axis=1), -heights.min(axis=1)) <= FINEST))
+
+
+def _without_corners(centres: Array, radii: Array, children: Whole) -> SphereTree:
+    return SphereTree(centres, radii, children, np.zeros((len(radii), 2), dtype=np.int64), np.zeros((0, 3)))
+
+
+def _divided(triangles: Array) -> SphereTree:
+    """Divide the triangles of the largest ball again and again."""
+    cells, balls, children = [triangles], [_ball(triangles.reshape(-1, 3))], [-1]
+    waiting = [(-balls[0][1], 0)]
     leaves = 1
     while waiting and leaves < LEAVES:
-        radius, index, cell = heapq.heappop(waiting)
-        if -radius <= FINEST or len(both := parts(cell)) < 2:
+        radius, index = heapq.heappop(waiting)
+        if -radius <= FINEST or len(both := _parted(cells[index])) < 2:
             continue
         children[index] = len(balls)
         for one in both:
-            found = ball(one)
-            heapq.heappush(waiting, (-found[1], len(balls), one))
+            found = _ball(one.reshape(-1, 3))
+            heapq.heappush(waiting, (-found[1], len(balls)))
+            cells.append(one)
             balls.append(found)
             children.append(-1)
         leaves += 1
-    radii = np.array([one for _, one in balls]) + SLACK
-    return SphereTree(np.array([one for one, _ in balls]), radii, np.array(children))
-
-
-def _box_ball(cell: tuple[Array, Array]) -> Ball:
-    low, high = cell
-    return (low + high) / 2, math.hypot(*((high - low) / 2).tolist())
-
-
-def _halves(cell: tuple[Array, Array]) -> list[tuple[Array, Array]]:
-    """Return both halves of a cell along its longest side."""
-    low, high = cell
-    axis = int(np.argmax(high - low))
-    upper, lower = high.copy(), low.copy()
-    upper[axis] = lower[axis] = (low[axis] + high[axis]) / 2
-    return [(low, upper), (lower, high)]
+    corners = [_corners(one) for one in cells]
+    ends = np.cumsum([len(one) for one in corners])
+    return SphereTree(
+        np.array([one for one, _ in balls]),
+        np.array([one for _, one in balls]) + SLACK,
+        np.array(children),
+        np.stack((ends - [len(one) for one in corners], ends), axis=1),
+        np.concatenate(corners),
+    )
 
 
 def _ball(points: Array) -> Ball:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Generator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,46 +23,43 @@ BESIDE = 2 * TOLERANCE  # [m] by which the tip may be off half way between two p
 
 
 @dataclass(frozen=True, slots=True)
-class StraightLine:
-    """Positions of joints from the start as far as the line was followed, of shape (m, n), and why no farther."""
+class LineEnd:
+    """How much of a line was followed, and why no more; nothing if that was all of it."""
 
-    positions: Array
     fraction: float
     problem: str = ""
 
 
-def straight(
+def line_steps(
     kinematics: ArmKinematics, space: JointSpace, start: Array, goal: Transform3, step: float = STEP
-) -> StraightLine:
-    """Follow the line from the tip's pose at `start` to `goal`, both in the root's frame, turning evenly on the way.
+) -> Generator[Array, None, LineEnd]:
+    """Yield positions on the line from the tip's pose at `start` to `goal`, both in the root's frame, after `start`.
 
-    Collisions are not looked at. `step` is the distance between poses [m].
+    The tip turns evenly on the way. Collisions are not looked at. `step` is the distance between poses [m].
     """
-    here = kinematics.tip_pose(start)
+    here, last = kinematics.tip_pose(start), start
     away, angle = PoseTarget(goal).error(here)
     count = max(1, math.ceil(away / step), math.ceil(angle / TURN))
-    found = [start]
     for index in range(1, count + 1):
         share = index / count
         pose = Transform3(lerp(here.translation, goal.translation, share), slerp(here.rotation, goal.rotation, share))
         target = PoseTarget(pose)
-        values, missed = descended(kinematics, space, target, found[-1])
-        jump = float(np.max(np.abs(values - found[-1])))
+        values, missed = descended(kinematics, space, target, last)
+        jump = float(np.max(np.abs(values - last)))
         if not target.is_met(kinematics.tip_pose(values)):
             problem = (
                 f"the line ends {missed[0] * 100:.1f} cm and {math.degrees(missed[1]):.1f} deg beside a pose on it"
             )
         elif jump > JUMP:
             problem = f"a joint would have to jump by {jump:.2f} rad"
-        elif (beside := _off_half_way(kinematics, found[-1], values, here, goal, share - 0.5 / count)) > BESIDE:
+        elif (beside := _off_half_way(kinematics, last, values, here, goal, share - 0.5 / count)) > BESIDE:
             problem = f"the tip would leave the line by {beside * 1e3:.1f} mm between two poses"
         else:
-            found.append(values)
+            yield values
+            last = values
             continue
-        return StraightLine(
-            np.array(found), (index - 1) / count, f"{problem}, at {(index - 1) / count:.0%} of the line"
-        )
-    return StraightLine(np.array(found), 1.0)
+        return LineEnd((index - 1) / count, f"{problem}, at {(index - 1) / count:.0%} of the line")
+    return LineEnd(1.0)
 
 
 def _off_half_way(

@@ -20,7 +20,7 @@ from rbxcompose.motion.arm_kinematics import ArmKinematics
 from rbxcompose.motion.collisions import Checker, told
 from rbxcompose.motion.joint_space import interpolated
 from rbxcompose.motion.parametrisation import MARGIN, Trajectory, speeds_of
-from rbxcompose.motion.planner import FINE, MotionPlanner
+from rbxcompose.motion.planner import MotionPlanner
 from rbxcompose.motion.tip_path import TURN
 
 Array = NDArray[np.float64]
@@ -31,6 +31,7 @@ LEAD = 0.04  # [s] from a decision to where it begins, in which it reaches the c
 CRUISE = 0.08  # [s] for which a velocity is led to and kept, before the arm brakes if nothing newer has come
 FIRST = 0.04  # [s] to the first velocity, in which joints may also come to where they were measured to be
 BRIEFEST = 0.005  # [s] between others
+STEP = 0.005  # [rad or m] between examined positions on the way to rest
 LOOK_STEP, LEAST_LOOKS = 0.05, 4  # [rad or m] between positions ahead, and how many there are at least
 LOOK = 0.5  # [s] ahead that is examined; what is nearer slows down
 SHARES = (1.0, 0.5, 0.2)  # of a velocity, which are tried one after the other
@@ -216,7 +217,7 @@ class TipServo:
 
     def _first_bad(self, motion: ServoMotion) -> Array | None:
         """Return the first positions that collide or are beyond a limit, up to where it comes to rest."""
-        points = motion.points(FINE)
+        points = motion.points(STEP)
         low, high = np.minimum(self._lower, points[0]), np.maximum(self._upper, points[0])
         is_inside = np.all((points >= low) & (points <= high), axis=1)
         checker: Checker = self._planner.checker

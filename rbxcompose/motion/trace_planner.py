@@ -13,6 +13,7 @@ from rbxcompose.dataclass import dataclass
 from rbxcompose.geometry import Transform3
 from rbxcompose.motion.arm_kinematics import ArmKinematics
 from rbxcompose.motion.inverse_kinematics import ANGLE_TOLERANCE, TOLERANCE, PoseTarget
+from rbxcompose.motion.jerk_limits import jerks_of
 from rbxcompose.motion.parametrisation import MARGIN, Trajectory, speeds_of, timed
 from rbxcompose.motion.planner import FINE, MotionPlan, MotionPlanner, Planning, mistake_in_start
 from rbxcompose.motion.reasons import MotionFailure, MotionReason
@@ -167,8 +168,12 @@ class _Trace:
         planner, wish = self._planner, self._wish
         fast, hard = speeds_of(planner.space, 1.0, wish.acceleration)
         tip = wish.speed / MARGIN
+        jerks = jerks_of(planner.space)
         found = timed(
-            np.column_stack((part.values, part.lengths)), np.append(fast, tip), np.append(hard, tip / SECONDS_TO_SPEED)
+            np.column_stack((part.values, part.lengths)),
+            np.append(fast, tip),
+            np.append(hard, tip / SECONDS_TO_SPEED),
+            None if jerks is None else np.append(jerks, np.inf),
         )
         if isinstance(found, str):
             return MotionFailure(MotionReason.NO_TIMING, found)

@@ -16,12 +16,13 @@ class ArrayEntries:
     """Arguments of a skill that are entries of two arrays: a name, and a number in SI.
 
     `names` and `values` are the fields, `each` is what is measured by each name. An argument may be left out, but one
-    of them must be given. A field of the message with the same name as an entry takes precedence.
+    of them must be given, or the field `instead`. A field of the message with the name of an entry takes precedence.
     """
 
     names: str
     values: str
     each: Mapping[str, Dimension]
+    instead: str = ""
 
     def require_in(self, message: type[Message]) -> None:
         """Do nothing if a message has these arrays.

@@ -494,16 +494,17 @@ class MoveArm(Action["MoveArm.Goal", "MoveArm.Result", "MoveArm.Feedback"]):
     """Plan a motion of an arm, verify it, and carry it out."""
 
     TYPE: ClassVar[str] = "rbxcompose_msgs/action/MoveArm"
-    HASH: ClassVar[str] = "RIHS01_5af952e2ea1df5b19d8162887e8a888caad3f83c67617ffc60e696c825759fb4"
+    HASH: ClassVar[str] = "RIHS01_44f4028c82f9588c96ae944e8773575ed0d9ed63e1af96cd035ab07129e12302"
 
     @dataclass(frozen=True, slots=True, eq=False)
     class Goal(ArrayMessage):
         """Goal of `MoveArm`."""
 
         TYPE: ClassVar[str] = "rbxcompose_msgs/action/MoveArm_Goal"
-        HASH: ClassVar[str] = "RIHS01_8cd3b837e3290faefb4dd15c690655ff19c42baeb1f71f0179b2f68cc413327a"
+        HASH: ClassVar[str] = "RIHS01_ca34d69c05d6a6ceac6bd48701fb0f2433da3807c5babe9d5a5de79cd1456ad5"
         FIELDS: ClassVar[Fields] = {
             "pose": "string",
+            "remembered": "string",
             "joints": "string[]",
             "positions": "float64[]",
             "speed": "float64",
@@ -514,6 +515,7 @@ class MoveArm(Action["MoveArm.Goal", "MoveArm.Result", "MoveArm.Feedback"]):
         }
 
         pose: str = ""  # its name; empty if only joints are given
+        remembered: str = ""  # instead of a pose, the name by which the arm was told to remember where it was
         joints: tuple[str, ...] = ()  # of the arm; the others go to the pose, or stay where they are
         positions: NDArray[np.float64] = field(default_factory=lambda: zeros("float64", 0))  # [rad or m]
         speed: float = 0.0  # share of the greatest speeds of joints; 0 is all
@@ -552,14 +554,14 @@ class MoveArm(Action["MoveArm.Goal", "MoveArm.Result", "MoveArm.Feedback"]):
         """Sends a goal of `MoveArm`."""
 
         TYPE: ClassVar[str] = "rbxcompose_msgs/action/MoveArm_SendGoal"
-        HASH: ClassVar[str] = "RIHS01_4704723bf897e03e17d860df9bb31778c5132054ebe4409dcc4ff37a08df16a5"
+        HASH: ClassVar[str] = "RIHS01_b474506bc386080bd42ae2353422fb275d1434487e6c5eb7f362c04d26061aa1"
 
         @dataclass(frozen=True, slots=True)
         class Request(Message):
             """Request of `MoveArm.SendGoal`."""
 
             TYPE: ClassVar[str] = "rbxcompose_msgs/action/MoveArm_SendGoal_Request"
-            HASH: ClassVar[str] = "RIHS01_6b2ec0a249e7e64b76dc998de67da38dce2863d320e814c37d33b826f586e247"
+            HASH: ClassVar[str] = "RIHS01_c623bf737d4c23ff0518a7ceff50617cceafb843ca917120b6e618e5d256b6a9"
             FIELDS: ClassVar[Fields] = {
                 "goal_id": "unique_identifier_msgs/msg/UUID",
                 "goal": "rbxcompose_msgs/action/MoveArm_Goal",
@@ -1046,14 +1048,14 @@ class ReachPose(Action["ReachPose.Goal", "ReachPose.Result", "ReachPose.Feedback
     """Bring the tip of an arm to a pose, on a way that is planned and verified."""
 
     TYPE: ClassVar[str] = "rbxcompose_msgs/action/ReachPose"
-    HASH: ClassVar[str] = "RIHS01_3f4665597c282cc88965176a8346bebe7eebf274b9bebaeae5e5b1cd1ac28006"
+    HASH: ClassVar[str] = "RIHS01_136da2fd6b4f01aa8681143c70ed788bcf1e270b3cb94e0747e6fa4681c82463"
 
     @dataclass(frozen=True, slots=True)
     class Goal(Message):
         """Goal of `ReachPose`."""
 
         TYPE: ClassVar[str] = "rbxcompose_msgs/action/ReachPose_Goal"
-        HASH: ClassVar[str] = "RIHS01_0433f03fc9235c64b70d1abc6eeec475d564cb62ced486fb389a262937ff2ed1"
+        HASH: ClassVar[str] = "RIHS01_4c19aa33f24cc111045031d1e05c7b927e20b83a269842617a3db51c4ad1eb4c"
         FIELDS: ClassVar[Fields] = {
             "x": "float64",
             "y": "float64",
@@ -1063,6 +1065,9 @@ class ReachPose(Action["ReachPose.Goal", "ReachPose.Result", "ReachPose.Feedback
             "yaw": "float64",
             "frame": "string",
             "any_orientation": "bool",
+            "any_position": "bool",
+            "approximate": "bool",
+            "prefer": "string",
             "tolerance": "float64",
             "angle_tolerance": "float64",
             "speed": "float64",
@@ -1079,6 +1084,9 @@ class ReachPose(Action["ReachPose.Goal", "ReachPose.Result", "ReachPose.Feedback
         yaw: float = 0.0
         frame: str = ""  # a link of the body; empty is its root
         any_orientation: bool = False  # whether only the position counts
+        any_position: bool = False  # whether only the orientation counts
+        approximate: bool = False  # whether the nearest pose that can be taken will do
+        prefer: str = ""  # the pose of the arm that joints should be near to, if several positions do
         tolerance: float = 0.0  # [m]; 0 is 1 mm
         angle_tolerance: float = 0.0  # [rad]; 0 is 0.5 degrees
         speed: float = 0.0  # share of the greatest speeds of joints; 0 is all
@@ -1091,14 +1099,20 @@ class ReachPose(Action["ReachPose.Goal", "ReachPose.Result", "ReachPose.Feedback
         """Result of `ReachPose`."""
 
         TYPE: ClassVar[str] = "rbxcompose_msgs/action/ReachPose_Result"
-        HASH: ClassVar[str] = "RIHS01_2fc892259d6f8839e17298cb15ccc551b704672f53bcb5ce84f81b82fdd34a63"
+        HASH: ClassVar[str] = "RIHS01_18e5315624a8f0a96322da8033bc996e5338b9989560533596860538290e9db3"
         FIELDS: ClassVar[Fields] = {
             "outcome": "string",
             "message": "string",
+            "approximate": "bool",
+            "away": "float64",
+            "angle": "float64",
         }
 
         outcome: str = ""  # the reason of a failure, of a closed list
         message: str = ""
+        approximate: bool = False  # whether the pose cannot be taken, and the tip is as near to it as was found
+        away: float = 0.0  # [m] how far from it the tip is then
+        angle: float = 0.0  # [rad] how far it is turned then
 
     @dataclass(frozen=True, slots=True)
     class Feedback(Message):
@@ -1116,14 +1130,14 @@ class ReachPose(Action["ReachPose.Goal", "ReachPose.Result", "ReachPose.Feedback
         """Sends a goal of `ReachPose`."""
 
         TYPE: ClassVar[str] = "rbxcompose_msgs/action/ReachPose_SendGoal"
-        HASH: ClassVar[str] = "RIHS01_1c547b99ca120e7181f6f3ad0da2824cb4d8c3b320163084281b8e559a62c343"
+        HASH: ClassVar[str] = "RIHS01_aea30d73a9bfb4b8bafd0d6c17b74d890780142a99cec1b77d8f4ea1d7c0f6bd"
 
         @dataclass(frozen=True, slots=True)
         class Request(Message):
             """Request of `ReachPose.SendGoal`."""
 
             TYPE: ClassVar[str] = "rbxcompose_msgs/action/ReachPose_SendGoal_Request"
-            HASH: ClassVar[str] = "RIHS01_c6d55ef77ad42b0f86abecb06ca22204ca1885d63ad4c49feefcc3288ed43b11"
+            HASH: ClassVar[str] = "RIHS01_d5175b1e25ac690ef6def879f35ba890a18cd960c4a70a6606b308c5b25b18b4"
             FIELDS: ClassVar[Fields] = {
                 "goal_id": "unique_identifier_msgs/msg/UUID",
                 "goal": "rbxcompose_msgs/action/ReachPose_Goal",
@@ -1150,7 +1164,7 @@ class ReachPose(Action["ReachPose.Goal", "ReachPose.Result", "ReachPose.Feedback
         """Waits for the result of a goal of `ReachPose`."""
 
         TYPE: ClassVar[str] = "rbxcompose_msgs/action/ReachPose_GetResult"
-        HASH: ClassVar[str] = "RIHS01_40f0ef6a94fd7c85f39022ec9fd7f608232d2aefa0b1f8b2ea3d93c38b16b899"
+        HASH: ClassVar[str] = "RIHS01_bd1ba1491b932b4b67af26934d7041a59c45437515813f1fdbb406a4b619107c"
 
         @dataclass(frozen=True, slots=True)
         class Request(Message):
@@ -1169,7 +1183,7 @@ class ReachPose(Action["ReachPose.Goal", "ReachPose.Result", "ReachPose.Feedback
             """Response of `ReachPose.GetResult`."""
 
             TYPE: ClassVar[str] = "rbxcompose_msgs/action/ReachPose_GetResult_Response"
-            HASH: ClassVar[str] = "RIHS01_8cc451d8a7a5f4e56d84a4287abef7624167406635fa2c1b023e5b9b0546ab87"
+            HASH: ClassVar[str] = "RIHS01_2638a82e50001186dedfce395e20a3fb67cacc9a8319298348d80649250af42a"
             FIELDS: ClassVar[Fields] = {
                 "status": "int8",
                 "result": "rbxcompose_msgs/action/ReachPose_Result",
@@ -1619,6 +1633,53 @@ class DetachObject(Service["DetachObject.Request", "DetachObject.Response"]):
 
         success: bool = False
         message: str = ""
+
+
+class LocateArm(Service["LocateArm.Request", "LocateArm.Response"]):
+    """Tell where an arm is, and let it remember that."""
+
+    TYPE: ClassVar[str] = "rbxcompose_msgs/srv/LocateArm"
+    HASH: ClassVar[str] = "RIHS01_d2af3d2bfafcc449312f770b913fd51d7a648d6f041781d588d2541eb9dcc5e3"
+
+    @dataclass(frozen=True, slots=True)
+    class Request(Message):
+        """Request of `LocateArm`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/srv/LocateArm_Request"
+        HASH: ClassVar[str] = "RIHS01_4fecb2a1ab71f4a45e931c247de895a539d788cb210b8099c7251364281cf4ba"
+        FIELDS: ClassVar[Fields] = {
+            "remember": "string",
+            "frame": "string",
+        }
+
+        remember: str = ""  # a name by which the arm can go there again while its process runs; empty if not
+        frame: str = ""  # a link of the body in whose frame the tip is told; empty is its root
+
+    @dataclass(frozen=True, slots=True)
+    class Response(Message):
+        """Response of `LocateArm`."""
+
+        TYPE: ClassVar[str] = "rbxcompose_msgs/srv/LocateArm_Response"
+        HASH: ClassVar[str] = "RIHS01_72add678e1040f16757d60af1e18801d226484c71671987fe00c1613909f6035"
+        FIELDS: ClassVar[Fields] = {
+            "success": "bool",
+            "message": "string",
+            "x": "float64",
+            "y": "float64",
+            "z": "float64",
+            "roll": "float64",
+            "pitch": "float64",
+            "yaw": "float64",
+        }
+
+        success: bool = False
+        message: str = ""  # where the tip and the joints are, or why that is not known
+        x: float = 0.0  # [m] of the tip
+        y: float = 0.0
+        z: float = 0.0
+        roll: float = 0.0  # [rad]
+        pitch: float = 0.0
+        yaw: float = 0.0
 
 
 class SetBatteryLevel(Service["SetBatteryLevel.Request", "SetBatteryLevel.Response"]):

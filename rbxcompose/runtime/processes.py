@@ -9,13 +9,12 @@ import signal
 import sys
 import time
 import traceback
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 
 from rbxcompose.dataclass import dataclass
 
-_PR_SET_PDEATHSIG = 1
 _PR_SET_CHILD_SUBREAPER = 36
 _M_MMAP_THRESHOLD = -3  # of mallopt(3)
 _LARGE = 1 << 20  # [B]
@@ -121,6 +120,26 @@ def _stat(pid: int) -> list[str] | None:
     return text.rpartition(b")")[2].decode("ascii").split()
 
 
+def waits_of(pid: int) -> dict[str, float]:
+    """Return for how long each thread of a process has been ready to run but waited for a processor [s], by its id.
+
+    Nothing, if the process has ended or the kernel does not count it.
+    """
+    waits = {}
+    try:
+        for thread in os.listdir(f"/proc/{pid}/task"):
+            with suppress(FileNotFoundError, ProcessLookupError), open(f"/proc/{pid}/task/{thread}/schedstat") as file:
+                waits[thread] = int(file.read().split()[1]) * 1e-9
+    except (FileNotFoundError, ProcessLookupError):
+        return {}
+    return waits
+
+
+def longest_wait(before: Mapping[str, float], after: Mapping[str, float]) -> float:
+    """Return for how long a thread has waited for a processor between two answers of `waits_of` [s], at most."""
+    return max((wait - before.get(thread, 0.0) for thread, wait in after.items()), default=0.0)
+
+
 def signal_descriptor(descriptor: int, number: signal.Signals) -> bool:
     """Send a signal through a pidfd; return whether the process existed."""
     try:
@@ -142,17 +161,6 @@ def wait_until_ended(processes: Sequence[Process], seconds: float) -> list[Proce
         finally:
             os.close(descriptor)
     return [process for process in processes if process.is_running]
-
-
-def end_with(parent: int, number: signal.Signals) -> None:
-    """Have the kernel send `number` to this process when its parent ends; end now if the parent has already ended.
-
-    Call it in a child of the main thread: for the kernel, the parent is the thread that forked.
-    """
-    if _LIBC.prctl(_PR_SET_PDEATHSIG, int(number), 0, 0, 0) != 0:
-        raise OSError(ctypes.get_errno(), "prctl(PR_SET_PDEATHSIG) failed")
-    if os.getppid() != parent:
-        os._exit(0)
 
 
 def adopt_orphans() -> None:

@@ -224,6 +224,7 @@ def _skills(cls: type[Any]) -> Iterator[Skill]:
                 entries=port.entries,
                 measures=port.measures,
                 choices=port.choices,
+                may_lack=port.may_lack,
             )
         if isinstance(port, ServesTopic) and port.interface is not None:
             yield topic_skill(port.interface, name, None, port.claims, port.restartable, entries=port.entries)

@@ -84,10 +84,9 @@ class Asking(NodeReader):
         self.schemas[key] = MAPS.get(key, {"type": "object", "minProperties": 1})
         return None
 
-    def branch(self, key: str, branches: tuple[str, ...]) -> str:
+    def branch(self, key: str, branches: tuple[str, ...]) -> None:
         """Note a name."""
         self.schemas[key] = ITEM_NAME
-        return ""
 
     def name(self, key: str, what: str) -> ScalarNode:
         """Note a name."""

@@ -165,6 +165,13 @@ class WritesFrame(Capability):
 
 
 @dataclass(frozen=True, slots=True)
+class PutsThings(Capability):
+    """It puts things into the planning scene, which stand still in the frame `stands_in`."""
+
+    stands_in: Setting[str]
+
+
+@dataclass(frozen=True, slots=True)
 class OpensPort(Capability):
     """It opens a serial port of this machine, which `up` looks at before anything starts."""
 

@@ -86,6 +86,7 @@ class Component(Generic[C]):
     steps_for_goals: ClassVar[bool] = False  # steps only while an action that it serves has a goal, and once after it
     process: ClassVar[str] = "robot"  # default process group
     blocking: ClassVar[bool] = False  # may wait or compute for a long time: runs in a thread of its own
+    configures_within: ClassVar[float] = 30.0  # [s] in which a blocking one is configured; after them it has failed
     simulated: ClassVar[bool] = False  # exists only in simulation
     made_by: ClassVar[str] = ""  # says which section creates it, for a type that users do not list themselves
     type_name: ClassVar[str] = ""  # set by the decorator
@@ -106,6 +107,11 @@ class Component(Generic[C]):
                     if isinstance(argument, type) and issubclass(argument, Config):
                         return argument
         return Config
+
+    @classmethod
+    def rate_of(cls, config: C) -> float:
+        """Return how often `step` runs with this configuration [Hz]: `rate`, if that does not say otherwise."""
+        return cls.rate
 
     @classmethod
     def ports(cls, config: C) -> dict[str, Port[Any]]:

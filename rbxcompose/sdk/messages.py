@@ -45,7 +45,7 @@ def number_field(message: str, path: str) -> str:
     try:
         found = field_type(message, path)
     except NoFieldError as error:
-        context = {"name": error.name, "valid": tuple(error.fields), "what": f"fields of {error.message}"}
+        context = {"name": error.name, "valid": tuple(error.fields), "what": f"'message' is {message}, with the fields"}
         raise PydanticCustomError("field", f"{error.message} has no field '{{name}}'", context) from None
     if found.is_message or found.shape is not FieldShape.SINGLE or found.base in ("string", "bool"):
         raise PydanticCustomError("field", "'{path}' is a {type}, not a number", {"path": path, "type": str(found)})

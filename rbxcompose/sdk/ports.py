@@ -173,14 +173,15 @@ class SendsOrders(Out[M]):
 class Serves(Port[None]):
     """Serves requests: the method `on_<port>` takes a request and returns the response, or a `Later` that tells it.
 
-    It is a skill of missions if the response has a flag `success`; `skill` is as in `ServesAction`.
+    It is a skill of missions if the response has a flag `success`; `skill` is as in `ServesAction`. `unit` says what a
+    bare number in the request means (`%`).
     """
 
     kind = "serves"
 
-    def __init__(self, service: type[Service[Q, R]], topic: str, *, skill: str | None = "") -> None:
+    def __init__(self, service: type[Service[Q, R]], topic: str, *, skill: str | None = "", unit: str = "") -> None:
         super().__init__(topic)
-        self.interface, self.skill = service, skill
+        self.interface, self.skill, self.unit = service, skill, unit
 
 
 class Calls(Port[Caller[Q, R]]):
@@ -204,7 +205,8 @@ class ServesAction(Port[ActionServer[G, R, F]]):
     goal, and the `entries` of two of its arrays. `measures` are the dimensions of numbers of the goal, so that missions
     write them with units: `{"opening": LENGTH}`; a map stands for those of a nested message, which becomes an argument
     by it. `choices` are the words that texts of the goal may be; the first of
-    these texts is the main argument.
+    these texts is the main argument if there are `entries`, else that is the first argument. It must be given if it
+    measures something, unless it `may_lack`.
     """
 
     kind = "serves_action"
@@ -222,6 +224,7 @@ class ServesAction(Port[ActionServer[G, R, F]]):
         entries: ArrayEntries | None = None,
         measures: Measures = MappingProxyType({}),
         choices: Mapping[str, Collection[str]] = MappingProxyType({}),
+        may_lack: bool = False,
     ) -> None:
         """Declare the port.
 
@@ -239,7 +242,7 @@ class ServesAction(Port[ActionServer[G, R, F]]):
             raise ValueError(f"{action.Goal.TYPE} has no number '{wrong[0]}'")
         if wrong := [name for name in choices if action.Goal.FIELDS.get(name) != "string"]:
             raise ValueError(f"{action.Goal.TYPE} has no text '{wrong[0]}'")
-        self.measures, self.choices = measures, choices
+        self.measures, self.choices, self.may_lack = measures, choices, may_lack
         self.interface, self.claims, self.restartable = action, claims, restartable
         self.pausable, self.outcomes = pausable, outcomes
 

@@ -10,10 +10,10 @@ from pydantic import Field
 from rbxcompose.actuation.bus_types import DYNAMIXEL, BusType, bus_type, bus_type_names
 from rbxcompose.actuation.servo_models import ServoModel
 from rbxcompose.config import Config, Name, Ratio
-from rbxcompose.findings import Finding, Related, Span, kind
+from rbxcompose.findings import Finding, Related, kind
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading
-from rbxcompose.manifest.tree import ScalarNode, at, value_span
+from rbxcompose.manifest.tree import ScalarNode, at, key_span, value_span
 from rbxcompose.references import ACTUATOR, SERVO_BUS, Refers
 
 NO_MODEL = kind(
@@ -151,11 +151,13 @@ def _models(reading: Reading[ActuatorModel], found: Mapping[str, ActuatorModel])
 
 
 def _ids(reading: Reading[ActuatorModel], found: Mapping[str, ActuatorModel]) -> Iterator[Finding]:
-    first: dict[tuple[str, int], Span] = {}
+    first: dict[tuple[str, int], str] = {}
     for name, one in found.items():
-        span = value_span(reading.contents.root, ("actuators", name, "id"))
-        other = first.setdefault((one.bus, one.id), span)
-        if other is not span:
+        if (before := first.setdefault((one.bus, one.id), name)) != name:
+            root = reading.contents.root
+            span, other = (value_span(root, ("actuators", each, "id")) for each in (name, before))
+            if span == other:  # by '<<', one has the keys of the other
+                span = key_span(root, ("actuators", name))
             message = f"two servos of the bus '{one.bus}' have the id {one.id}"
             taken = {each.id for each in found.values() if each.bus == one.bus}
             free = next((number for number in range(1, 253) if number not in taken), None)

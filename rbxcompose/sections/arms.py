@@ -21,8 +21,16 @@ from rbxcompose.manifest.section import Contents, Reading
 from rbxcompose.manifest.tree import at, key_span, value_span
 from rbxcompose.manifest.validate import not_a_choice
 from rbxcompose.manifest.wanted_components import WantedComponent, Wiring
-from rbxcompose.motion.group_findings import BEYOND, GRIPPER_ELSEWHERE, NO_CHAIN, NO_GRIPPER, NOT_LED, NOT_OF_ARM
-from rbxcompose.motion.groups import ArmGroup, chain, group_of, moved_links, together
+from rbxcompose.motion.group_findings import (
+    BEYOND,
+    GRIPPER_ELSEWHERE,
+    NO_CHAIN,
+    NO_GRIPPER,
+    NO_POSE,
+    NOT_LED,
+    NOT_OF_ARM,
+)
+from rbxcompose.motion.groups import ArmGroup, carrying, chain, group_of, moved_links, together
 from rbxcompose.motion.planner_types import PLANNERS
 from rbxcompose.msgs.control_msgs import FollowJointTrajectory, GripperCommand
 from rbxcompose.references import ARM, CONTROLLER, Refers
@@ -45,6 +53,8 @@ class ArmModel(Config):
     """Its joints are those between these links."""
     joints: list[JointName] = []
     """Its joints, instead of a chain."""
+    links: list[LinkName] = []
+    """Links whose joints are its own, instead of a chain; the last one is the tip."""
     groups: list[Annotated[Name, Refers(ARM)]] = []
     """Arms whose joints are its own, instead of a chain; the last one has the tip."""
     passive: list[JointName] = []
@@ -72,8 +82,8 @@ class ArmModel(Config):
 
     @model_validator(mode="after")
     def _one_of_them(self) -> ArmModel:
-        if [self.chain is not None, bool(self.joints), bool(self.groups)].count(True) != 1:
-            raise ValueError("an arm has either 'chain' or 'joints' or 'groups'")
+        if [self.chain is not None, bool(self.joints), bool(self.links), bool(self.groups)].count(True) != 1:
+            raise ValueError("an arm has either 'chain' or 'joints' or 'links' or 'groups'")
         if self.passive and self.chain is None:
             raise ValueError("'passive' is for joints of a chain")
         return self
@@ -263,6 +273,11 @@ def _leads_to(name: str, wanted: str, entries: Mapping[str, ArmModel]) -> bool:
 def _group(reading: Reading[ArmModel], name: str, one: ArmModel, known: Body) -> ArmGroup | None:
     """Return the joints of an arm; None after a finding."""
     root = reading.contents.root
+    if one.links:
+        if (found := carrying(known, one.links)) is None:
+            message = f"no joint of these links carries '{one.links[-1]}', which would be the tip of the arm '{name}'"
+            reading.report.add(NO_CHAIN.at(value_span(root, ("arms", name, "links", len(one.links) - 1)), message))
+        return found
     if one.chain is None:
         for index, joint in enumerate(one.joints):
             if not known.joints[joint].moves or known.joints[joint].mimic is not None:
@@ -294,6 +309,9 @@ def _group(reading: Reading[ArmModel], name: str, one: ArmModel, known: Body) ->
 
 def _mistakes(reading: Reading[ArmModel], name: str, one: ArmModel, group: ArmGroup, known: Body) -> Iterator[Finding]:
     yield from _unled(reading, name, one, group)
+    if (prefer := one.kinematics.prefer) is not None and prefer not in one.poses:
+        span = value_span(reading.contents.root, ("arms", name, "kinematics", "prefer"))
+        yield NO_POSE.misspelt(span, f"the arm '{name}' has no pose '{prefer}'", prefer, one.poses, "its poses")
     there = reading.contents.of(controllers).get(one.gripper or "")
     if one.gripper is not None and there is not None and not served_topic(one.gripper, there, GripperCommand):
         span = value_span(reading.contents.root, ("arms", name, "gripper"))

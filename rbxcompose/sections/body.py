@@ -6,16 +6,17 @@ from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, StringConstraints, model_validator
 
 from rbxcompose.body.attachment import PieceAttachment
 from rbxcompose.body.description import BodyPart, Description, describe
 from rbxcompose.body.files import BodyFile
 from rbxcompose.body.link_pairs import CollisionMatrix, digest_of, read_matrix
+from rbxcompose.body.virtual_joint import VirtualJoint, VirtualKind, misfits
 from rbxcompose.config import Config, Name
-from rbxcompose.findings import Finding, Severity, Span, kind, replacement
+from rbxcompose.findings import Finding, Report, Severity, Span, kind, replacement
 from rbxcompose.manifest.fields import FileName
 from rbxcompose.manifest.files import project_of, resolve, shown_name
 from rbxcompose.manifest.reader import UNREADABLE, read_source
@@ -32,9 +33,9 @@ STALE = kind(
     "RBX2307",
     """The pairs of links that arms need not watch are not those of this body
 
-The file under `collisions` is missing, or its `body` is the digest of another one: joints or shapes have changed since
-it was written. Without it, arms watch all pairs of links but those that a joint connects, which is safe and may be
-slower. A profile that changes the body has a file of its own.
+The file under `collisions` is missing, or its `body` is the digest of another one: joints, shapes or what `cover` says
+have changed since it was written. Without it, arms watch all pairs of links but those that a joint connects and those
+that always collide, which is safe and may be slower. A profile that changes the body has a file of its own.
 
 Bad: `body: {urdf: robot.urdf, collisions: robot.collisions.yaml}`, after a link got another shape.
 Good: the same, after `rbxcompose arm setup`
@@ -85,13 +86,28 @@ class PieceModel(BodyFileModel):
         return "there is no 'urdf' or 'xacro' to attach" if self.attach else "a piece needs 'urdf' or 'xacro'"
 
 
+class VirtualJointModel(Config):
+    """Where the root of the body is."""
+
+    frame: Annotated[str, StringConstraints(pattern=r"^[^\s/]\S*$")]
+    """The frame outside of the body, such as `world` or `odom`."""
+    type: VirtualKind = "fixed"
+    """The root is `fixed` at its origin, and goals and things may be in it as in a link; or moves in it."""
+    name: Annotated[str, StringConstraints(pattern=r"^\S+$")] = "virtual_joint"
+    """What MoveIt calls the joint."""
+
+
 class BodyModel(BodyFileModel):
     """What the robot looks like and how it moves: a file, and further pieces, which are attached to it."""
 
     pieces: dict[Name, PieceModel] = {}
     """Further pieces of the body, by the prefix of their links and joints; parts bring theirs."""
+    cover: Literal["collision", "visual"] = "collision"
+    """What nothing may be within: collision shapes, or what is seen, too, which then counts as collision shapes."""
     collisions: FileName | None = None
     """Pairs of links that arms need not watch: a file that `arm setup` writes, relative to this one."""
+    virtual_joint: VirtualJointModel | None = None
+    """The frame outside of the body in which its root stands or moves."""
 
     def lacks_file(self) -> str:
         """Return what is wrong if there is no file; its pieces may be all."""
@@ -102,7 +118,7 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
     """Yield the component that publishes the description."""
     if found := contents.of(body):
         keys = [key for key in ("urdf", "xacro") if at(contents.root, (body.name, key)) is not None]
-        yield WantedComponent(DESCRIPTION, DESCRIPTION, {"urdf": found.text}, (body.name, *keys))
+        yield WantedComponent(DESCRIPTION, DESCRIPTION, {"urdf": found.published}, (body.name, *keys))
 
 
 def _brought(instance: str, own: TreeNode | None, entry: TreeNode) -> TreeNode | None:
@@ -163,9 +179,26 @@ def body(reading: Reading[BodyModel]) -> Description | None:
     robot = reading.contents.root.get("name")
     named = robot.text if isinstance(robot, ScalarNode) else ""
     usable = [one for one in parts if not isinstance(one, Finding)]
-    found, findings = describe(named, reading.contents.file.parent, usable, reading.contents.documents.sources)
+    sources = reading.contents.documents.sources
+    covers_visuals = read.cover == "visual"
+    found, findings = describe(named, reading.contents.file.parent, usable, sources, covers_visuals=covers_visuals)
     report.extend(findings)
-    return found and replace(found, matrix=_matrix(reading, reading.node, read, found))
+    if found is None:
+        return None
+    found = _placed(found, read.virtual_joint, reading.node, report)
+    return replace(found, matrix=_matrix(reading, reading.node, read, found))
+
+
+def _placed(found: Description, wanted: VirtualJointModel | None, node: TreeNode, report: Report) -> Description:
+    """Return a body with its virtual joint, without it after findings."""
+    if wanted is None:
+        return found
+    span, frame = (value_span(node, ("virtual_joint", key)) for key in ("name", "frame"))
+    joint = VirtualJoint(wanted.name, wanted.type, wanted.frame, span, frame)
+    if wrong := [*misfits(joint, found.body)]:
+        report.extend(wrong)
+        return found
+    return found.with_virtual(joint)
 
 
 def _matrix(reading: Reading[BodyModel], node: TreeNode, read: BodyModel, found: Description) -> CollisionMatrix | None:

@@ -60,6 +60,7 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
         return
     for name, head in found.items():
         one = head.model
+        frames = dict.fromkeys((*one.frames, *contents.of(scene).frames))
         config = {
             "name": name,
             "skill": "look_at" if len(found) == 1 else f"look_at_{name}",
@@ -70,7 +71,7 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
             "follow": follow_topic(contents, one.controller),
             "stream": stream_topic(contents, one.controller),
             "sees_scene": bool(contents.of(arms)),
-            "frames": tuple(dict.fromkeys((*one.frames, *contents.of(scene).frames))),
+            "frames": tuple(each for each in frames if each != description.body.frame),
         }
         yield WantedComponent(name, HEAD, config, ("heads", name))
 

@@ -37,8 +37,10 @@ from rbxcompose.units import (
     ACCELERATION,
     ANGLE,
     ANGULAR_ACCELERATION,
+    ANGULAR_JERK,
     ANGULAR_SPEED,
     FORCE,
+    JERK,
     LENGTH,
     SPEED,
     TORQUE,
@@ -77,7 +79,7 @@ NOWHERE_TO_GO = kind(
     """Limits that leave a joint no motion
 
 Its least position is above its greatest one, no position is within its limits and within those of the body, or its
-speed or acceleration is not above 0.
+speed, acceleration or jerk is not above 0.
 
 Bad: `limits: {position: [120 deg, 150 deg]}`, where the URDF has `<limit lower="-1.5" upper="1.5" .../>`.
 Good: `limits: {position: [-60 deg, 60 deg]}`
@@ -101,6 +103,7 @@ def _either(turning: Dimension, sliding: Dimension) -> PlainValidator:
 JointPosition = Annotated[Quantity, _either(ANGLE, LENGTH)]
 JointSpeed = Annotated[Quantity, _either(ANGULAR_SPEED, SPEED)]
 JointAcceleration = Annotated[Quantity, _either(ANGULAR_ACCELERATION, ACCELERATION)]
+JointJerk = Annotated[Quantity, _either(ANGULAR_JERK, JERK)]
 JointEffort = Annotated[Quantity, _either(TORQUE, FORCE)]
 
 
@@ -113,6 +116,8 @@ class DrivenLimitsModel(Config):
     """Largest speed."""
     acceleration: JointAcceleration | None = None
     """Largest acceleration."""
+    jerk: JointJerk | None = None
+    """Largest change of the acceleration in motions that are planned for an arm; they take a little longer."""
     effort: JointEffort | None = None
     """Largest torque or force; that of the body holds, too, unless it is 0."""
 
@@ -272,13 +277,14 @@ def _follows(
         yield NOT_TOGETHER.at(at, f"joint '{name}' mimics '{leader}' in the body, but servos with velocities do not")
 
 
-_TURNING = (ANGLE, ANGULAR_SPEED, ANGULAR_ACCELERATION, TORQUE)
+_TURNING = (ANGLE, ANGULAR_SPEED, ANGULAR_ACCELERATION, ANGULAR_JERK, TORQUE)
 
 
 def _no_motion(one: JointModel, joint: BodyJoint | None) -> Iterator[tuple[str, str, str]]:
     """Yield the limits under which it cannot move: the key, why not, and what helps."""
     limits, outer = one.limits, _body_limits(joint)
-    for key, value in (("velocity", limits.velocity), ("acceleration", limits.acceleration)):
+    for key in ("velocity", "acceleration", "jerk"):
+        value: Quantity | None = getattr(limits, key)
         if value is not None and value.value <= 0.0:
             yield key, f"cannot move with a limit of {_shown(value)}", "a limit is above 0, for both directions"
     if limits.position is None:
@@ -311,8 +317,8 @@ def limits_of(one: JointModel, joint: BodyJoint | None) -> Tightened:
     own = one.limits
     least, greatest = [each.value for each in own.position] if own.position else (None, None)
     velocity = own.velocity.value if own.velocity else None
-    acceleration = own.acceleration.value if own.acceleration else None
-    return tightened(_body_limits(joint), MotionLimits(least, greatest, velocity, acceleration))
+    acceleration, jerk = own.acceleration.value if own.acceleration else None, own.jerk.value if own.jerk else None
+    return tightened(_body_limits(joint), MotionLimits(least, greatest, velocity, acceleration, jerk=jerk))
 
 
 def held_limits(one: JointModel, joint: BodyJoint | None) -> MotionLimits:
@@ -349,7 +355,7 @@ def _quantities(one: JointModel) -> Iterator[tuple[KeyPath, Quantity]]:
     limits = one.limits
     for index, position in enumerate(limits.position or ()):
         yield ("limits", "position", index), position
-    for name in ("velocity", "acceleration", "effort"):
+    for name in ("velocity", "acceleration", "jerk", "effort"):
         if (value := getattr(limits, name)) is not None:
             yield ("limits", name), value
     for index, point in enumerate(one.calibration):

@@ -23,6 +23,7 @@ def joint_limits(contents: Contents, joint: BodyJoint) -> dict[str, object]:
         "upper": limits.upper,
         "velocity": limits.velocity,
         "acceleration": limits.acceleration,
+        "jerk": limits.jerk,
         "is_continuous": joint.kind == "continuous",
         "slides": joint.slides,
     }

@@ -124,5 +124,7 @@ def safety(reading: Reading[SafetyModel]) -> SafetyModel:
         reading.report.add(THERMAL_ORDER.at(key_span(root, ("safety", "thermal")), message, help=help_text))
     if read.on_shutdown == "park" and not read.park:
         span = key_span(root, ("safety", "on_shutdown"))
-        reading.report.add(NOTHING_TO_PARK.at(span, "joints are to be parked, but 'park' names none"))
+        message = "joints are to be parked, but 'park' names none"
+        help_text = "add 'park: {JOINT: 0 deg}' beside it, with the position of each joint"
+        reading.report.add(NOTHING_TO_PARK.at(span, message, help=help_text))
     return read

@@ -7,24 +7,26 @@ from dataclasses import field, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic_core import PydanticCustomError
 
 from rbxcompose.body.attachment import FramePose
 from rbxcompose.body.mesh_files import FORMATS, mesh_problem
 from rbxcompose.body.model import Body, Geometry
-from rbxcompose.config import Config, Frequency, Length, LinkName, Name, Time
+from rbxcompose.cloud_config import CloudModel
+from rbxcompose.config import Config, Length, LinkName, Name
 from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Span, kind
-from rbxcompose.manifest.fields import FileName, TopicName
+from rbxcompose.manifest.fields import FileName
 from rbxcompose.manifest.files import resolve, shown_name
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading
 from rbxcompose.manifest.tree import KeyPath, key_span, value_span
 from rbxcompose.manifest.wanted_components import WantedComponent, Wiring
-from rbxcompose.motion.scene import MOST_PADDING, MOST_SHAPES, PlacedObject, mistake_in
+from rbxcompose.motion.scene import MOST_PADDING, MOST_SHAPES, PlacedObject, mistake_in, settled
 from rbxcompose.motion.scene_text import LARGEST, NO_SCENE, SceneFile, read_scene
 from rbxcompose.printable import plain
-from rbxcompose.references import OBJECT, Refers
+from rbxcompose.references import LINK, OBJECT, Refers
 from rbxcompose.regular_files import read_regular
 from rbxcompose.sections.arms import arms
 from rbxcompose.sections.body import body
@@ -127,6 +129,17 @@ class ObjectModel(Config):
     """Links that it may touch."""
     touches_objects: list[Annotated[Name, Refers(OBJECT)]] = []
     """Other things that it may touch, while an arm holds one of both."""
+
+    @field_validator("touches", mode="before")
+    @classmethod
+    def _are_links(cls, names: object, info: ValidationInfo) -> object:
+        known = info.context or {}
+        for name in names if isinstance(names, list) else ():
+            if isinstance(name, str) and name in known.get(OBJECT, ()) and name not in known.get(LINK, ()):
+                context = {"name": name, "help": f"write 'touches_objects: [{name}]'"}
+                raise PydanticCustomError(OBJECT, "'{name}' is an object, and no link", context)
+        return names
+
     padding: Padding = 0.0
     """How far arms keep from it."""
     colour: ColourName | None = None
@@ -173,29 +186,6 @@ class ObjectModel(Config):
         )
 
 
-class CloudModel(Config):
-    """Clouds of points of a sensor, which arms plan around."""
-
-    topic: TopicName
-    """Their topic, of the type `sensor_msgs/PointCloud2`."""
-    range: Length = Field(1.5, gt=0, le=20)
-    """How far from the sensor points count."""
-    nearest: Length = Field(0.0, ge=0)
-    """Nearer points do not count."""
-    cell: Length = Field(0.02, ge=0.005, le=0.5)
-    """Side of the cells of space that are taken as occupied."""
-    least: int = Field(1, ge=1)
-    """How many points of one cloud a cell must have: more leave out noise."""
-    padding: Length = Field(0.03, ge=0, le=0.5)
-    """Points nearer to the robot or to things of the scene are taken for these."""
-    forget: Time = Field(5.0, gt=0)
-    """How long a cell stays in which clouds show nothing any more."""
-    rate: Frequency = Field(2.0, gt=0, le=30)
-    """How many clouds a second are used."""
-    frame: Name | None = None
-    """A frame such as `odom`, in which cells stay where they are while the robot drives; without it the body's root."""
-
-
 class SceneModel(Config):
     """Things around the robot."""
 
@@ -224,7 +214,8 @@ class SceneOfRobot:
 
     def on(self, known: Body) -> tuple[PlacedObject, ...]:
         """Return the things as seen by a robot that stands at the origin of all frames."""
-        return tuple(one if one.link in known.links else replace(one, link=known.root) for one in self.objects)
+        placed = (one if one.link in known.links else replace(one, link=known.root) for one in self.objects)
+        return tuple(settled(one, known) for one in placed)
 
 
 def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]:
@@ -312,7 +303,8 @@ def scene(reading: Reading[SceneModel]) -> SceneOfRobot:
         *(one.frame for one in read.objects.values()),
         *(one.frame for one in read.clouds.values() if one.frame not in known.links),
     )
-    frames = tuple(dict.fromkeys([*read.frames, *filter(None, named)]))
+    outer = description.virtual.frame if description.virtual else ""
+    frames = tuple(one for one in dict.fromkeys((outer, *read.frames, *named)) if one and one != known.frame)
     found = []
     for name, one in read.objects.items():
         path = ("scene", "objects", name)

@@ -78,7 +78,7 @@ def stops_after_cut(robot: PlacedRobot) -> Iterator[StopAfterCut]:
 
 
 def _stop_of(base: RobotComponent, drives: Drives, host: str) -> StopAfterCut:
-    cycles = CYCLES / (base.cls.rate or SLOWEST)
+    cycles = CYCLES / (base.cls.rate_of(base.config) or SLOWEST)
     waiting = drives.stops_after.value + cycles if drives.stops_after else None
     times = (
         _braking(drives.max_speed, drives.acceleration),

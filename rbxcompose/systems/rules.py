@@ -96,7 +96,7 @@ SAME_ENDPOINT = kind(
 
 Each robot has a router of its own on each host. Two of them cannot listen at one port.
 
-Bad: two robots of a system with `link_port: 7447`.
+Bad: two robots of a system whose bases are on one host, both with `link_port: 7447`.
 Good: leave `link_port` out; each robot gets a port of its own.
 """,
 )

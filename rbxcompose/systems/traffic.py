@@ -118,7 +118,7 @@ def _ends(one: Instance, host: str) -> Iterator[tuple[tuple[str, str], End]]:
         port = ports.get(wire.port)
         if isinstance(port, (*_GIVES, *_TAKES)) and wire.topic:
             declared = port.rate if isinstance(port, Out) else None
-            yield (wire.topic, wire.type), End(one.name, host, port, declared or cls.rate or None)
+            yield (wire.topic, wire.type), End(one.name, host, port, declared or cls.rate_of(one.config) or None)
 
 
 def least_size(interface: type[Message]) -> int:

@@ -76,7 +76,7 @@ def _bases(plan: Plan) -> Iterator[Base]:
             timeout, straight, turning = drives.stops_after, drives.acceleration, drives.turn_acceleration
             if timeout and straight and turning and drives.odometry:
                 command, motion = one.topic(drives.commands), one.topic(drives.odometry)
-                cycle = 1.0 / component_type(one.type).rate
+                cycle = 1.0 / component_type(one.type).rate_of(one.config)
                 yield Base(command, motion, one.process, timeout.value, cycle, (straight.value, turning.value))
 
 

@@ -14,7 +14,10 @@ from rbxcompose.geometry import (
     Transform3,
     Vector3,
     Velocity2,
+    quaternion_from_rpy,
     quaternion_from_yaw,
+    rotate,
+    rpy_from_quaternion,
     wrap_angle,
     yaw_of,
 )
@@ -123,3 +126,17 @@ def test_a_pose_on_the_ground_is_a_transform_that_composes_alike(a: Pose2, b: Po
 )
 def test_a_velocity_knows_whether_it_can_be_driven(velocity: Velocity2, finite: bool) -> None:
     assert velocity.is_finite is finite
+
+
+@given(ROTATIONS, POINTS)
+def test_roll_pitch_and_yaw_of_a_rotation_give_it_back(rotation: Quaternion, point: Vector3) -> None:
+    again = quaternion_from_rpy(*rpy_from_quaternion(rotation))
+    assert math.dist(rotate(again, point), rotate(rotation, point)) < 1e-3
+
+
+@given(st.sampled_from([math.pi / 2, -math.pi / 2]), ANGLES, ANGLES, POINTS)
+def test_straight_up_or_down_roll_counts_as_yaw(pitch: float, roll: float, yaw: float, point: Vector3) -> None:
+    rotation = quaternion_from_rpy(roll, pitch, yaw)
+    found = rpy_from_quaternion(rotation)
+    assert found[0] == 0.0
+    assert math.dist(rotate(quaternion_from_rpy(*found), point), rotate(rotation, point)) < 1e-3

@@ -65,3 +65,7 @@ def test_a_compile_stops_guessing_after_much_work_and_the_next_starts_anew() -> 
 @given(st.text("abc_", max_size=12), st.sets(st.text("abc_", max_size=12), max_size=8), st.integers(1, 3))
 def test_what_is_near_is_what_difflib_tells(name: str, others: set[str], most: int) -> None:
     assert nearest(name, others, most=most) == difflib.get_close_matches(name, sorted(others), n=most)
+
+
+def test_of_equally_similar_names_the_one_that_looks_the_same_comes_first() -> None:
+    assert suggest("corner_l", ["corner_1", "corner_2", "corner_4"]) == "did you mean 'corner_1'?"

@@ -279,3 +279,18 @@ def test_metres_for_a_time_may_be_minutes(written: str, cure: str) -> None:
     with pytest.raises(UnitError) as refused:
         to_si(written, units.TIME)
     assert refused.value.help == cure
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted", "help_text"),
+    [
+        ("20 ms", units.FREQUENCY, "a period as a rate: write '50 Hz'"),
+        ("2 Hz", units.TIME, "once every 0.5 s: write '0.5 s'"),
+        ("1e-300 s", units.FREQUENCY, ""),
+        ("0 s", units.FREQUENCY, ""),
+    ],
+)
+def test_a_period_for_a_rate_is_turned_round_if_it_is_one(text: str, wanted: Dimension, help_text: str) -> None:
+    with pytest.raises(UnitError) as error:
+        to_si(text, wanted)
+    assert error.value.help == help_text

@@ -122,7 +122,7 @@ PYTHON = {
 ENDLESS = {
     "messages without end": computed("[xacro.message('x' * 10 ** 6) for n in range(10 ** 6)]", is_placed=False),
     "output without end": computed(
-        "[f.__globals__['os'].write(1, b'x' * 10 ** 6) for f in [xacro.tokenize] for n in range(10 ** 5)]",
+        "[f.__globals__['os'].write(1, b'x' * 10 ** 6) for f in [xacro.tokenize] for n in range(10 ** 9)]",
         is_placed=False,
     ),
     "an expansion of 9 MB": xacro("".join(

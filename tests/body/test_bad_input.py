@@ -22,7 +22,7 @@ from rbxcompose.body.xml_reader import read_urdf
 from rbxcompose.cli.main import main
 from rbxcompose.findings import Finding
 from rbxcompose.printable import FORBIDDEN
-from rbxcompose.testing.manifests import check_file
+from rbxcompose.testing.manifests import check_file, check_text
 from tests.body.bad_bodies import ALL, MESHES, PWNED, SECRET, YAML, BadBody, computed, fixed, links, mesh, stl, urdf
 from tests.soak import Soak
 
@@ -44,6 +44,21 @@ def test_a_bad_description_is_a_finding_at_its_place_and_executes_nothing(
     assert sorted(tmp_path.rglob("*")) == before
     assert not Path(PWNED).exists()
     soak.tell("hostile descriptions of bodies", len(ALL), 0, "all refused at their place; nothing was executed")
+
+
+def test_a_mesh_in_other_capitals_is_told_if_it_is_in_the_project(tmp_path: Path) -> None:
+    text = "rbx: 1\nkind: Robot\nname: r\nbody: {urdf: r.urdf}\n"
+    for name in ("meshes/Arm.STL", "../meshes/Arm.STL"):
+        home = tmp_path / "project"
+        for folder in (home, tmp_path):
+            (folder / "meshes").mkdir(parents=True, exist_ok=True)
+            (folder / "meshes" / "arm.stl").write_bytes(b"")
+        (home / ".git").mkdir(exist_ok=True)
+        shape = f'<visual><geometry><mesh filename="{name}"/></geometry></visual>'
+        (home / "r.urdf").write_text(f'<robot name="r"><link name="l">{shape}</link></robot>', encoding="utf-8")
+        checked = check_text(text, home)
+        assert ("did you mean 'meshes/arm.stl'?" in checked.text) is name.startswith("meshes")
+        assert "arm.stl'" not in checked.text or name.startswith("meshes")
 
 
 def test_values_may_come_from_a_yaml_file_of_the_project(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.body.link_pairs import REASONS, pair_of
-from rbxcompose.body.srdf import EndEffector, SemanticGroup, Semantics, is_srdf, read_semantics, to_srdf
+from rbxcompose.body.srdf import EndEffector, OuterJoint, SemanticGroup, Semantics, is_srdf, read_semantics, to_srdf
 from rbxcompose.body.xml_reader import XmlElement, read_urdf
 from tests.motion.toy_arm import urdf
 
@@ -27,6 +27,7 @@ SAID = st.builds(
     st.lists(st.builds(EndEffector, NAMES, NAMES, NAMES, NAMES | st.just("")), max_size=2).map(tuple),
     SEVERAL,
     st.dictionaries(st.builds(pair_of, NAMES, NAMES), st.sampled_from(REASONS), max_size=4),
+    st.lists(st.builds(OuterJoint, NAMES, NAMES, NAMES, NAMES), max_size=2).map(tuple),
 )
 
 
@@ -44,14 +45,14 @@ def test_what_is_written_reads_back_the_same(said: Semantics) -> None:
 def test_what_moveit_alone_understands_is_kept_with_its_place() -> None:
     text = """<robot name="a">
   <group name="g"><joint name="j"/></group>
-  <virtual_joint name="v" type="fixed" parent_frame="world" child_link="base"/>
+  <link_sphere_approximation link="base"/>
   <group_state name="s" group="g"><joint name="j" value="1 2"/></group_state>
   <disable_collisions link1="b" link2="a" reason="CollisionIgnoredBySomebody"/>
 </robot>"""
     said = read_semantics(read(text))
     assert [(words, span.line) for words, span in said.others] == [
         ("'1 2' is no single position of a joint", 4),
-        ("the element 'virtual_joint'", 3),
+        ("the element 'link_sphere_approximation'", 3),
     ]
     assert said.pairs == {("a", "b"): "user"}
     assert is_srdf(read(text))

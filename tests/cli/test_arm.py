@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -46,6 +47,34 @@ def test_what_inverse_kinematics_finds_is_where_forward_kinematics_ends(capsys: 
     assert position[0] == pytest.approx(0.12, abs=2e-3)  # the torso stands 10 cm behind the middle
 
 
+def test_an_orientation_alone_is_taken_in_the_posture_that_is_preferred(capsys: pytest.CaptureFixture[str]) -> None:
+    joints = ("right_arm_shoulder_lift_joint", "right_arm_elbow_flex_joint")
+    for lift, elbow in ((-1.0, 0.2), (-0.6, 0.9)):
+        liked = f"{{{joints[0]}: {lift} rad, {joints[1]}: {elbow} rad}}"
+        found = answered(capsys, "ik", "{pitch: 40 deg}", "--any-position", "--prefer", liked)
+        solutions, errors = found["solutions"], found["errors"]
+        assert isinstance(solutions, list)
+        assert isinstance(errors, list)
+        assert [solutions[0][one] for one in joints] == pytest.approx([lift, elbow], abs=0.02)
+        assert (errors[0]["away"], found["approximate"]) == (0.0, False)
+        assert errors[0]["angle"] < math.radians(0.5)
+
+
+def test_the_nearest_pose_is_told_with_what_remains(capsys: pytest.CaptureFixture[str]) -> None:
+    far = ("ik", "{x: 2 m, z: 55 cm}", "--any-orientation", "--approximate")
+    found = answered(capsys, *far)
+    solutions, errors = found["solutions"], found["errors"]
+    assert isinstance(solutions, list)
+    assert isinstance(errors, list)
+    assert found["approximate"] is True
+    goal = ", ".join(f"{name}: {value} rad" for name, value in solutions[0].items())
+    position = answered(capsys, "fk", f"{{{goal}}}")["position"]
+    assert isinstance(position, list)
+    assert math.dist(position, (2.0, 0.0, 0.55)) == pytest.approx(errors[0]["away"])
+    assert command.main(["arm", *in_order(far)]) == 0
+    assert f"approximate, {100 * errors[0]['away']:.1f} cm" in capsys.readouterr().out
+
+
 def test_a_way_tells_how_much_of_it_there_is(capsys: pytest.CaptureFixture[str]) -> None:
     start = ("--from", "{right_arm_shoulder_lift_joint: -70 deg, right_arm_elbow_flex_joint: 40 deg}")
     whole = answered(capsys, "trace", "{points: [{z: 3 cm}], relative: true, any_orientation: true}", *start)
@@ -78,6 +107,8 @@ def test_a_picture_tells_the_cells_that_the_tip_gets_to(capsys: pytest.CaptureFi
         (["plan", "{right_arm_shoulder_pan_joint: -115 deg, right_arm_shoulder_lift_joint: 69 deg}"], "goal_in_coll"),
         (["ik", "{x: 2 m}"], "goal_out_of_reach: the tip got within"),
         (["ik", REACH, "--frame", "torso"], "there is no link 'torso'"),
+        (["ik", REACH, "--prefer", "wav"], "did you mean 'wave'?"),
+        (["plan", "{right_arm_elbow_flex_joint: 5 cm}"], "'right_arm_elbow_flex_joint' turns, and this is a length"),
         (["fk", "wave", "--arm", "left_arm"], "there is no arm 'left_arm'"),
         (["plan", "wave", "--keep", "{roll: 10 deg}"], "not_kept: at the goal, the tip's"),
         (["plan", "wave", "--keep", "{z: [1 m]}"], "unknown_goal: a range of 'keep'"),
@@ -90,3 +121,20 @@ def test_a_picture_tells_the_cells_that_the_tip_gets_to(capsys: pytest.CaptureFi
 def test_what_cannot_be_says_why(words: list[str], told: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert command.main(["arm", *in_order(words)]) == 1
     assert told in capsys.readouterr().err
+
+
+def test_a_mesh_that_cannot_be_read_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("tip.dae").write_text("<COLLADA")
+    shape = '<visual><geometry><mesh filename="tip.dae"/></geometry></visual>'
+    Path("tip.urdf").write_text(f'<robot name="tip"><link name="rod">{shape}</link></robot>')
+    Path("robot.yaml").write_text(
+        "rbx: 1\nkind: Robot\nname: reader\nbody: {cover: visual, pieces: {tip: {urdf: tip.urdf, "
+        "attach: {to: arm_tip}}}}\n"
+        "buses: {servos: {type: dynamixel}}\ninclude: {arm: {part: rbx:parts/servo_arm.yaml, with: {bus: servos}}}\n"
+    )
+    for words in (["plan", "wave"], ["setup", "--check"]):
+        assert command.main(["arm", *words, "robot.yaml"]) == 1
+        assert "the mesh 'tip.dae' cannot be read" in capsys.readouterr().err

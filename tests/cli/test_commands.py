@@ -98,6 +98,7 @@ def test_ps_shows_what_a_dead_supervisor_last_wrote(capsys: pytest.CaptureFixtur
         "supervisor": {"pid": None},
         "router": {"endpoint": None},
         "stop": None,
+        "real": False,
         "clocks": {},
         "components": [
             {"name": "base", "type": "toy", "state": "dead", "process": "robot", "pid": None, "restarts": 1}

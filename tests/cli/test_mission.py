@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -133,7 +134,8 @@ def test_watch_tells_programs_the_whole_and_then_what_changes(
         lambda: arrive(robot),
         lambda: robot.mission.handle(CancelMission()),
     ]
-    monkeypatch.setattr("rbxcompose.cli.missions.live_view.time.sleep", lambda seconds: steps.pop(0)())
+    step = SimpleNamespace(sleep=lambda seconds: steps.pop(0)())
+    monkeypatch.setattr("rbxcompose.cli.missions.live_view.time", step)  # there alone: other threads sleep, too
     lines = [json.loads(line) for line in told(capsys, "watch", "--json").splitlines()]
     assert [(one["whole"], one["state"]) for one in lines] == [(True, "running"), (False, "running"), (False, "halted")]
     assert len(lines[1]["statuses"]) < len(lines[0]["statuses"])

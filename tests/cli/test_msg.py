@@ -72,6 +72,7 @@ def test_the_package_has_the_texts_as_they_are_and_names_all_of_them(tmp_path: P
         "action/Recharge.action",
         "srv/AttachObject.srv",
         "srv/DetachObject.srv",
+        "srv/LocateArm.srv",
         "srv/SetBatteryLevel.srv",
         "srv/SetSpeed.srv",
     }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 
 from rbxcompose.compiler import compile_robot
 from rbxcompose.msgs.geometry_msgs import Point, PointStamped
-from rbxcompose.msgs.rbxcompose_msgs import FollowPoint, MoveArm, TipPoint, TraceArm
+from rbxcompose.msgs.rbxcompose_msgs import FollowPoint, MoveArm
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.plan.model import Instance
 from rbxcompose.sdk.bound import Outcome
@@ -18,15 +19,21 @@ from rbxcompose.testing import Bench
 from tests.conftest import ROOT
 
 TYPES = ("arm", "head", "arm_tracker", "scene", "servo_bus", "transforms")
-SHOULDER = (0.0, -0.013, 0.55)  # about, in the frame of the torso
+BASE = "right_arm_base_link"  # the frame of all points here
+AHEAD = {"pi_robot": 0.24, "pedestal_pi": 0.24, "porter": 0.77}  # where the tip gets easily [m]
 Place = tuple[float, float, float]
+
+
+@cache
+def parts_of(robot: str) -> list[Instance]:
+    plan = compile_robot(str(ROOT / "robots" / robot), profiles=["tracking"], environment={}).plan
+    assert plan
+    return [one for one in plan.instances if one.type in TYPES]
 
 
 @pytest.fixture(scope="module")
 def parts() -> list[Instance]:
-    plan = compile_robot(str(ROOT / "robots/pi_robot"), profiles=["tracking"], environment={}).plan
-    assert plan
-    return [one for one in plan.instances if one.type in TYPES]
+    return parts_of("pi_robot")
 
 
 class Chased:
@@ -37,9 +44,7 @@ class Chased:
         self.ends: list[Any] = []
         self.told: list[FollowPoint.Feedback] = []
         self.bench.advance(0.5)
-        self._done(MoveArm, "/right_arm/move", MoveArm.Goal(pose="straight_forward"))
-        bend = TraceArm.Goal(points=(TipPoint(x=-0.06),), relative=True, any_orientation=True)
-        self._done(TraceArm, "/right_arm/trace", bend)
+        self._done(MoveArm, "/right_arm/move", MoveArm.Goal(pose="ready"))
         client = self.bench.bus.action_client("me", "/chase/follow", FollowPoint)
         self.goal = client(FollowPoint.Goal(patience=patience), self.ends.append, self.told.append)
 
@@ -49,7 +54,7 @@ class Chased:
         assert self.bench.run_until(lambda: bool(ends), 30.0)
         assert ends[0].outcome is Outcome.SUCCEEDED
 
-    def show(self, *places: Place, frame: str = "torso_link", each: float = 0.1) -> None:
+    def show(self, *places: Place, frame: str = BASE, each: float = 0.1) -> None:
         """Tell where the point is, again and again."""
         for x, y, z in places:
             self.bench.publish("/target", PointStamped(header=Header(frame_id=frame), point=Point(x=x, y=y, z=z)))
@@ -57,24 +62,25 @@ class Chased:
 
     @property
     def tip(self) -> Place:
-        """Return where the tip is in the frame of the torso [m]."""
+        """Return where the tip is in the frame of the base of its arm [m]."""
         arm: Any = self.bench.component("right_arm")
         poses = arm.works.kinematics.poses(np.array([arm.measured[one][0] for one in arm.works.space.names]))
-        found: Place = poses["torso_link"].inverse().compose(poses["right_arm_tip"]).translation
+        found: Place = poses[BASE].inverse().compose(poses["right_arm_tip"]).translation
         return found
 
 
-def test_the_tip_and_the_head_follow_until_the_point_is_lost(parts: list[Instance]) -> None:
-    chased = Chased(parts)
-    there = (0.24, 0.0, 0.5)
+@pytest.mark.parametrize("robot", AHEAD)
+def test_the_tip_and_the_head_follow_until_the_point_is_lost(robot: str) -> None:
+    chased, ahead = Chased(parts_of(robot)), AHEAD[robot]
+    there = (ahead, 0.01, -0.05)
     chased.show(*[there] * 40)
     assert math.dist(chased.tip, there) < 0.03
     assert chased.told[-1].state == "there"
-    circle = [(0.24, 0.08 * math.sin(step / 15), 0.5) for step in range(60)]
+    circle = [(ahead, 0.08 * math.sin(step / 15), -0.05) for step in range(60)]
     chased.show(*circle)
     assert math.dist(chased.tip, circle[-1]) < 0.06
     head: Any = chased.bench.component("head")
-    root = head.body.poses({})["torso_link"].apply(circle[-1])
+    root = head.body.poses(head.positions)[BASE].apply(circle[-1])
     assert head.gaze.angle(root, head.positions) < math.radians(6)
     assert chased.ends == []
     chased.bench.advance(1.2)
@@ -82,35 +88,49 @@ def test_the_tip_and_the_head_follow_until_the_point_is_lost(parts: list[Instanc
     assert "nothing has told on 'target'" in chased.ends[0].result.message
 
 
-def test_far_points_are_reached_for_and_very_far_ones_let_the_arm_rest_until_they_are_back(
-    parts: list[Instance],
-) -> None:
-    chased = Chased(parts)
-    chased.show(*[(0.7, -0.1, 0.3)] * 40)
-    assert math.dist(chased.tip, SHOULDER) == pytest.approx(0.36, abs=0.05)
-    chased.show(*[(3.0, 0.0, 0.3)] * 80)
+@pytest.mark.parametrize("robot", AHEAD)
+def test_a_point_that_hardly_moves_is_where_it_was(robot: str) -> None:
+    chased, ahead = Chased(parts_of(robot)), AHEAD[robot]
+    there = (ahead, 0.01, -0.05)
+    chased.show(*[there] * 40)
+    at = chased.tip
+    chased.show(*[(there[0], there[1] + 0.009, there[2])] * 20)
+    assert math.dist(chased.tip, at) < 1e-3
+    moved = (there[0], there[1] + 0.04, there[2])
+    chased.show(*[moved] * 20)
+    assert math.dist(chased.tip, moved) < 0.03
+
+
+@pytest.mark.parametrize("robot", AHEAD)
+def test_far_points_are_reached_for_and_very_far_ones_let_the_arm_rest_until_they_are_back(robot: str) -> None:
+    chased, ahead = Chased(parts_of(robot)), AHEAD[robot]
+    follows: Any = chased.bench.component("chase").config
+    chased.show(*[(ahead + 0.5, -0.1, -0.25)] * 60)
+    assert math.dist(chased.tip, follows.shoulder) == pytest.approx(0.9 * follows.length, abs=0.05)
+    chased.show(*[(3.0, 0.0, -0.25)] * 80)
     assert chased.told[-1].state == "far"
     arm: Any = chased.bench.component("right_arm")
-    assert max(abs(arm.measured[one][0]) for one in arm.works.space.names) < 0.03
+    resting = arm.config.poses["resting"]
+    assert max(abs(arm.measured[one][0] - resting[one]) for one in arm.works.space.names) < 0.03
     assert chased.ends == []
 
 
 def test_it_comes_to_rest_when_it_is_cancelled(parts: list[Instance]) -> None:
     chased = Chased(parts)
-    chased.show(*[(0.24, 0.1, 0.55)] * 5)
+    chased.show(*[(0.24, 0.1, 0.0)] * 5)
     chased.goal.cancel()
     chased.bench.advance(1.0)
     assert chased.ends[0].outcome is Outcome.CANCELED
     at = chased.tip
-    chased.show(*[(0.24, -0.1, 0.5)] * 10)
+    chased.show(*[(0.24, -0.1, -0.05)] * 10)
     assert math.dist(chased.tip, at) < 2e-3
 
 
 @pytest.mark.parametrize(
     ("frame", "place", "said"),
     [
-        ("map", (0.2, 0.0, 0.5), "the point is in 'map', and expected in 'torso_link'"),
-        ("torso_link", (math.nan, 0.0, 0.5), "the point is not finite"),
+        ("map", (0.2, 0.0, -0.05), "the point is in 'map', and expected in 'right_arm_base_link'"),
+        (BASE, (math.nan, 0.0, -0.05), "the point is not finite"),
     ],
 )
 def test_what_is_no_point_is_told_once_and_does_not_count(

@@ -32,6 +32,17 @@ def test_it_follows_commands_and_tells_where_it_is() -> None:
     assert link.transform.translation.x == odometry[-1].pose.pose.position.x
 
 
+@pytest.mark.parametrize("rate", [5, 10, 50, 100])
+def test_it_moves_and_publishes_at_its_rate_and_gets_as_far(rate: int) -> None:
+    robot = Bench(instance("base", "diff_drive_sim", {"rate": f"{rate} Hz"}))
+    odometry = robot.collect("/odom", Odometry)
+    drive(robot, 2.0)
+    assert len(odometry) == pytest.approx(2 * rate, abs=1)
+    assert odometry[-1].pose.pose.position.x == pytest.approx(0.4 * 1.8, abs=0.4 * 1.5 / rate + 0.01)
+    robot.advance(1.5)
+    assert odometry[-1].twist.twist.linear.x == 0.0
+
+
 def test_it_brakes_when_no_command_comes() -> None:
     robot = bench()
     drive(robot, 2.0)

@@ -11,6 +11,7 @@ import pytest
 
 from rbxcompose.compiler import compile_robot
 from rbxcompose.geometry import Transform3
+from rbxcompose.motion.inverse_kinematics import PoseTarget
 from rbxcompose.motion.scene_messages import pose_message
 from rbxcompose.msgs.geometry_msgs import Quaternion
 from rbxcompose.msgs.moveit_msgs import (
@@ -35,7 +36,7 @@ from rbxcompose.msgs.moveit_msgs import (
     TrajectoryConstraints,
     VisibilityConstraint,
 )
-from rbxcompose.msgs.rbxcompose_msgs import MoveArm, SceneObjects
+from rbxcompose.msgs.rbxcompose_msgs import MoveArm, ReachPose, SceneObjects
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.shape_msgs import SolidPrimitive
 from rbxcompose.msgs.std_msgs import Header
@@ -76,7 +77,7 @@ class Client:
     def begin(self, action: Any, topic: str, goal: Any) -> tuple[list[Any], Any]:
         ends: list[Any] = []
         client = self.bench.bus.action_client("me", topic, action)
-        return ends, client(goal, ends.append, lambda message: self.feedback.append(message.state))
+        return ends, client(goal, ends.append, lambda message: self.feedback.append(getattr(message, "state", "")))
 
     def sent(self, action: Any, topic: str, goal: Any) -> Any:
         ends, _ = self.begin(action, topic, goal)
@@ -188,6 +189,21 @@ def test_the_tip_goes_to_a_pose_and_to_a_point(client: Client) -> None:
     point = Constraints(position_constraints=(place(x - 0.02, y, z + 0.02),))
     assert client.move(point).outcome is Outcome.SUCCEEDED
     assert math.dist(tip_of(client).translation, (x - 0.02, y, z + 0.02)) < 0.02
+    turn = Constraints(orientation_constraints=(turned(there, 0.01, 0.01, 0.01),))
+    assert client.move(turn).outcome is Outcome.SUCCEEDED
+    assert PoseTarget(there, any_position=True).error(tip_of(client))[1] < 0.02
+
+
+def test_a_goal_beyond_its_reach_is_approximate_if_that_is_asked_for_and_says_so(client: Client) -> None:
+    far = ReachPose.Goal(x=2.0, z=0.55, any_orientation=True)
+    for goal, outcome in ((far, Outcome.ABORTED), (replace(far, approximate=True), Outcome.SUCCEEDED)):
+        end = client.sent(ReachPose, f"/{ARM}/reach", goal)
+        assert (end.outcome, end.result.approximate) == (outcome, goal.approximate)
+    away = math.dist(tip_of(client).translation, (2.0, 0.0, 0.55))
+    assert (end.result.away, end.result.angle) == (pytest.approx(away, abs=0.01), 0.0)
+    assert f"approximate: the tip is {100 * end.result.away:.1f} cm" in end.result.message
+    nothing = client.sent(ReachPose, f"/{ARM}/reach", replace(far, any_position=True))
+    assert (nothing.outcome, nothing.result.outcome) == (Outcome.ABORTED, "unknown_goal")
 
 
 def test_a_plan_is_executed_later_unless_the_arm_has_moved_since_or_it_would_collide(client: Client) -> None:

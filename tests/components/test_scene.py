@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rbxcompose.body.virtual_joint import rooted_text
 from rbxcompose.geometry import Transform3
 from rbxcompose.motion.scene_messages import pose_message
 from rbxcompose.msgs.builtin_interfaces import Time
@@ -37,6 +38,7 @@ from rbxcompose.msgs.visualization_msgs import MarkerArray
 from rbxcompose.qos import Qos
 from rbxcompose.sdk.bound import Reply
 from rbxcompose.testing import Bench, instance
+from tests.body.test_virtual_joint import WORLD
 from tests.motion.toy_arm import urdf
 
 BOX = SolidPrimitive(type=SolidPrimitive.BOX, dimensions=np.array((0.1, 0.2, 0.3)))
@@ -123,6 +125,20 @@ def test_objects_from_outside_are_added_extended_moved_and_removed() -> None:
     assert len(scene.markers[-1].markers) == 1 + 4  # the first one deletes those of before
     scene.box(operation=CollisionObject.REMOVE)
     assert scene.names == ["can"]
+    scene.box("", CollisionObject.REMOVE)
+    assert scene.names == []
+
+
+def test_a_link_that_never_moves_holds_nothing() -> None:
+    scene = Scene(urdf=rooted_text(urdf(), "ground", WORLD))
+    scene.box(header=Header(frame_id="ground"))
+    scene.box(operation=CollisionObject.APPEND, header=Header(frame_id="world"))
+    scene.box("can", header=Header(frame_id="turret"))
+    scene.box("can", CollisionObject.MOVE, header=Header(frame_id="ground"))
+    scene.box("ball", planes=(Plane(coef=np.array((0.0, 0.0, 1.0, 0.0))),), primitives=(), plane_poses=(THERE,))
+    assert [(one.name, one.link) for one in scene.told[-1].objects] == [
+        (one, "world") for one in ("box", "can", "ball")
+    ]
     scene.box("", CollisionObject.REMOVE)
     assert scene.names == []
 

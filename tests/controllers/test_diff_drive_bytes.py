@@ -56,6 +56,11 @@ class Site:
         self.told.append(text)
 
 
+def are_still(line: FakeLine) -> bool:
+    """Return whether the motors stand: they take a while after the base has been told to."""
+    return all(abs(line[id_].motor.velocity) < 1.0 for id_ in (1, 2))
+
+
 @pytest.mark.parametrize("model", ["XL430-W250", "MX-28"])
 def test_a_base_drives_by_bytes_and_knows_where_it_is(model: str, tmp_path: Path) -> None:
     config = ServoBusConfig.model_validate(wheels(model, acceleration="2 m/s^2"))

@@ -251,6 +251,14 @@ def test_each_model_takes_its_own_keys_and_no_others(model: str) -> None:
         assert f"'{key}'" in mistake[1]
 
 
+def test_a_servo_that_turns_back_while_it_opens_is_told_with_its_openings() -> None:
+    angles = {"1 cm": "-20 deg", "2 cm": "10 deg", "3 cm": "0 deg", "4 cm": "20 deg"}
+    pairs = [{"opening": opening, "angle": angle} for opening, angle in angles.items()]
+    where, words = GripperController.mistake(config_of("calibrated", calibration=pairs)) or ("", "")
+    assert where == "calibration"
+    assert words == "as it opens, the servo turns one way only, but 0 deg at 0.03 m follows 10 deg at 0.02 m"
+
+
 @given(
     pad=st.floats(0.0, 0.1),
     finger=st.floats(0.005, 0.2),

@@ -9,10 +9,11 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from itertools import dropwhile
 from pathlib import Path
+from types import MappingProxyType
 from typing import Self
 
 from rbxcompose.runtime.folder import RobotFolder
@@ -35,14 +36,17 @@ SETTINGS = {
     "components.battery.runtime": "10 min",
 }
 WORLD, ROBOT, MISSION, ROUTER, PARENT, SUPERVISOR = "world", "robot", "mission", "router", "parent", "supervisor"
+NONE: Mapping[str, object] = MappingProxyType({})
 SHARED_MEMORY = re.compile(r"/dev/shm/\S+")
 
 
 class Patrol:
     """The robot, up in the foreground of a process; at its end, nothing but its log may be left."""
 
-    def __init__(self, folder: Path, *, times: int = 1, hears_commands: bool = True) -> None:
-        """Start it in an empty folder, to go around so many times."""
+    def __init__(
+        self, folder: Path, *, times: int = 1, hears_commands: bool = True, more: Mapping[str, object] = NONE
+    ) -> None:
+        """Start it in an empty folder, to go around so many times, with `more` settings."""
         self._folder = folder
         (folder / "robots").mkdir()
         (folder / "missions").mkdir()
@@ -63,7 +67,7 @@ class Patrol:
         self._shared: set[str] = set()
         with socket.create_server(("127.0.0.1", 0)) as listener:
             port = listener.getsockname()[1]  # of its own: another robot may take the next one that is free
-        settings = {**SETTINGS, "missions.patrol.with.rounds": times, "bus.port": port}
+        settings = {**SETTINGS, "missions.patrol.with.rounds": times, "bus.port": port, **more}
         self.process = self.start("up", "robots/robot.yaml", *(f"--set={key}={one}" for key, one in settings.items()))
         self.observer = Observer(self._router(), hears_commands=hears_commands)
 

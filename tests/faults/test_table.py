@@ -34,6 +34,14 @@ ROWS = {
     "the pre-fork parent is killed": (REAL, "without_the_prefork_parent_the_robot_goes_down"),
     "the pre-fork parent is stopped": (ROUNDS, "without_what_cannot_come_back_the_robot_comes_to_rest_and_ends"),
     "the router is killed": (REAL, "a_killed_router_comes_again_where_it_was"),
+    "the router that robots share is killed": (
+        "faults/test_common_router.py",
+        "without_the_router_the_base_stands_and_with_it_the_patrol_goes_on",
+    ),
+    "a process gets no processor": (
+        "runtime/test_silence.py",
+        "a_process_that_waits_for_a_processor_is_told_but_not_ended_until_it_had_one",
+    ),
     "the session on the bus is stuck": (
         "runtime/test_lifeline.py",
         "a_stuck_session_is_opened_again_with_all_that_was_declared",

@@ -83,6 +83,7 @@ def test_a_node_is_a_component_only_if_all_fits(tmp_path: Path) -> None:
         "acceleration": 1.0,
         "turn_acceleration": 2.0,
         "command_timeout": 0.5,
+        "rate": 50.0,
     }
     for name, given_ones, is_known in (
         ("base", whole, True),

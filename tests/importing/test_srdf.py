@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, files
 from pathlib import Path
 
@@ -59,6 +60,51 @@ def test_what_is_exported_is_imported_as_the_same(robot: str, tmp_path: Path) ->
     paths = [tmp_path / f"{robot}.{end}" for end in ("srdf", "urdf")]
     again = import_files(paths, robot, "srdf")
     assert said(compiled(tmp_path / "two", again, paths[1])) == said(first)
+
+
+FITS = '<virtual_joint name="world_joint" type="fixed" parent_frame="world" child_link="base"/>'
+
+
+@pytest.mark.parametrize(
+    ("written", "words", "taken"),
+    [
+        (FITS.replace("fixed", "Planar").replace("world", "odom"), [], ("odom_joint", "planar", "odom")),
+        (FITS.replace("fixed", "hinge"), ["no type 'hinge'", "fixed, planar or floating"], "world"),
+        (FITS.replace('frame="world', 'frame="/world'), ["frame '/world' is called 'world'"], "world"),
+        (FITS.replace('"base"', '"palm"'), ["the root of the URDF is 'base'", 'write child_link="base"'], None),
+        (FITS.replace('"base"', '"nobody"'), ["the root of the URDF is 'base'"], None),
+        (FITS.replace('"world"', '"palm"'), ["'palm' is a link of the URDF", "leave it out"], None),
+        (FITS.replace('"world_joint"', '"wrist"'), ["the URDF has a joint of its name"], None),
+        (FITS.replace(' parent_frame="world"', ""), ["it has no 'parent_frame'"], None),
+        (FITS.replace('"world"', '"the world"'), ["there are spaces in its names"], None),
+        (FITS + FITS.replace("world", "map"), ["'world_joint' places the root of the URDF already"], "world"),
+        (FITS.replace('"base"', '"palm"') + FITS, ["the root of the URDF is 'base'"], "world"),
+    ],
+)
+def test_the_virtual_joint_is_the_one_that_moveit_takes(
+    written: str, words: list[str], taken: str | tuple[str, str, str] | None, tmp_path: Path
+) -> None:
+    said = LIFTER[0].read_text().replace(FITS, written)
+    (tmp_path / "lifter.srdf").write_text(said)
+    found = import_files([tmp_path / "lifter.srdf", LIFTER[1]], "lifter", "srdf")
+    line = 1 + said[: said.index("<virtual_joint")].count("\n")
+    assert found.told.count(("RBX2353", line)) == bool(words)
+    assert [one for one in words if one not in found.words] == []
+    name, kind, frame = taken if isinstance(taken, tuple) else ("world_joint", "fixed", taken)
+    wanted = {"name": name, "type": kind, "frame": frame} if frame is not None else None
+    assert found.data["body"].get("virtual_joint") == wanted
+
+
+def test_what_the_urdf_does_not_have_is_not_exported(tmp_path: Path) -> None:
+    made = import_files(LIFTER, "lifter", "srdf")
+    text = made.text.replace("{from: column, to: palm}", "{from: world, to: palm}")
+    assert text != made.text
+    robot = compiled(tmp_path, replace(made, text=text), LIFTER[1]).robot
+    assert robot is not None
+    files = exported(robot.manifest.contents, "lifter")
+    assert files["lifter.urdf"] == LIFTER[1].read_text()
+    assert semantics_of(robot.manifest.contents, "").groups["arm"].chains == (("base", "palm"),)
+    assert FITS in files["lifter.srdf"]
 
 
 def test_without_its_urdf_an_srdf_means_nothing() -> None:

@@ -23,6 +23,16 @@ CURES = [
         "if a package brings it, install that; 'rbxcompose new component lidar_driver' begins one of your own",
     ),
     (GO_TO, f"{GO_TO}    depends_on: [base]\n", "did you mean 'starts_after'?"),
+    ("muxes:", "diagnostics: {rate: 20 ms}\nmuxes:", "a period as a rate: write '50 Hz'"),
+    ("timeout: 0.5 s", "timeout: 2 Hz", "once every 0.5 s: write '0.5 s'"),
+    (
+        "muxes:",
+        "diagnostics: {analyzers: {power: null}}\nmuxes:",
+        "in a profile or an overlay, '!remove' behind the colon removes it",
+    ),
+    ("name: helper", "metadata:\n  name: helper", "the keys below it belong at the top of the file: move them there"),
+    ("muxes:", "substitutions: {speed: 1}\nmuxes:", "arguments are below 'args', each with its type and default"),
+    ("muxes:", "diagnostics: !include of.yaml\nmuxes:", "a file of its own is named below 'include'"),
     (
         GO_TO,
         f"{GO_TO}    ros__parameters:\n      speed: 0.3\n",

@@ -63,9 +63,14 @@ def test_one_that_is_stopped_before_it_begins_begins_at_the_resume(trying: Tryin
 
 
 def test_the_reason_of_a_failure_is_told(trying: Trying) -> None:
-    verdict = trying.verdict(text("outcome: success", "result: failure\nmessage: the way is blocked"))
+    expected = "outcome: success\nreports: [the way is blocked]"
+    verdict = trying.verdict(text(expected, "result: failure\nmessage: the way is blocked"))
     assert verdict.passed
     assert [line.text for line in verdict.record.lines if "blocked" in line.text]
+
+
+def test_the_message_of_an_end_is_reported(trying: Trying) -> None:
+    assert trying.problems("expect: {outcome: failure, reports: [nobody came]}", "ending") == []
 
 
 def test_values_are_set_when_a_call_has_succeeded_and_see_its_arguments(trying: Trying) -> None:

@@ -14,6 +14,9 @@ from tests.conftest import ROOT
 
 MISSIONS = {
     "patrol": (ROOT / "missions/patrol.yaml").read_text(encoding="utf-8").partition("interrupts:")[2],
+    "ending": """
+        do: {end: failure, message: nobody came}
+    """,
     "choosing": """
         data:
           seen: 0

@@ -70,6 +70,22 @@ CURES = [
         "interrupts: {low: {when: $battery < 20 %, do: {go_to: $a}}}\ndo: {for: a, in: [dock], do: {go_to: $a}}",
         ["'$a' is known in its loop only: keep it there by 'set' in a datum, and read that"],
     ),
+    (
+        "data: {last: 0}\ndo:\n  - {set: {last: kitchen}}\n  - {log: $last}",
+        ["a datum keeps the type of its first value: give 'last' one of this type under 'data'"],
+    ),
+    ("inputs: {room: {type: place}}\ndo: {go_to: '{room}'}", ["write '$room'"]),
+    ("do: [{recharge: {}, save: got}, {check: $got.failed == 0}]", ["entries: "]),
+    (
+        "do: {yard/dust: dock}",
+        ["a robot 'yard' of the system must share 'dust', and name this robot below 'callers'"],
+    ),
+    (
+        "do: [{parallel: {a: recharge, b: {repeat: forever, do: {wait: 1 s}}}, ends_with: b}, recharge]",
+        ["name the branch that ends"],
+    ),
+    ("do: [{recharge now}]", ["inside {}, each key needs a value: 'key: value'", "write 'recharge: now'"]),
+    ("do: [{log: Here I am, and now}]", ["inside {} and [] a comma ends a text: put quotes around the whole text"]),
     ("do: {wait: $(arg time)}", ["write '$time', and declare 'time' under 'inputs'"]),
     (
         "data: {got: 0}\ndo:\n  - {recharge: {}, save: got}\n  - check: $got > 1",

@@ -21,6 +21,11 @@ def test_the_fields_of_a_goal_are_the_arguments_and_the_first_is_the_main_one() 
     assert (skill.main, skill.required, skill.claims, skill.restartable) == ("pose", frozenset({"pose"}), "base", True)
 
 
+def test_a_main_argument_that_may_lack_is_not_required() -> None:
+    skill = skill_of(NavigateToPose, "go_to", may_lack=True)
+    assert (skill.main, skill.required) == ("pose", frozenset())
+
+
 def test_an_empty_goal_makes_a_skill_without_arguments() -> None:
     skill = skill_of(Recharge, "recharge")
     assert (skill.main, skill.arguments, skill.required) == ("", {}, frozenset())

@@ -11,9 +11,11 @@ import pytest
 
 from rbxcompose.body.model import Geometry
 from rbxcompose.geometry import Transform3
-from rbxcompose.motion.arm_task import SETTLING, ArmGoal, ArmTask
+from rbxcompose.motion.arm_goal import ArmGoal
+from rbxcompose.motion.arm_task import SETTLING, ArmTask
 from rbxcompose.motion.collisions import MeshChecker, adjacent_pairs
-from rbxcompose.motion.inverse_kinematics import PoseTarget
+from rbxcompose.motion.inverse_kinematics import PoseTarget, SolverSettings
+from rbxcompose.motion.kept import Keep
 from rbxcompose.motion.parametrisation import Trajectory
 from rbxcompose.motion.reasons import MotionReason
 from rbxcompose.motion.scene import PlacedObject
@@ -92,6 +94,12 @@ def test_positions_of_joints_take_precedence_over_the_pose() -> None:
         (ArmGoal("up", {"nose": 1.0}), "'nose' is no joint of this arm"),
         (ArmGoal("up", speed=1.5), "a speed of 150%"),
         (ArmGoal("up", acceleration=float("nan")), "acceleration"),
+        (ArmGoal(target=PoseTarget(Transform3(), True), prefer="asid"), "there is no pose 'asid'"),
+        (ArmGoal(target=PoseTarget(Transform3(), True, any_position=True)), "neither the position nor"),
+        (
+            ArmGoal(target=PoseTarget(Transform3(), is_approximate=True), keep=Keep((0.1, 0.1, 0.0))),
+            "not possible together with 'approximate'",
+        ),
     ],
 )
 def test_a_goal_that_is_none_says_why(goal: ArmGoal, named: str) -> None:
@@ -165,6 +173,33 @@ def test_a_target_without_a_solution_says_why(goal: PoseTarget, reason: MotionRe
     assert task.failure is not None
     assert task.failure.reason is reason
     assert named in task.failure.text
+
+
+def test_the_nearest_pose_is_taken_only_if_that_is_asked_for_and_tells_what_remains() -> None:
+    site, far = Site(), PoseTarget(Transform3((-9.0, 0.0, 0.3)), True, is_approximate=True)
+    task = begun(site, ArmGoal(target=far))
+    end = KINEMATICS.tip_pose(site.sent[0][0].positions[-1])
+    assert task.missed == pytest.approx(far.error(end))
+    assert task.missed is not None
+    assert task.missed[0] == pytest.approx(9.0 - 0.6 * math.cos(math.pi - 2.0), abs=0.05)  # it turns to 2 rad at most
+    near = PoseTarget(KINEMATICS.tip_pose(np.array([1.2, 0.3, 0.3])), True, is_approximate=True)
+    assert begun(Site(), ArmGoal(target=near)).missed is None
+
+
+def test_of_several_solutions_the_one_near_the_preferred_pose_is_taken() -> None:
+    target = PoseTarget(KINEMATICS.tip_pose(np.array([1.2, 1.0, 1.0])), True)
+    bends = {}
+    for goal, solver in (("over", ""), ("under", ""), ("", "over"), ("", "under")):
+        site = Site()
+        site.poses = {"over": {"bend": 1.0}, "under": {"bend": -1.0}}
+        settings = SolverSettings(prefer=solver)
+        task = ArmTask(site, KINEMATICS, PLANNER, ArmGoal(target=target, prefer=goal), settings)
+        while not site.sent:
+            task.advance()
+        bends[goal + solver, bool(goal)] = float(site.sent[0][0].positions[-1][2])
+    assert bends["over", True] == pytest.approx(1.0, abs=0.02)
+    assert bends["under", True] == pytest.approx(-1.0, abs=0.02)
+    assert (bends["over", False], bends["under", False]) == (bends["over", True], bends["under", True])
 
 
 def test_a_motion_stops_for_an_object_that_comes_into_its_way() -> None:

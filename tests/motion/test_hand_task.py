@@ -5,14 +5,18 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import pytest
 
 from rbxcompose.body.model import Geometry
 from rbxcompose.geometry import Transform3, quaternion_from_rpy
 from rbxcompose.hand_config import GraspModel
+from rbxcompose.motion import contacts
+from rbxcompose.motion.collisions import MeshChecker
 from rbxcompose.motion.hand_task import HandTask
 from rbxcompose.motion.scene import PlacedObject
+from rbxcompose.motion.straight_line import LineEnd, line_steps
 from rbxcompose.msgs.rbxcompose_msgs import MoveArm, PickObject, PlaceObject
 from tests.motion.pi_hand import HandBench
 
@@ -107,6 +111,36 @@ def test_an_object_that_cannot_be_grasped_says_why(
 ) -> None:
     bench = HandBench(box("other", size, at), without=("target", "box1", "box2"))
     assert failed(bench, PickObject.Goal(object="other"))[:2] == (stage, reason)
+
+
+def test_the_scene_is_modelled_once_for_all_grasps(monkeypatch: pytest.MonkeyPatch) -> None:
+    bench, built = HandBench(box("wall", (0.02, 0.6, 0.3), (0.19, 0, 0.86))), list[object]()
+    build = MeshChecker.__init__
+    monkeypatch.setattr(MeshChecker, "__init__", lambda one, *given, **named: built.append(build(one, *given, **named)))
+    assert "the nearest of 98 poses" in failed(bench, PICK)[2]
+    assert len(built) == 1  # to see what the target stands on
+
+
+def test_a_blocked_table_is_told_after_few_steps_of_the_component(monkeypatch: pytest.MonkeyPatch) -> None:
+    bench, steps, advance = HandBench(box("wall", (0.02, 0.6, 0.3), (0.19, 0, 0.86))), list[None](), HandTask.advance
+    monkeypatch.setattr(HandTask, "advance", lambda task: steps.append(advance(task)))
+    assert "the nearest of 98 poses" in failed(bench, PICK)[2]
+    assert len(steps) < 10  # 20 are a second
+
+
+def test_lines_are_not_followed_behind_what_they_hit(monkeypatch: pytest.MonkeyPatch) -> None:
+    followed, whole = list[object](), list[object]()
+
+    def counted(*given: Any) -> Any:
+        whole.extend(line_steps(*given))
+        for one in line_steps(*given):
+            followed.append(one)
+            yield one
+        return LineEnd(0.0, "it is out of reach")
+
+    monkeypatch.setattr(contacts, "line_steps", counted)
+    assert failed(HandBench(box("roof", (0.1, 0.1, 0.02), (0.24, 0, 0.85))), PICK)[0] == "lift"
+    assert len(followed) < 0.8 * len(whole)
 
 
 def test_an_unknown_object_names_those_that_are_there() -> None:

@@ -10,10 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbxcompose.geometry import Transform3
-from rbxcompose.motion.inverse_kinematics import PoseTarget
+from rbxcompose.motion.inverse_kinematics import PoseSolutions, PoseTarget
 from rbxcompose.motion.kept import Keep, KeptTip
 from rbxcompose.motion.kept_goals import kept_solutions
 from rbxcompose.motion.planner import MotionPlan, MotionPlanner, MotionRequest, PlannerSettings
+from rbxcompose.motion.posture import Posture
 from rbxcompose.motion.reasons import MotionFailure, MotionReason
 from tests.motion.test_inverse_kinematics import ARM, SPACE
 from tests.motion.test_planner import sampled
@@ -132,3 +133,18 @@ def test_a_search_for_what_there_is_no_way_to_is_given_up_in_time() -> None:
 def test_what_cannot_be_kept_says_why(keep: Keep, named: str) -> None:
     assert named in keep.mistake(ARM)
     assert bool(named) is bool(keep.mistake(ARM))
+
+
+def test_what_is_kept_leaves_room_for_a_posture() -> None:
+    target = PoseTarget(Transform3(ARM.tip_pose(READY).translation), any_orientation=True, tolerance=1e-3)
+    posture = Posture(np.array([0.0, -1.0, 1.0, 1.5, 0.5, 0.5]))
+    space, keep = UPRIGHT.narrowed(SPACE), UPRIGHT
+
+    def found(liked: Posture | None) -> PoseSolutions:
+        return ended(kept_solutions(ARM, space, target, keep, READY, READY, Free(), seed=1, posture=liked))
+
+    without, preferred = found(None).free, found(posture).free
+    ways = [posture.distance(SPACE, one) for one in preferred]
+    assert ways == sorted(ways)
+    assert ways[0] <= min(posture.distance(SPACE, one) for one in without)
+    assert all(KeptTip(ARM, keep, READY).is_kept(one) for one in preferred)

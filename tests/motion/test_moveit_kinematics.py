@@ -19,6 +19,7 @@ from rbxcompose.msgs.moveit_msgs import (
     GetPositionIK,
     JointConstraint,
     MoveItErrorCodes,
+    PositionConstraint,
     PositionIKRequest,
     RobotState,
 )
@@ -37,6 +38,13 @@ def state(**positions: float) -> RobotState:
 
 def at(x: float) -> PoseStamped:
     return PoseStamped(pose=pose_message(Transform3((x, 0.0, 0.0))))
+
+
+def joint(name: str, position: float, tolerance: float = 0.1) -> Constraints:
+    one = JointConstraint(
+        joint_name=name, position=position, tolerance_above=tolerance, tolerance_below=tolerance, weight=1.0
+    )
+    return Constraints(joint_constraints=(one,))
 
 
 def tip(frame: str = "") -> GetPositionFK.Response:
@@ -83,9 +91,14 @@ def test_links_are_told_in_the_order_in_which_they_were_asked_for() -> None:
         ({"robot_state": state(knee=0.0)}, MoveItErrorCodes.INVALID_ROBOT_STATE),
         ({"robot_state": state(turn=math.nan)}, MoveItErrorCodes.INVALID_ROBOT_STATE),
         (
-            {"constraints": Constraints(joint_constraints=(JointConstraint(joint_name="turn"),))},
+            {"constraints": Constraints(position_constraints=(PositionConstraint(),))},
             MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS,
         ),
+        ({"constraints": joint("knee", 0.0)}, MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS),
+        ({"constraints": joint("bend", 0.0, -0.1)}, MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS),
+        ({"constraints": joint("bend", math.nan)}, MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS),
+        ({"constraints": joint("bend", 3.0)}, MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS),
+        ({"constraints": joint("bend", -0.4)}, MoveItErrorCodes.NO_IK_SOLUTION),
     ],
 )
 def test_what_cannot_be_answered_has_a_code_and_a_text(fields: dict[str, Any], code: int) -> None:
@@ -98,3 +111,11 @@ def test_a_place_in_the_wall_is_in_collision_only_if_that_counts() -> None:
     inside = QUERY.forward(GetPositionFK.Request(robot_state=state(turn=0.0, lift=0.0, bend=0.0))).pose_stamped[0]
     assert asked(pose_stamped=inside, avoid_collisions=True).error_code.val == MoveItErrorCodes.GOAL_IN_COLLISION
     assert asked(pose_stamped=inside).error_code.val == MoveItErrorCodes.SUCCESS
+
+
+def test_a_constraint_of_a_joint_is_kept_and_its_middle_preferred() -> None:
+    answer = asked(constraints=joint("bend", 0.35), robot_state=state(turn=0.8, lift=0.0, bend=0.0))
+    assert answer.error_code.val == MoveItErrorCodes.SUCCESS, answer.error_code.message
+    found = dict(zip(answer.solution.joint_state.name, answer.solution.joint_state.position.tolist(), strict=True))
+    assert 0.25 <= found["bend"] <= 0.45
+    assert found == pytest.approx(AT, abs=5e-3)

@@ -105,7 +105,7 @@ def test_what_an_arm_holds_collides_with_the_things_around_it() -> None:
         (PlacedObject("star", BALL.shape, "ground", Transform3((1e6, 0.0, 0.0))), "away from its frame"),
         (PlacedObject("soft", BALL.shape, "ground", Transform3(), padding=-0.1), "padding"),
         (PlacedObject("wall", Geometry("plane", (0.0, 0.0, 0.0, 1.0)), "ground", Transform3()), "its normal is not 1"),
-        (PlacedObject("wall", FLOOR, "fore", Transform3()), "no link but 'ground' can carry its plane"),
+        (PlacedObject("wall", FLOOR, "fore", Transform3()), "no link that moves can carry its plane"),
         (PlacedObject("hole", replace(MESH, triangles=(0, 1, 9)), "ground", Transform3()), "corner that there is not"),
         (PlacedObject("none", replace(MESH, points=()), "ground", Transform3()), "no points"),
         (PlacedObject("flat", replace(MESH, size=(1.0, 1.0, 0.0)), "ground", Transform3()), "scale of its mesh is 0"),

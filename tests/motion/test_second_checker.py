@@ -42,6 +42,19 @@ def test_an_object_is_hit_where_a_link_holds_it_and_not_by_what_may_touch_it() -
     assert not SecondChecker(DESCRIPTION, JOINTS, ALLOWED, [untouchable]).is_free(away)
 
 
+def test_fingers_that_follow_each_other_and_not_the_arm_do_not_count() -> None:
+    ball = '<collision><geometry><sphere radius="0.05"/></geometry></collision>'
+    slide = '<parent link="tip"/><child link="{0}"/><limit lower="0" upper="1" effort="1" velocity="1"/>'
+    fingers = f"""<link name="left">{ball}</link><link name="right">{ball}</link>
+    <joint name="grip" type="prismatic">{slide.format("left")}</joint>
+    <joint name="grip_too" type="prismatic">{slide.format("right")}<mimic joint="grip"/></joint></robot>"""
+    description = description_of(urdf().replace("</robot>", fingers))
+    allowed = adjacent_pairs(description.body) | {("fore", "left"), ("fore", "right")}
+    for joints, is_free in ((JOINTS, True), ((*JOINTS, "grip"), False)):
+        away = np.array([1.5, 0.5, 0.0, 0.0])[: len(joints)]
+        assert SecondChecker(description, joints, allowed).is_free(away) is is_free
+
+
 def test_samples_of_a_curve_are_as_near_as_was_asked_for() -> None:
     positions = np.array([[0.0, 0.0], [0.5, 1.0], [0.4, 1.2]])
     velocities = np.array([[0.0, 0.0], [0.4, 2.0], [0.0, 0.0]])

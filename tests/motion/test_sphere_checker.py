@@ -119,9 +119,8 @@ def test_shortcuts_make_the_way_shorter() -> None:
 
 def test_a_start_where_only_spheres_collide_is_left_to_ompl_which_is_told() -> None:
     x, y, z = ARM.poses(LEFT)["tip"].translation
-    corners = (0.0, -0.06, 0.0, 0.0, 0.06, 0.0, 0.0, -0.06, 0.12, 0.0, 0.06, 0.12)  # of a plate: its spheres stand out
-    plate = Geometry("mesh", (1.0, 1.0, 1.0), points=corners, triangles=(0, 1, 2, 1, 3, 2))
-    near = PlacedObject("plate", plate, "ground", Transform3((x + 0.029, y, z - 0.06)))
+    cone = Geometry("cone", (0.1, 0.2))  # it is taken for a cylinder
+    near = PlacedObject("cone", cone, "ground", Transform3((x + 0.07, y, z - 0.09)))
     used = fast_planner(things=[near], time=2.0)
     assert used.checker.is_free(LEFT)
     found = ended(used.plan(MotionRequest(LEFT, RIGHT)))
@@ -129,6 +128,17 @@ def test_a_start_where_only_spheres_collide_is_left_to_ompl_which_is_told() -> N
         assert (found.found_by, found.fast_failed) == ("rrt_connect", "spheres collide at the start")
     else:
         assert "fast: spheres collide at the start" in found.text
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("triangles", [(0, 1, 2), (0, 1, 2, 1, 3, 2)])
+def test_a_flat_mesh_is_in_the_way_on_both_paths(axis: int, triangles: tuple[int, ...]) -> None:
+    corners = np.roll(np.array(((0.0, -0.2, -0.2), (0.0, 0.2, -0.2), (0.0, 0.0, 0.3), (0.0, 0.3, 0.3))), axis, axis=1)
+    flat = Geometry("mesh", points=tuple(corners.ravel().tolist()), triangles=triangles)
+    at = Transform3(ARM.poses(LEFT)["tip"].translation)
+    mesh = MeshChecker(ARM, {}, ADJACENT, [PlacedObject("plate", flat, "ground", at)])
+    assert ("fore", "plate") in mesh.colliding(LEFT)
+    assert both(mesh, LEFT[None]) == (0, 0)
 
 
 def test_a_goal_behind_a_fence_is_given_up_in_time_on_both_paths() -> None:

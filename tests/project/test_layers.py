@@ -34,6 +34,7 @@ GROUND = {
     "per_compile": "dataclass",
     "plugins": "findings printable",
     "printable": "",
+    "process_end": "",
     "qos": "",
     "references": "dataclass findings units",
     "regular_files": "",
@@ -53,16 +54,18 @@ ABOVE = {
     "arm_config": "body control hand_config motion",
     "arm_goals": "motion",
     "arm_model": "motion.planner_types",
+    "arm_location": "arm_config sdk",
     "arm_moveit": "arm_config motion sdk",
     "arm_hand": "arm_config arm_pictures hand_config motion sdk",
     "arm_pictures": "arm_config body motion",
+    "arm_processes": "arm_config motion process_end",
     "arm_servo": "arm_config motion sdk",
     "body": "",
     "bus": "sdk.bound",
     "bus_types": "actuation",
     "check_runner": "missions.analysis model.doubts model.robot",
-    "checks": "actuation body.model check_runner composition diagnostics hand_config missions model motion mux params "
-    "sdk sections",
+    "checks": "actuation body.model body.solid_boxes check_runner composition diagnostics hand_config missions model "
+    "motion mux params sdk sections",
     "cli": "actuation arm_config arm_goals body bus compiler composition controller_requests devices "
     "diagnostics.requests doctor executive.requests exporting finding_pages importing inspection "
     "lsp.server mission_tests missions model motion mux.requests params plan recording rendering replay "
@@ -71,10 +74,12 @@ ABOVE = {
     "controller_manager": "controller_interface sdk",
     "controller_requests": "",
     "controllers": "control controller_interface sdk",
+    "cloud_config": "manifest.fields",
     "compiler": "check_runner composition model plan",
-    "components": "actuation arm_config arm_goals arm_hand arm_moveit arm_servo body control controller_interface "
-    "controller_manager controller_requests devices diagnostics executive missions monitors motion mux navigation "
-    "scene_requests scene_view sdk servo_bus_config servo_bus_line servo_report sim twins.fault_script",
+    "components": "actuation arm_config arm_goals arm_hand arm_location arm_moveit arm_processes arm_servo body "
+    "control controller_interface controller_manager controller_requests devices diagnostics executive missions "
+    "monitors motion mux navigation scene_requests scene_view sdk servo_bus_config servo_bus_line "
+    "servo_report sim twins.fault_script",
     "servo_report": "actuation control",
     "composition": "body.description diagnostics.settings sections",
     "control": "",
@@ -103,12 +108,12 @@ ABOVE = {
     "rendering": "",
     "replay": "bus plan.model recording runtime.process_group runtime.records sdk",
     "runtime": "body.transform_errors body.transforms bus diagnostics.updater missions.program.sources params plan "
-    "recording sdk",
+    "process_end recording sdk",
     "scaffold": "actuation.bus_load actuation.servo_models actuation.torques composition missions sdk",
     "schema": "controller_interface missions sdk sections",
     "sdk": "diagnostics.updater",
     "sections": "arm_model actuation.bus_types actuation.control_tables actuation.servo_models actuation.torques body "
-    "control.calibration control.limits controller_interface devices.usb diagnostics.settings hand_config "
+    "cloud_config control.calibration control.limits controller_interface devices.usb diagnostics.settings hand_config "
     "motion.group_findings "
     "motion.gaze motion.groups motion.planner_types motion.scene motion.scene_text mux.words sdk twins.servo_faults",
     "scene_requests": "motion.scene",

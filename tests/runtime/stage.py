@@ -49,6 +49,7 @@ class Stage:
         self.sent: list[tuple[str, say.ChannelOrder]] = []
         self.killed: list[str] = []
         self.suspended: set[str] = set()
+        self.waited: dict[str | None, float] = {}  # for a processor [s]; None is the supervisor
         self.ended: list[str] = []
         self.reports: list[HostReport] = []
         self.records: list[tuple[Level, str]] = []
@@ -80,6 +81,9 @@ class Stage:
 
     def is_suspended(self, process: str) -> bool:
         return process in self.suspended
+
+    def waits(self, process: str | None) -> dict[str, float]:
+        return {"thread": self.waited.get(process, 0.0)}
 
     def log(self, level: Level, text: str, detail: str = "") -> None:
         self.records.append((level, text))

@@ -114,12 +114,12 @@ def test_only_what_has_changed_restarts(robot: Changing) -> None:
 @pytest.mark.timeout(60)
 def test_what_is_longer_than_a_socket_holds_reaches_a_process_that_runs(robot: Changing) -> None:
     urdf = robot.file.parent / "large.urdf"
-    urdf.write_text(f"<robot>{LINK}{'<!---->' * 150_000}</robot>", encoding="utf-8")
+    urdf.write_text(f"<robot>{LINK}{'<!---->' * 75_000}</robot>", encoding="utf-8")
     robot.edit(AT_REST, BODY)
     robot.do("up", "-d", "robots/turtlebot")
-    urdf.write_text(f"<robot>{LINK}{'<thing/>' * 120_000}</robot>", encoding="utf-8")
+    urdf.write_text(f"<robot>{LINK}{'<thing/>' * 60_000}</robot>", encoding="utf-8")
     shown = robot.do("apply", "robots/turtlebot", "--yes")
-    assert "urdf: 1,050,044 characters, " in shown
+    assert "urdf: 525,044 characters, " in shown
     assert shown.endswith(f"{NAME} is changed: robot_description transforms restarted\n")
     assert robot.ps()["robot_description"]["state"] == "active"
 

@@ -10,7 +10,15 @@ from collections.abc import Iterator
 import pytest
 
 from rbxcompose.runtime.folder import RobotFolder, RobotState
-from rbxcompose.runtime.processes import Process, boot_id, describe_exit, titled, wait_until_ended
+from rbxcompose.runtime.processes import (
+    Process,
+    boot_id,
+    describe_exit,
+    longest_wait,
+    titled,
+    wait_until_ended,
+    waits_of,
+)
 from rbxcompose.runtime.supervision.leftovers import end_leftovers
 
 
@@ -51,6 +59,31 @@ def test_waiting_ends_with_the_process(child: subprocess.Popen[bytes]) -> None:
     assert process.send_signal(signal.SIGKILL)
     assert wait_until_ended([process], 5.0) == []
     assert not process.send_signal(signal.SIGKILL)
+
+
+def test_what_keeps_a_processor_busy_makes_others_on_it_wait() -> None:
+    one = next(iter(os.sched_getaffinity(0)))
+    words = [sys.executable, "-c", "print(flush=True)\nwhile True: pass"]
+    some = [subprocess.Popen(words, stdout=subprocess.PIPE) for _ in range(3)]
+    try:
+        for process in some:
+            os.sched_setaffinity(process.pid, {one})
+        for process in some:
+            assert process.stdout is not None
+            process.stdout.readline()
+        before, deadline = [waits_of(process.pid) for process in some], time.monotonic() + 30.0
+        while min(longest_wait(b, waits_of(p.pid)) for b, p in zip(before, some, strict=True)) < 0.2:
+            assert time.monotonic() < deadline
+    finally:
+        for process in some:
+            process.kill()
+            process.communicate()
+    assert waits_of(some[0].pid) == {}
+
+
+def test_a_wait_is_that_of_one_thread_and_new_threads_count_from_their_start() -> None:
+    assert longest_wait({"1": 1.0, "2": 5.0}, {"1": 1.5, "2": 5.25, "3": 0.75}) == 0.75
+    assert longest_wait({"1": 1.0}, {}) == 0.0
 
 
 def test_a_zombie_has_ended(child: subprocess.Popen[bytes]) -> None:

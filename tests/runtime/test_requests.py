@@ -96,6 +96,9 @@ class Desk:
     def is_suspended(self, process: str) -> bool:
         return False
 
+    def waits(self, process: str | None) -> dict[str, float]:
+        return {}
+
     def states_changed(self) -> None:
         pass
 

@@ -23,7 +23,7 @@ from rbxcompose.requests import Command, answers
 from rbxcompose.runtime.process_group.host import Host
 from rbxcompose.runtime.process_group.hosted import Lifecycle
 from rbxcompose.runtime.process_group.inbox import CallbackInbox
-from rbxcompose.runtime.process_group.worker import LONGEST
+from rbxcompose.runtime.process_group.worker import CONFIGURE, LONGEST, Worker
 from rbxcompose.runtime.records import Record
 from rbxcompose.scheduler import Scheduler
 from rbxcompose.sdk import Calls, Component, Config, In, Out, Refused, Reply, Serves, ServesAction, component
@@ -303,6 +303,21 @@ def test_a_call_that_takes_long_is_told_and_one_that_never_returns_is_a_fault(pr
     process.send("work", 2.0)
     process.until(lambda: done)
     assert done == [2.0]  # and nothing of the one that was left behind
+
+
+def test_a_component_that_says_so_may_be_configured_for_longer() -> None:
+    clock, gate, failures, returned = Late(), Gate(), list[Exception](), threading.Event()
+    worker = Worker("arm", clock, lambda owner, call: returned.set(), failures.append, configures_within=100.0)
+    worker.submit(CONFIGURE, gate.hold)
+    clock.ahead = LONGEST + 1.0
+    assert worker.look() == "has been in configure for 31 s"
+    assert failures == []
+    clock.ahead = 101.0
+    worker.look()
+    assert [str(one) for one in failures] == ["configure has not returned for 100 s"]
+    gate.opened.set()
+    assert returned.wait(PATIENCE)
+    assert worker.close(PATIENCE)
 
 
 def test_one_that_becomes_active_while_the_robot_goes_down_brakes(process: Process) -> None:

@@ -54,7 +54,7 @@ def test_a_robot_changes_the_arm_of_its_part(tmp_path: Path) -> None:
     assert project.findings == []
     config = arm_of(project).config
     assert config.planner.time == 2.0
-    assert set(config.poses) == {"resting", "straight_forward", "wave", "down"}
+    assert set(config.poses) == {"resting", "straight_forward", "ready", "wave", "down"}
 
 
 def test_a_pose_that_does_not_exist_is_a_finding_of_the_mission(tmp_path: Path) -> None:
@@ -81,6 +81,29 @@ def test_points_of_a_way_are_checked_one_by_one(points: str, told: str, tmp_path
     checked = project.check(ROBOT + "missions: {go: ../../go.yaml}\n", files={"go.yaml": mission})
     assert checked.codes == (["RBX4105"] if told else []), checked.text
     assert told in checked.text
+
+
+@pytest.mark.parametrize(
+    ("arms", "mission", "codes"),
+    [
+        ("{prefer: resting}", "{pitch: 90 deg, any_position: true, prefer: wave}", []),
+        ("{}", "{x: 10 m, any_orientation: true, approximate: true}", []),
+        ("{prefer: restng}", "{x: 10 cm, any_orientation: true}", ["RBX2357"]),
+        ("{}", "{x: 10 cm, any_orientation: true, prefer: restng}", ["RBX4105"]),
+        ("{}", "{x: 10 cm, pitch: 90 deg, any_position: true}", ["RBX2358"]),
+        ("{}", "{pitch: 90 deg}", ["RBX2359"]),
+    ],
+)
+def test_solutions_may_be_preferred_near_a_pose_and_a_goal_may_be_partial(
+    arms: str, mission: str, codes: list[str], tmp_path: Path
+) -> None:
+    project = Project(tmp_path)
+    text = f"rbx: 1\nkind: Mission\nname: go\ndo: {{reach_right_arm: {mission}}}\n"
+    robot = ROBOT + f"arms: {{right_arm: {{kinematics: {arms}}}}}\nmissions: {{go: ../../go.yaml}}\nstart: go\n"
+    checked = project.check(robot, files={"go.yaml": text})
+    assert checked.codes == codes, checked.text
+    if "resting" in arms:
+        assert arm_of(project).config.kinematics.settings == SolverSettings(60, 5.0, prefer="resting")
 
 
 def test_both_a_chain_and_joints_are_too_much(tmp_path: Path) -> None:
@@ -187,6 +210,22 @@ def test_what_is_wrong_with_an_arm_of_other_arms_is_told(tmp_path: Path, text: s
     assert checked.codes
     assert checked.codes[0].startswith(code), checked.text
     assert words in checked.text
+
+
+def test_an_arm_of_links_has_the_joints_above_them_and_the_last_as_its_tip(tmp_path: Path) -> None:
+    project = Project(tmp_path)
+    links = "right_arm_elbow_flex_link, right_arm_wrist_flex_link, right_arm_tip"
+    project.check(group(f"links: [{links}], controller: right_arm_controller"))
+    assert project.findings == []
+    config = config_of(project, "whole")
+    assert list(config.joints) == ["right_arm_elbow_flex_joint", "right_arm_wrist_flex_joint"]
+    assert (config.base, config.tip) == ("right_arm_elbow_flex_servo_link", "right_arm_tip")
+
+
+@pytest.mark.parametrize("links", ["right_arm_tip", "right_arm_wrist_flex_link, right_arm_elbow_flex_link"])
+def test_the_last_link_of_an_arm_is_one_that_it_moves(links: str, tmp_path: Path) -> None:
+    checked = Project(tmp_path).check(group(f"links: [{links}], controller: right_arm_controller"))
+    assert checked.codes == ["RBX2301"], checked.text
 
 
 def test_passive_joints_of_a_chain_are_not_moved(tmp_path: Path) -> None:

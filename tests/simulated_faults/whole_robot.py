@@ -282,6 +282,9 @@ class WholeRobot:
     def is_suspended(self, process: str) -> bool:
         return False
 
+    def waits(self, process: str | None) -> dict[str, float]:
+        return {}
+
     def log(self, level: Level, text: str, detail: str = "") -> None:
         self.records.append(Record(self.clock.now(), level, "robot", text, detail))
 

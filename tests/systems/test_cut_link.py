@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -21,6 +23,15 @@ def test_a_base_has_a_bound_exactly_if_its_commands_cross(hosts: dict[str, str])
     _, robot = spread(hosts)
     way = {hosts[name] for name in ("base", "cmd_vel", "go_to")}
     assert [(one.base, one.host) for one in stops_after_cut(robot)] == ([("base", hosts["base"])] * (len(way) > 1))
+
+
+def test_a_slower_base_needs_two_of_its_own_cycles() -> None:
+    (fast,) = stops_after_cut(ROBOT)
+    slower = BASE.model_copy(update={"rate": 10.0})
+    components = {**ROBOT.robot.components, "base": replace(ROBOT.robot.components["base"], config=slower)}
+    (slow,) = stops_after_cut(replace(ROBOT, robot=replace(ROBOT.robot, components=components)))
+    assert fast.time is not None
+    assert slow.time == pytest.approx(fast.time + CYCLES * (1 / 10 - 1 / 50))
 
 
 @given(st.floats(-1, 1), st.floats(-1, 1), st.floats(0, CYCLE))

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pytest
 
 from rbxcompose.cli.main import main
+from rbxcompose.cli.robots.live_rules import compiled_with
 from rbxcompose.cli.systems import everywhere, forward
 from rbxcompose.cli.systems.everywhere import Shares, shares_of
 from rbxcompose.cli.systems.remote import Remote
+from rbxcompose.compiler import Compilation
 from rbxcompose.manifest.system_file import HostModel
+from rbxcompose.runtime.options import ChosenLayers
 from rbxcompose.systems.model import System
 from rbxcompose.testing.golden import Golden
 
@@ -31,16 +34,25 @@ name: lab
 hosts: {far: {address: 10.0.0.2, ssh: far}}
 robots: {cart: {robot: cart.yaml}}
 """
+REAL = """rbx: 1
+kind: Robot
+name: cart
+components:
+  battery: {type: threshold, topic: charge, warn_below: 20}
+"""
+REAL_HOSTS = {"real_one"}
 _HOST = """
 import json, sys
 words = sys.argv[1:]
 if words[0] == "true":
     pass
+elif words[0] == "ps":
+    print(json.dumps({"robot": "cart", "real": REAL}))
 elif words[1] == "dump":
-    print(json.dumps({"battery": {"runtime": 30.0, "warn": 0.5}}))
+    print(json.dumps({"battery": {"warn_below": 30.0} if REAL else {"runtime": 30.0, "warn": 0.5}}))
 elif words[1] == "history":
-    told = [{"component": "battery", "name": "runtime", "before": 45.0, "after": 30.0}]
-    print(json.dumps(told))
+    name, before = ("warn_below", 20.0) if REAL else ("runtime", 45.0)
+    print(json.dumps([{"component": "battery", "name": name, "before": before, "after": 30.0}]))
 else:
     print(" ".join(words), "<", "" if words[1] == "set" else sys.stdin.read().strip())
 """
@@ -54,7 +66,7 @@ class _Host(Remote):
         return False
 
     def rbxcompose(self, words: Sequence[str], *, folder: str = "", has_terminal: bool = False) -> list[str]:
-        return [sys.executable, "-c", _HOST, *words]
+        return [sys.executable, "-c", _HOST.replace("REAL", str(self.name in REAL_HOSTS)), *words]
 
     def ssh(self, script: str, *, has_terminal: bool = False) -> list[str]:
         return [sys.executable, "-c", _HOST, script]
@@ -83,6 +95,24 @@ def test_a_value_that_somebody_has_set_there_is_written_here_at_its_place(
     assert (folder / "cart.yaml").read_text(encoding="utf-8") == ROBOT
     assert main(["param", "save", "--robot", "lab.yaml:cart"]) == 0
     assert (folder / "cart.yaml").read_text(encoding="utf-8") == ROBOT.replace("45 s", "30 s")
+
+
+def test_a_robot_with_real_devices_is_compiled_as_that(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    compiled, chosen = compiled_with, list[ChosenLayers]()
+
+    def noted(file: str, layers: ChosenLayers, unsaved: Mapping[Path, str]) -> Compilation:
+        chosen.append(layers)
+        return compiled(file, layers, unsaved)
+
+    monkeypatch.setattr("rbxcompose.cli.systems.parameters.compiled_with", noted)
+    assert main(["param", "diff", "--robot", "lab.yaml"]) == 1
+    assert {one.real for one in chosen} == {False}
+    chosen.clear()
+    (folder / "cart.yaml").write_text(REAL, encoding="utf-8")
+    (folder / "lab.yaml").write_text(SYSTEM.replace("far:", "real_one:"), encoding="utf-8")
+    assert main(["param", "save", "--robot", "lab.yaml"]) == 0
+    assert {one.real for one in chosen} == {True}
+    assert (folder / "cart.yaml").read_text(encoding="utf-8") == REAL.replace("20", "30")
 
 
 def test_a_file_that_somebody_has_edited_is_not_written_over(

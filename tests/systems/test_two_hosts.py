@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
 from tests.systems.host_alone import DURATION, RATE, SIZE
-from tests.systems.namespaces import Hosts, NotPermittedError
+from tests.systems.namespaces import NotPermittedError
 from tests.systems.patrol import (
     ADDRESSES,
     ENVIRONMENT,
@@ -21,16 +19,6 @@ from tests.systems.sshd import serve, wrapper
 
 STOP_WITHIN = 0.6  # [s] after a cut, as the system declares and `check` has computed
 CUT = 4.0  # [s], longer than the others wait for a sign of life
-
-
-@pytest.fixture
-def patrol(tmp_path: Path) -> Iterator[PatrolOnHosts]:
-    try:
-        hosts = Hosts(tmp_path, ADDRESSES)
-    except NotPermittedError as reason:
-        pytest.skip(str(reason))
-    with hosts:
-        yield PatrolOnHosts(hosts)
 
 
 @pytest.mark.timeout(150)

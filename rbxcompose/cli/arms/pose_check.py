@@ -7,7 +7,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from rbxcompose.arm_config import ArmConfig, ArmWorks
+from rbxcompose.arm_config import ArmConfig
+from rbxcompose.cli.arms.chosen import works_of
 from rbxcompose.cli.arms.told_pairs import told_pairs
 from rbxcompose.cli.output.console import FINDINGS, tell, tell_report
 from rbxcompose.compiler import Compilation
@@ -15,7 +16,6 @@ from rbxcompose.findings import Finding, Report, Severity, kind
 from rbxcompose.model.robot import Robot
 from rbxcompose.motion.collisions import MeshChecker, adjacent_pairs
 from rbxcompose.sections.arms import arms
-from rbxcompose.sections.scene import scene
 
 COLLIDES = kind(
     "RBX9423",
@@ -63,13 +63,12 @@ def _findings(robot: Robot) -> Iterator[tuple[str, str, list[tuple[str, str]], F
     contents, description = robot.manifest.contents, robot.manifest.body
     if description is None:
         return
-    things = contents.of(scene)
     matrix = description.matrix.pairs if description.matrix is not None else {}
     for name, arm in contents.of(arms).items():
         config = robot.components[name].config
         if not isinstance(config, ArmConfig):
             continue
-        works = ArmWorks(config, lambda: 0.0, things.on(description.body), things.paddings, is_fast=False)
+        works = works_of(robot, config, description, is_fast=False)
         every = MeshChecker(works.kinematics, description.meshes, adjacent_pairs(description.body))
         rest = [description.body.joints[joint].rest for joint in works.space.names]
         for pose in arm.model.poses:

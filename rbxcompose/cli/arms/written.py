@@ -39,3 +39,9 @@ def read_written(model: type[T], text: str) -> T:
         first = next(iter(report), None)
         raise NotDoneError(NO_MOTION.at(None, first.message if first else f"'{text}' is no map"))
     return read
+
+
+def keys_of(text: str) -> frozenset[str]:
+    """Return the keys of a map on the command line; none if it is something else."""
+    root, _ = read_text(text, _SHOWN)
+    return frozenset(root.entries) if isinstance(root, MappingNode) else frozenset()

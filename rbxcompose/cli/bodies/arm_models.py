@@ -102,4 +102,4 @@ class KeepModel(Config):
     def message(self) -> dict[str, Any]:
         """Return it as `PathConstraints`."""
         joints = [{"name": one.name, "lower": one.lower.value, "upper": one.upper.value} for one in self.joints]
-        return {**self.model_dump(exclude_none=True), "joints": joints}
+        return {**self.model_dump(exclude_none=True, exclude={"joints"}), "joints": joints}

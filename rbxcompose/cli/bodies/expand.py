@@ -18,6 +18,6 @@ def add(actions: Actions) -> None:
 
 def _expand(arguments: argparse.Namespace, description: Description) -> int:
     if arguments.out is None:
-        tell(description.text.rstrip("\n"))
+        tell(description.published.rstrip("\n"))
         return 0
-    return write(Path(arguments.out), description.text.encode())
+    return write(Path(arguments.out), description.published.encode())

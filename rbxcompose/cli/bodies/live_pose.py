@@ -13,28 +13,25 @@ from collections.abc import Mapping
 import numpy as np
 
 from rbxcompose.body.model import Body
-from rbxcompose.body.urdf import read_body
-from rbxcompose.body.xml_reader import read_urdf
-from rbxcompose.bus.graph import GraphName, find
+from rbxcompose.bus.graph import find
 from rbxcompose.bus.topics import Publisher
-from rbxcompose.cli.bodies.actions import NO_BODY, UNKNOWN
+from rbxcompose.cli.bodies.actions import UNKNOWN
+from rbxcompose.cli.bodies.heard_body import described, described_body
 from rbxcompose.cli.bodies.sliders import PERIOD, Slider, SliderPanel, is_end, sliders_of, split_keys
-from rbxcompose.cli.bus.entities import NO_NAME, NOBODY, visit
-from rbxcompose.cli.bus.guest import NAME, Guest, HeardMessage
+from rbxcompose.cli.bus.entities import NOBODY, visit
+from rbxcompose.cli.bus.guest import NAME, Guest
 from rbxcompose.cli.bus.heard_frames import HeardFrames
-from rbxcompose.cli.bus.topic_echo import EchoReader
 from rbxcompose.cli.output.console import misused, refuse, tell
 from rbxcompose.cli.output.terminal import NO_TERMINAL, full_screen, raw, show
 from rbxcompose.cli.robots.lookup import NotDoneError
-from rbxcompose.findings import Finding
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.stamps import to_time
-from rbxcompose.msgs.std_msgs import Header, String
+from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.printable import plain
 from rbxcompose.qos import Qos
 
 HEARD = 1.5  # [s] in which transforms of all joints should come
-_DESCRIPTION, _JOINTS = "robot_description", "joint_states"
+_JOINTS = "joint_states"
 _MOST_READ = 4096  # bytes of keys per read
 
 
@@ -50,8 +47,8 @@ def pose(arguments: argparse.Namespace) -> int:
 
 
 def _posed(guest: Guest, arguments: argparse.Namespace) -> int:
-    topic = _described(guest, arguments.topic)
-    body = _body(guest, topic, arguments.timeout)
+    topic = described(guest, arguments.topic)
+    body = described_body(guest, topic, arguments.timeout)
     sliders = sliders_of(body)
     if not sliders:
         return refuse(UNKNOWN.at(None, "the body has no joint that moves"))
@@ -73,46 +70,6 @@ def _start(guest: Guest, body: Body) -> dict[str, float]:
     guest.run(lambda: all(frames.tree.parent_of(joint.child) for joint in body.moving), HEARD)
     found = ((joint, frames.tree.lookup(joint.parent, joint.child)) for joint in body.moving)
     return {joint.name: joint.position_of(pose) for joint, pose in found if pose is not None}
-
-
-def _described(guest: Guest, wanted: str | None) -> GraphName:
-    """Return the topic with the URDF; with a namespace, it lies below that."""
-    given = [one for one in guest.graph().topics if one.givers and String.TYPE in one.types]
-    names = (
-        [f"/{wanted.lstrip('/')}"] if wanted else [one.name for one in given if one.name.endswith(f"/{_DESCRIPTION}")]
-    )
-    if len(names) == 1 and (found := find(given, names[0])):
-        return found
-    if len(names) > 1:
-        listed = ", ".join(map(plain, names))
-        raise NotDoneError(NO_NAME.at(None, f"several topics have a URDF: {listed}", help="choose one with '--topic'"))
-    if wanted is None:
-        raise NotDoneError(NO_BODY.at(None, f"nothing publishes '{_DESCRIPTION}': this robot has no body"))
-    words = f"nothing publishes a URDF on '{plain(wanted)}'"
-    raise NotDoneError(NO_NAME.misspelt(None, words, names[0], [one.name for one in given], "topics with texts"))
-
-
-def _body(guest: Guest, topic: GraphName, timeout: float) -> Body:
-    """Return the body that a latched topic describes.
-
-    Raises:
-        NotDoneError: if none comes in time, or it is wrong.
-    """
-    texts: list[str] = []
-    reader = EchoReader(topic)
-
-    def heard(one: HeardMessage) -> None:
-        message = reader.read(one)
-        texts.extend([message.data] if isinstance(message, String) else [])
-
-    guest.listen(topic, heard)
-    if not guest.run(lambda: bool(texts), timeout):
-        raise NotDoneError(NOBODY.at(None, f"no URDF comes on '{topic.name}'"))
-    root = read_urdf(texts[-1], topic.name)
-    body, findings = (Body(""), [root]) if isinstance(root, Finding) else read_body(root)
-    if findings:
-        raise NotDoneError(findings[0])
-    return body
 
 
 def _position(sliders: list[Slider], written: str) -> tuple[str, float]:

@@ -7,6 +7,7 @@ import json
 import subprocess
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from rbxcompose.compiler import Compilation
 from rbxcompose.composition.value_edits import is_same
 from rbxcompose.config import Config
 from rbxcompose.dataclass import dataclass
+from rbxcompose.model.robot import Robot
 from rbxcompose.msgs.rcl_interfaces import Parameter
 from rbxcompose.params.core import UnsettableError, changed, settings
 from rbxcompose.params.values import to_message
@@ -36,28 +38,37 @@ _LARGEST = 10_000_000  # [bytes] of a file of parameters
 
 @dataclass(frozen=True, slots=True)
 class RemoteParameters:
-    """The parameters of a robot of a system; `words` is the command as a host of it would take it."""
+    """The parameters of a robot of a system; `words` is the command as a host of it would take it.
+
+    The files here have a robot with simulated devices and one with `real` ones: the one meant is the one that runs.
+    """
 
     system: System
     robot: PlacedRobot
     remote: Remote
     words: Sequence[str]
+    real: bool = False
 
     def run(self, arguments: argparse.Namespace) -> int:
         """Carry the command out and return its exit code."""
         try:
             if arguments.action == "load":
                 return self._load(arguments.file)
-            live = self._live()
-            match arguments.action:
-                case "diff":
-                    return tell_differences(live, arguments)
-                case "reset":
-                    return self._reset(chosen(list(live.changes), live, arguments.names), arguments)
-                case _:
-                    return self._save(live, arguments)
+            running = self._ask("ps")
+            return replace(self, real=bool(running.get("real")))._compare(arguments)
         except NotDoneError as error:
             return refuse(error.finding)
+
+    def _compare(self, arguments: argparse.Namespace) -> int:
+        """Compare the live values with the files, and carry out what follows."""
+        live = self._live()
+        match arguments.action:
+            case "diff":
+                return tell_differences(live, arguments)
+            case "reset":
+                return self._reset(chosen(list(live.changes), live, arguments.names), arguments)
+            case _:
+                return self._save(live, arguments)
 
     def _load(self, file: Path) -> int:
         """Send a file of parameters along."""
@@ -77,13 +88,13 @@ class RemoteParameters:
             return 0
         pairs = [f"{one.path}={json.dumps(one.written, default=str)}" for one in changes]
         return subprocess.run(
-            self._there("set", *pairs, *(["--json"] if arguments.json else [])), check=False
+            self._there("param", "set", *pairs, *(["--json"] if arguments.json else [])), check=False
         ).returncode
 
     def _save(self, live: LiveSettings, arguments: argparse.Namespace) -> int:
         """Write what somebody has set into the files on this machine."""
         had: dict[str, list[object]] = {}
-        for one in self._ask("history"):
+        for one in self._ask("param", "history"):
             had.setdefault(f"{one['component']}.{one['name']}", []).extend(
                 (_plain(one["before"]), _plain(one["after"]))
             )
@@ -101,43 +112,45 @@ class RemoteParameters:
         Raises:
             NotDoneError: if the robot does not tell them.
         """
-        found, told = self._compiled({}), self._ask("dump")
+        found, told = self._compiled({}), self._ask("param", "dump")
         if found.robot is None or found.plan is None:
             raise NotDoneError(NO_FILES.at(None, f"the files of '{self.robot.name}' have errors"))
-        return LiveSettings(found.robot, found.plan, found.sources, dict(self._configs(told)))
+        return LiveSettings(found.robot, found.plan, found.sources, dict(_configs(found.robot, told)))
 
     def _compiled(self, unsaved: Mapping[Path, str]) -> Compilation:
         """Return the robot as it is by itself, with other texts of its files."""
-        layers = layers_of(self.system, self.robot, real=False)
+        layers = layers_of(self.system, self.robot, real=self.real)
         return compiled_with(self.robot.plan.file, layers, unsaved)
 
-    def _configs(self, told: Mapping[str, Mapping[str, object]]) -> Iterator[tuple[str, Config]]:
-        for node, name in nodes_of(self.robot.robot).items():
-            values = told.get(node.removeprefix("/"))
-            if values is None:
-                continue
-            config = self.robot.robot.components[name].config
-            live = {one.name for one in settings(config).values() if one.is_live}
-            messages = {key: to_message(_plain(value)) for key, value in values.items() if key in live}
-            wanted = [Parameter(name=key, value=one) for key, one in messages.items() if one is not None]
-            with suppress(UnsettableError):  # its file has changed meanwhile
-                config = changed(config, wanted)
-            yield name, config
-
-    def _ask(self, action: str) -> Any:
+    def _ask(self, *words: str) -> Any:
         """Return what the robot answers.
 
         Raises:
             NotDoneError: if it does not.
         """
-        done = on_all({"": self._there(action, "--json")})[""]
+        done = on_all({"": self._there(*words, "--json")})[""]
         if done.wait() or done.answer is None:
             why = plain(done.lines[0]) if done.lines else "it says nothing"
             raise NotDoneError(UNREACHED.at(None, f"'{self.remote.name}' does not tell the parameters: {why}"))
         return done.answer
 
-    def _there(self, action: str, *words: str) -> list[str]:
-        return self.remote.rbxcompose(["param", action, *words, "--robot", self.robot.name])
+    def _there(self, *words: str) -> list[str]:
+        return self.remote.rbxcompose([*words, "--robot", self.robot.name])
+
+
+def _configs(robot: Robot, told: Mapping[str, Mapping[str, object]]) -> Iterator[tuple[str, Config]]:
+    """Yield the components that were told of, with the live values of each."""
+    for node, name in nodes_of(robot).items():
+        values = told.get(node.removeprefix("/"))
+        if values is None:
+            continue
+        config = robot.components[name].config
+        live = {one.name for one in settings(config).values() if one.is_live}
+        messages = {key: to_message(_plain(value)) for key, value in values.items() if key in live}
+        wanted = [Parameter(name=key, value=one) for key, one in messages.items() if one is not None]
+        with suppress(UnsettableError):  # its file has changed meanwhile
+            config = changed(config, wanted)
+        yield name, config
 
 
 def _json(value: object) -> object:

@@ -18,7 +18,8 @@ from rbxcompose.importing.foreign_files import ForeignFile
 from rbxcompose.importing.importer import NOT_CARRIED_OVER, OTHER_PROGRAM, ImportedFiles, importer
 from rbxcompose.importing.manifest_text import flow, flow_list, header, key
 from rbxcompose.importing.names import FreeNames
-from rbxcompose.motion.groups import chain
+from rbxcompose.importing.virtual_joints import virtual_joint
+from rbxcompose.motion.groups import carrying, chain
 from rbxcompose.printable import plain
 
 NO_SUCH = kind(
@@ -79,12 +80,13 @@ def srdf(files: Sequence[ForeignFile], name: str, report: Report) -> ImportedFil
     drafts = list(_Drafts(semantics, description.body, report, said[1].span).drafts())
     report.extend(NOT_CARRIED_OVER.at(span, f"{words} has no counterpart") for words, span in semantics.others)
     matrix = _matrix(semantics, description, report, said[1].span)
+    outer = virtual_joint(semantics.outer, description.body, report)
     beside = {f"{name}.collisions.yaml": matrix.text()} if matrix.pairs else {}
     if not drafts and not beside:
         return ImportedFiles("")
     top = header("srdf", [file.name for file in files], "Robot", name)
     return ImportedFiles(
-        f"{top}\n{manifest_of(description.body, drafts, body_file.path.name, next(iter(beside), ''))}", beside
+        f"{top}\n{manifest_of(description.body, drafts, body_file.path.name, next(iter(beside), ''), outer)}", beside
     )
 
 
@@ -152,7 +154,7 @@ class _Drafts:
             elif (above := self.body.joint_above.get(link)) is not None:
                 found.add(above.name)
         for joint in group.joints:
-            if joint not in self.body.joints:
+            if joint not in self.body.joints and all(one.name != joint for one in self.said.outer):
                 self._tell_unknown(group, joint)
             found.add(joint)
         for other in group.groups:
@@ -173,6 +175,9 @@ class _Drafts:
             return f"chain: {flow({'from': key(base), 'to': key(tip)})}"
         if others and all(others) and not (group.chains or group.joints or group.links):
             return f"groups: {flow_list([one for one in others if one])}"
+        there = carrying(self.body, group.links) if not (group.chains or group.joints or group.groups) else None
+        if there is not None and there.joints == moved:
+            return f"links: {flow_list([key(link) for link in group.links])}"
         return f"joints: {flow_list([key(joint) for joint in moved])}"
 
     def _poses(self, group: SemanticGroup, moved: tuple[str, ...]) -> Mapping[str, Mapping[str, float]]:

@@ -95,7 +95,10 @@ def _entries(program: Program, robot: RobotNames, name: str) -> tuple[str, ...]:
 
 def _result_names(node: MissionNode, robot: RobotNames) -> tuple[str, ...]:
     used = robot.missions.get(node.step.uses.text) if node.step.uses else None
-    return tuple(used.outputs) if used and not used.is_open else node.step.result_names
+    if used is not None and not used.is_open:
+        return tuple(used.outputs)
+    skill = robot.skills.get(node.skill)
+    return tuple(skill.results) if skill is not None else node.step.result_names
 
 
 def base_scope(program: Program, robot: RobotNames) -> NodeScope:
@@ -131,7 +134,9 @@ def findings_of(
         if unknown_word and scope.word(unknown_word) is None and problem.meant.startswith("$"):
             yield codes.UNKNOWN_NAME.at(span, problem.message, help=problem.help, fix=fix)
         elif unknown_word and wanted.kind in _MEASURED and isinstance(expression.tree, Word):
-            message = f"this must be {wanted.phrase}; nothing is named '{unknown_word}'"
+            is_place = scope.word(unknown_word) is not None
+            named = f"'{unknown_word}' is a place" if is_place else f"nothing is named '{unknown_word}'"
+            message = f"this must be {wanted.phrase}; {named}"
             help_text = "write a number such as 2" if wanted.kind is TypeKind.COUNT else problem.help
             yield kind.at(span, message, help=help_text, fix=fix)
         elif unknown_word and wanted == TEXT and unknown_word not in scope.removed:

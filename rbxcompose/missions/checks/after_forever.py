@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import pairwise
 
-from rbxcompose.findings import Finding, Related, Severity
+from rbxcompose.findings import Finding, Related, Severity, Span
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.endings import Ending
 from rbxcompose.missions.analysis.examined import Examined
@@ -42,12 +42,30 @@ def after_forever(mission: Examined) -> Iterator[Finding]:
     for node in mission.program.nodes:
         if found := _barrier(mission.program, node, mission.ending):
             barrier, following, why, cure = found
+            if mistaken := _endless_branch(barrier, mission.ending):
+                yield after_forever.at(
+                    mistaken,
+                    f"this branch {why}, so the step after it is never reached",
+                    help="name the branch that ends",
+                    related=[Related(following.span, "the step")],
+                )
+                continue
             yield after_forever.at(
                 following.span,
                 f"this step is never reached: the one before it {why}",
                 help=cure,
                 related=[Related(barrier.span, "this one")],
             )
+
+
+def _endless_branch(barrier: MissionNode, ending: Ending) -> Span | None:
+    """Return where a parallel is told to end with a branch that never does, beside others that do."""
+    branches = barrier.step.branches
+    if branches is None or not branches.ends_with:
+        return None
+    ends = ending.of_branches(barrier)
+    others = [one.counting_as(SUCCEEDS) for name, one in ends.items() if name != branches.ends_with]
+    return branches.ends_at if any(others) else None
 
 
 def _barrier(program: Program, node: MissionNode, ending: Ending) -> tuple[MissionNode, MissionNode, str, str] | None:

@@ -21,7 +21,7 @@ def idle_modifier(mission: Examined) -> Iterator[Finding]:
 
     `optional` and `attempts` are for steps that can fail. On a step that cannot, they probably belong to another step.
     `once` and `cooldown` are for steps that run repeatedly, in a loop or a machine. An `attempt_timeout` that is not
-    shorter than the `timeout` never passes.
+    shorter than the `timeout` never passes. An `optional` condition of `check` guards nothing.
 
     Bad:
     ```yaml
@@ -41,6 +41,7 @@ def idle_modifier(mission: Examined) -> Iterator[Finding]:
     known = constants_of(mission.program, {})
     for node in mission.program.nodes:
         yield from _attempt(node, known)
+        yield from _forgiven(mission, node)
         for key, modifier in node.modifiers.items():
             if modifier.serves is ModifierScope.FAILING and not mission.ending.inside_of(node, key).counting_as(FAILS):
                 yield idle_modifier.at(
@@ -66,6 +67,21 @@ def _attempt(node: MissionNode, known: Constants) -> Iterator[Finding]:
             f"'attempt_timeout' changes nothing here: all attempts together end after {format_quantity(whole, TIME)}",
             help="'timeout' counts all attempts: make it longer than 'attempt_timeout' times 'attempts'",
         )
+
+
+def _forgiven(mission: Examined, node: MissionNode) -> Iterator[Finding]:
+    """Yield the finding about a condition whose answer nothing takes."""
+    is_question = node.step.only_asks and not node.step.waits
+    if not is_question or any(one.moments or one.saved for one in node.modifiers.values()):
+        return
+    for key, modifier in node.modifiers.items():
+        turned = mission.ending.inside_of(node, key)
+        if modifier.forgives and turned.counting_as(FAILS) and not modifier.changed(turned).counting_as(FAILS):
+            yield idle_modifier.at(
+                node.span,
+                f"'{node.step.word}' decides nothing here: with '{key}', the mission goes on whatever the answer is",
+                help=f"remove '{key}', or write 'if' with the steps that it guards below 'then'",
+            )
 
 
 def _comes_again(program: Program, node: MissionNode) -> bool:

@@ -65,5 +65,12 @@ def unknown_skill(mission: Examined) -> Iterator[Finding]:
                     fix = replacement(node.span, node.skill, ours, is_safe=False)  # what is below it may differ
                     yield unknown_skill.at(node.span, message, help=f"{DID_YOU_MEAN} '{ours}'?", fix=fix)
                     continue
+                owner, is_other, own = node.skill.rpartition("/")
+                if is_other and not close:
+                    help_text = (
+                        f"a robot '{owner}' of the system must share '{own}', and name this robot below 'callers'"
+                    )
+                    yield unknown_skill.at(node.span, message, help=help_text)
+                    continue
                 valid = known if close else skills
                 yield unknown_skill.misspelt(node.span, message, node.skill, valid, "skills of this robot")

@@ -74,9 +74,9 @@ def _missing(view: View, skill: Skill) -> Iterator[Finding]:
     given = {argument.name or skill.main for argument in view.node.step.arguments}
     if given - skill.arguments.keys():
         return  # the missing argument may be the misspelt one
-    if skill.entries and not given & {*skill.entries.each, skill.main}:
+    if skill.entries and not given & {*skill.entries.each, skill.main, skill.entries.instead}:
         first, measured = next(iter(skill.entries.each.items()))
-        names = ", ".join((*([skill.main] if skill.main else []), *skill.entries.each))
+        names = ", ".join(filter(None, (skill.main, skill.entries.instead, *skill.entries.each)))
         message = f"the skill '{skill.name}' needs at least one of {names}"
         yield wrong_argument.at(view.node.span, message, help=f"write '{first}: {example(measured)}' below it")
     for name in sorted(skill.required - given):

@@ -8,7 +8,7 @@ from dataclasses import replace
 from rbxcompose.expressions.check import check
 from rbxcompose.expressions.tree import Number, walk
 from rbxcompose.expressions.types import COUNT, PLACE, TEXT, UNKNOWN, Type, TypeKind, choice_of, quantity_of
-from rbxcompose.findings import Finding
+from rbxcompose.findings import Finding, Related
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.effects import assignments
 from rbxcompose.missions.analysis.endings import Ending
@@ -49,11 +49,17 @@ def _assigned(view: View, assignment: Assignment) -> Iterator[Finding]:
     a text accepts a place: `room: dock` is both a text and the name of a place.
     """
     asked, data = assignment.asked, view.program.data
-    wanted = data[assignment.name].type if assignment.name in data else UNKNOWN
-    wanted = _with_numbers(wanted)
-    if wanted == TEXT and check(asked.expression, view.scope)[0] == PLACE:
+    datum = data.get(assignment.name)
+    wanted = _with_numbers(datum.type if datum else UNKNOWN)
+    found, problems = check(asked.expression, view.scope)
+    if wanted == TEXT and found == PLACE:
         wanted = PLACE
-    yield from view.typed(asked.expression, wanted, asked.scalar, WRONG_TYPE)
+    for finding in view.typed(asked.expression, wanted, asked.scalar, WRONG_TYPE):
+        if datum is None or finding.help or problems or finding.code != WRONG_TYPE.code:
+            yield finding
+            continue
+        help_text = f"a datum keeps the type of its first value: give '{assignment.name}' one of this type under 'data'"
+        yield replace(finding, help=help_text, related=(*finding.related, Related(datum.span, "its first value")))
 
 
 def _with_numbers(wanted: Type) -> Type:

@@ -174,12 +174,13 @@ class ParallelStep(Straight):
     def read(cls, reader: NodeReader) -> Self:
         """Read the branches, and the options that decide the result."""
         names = reader.branches()
-        ends_with = reader.branch("ends_with", names) if reader.has("ends_with") else ""
+        ends_with = reader.branch("ends_with", names) if reader.has("ends_with") else None
         succeed_when = reader.count_or("succeed_when", (ALL, ANY)) if reader.has("succeed_when") else ALL
         fail_when = reader.count_or("fail_when", (ANY, ALL)) if reader.has("fail_when") else ANY
         waits_for_all = reader.flag("wait_for_all") if reader.has("wait_for_all") else False
         outcomes = read_outcomes(reader, names)
-        return cls(Branches(names, succeed_when, fail_when, ends_with, outcomes), waits_for_all)
+        name, place = (ends_with.text, ends_with.span) if ends_with else ("", None)
+        return cls(Branches(names, succeed_when, fail_when, name, place, outcomes), waits_for_all)
 
     @property
     def reads(self) -> frozenset[str]:

@@ -198,13 +198,13 @@ class ValueReader:
         self.asked.append(Asked(expression, wanted, scalar, is_watched=is_watched))
         return expression
 
-    def branch(self, key: str, branches: tuple[str, ...]) -> str:
+    def branch(self, key: str, branches: tuple[str, ...]) -> ScalarNode | None:
         """Read the name of one of the branches."""
         scalar = self.scalar(key, "the name of a branch")
         if scalar and scalar.text not in branches:
             message = f"there is no branch '{scalar.text}'"
             self.add(codes.NOT_A_CHOICE.misspelt(scalar.span, message, scalar.text, branches, "its branches"))
-        return scalar.text if scalar else ""
+        return scalar
 
 
 _FLOW_HELP = "inside '{}', commas and colons separate: put quotes around the condition, or write it in block style"

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.tree import Comparison, Expression, ExpressionNode, Variable, Word
 from rbxcompose.expressions.values import NotArrived, Value
+from rbxcompose.findings import Span
 from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions import codes
 from rbxcompose.missions.engine.scopes import Inner, MissionScope
@@ -49,6 +50,7 @@ class Branches:
     succeed_when: Expression | str = ALL
     fail_when: Expression | str = ANY
     ends_with: str = ""
+    ends_at: Span | None = None  # where `ends_with` names its branch
     outcomes: tuple[OutcomeRule, ...] = ()
 
     def deciding(self, children: tuple[int, ...]) -> tuple[int, ...]:

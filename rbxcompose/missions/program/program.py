@@ -42,7 +42,7 @@ class Skill:
 
     `outcomes` are those besides `success` and `failure`, each with which of the two it counts as. `claims` is what it
     needs exclusively (base, arm, head, voice), empty for nothing. `results` are the types of its result values.
-    `entries` are arguments among which at least one must be given, or the main one.
+    `entries` are arguments among which at least one must be given, or the main one, or the one that may stand instead.
     """
 
     name: str

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from typing import TYPE_CHECKING
+
+import zenoh
 
 from rbxcompose.bus import shared_memory
 from rbxcompose.bus.bus import Bus
@@ -17,10 +20,14 @@ from rbxcompose.plan.model import Plan
 from rbxcompose.runtime.process_group.inbox import CallbackInbox
 from rbxcompose.runtime.process_group.lifeline import Lifeline
 from rbxcompose.runtime.process_group.turns import Turns
+from rbxcompose.runtime.processes import longest_wait, waits_of
 from rbxcompose.scheduler import Scheduler
 
 if TYPE_CHECKING:
     from rbxcompose.recording.tape import Tape
+
+
+_STARVED = 1.0  # [s] of waiting for a processor, after which a router that does not answer may be late as well
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +52,7 @@ def open_bus(
     """Open a Zenoh session that finds the robot's other processes at `router`, and the bus over it."""
 
     def opened() -> ZenohTransport:
-        session = open_lone(router) if plan.bus.links == "router" else open_peer(router)
+        session = _open_lone(router) if plan.bus.links == "router" else open_peer(router)
         return ZenohTransport(session, inbox.put, turns)
 
     if reason := shared_memory.problem():
@@ -71,3 +78,18 @@ def open_bus(
         log=lambda text: log("robot", text),
     )
     return Connection(bus, lifeline, transport)
+
+
+def _open_lone(router: str) -> zenoh.Session:
+    """Open a session at `router`; as often as it takes, while this machine has too much to do.
+
+    Raises:
+        OSError: if the router does not answer.
+    """
+    while True:
+        before = waits_of(os.getpid())
+        try:
+            return open_lone(router)
+        except OSError:
+            if longest_wait(before, waits_of(os.getpid())) < _STARVED:
+                raise

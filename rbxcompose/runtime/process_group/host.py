@@ -305,9 +305,11 @@ class Host:
 
     # Who works
 
-    def worker(self, name: str) -> Worker | None:
+    def worker(self, name: str, configures_within: float) -> Worker | None:
         """Return a thread for a component that may block, or None if all must run in one thread: on a stepped clock."""
-        return Worker(name, self.clock, self._post, partial(self.failed, name)) if self._post is not None else None
+        if self._post is None:
+            return None
+        return Worker(name, self.clock, self._post, partial(self.failed, name), configures_within)
 
     def ready(self, name: str) -> None:
         """Activate a component that was slow to configure, if its activation was requested meanwhile."""

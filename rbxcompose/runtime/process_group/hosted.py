@@ -24,7 +24,7 @@ from rbxcompose.runtime.process_group.handover import HandedOver, handed_over
 from rbxcompose.runtime.process_group.live_ports import bind, subscribe
 from rbxcompose.runtime.process_group.statuses import Statuses
 from rbxcompose.runtime.process_group.steps import GoalSteps
-from rbxcompose.runtime.process_group.worker import Worker
+from rbxcompose.runtime.process_group.worker import CONFIGURE, Worker
 from rbxcompose.scheduler import Scheduler
 from rbxcompose.sdk.bound import Window
 from rbxcompose.sdk.component import Component
@@ -81,7 +81,7 @@ class InstanceHome(Protocol):
         """Return the server of parameters."""
         ...
 
-    def worker(self, name: str) -> Worker | None:
+    def worker(self, name: str, configures_within: float) -> Worker | None:
         """Return a thread for an instance that may block; None if it runs in the scheduler's thread."""
         ...
 
@@ -127,7 +127,7 @@ class Hosted:
     def configure(self) -> None:
         """Create the component, bind its ports, and configure it."""
         cls = component_type(self.instance.type)
-        self.worker = self.host.worker(self.instance.name) if cls.blocking else None
+        self.worker = self.host.worker(self.instance.name, cls.configures_within) if cls.blocking else None
         made = cls(self.instance.name, self.config, self if self.worker is None else HandedOver(self, self.worker))
         self.component = made
         self.host.statuses.forget_tasks(self.instance.name)
@@ -140,7 +140,7 @@ class Hosted:
         if self.worker is not None:
             made.bound = {name: handed_over(end, ports[name], self.worker) for name, end in self._ends.items()}
         self.host.parameters.serve(self)
-        self.do("configure", made.configure, then=self._configured)
+        self.do(CONFIGURE, made.configure, then=self._configured)
 
     def _configured(self) -> None:
         self._enter(Lifecycle.INACTIVE)
@@ -170,8 +170,8 @@ class Hosted:
     def _activated(self) -> None:
         component = self._made()
         self._enter(Lifecycle.ACTIVE)
-        if component.rate:
-            self._step_with(component)
+        if (rate := component.rate_of(component.config)) > 0:
+            self._step_with(component, rate)
         if self.host.is_stopped:
             self.do("stop", component.stop)
         if self.host.is_held:
@@ -184,8 +184,8 @@ class Hosted:
                 self.do("command", partial(self._repeat, component, request))
         self.host.bus.open(self.instance.name)  # those who found it before it was active have waited
 
-    def _step_with(self, component: Component[Any]) -> None:
-        scheduler, owner, period, step = self.host.scheduler, self.instance.name, 1.0 / component.rate, component.step
+    def _step_with(self, component: Component[Any], rate: float) -> None:
+        scheduler, owner, period, step = self.host.scheduler, self.instance.name, 1.0 / rate, component.step
 
         def run(dt: float) -> None:
             self.do("step", lambda: step(dt), depth=1)

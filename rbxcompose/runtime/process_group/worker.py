@@ -18,6 +18,7 @@ from rbxcompose.dataclass import dataclass
 
 LONG = 1.0  # [s] in one call, after which diagnostics report it
 LONGEST = 30.0  # [s] in one call, after which the component has failed and its thread is left behind
+CONFIGURE = "configure"  # the call that may take as long as the component says
 
 Call = Callable[[], None]
 Post = Callable[[str, Call], None]
@@ -36,8 +37,19 @@ class _Waiting:
 class Worker:
     """Runs calls one after the other in a thread of its own; all methods are called from the scheduler's thread."""
 
-    def __init__(self, owner: str, clock: Clock, post: Post, failed: Callable[[Exception], None]) -> None:
-        """Take `post`, with which any thread can run a callback in the scheduler's thread for `owner`."""
+    def __init__(
+        self,
+        owner: str,
+        clock: Clock,
+        post: Post,
+        failed: Callable[[Exception], None],
+        configures_within: float = LONGEST,
+    ) -> None:
+        """Take `post`, with which any thread can run a callback in the scheduler's thread for `owner`.
+
+        The call `configure` may take `configures_within` [s], all others take at most `LONGEST`.
+        """
+        self._configures_within = configures_within
         self.skipped = 0  # calls dropped in favour of newer ones
         self._owner, self._clock, self._failed = owner, clock, failed
         self._post = post
@@ -76,8 +88,9 @@ class Worker:
     def look(self) -> str:
         """Return in words which call takes long, empty if none does; a call that takes too long is a failure."""
         label, seconds = self.busy_for()
-        if seconds > LONGEST and not self._is_closed:
-            error = HungError(f"{label} has not returned for {LONGEST:g} s")
+        most = self._configures_within if label == CONFIGURE else LONGEST
+        if seconds > most and not self._is_closed:
+            error = HungError(f"{label} has not returned for {most:g} s")
             error.add_note(self._stack())
             self._failed(error)
         return f"has been in {label} for {seconds:.0f} s" if seconds > LONG else ""

@@ -21,10 +21,11 @@ import setproctitle
 from rbxcompose.config import Config
 from rbxcompose.params.change import ChangeRefusal, RobotRules
 from rbxcompose.plan.dump import load
+from rbxcompose.process_end import end_with
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime import setting_messages as tell
 from rbxcompose.runtime.options import ChosenLayers
-from rbxcompose.runtime.processes import close_all, end_with, in_child
+from rbxcompose.runtime.processes import close_all, in_child
 from rbxcompose.runtime.supervision.setting_changes import WhenJudged
 from rbxcompose.scheduler import ScheduledCallback, Scheduler
 

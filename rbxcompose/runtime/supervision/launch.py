@@ -20,11 +20,12 @@ from rbxcompose.endpoints import unix_endpoint
 from rbxcompose.levels import Level
 from rbxcompose.manifest.garbage_collection import collect_as_usual
 from rbxcompose.plan.model import Plan
+from rbxcompose.process_end import end_with
 from rbxcompose.runtime.faults import explain
 from rbxcompose.runtime.folder import BrokenStateError, RobotFolder, RobotState, title
 from rbxcompose.runtime.log import start_new
 from rbxcompose.runtime.options import RunOptions
-from rbxcompose.runtime.processes import Process, boot_id, end_with
+from rbxcompose.runtime.processes import Process, boot_id
 from rbxcompose.runtime.records import Record
 from rbxcompose.runtime.supervision.conductor import ROBOT_FAILED
 from rbxcompose.runtime.supervision.judge import FiledRules

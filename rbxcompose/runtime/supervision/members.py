@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import field
 from enum import Enum, auto
 from typing import Protocol
@@ -42,6 +42,10 @@ class ConductorEffects(Protocol):
 
     def is_suspended(self, process: str) -> bool:
         """Return whether a signal keeps a process from running."""
+        ...
+
+    def waits(self, process: str | None) -> Mapping[str, float]:
+        """Return how long each thread of a process has waited for a processor [s]; None is the supervisor itself."""
         ...
 
     def log(self, level: Level, text: str, detail: str = "") -> None:

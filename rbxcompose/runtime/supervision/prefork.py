@@ -24,11 +24,12 @@ import setproctitle
 from rbxcompose.clock import MonotonicClock
 from rbxcompose.dataclass import dataclass
 from rbxcompose.plan.model import Plan
+from rbxcompose.process_end import end_with
 from rbxcompose.runtime.channel import Channel
 from rbxcompose.runtime.folder import RobotFolder, title
 from rbxcompose.runtime.log import LogFile
 from rbxcompose.runtime.options import RunOptions
-from rbxcompose.runtime.processes import Process, close_all, end_with, give_back_large_memory, in_child
+from rbxcompose.runtime.processes import Process, close_all, give_back_large_memory, in_child
 from rbxcompose.runtime.supervision.judge import FiledRules
 from rbxcompose.sdk.registry import component_type
 from rbxcompose.typed_json import Family

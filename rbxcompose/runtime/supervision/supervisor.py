@@ -23,7 +23,7 @@ from rbxcompose.runtime.control import ControlServer
 from rbxcompose.runtime.folder import SILENT, SUSPENDED, ComponentState, RobotFolder, RobotState
 from rbxcompose.runtime.host_report import HostReport
 from rbxcompose.runtime.process_group.watchdog import MARK
-from rbxcompose.runtime.processes import Process, adopt_orphans, boot_id, describe_exit, signal_descriptor
+from rbxcompose.runtime.processes import Process, adopt_orphans, boot_id, describe_exit, signal_descriptor, waits_of
 from rbxcompose.runtime.records import Record
 from rbxcompose.runtime.service_manager import ALIVE, READY, of_this_process
 from rbxcompose.runtime.supervision import silence
@@ -187,6 +187,13 @@ class Supervisor:
         """Return whether a signal keeps a process from running."""
         child = self._children.get(process)
         return child is not None and child.process is not None and child.process.is_stopped
+
+    def waits(self, process: str | None) -> dict[str, float]:
+        """Return how long each thread of a process has waited for a processor [s]; None is this one."""
+        if process is None:
+            return waits_of(os.getpid())
+        child = self._children.get(process)
+        return waits_of(child.process.pid) if child is not None and child.process is not None else {}
 
     def log(self, level: Level, text: str, detail: str = "") -> None:
         """Write a record of the whole robot."""

@@ -1,0 +1,37 @@
+"""The curves of a trajectory, and the positions at which they are examined."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rbxcompose.motion.parametrisation import Trajectory, curve, timed
+
+SEEDS = st.integers(0, 2**31)
+
+
+@given(SEEDS, st.integers(2, 9), st.floats(1e-3, 0.3))
+def test_positions_on_curves_are_as_near_to_each_other_as_asked_for(seed: int, count: int, step: float) -> None:
+    rng = np.random.default_rng(seed)
+    times = np.cumsum(rng.uniform(0.01, 2.0, count))
+    made = Trajectory(times, rng.normal(size=(count, 3)), rng.normal(scale=rng.uniform(0.0, 3.0), size=(count, 3)))
+    found = made.dense(step)
+    assert np.max(np.abs(np.diff(found, axis=0))) <= step * (1.0 + 1e-9)
+    assert np.array_equal(found[0], made.positions[0])
+    assert np.allclose(found[-1], made.positions[-1])
+
+
+def test_a_straight_motion_is_examined_at_no_more_positions_than_needed() -> None:
+    made = Trajectory(np.array((0.0, 2.0)), np.array(((0.0,), (1.0,))), np.array(((0.5,), (0.5,))))
+    assert len(made.dense(0.01)) == 101
+
+
+@settings(max_examples=25, deadline=None)
+@given(SEEDS, st.integers(2, 7))
+def test_a_trajectory_stays_on_the_curve_that_was_looked_at_before(seed: int, count: int) -> None:
+    way = np.random.default_rng(seed).uniform(-2.0, 2.0, (count, 3))
+    made, path = timed(way, np.full(3, 1.0), np.full(3, 4.0)), curve(way, 0.001)
+    assert isinstance(made, Trajectory), made
+    away = [np.min(np.linalg.norm(path - one, axis=1)) for one in made.positions]
+    assert max(away) <= 0.005

@@ -1,0 +1,160 @@
+"""Processes that plan for an arm: what they plan is what is planned here, and whatever happens to them stays theirs."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from rbxcompose.arm_processes import PlanningProcess, planning_processes
+from rbxcompose.clock import MonotonicClock, SteppedClock
+from rbxcompose.motion import ways_ahead
+from rbxcompose.motion.planner import MotionPlan, MotionRequest
+from rbxcompose.motion.reasons import MotionFailure
+from rbxcompose.motion.ways_ahead import PlanJob, Planned
+from rbxcompose.runtime.processes import Process, wait_until_ended
+from tests.motion.pi_hand import made
+from tests.motion.test_ways_ahead import CONFINED, cluttered, outcome, planning
+from tests.motion.toy_arm import ended
+
+pytestmark = pytest.mark.timeout(200)  # each takes seconds to start
+TIMELESS = float  # a clock that stands still: so many positions are the limit, on any machine
+TIME = 0.3  # [s], in which helpers are asked, and answer first
+SCENES = (CONFINED, 175, 727)  # in which motions are hard to find, or are not found
+ORPHAN = """
+import os, signal
+from rbxcompose.arm_processes import PlanningProcess
+from tests.motion.pi_hand import made
+one = PlanningProcess(made()[0], print, float)
+print(one.pid, flush=True)
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def started(warned: list[str], time: float = TIME) -> PlanningProcess:
+    """Start a process that plans for a time [s]."""
+    config = made()[0]
+    short = config.model_copy(update={"planner": config.planner.model_copy(update={"time": time})})
+    return PlanningProcess(short, warned.append, TIMELESS)
+
+
+def wait_for(one: PlanningProcess) -> None:
+    """Wait until it can begin a job."""
+    while not one.is_idle:
+        os.sched_yield()
+
+
+@pytest.fixture
+def warned() -> list[str]:
+    return []
+
+
+@pytest.fixture
+def pair(warned: list[str], monkeypatch: pytest.MonkeyPatch) -> Iterator[list[PlanningProcess]]:
+    """Return two processes that are asked at once."""
+    monkeypatch.setattr(ways_ahead, "ALONE", 0)
+    both = [started(warned) for _ in range(2)]
+    for process in both:
+        wait_for(process)
+    yield both
+    for process in both:
+        process.close()
+
+
+def test_one_two_and_three_processes_come_to_the_same(pair: list[PlanningProcess], warned: list[str]) -> None:
+    for seed in SCENES:
+        alone = outcome(seed, (), TIME)
+        assert [outcome(seed, pair[:count], TIME) for count in (1, 2)] == [alone, alone]
+    assert warned == []
+
+
+def test_what_a_process_plans_is_what_is_planned_here(pair: list[PlanningProcess]) -> None:
+    kinds = set()
+    for seed in SCENES:
+        bench = cluttered(seed)
+        works = bench.works
+        free = [one for one in works.space.samples(400, seed) if works.planner.checker.is_free(one)]
+        with planning(bench, (), TIME):
+            for start, goal in pairwise(free[:4]):
+                job = PlanJob(MotionRequest(start, goal), {}, works.objects, works.paddings)
+                pair[0].begin(job)
+                works.kinematics.place({})
+                here = ended(works.planner.plan(job.request))
+                assert content(answer(pair[0], job)) == content(here)
+                kinds.add(type(here))
+    assert kinds == {MotionPlan, MotionFailure}
+
+
+def content(planned: Planned) -> object:
+    """Return all that there is in it."""
+    if isinstance(planned, MotionFailure):
+        return planned
+    assert planned.trajectory is not None
+    times, *others = (getattr(planned.trajectory, name).tolist() for name in ("times", "positions", "velocities"))
+    return times, others, planned.waypoints.tolist(), planned.attempts, planned.examined, planned.found_by
+
+
+def answer(one: PlanningProcess, job: PlanJob) -> Planned:
+    """Return what was planned, once it is."""
+    while (found := one.answer(job)) is None:
+        os.sched_yield()
+    return found
+
+
+@pytest.mark.parametrize(("number", "told"), [(signal.SIGKILL, "is gone"), (signal.SIGSTOP, "does not answer")])
+def test_a_goal_goes_on_without_one_that_is_killed_or_hangs(
+    pair: list[PlanningProcess], warned: list[str], number: signal.Signals, told: str
+) -> None:
+    alone = outcome(CONFINED, (), TIME)
+    os.kill(pair[0].pid, number)
+    assert outcome(CONFINED, pair, TIME) == alone
+    pair[0].patience = 0.0
+    assert outcome(CONFINED, pair[:1], TIME) == alone
+    assert not pair[0].is_idle
+    assert warned == [f"a process that plans for 'right_arm' {told}: there is one less until the arm starts again"]
+
+
+def test_what_is_abandoned_is_not_planned_to_the_end(warned: list[str]) -> None:
+    endless = started(warned, time=1e9)
+    wait_for(endless)
+    works, measured = cluttered(CONFINED).works, cluttered(CONFINED).measured
+    start = np.array([measured[name][0] for name in works.space.names])
+    there = next(one for one in works.space.samples(400, 1) if works.planner.checker.is_free(one))
+    job = PlanJob(MotionRequest(start, there), {}, works.objects, works.paddings)
+    endless.begin(job)
+    assert not endless.is_idle
+    endless.abandon()
+    wait_for(endless)
+    assert endless.answer(job) is None
+    endless.close()
+    assert warned == []
+
+
+def test_none_is_left_when_the_process_of_the_arm_is_killed() -> None:
+    done = subprocess.run([sys.executable, "-c", ORPHAN], stdout=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == -signal.SIGKILL
+    try:
+        left = [Process.of(int(done.stdout))]
+    except ProcessLookupError:
+        left = []
+    assert wait_until_ended(left, 30.0) == []
+
+
+def test_there_is_none_where_time_is_stepped_and_no_more_than_the_machine_has(
+    warned: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    config = made()[0]
+    many = config.model_copy(update={"planner": config.planner.model_copy(update={"processes": 4})})
+    assert planning_processes(many, SteppedClock(), warned.append) == ()
+    assert planning_processes(config, MonotonicClock(), warned.append) == ()
+    assert planning_processes(many.model_copy(update={"hand": None}), MonotonicClock(), warned.append) == ()
+    assert warned == []
+    monkeypatch.setattr(os, "sched_getaffinity", lambda pid: {0})
+    assert planning_processes(many, MonotonicClock(), warned.append) == ()
+    assert "4" in warned[0]

@@ -1,0 +1,55 @@
+from __future__ import annotations
+
+import sys
+from itertools import count
+from types import SimpleNamespace
+
+import pytest
+
+from rbxcompose.runtime.process_group.watchdog import HANG, PERIOD, Watchdog
+
+MODULE = "rbxcompose.runtime.process_group.watchdog"
+
+
+class EndedError(Exception):
+    """Raised instead of the end of the process."""
+
+
+def periods(monkeypatch: pytest.MonkeyPatch, share: float, fed: int = 0) -> int:
+    """Return after how many wake-ups it ends a process that waits for a processor for a `share` of the time.
+
+    Its loop feeds it in the first `fed` of them.
+    """
+    dog, slept, looked = Watchdog(), count(1), count()
+    dog._thread = object()  # type: ignore[assignment]
+
+    def sleep(seconds: float) -> None:
+        assert seconds == PERIOD
+        if next(slept) <= fed:
+            dog.feed()
+
+    def end(status: int) -> None:
+        raise EndedError
+
+    monkeypatch.setattr(f"{MODULE}.waits_of", lambda pid: {"1": 7.0 + share * PERIOD * next(looked)})
+    monkeypatch.setattr(f"{MODULE}.faulthandler.dump_traceback", lambda file: None)
+    monkeypatch.setattr(sys.stderr, "flush", lambda: None)
+    # In its module alone: other threads of the tests sleep and write, too.
+    monkeypatch.setattr(f"{MODULE}.time", SimpleNamespace(sleep=sleep))
+    system = SimpleNamespace(getpid=lambda: 0, write=lambda descriptor, text: len(text), _exit=end)
+    monkeypatch.setattr(f"{MODULE}.os", system)
+    with pytest.raises(EndedError):
+        dog._watch()
+    return next(slept) - 1
+
+
+def test_it_ends_a_process_whose_loop_does_not_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert periods(monkeypatch, 0.0) == HANG / PERIOD
+
+
+def test_time_in_which_the_process_waits_for_a_processor_does_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert 3 * HANG / PERIOD < periods(monkeypatch, 0.75) <= 4 * HANG / PERIOD
+
+
+def test_it_lives_for_as_long_as_it_is_fed(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert periods(monkeypatch, 0.0, fed=100) in (100 + HANG / PERIOD - 1, 100 + HANG / PERIOD)
