@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import re
+import socket
 from pathlib import Path
 
 LINK_LEASE = 2.0  # [s] of silence after which a link counts as lost
@@ -42,6 +43,24 @@ def is_private(endpoint: str) -> bool:
 def socket_of(endpoint: str) -> Path:
     """Return the file of a Unix socket."""
     return Path(endpoint.removeprefix(_UNIX))
+
+
+def accepts(endpoint: str, patience: float) -> bool:
+    """Return whether connections are accepted at an endpoint within `patience` [s]; UDP and QUIC cannot tell."""
+    protocol, _, place = re.split("[?#]", endpoint)[0].partition("/")
+    host, _, port = place.rpartition(":")
+    if protocol in ("udp", "quic"):
+        return False
+    try:
+        if is_private(endpoint):
+            with socket.socket(socket.AF_UNIX) as knocking:
+                knocking.settimeout(patience)
+                knocking.connect(str(socket_of(endpoint)))
+        else:
+            socket.create_connection((host.strip("[]"), int(port)), patience).close()
+    except OSError:
+        return False
+    return True
 
 
 def endpoint(text: str) -> str:

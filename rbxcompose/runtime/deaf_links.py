@@ -1,8 +1,9 @@
 """Finds links that only seem to be whole, from what hosts report of each other. Pure: time is an argument.
 
 A router of Zenoh computes the ways to the others 0.1 s after a link was made or lost. If a link is lost and made again
-meanwhile, it may not tell the other router what is subscribed to here, so one of the two does not hear the other. Two
-kinds of evidence show this: a host that is heard does not hear this one, or it hears one that is not heard here.
+meanwhile, it may not tell the other router what is subscribed to here, so one of the two does not hear the other. Nor
+does it dial again if a link is lost as soon as it is made. Three kinds of evidence show this: a host that is heard does
+not hear this one, it hears one that is not heard here, or no host is heard any more though there is a way to one.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ class DeafLinks:
 
     def __init__(self, host: str, now: float) -> None:
         self._host, self._begun = host, now
-        self._told, self._opened = now, -LONGEST
+        self._told, self._opened, self._sought = now, -LONGEST, now
         self._patience = PATIENCE
         self._heard: dict[str, float] = {}  # host -> when [s]
         self._doubts: dict[str, _Doubt] = {}
@@ -53,6 +54,23 @@ class DeafLinks:
             if self._is_proven(host, now):
                 return self._give_up(host, now)
         return None
+
+    def must_seek(self, now: float) -> bool:
+        """Return whether to seek a way to another host now, since none is heard any more."""
+        if not self._is_alone(now) or now - self._sought < FRESH / 2:
+            return False
+        self._sought = now
+        return True
+
+    def find(self, now: float) -> bool:
+        """Take that there is a way to another host; return whether all links must be opened again."""
+        is_proven = self._is_alone(now) and self._is_proven("", now)
+        if is_proven:
+            self._give_up("", now)
+        return is_proven
+
+    def _is_alone(self, now: float) -> bool:
+        return bool(self._heard) and now - max(self._heard.values()) > FRESH
 
     def _is_proven(self, host: str, now: float) -> bool:
         doubt = self._doubts.setdefault(host, _Doubt(now, now))

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import socket
 from pathlib import Path
 
 import pytest
 import zenoh
 
-from rbxcompose.endpoints import endpoint, is_private, socket_of, tcp_endpoint, unix_endpoint
+from rbxcompose.endpoints import accepts, endpoint, is_private, socket_of, tcp_endpoint, unix_endpoint
 
 FINE = [
     "tcp/127.0.0.1:7447",
@@ -58,3 +59,15 @@ def test_a_folder_too_long_for_sockets_is_refused_before_the_kernel_does() -> No
     with pytest.raises(OSError, match="sockets need a path of less than 91 bytes"):
         unix_endpoint(Path("/" + "x" * 90), "router")
     unix_endpoint(Path("/" + "x" * 89), "router")
+
+
+def test_whoever_listens_accepts_and_nobody_else_does(tmp_path: Path) -> None:
+    private = unix_endpoint(tmp_path, "router")
+    with socket.create_server(("127.0.0.1", 0)) as server, socket.socket(socket.AF_UNIX) as local:
+        local.bind(str(socket_of(private)))
+        local.listen()
+        port = server.getsockname()[1]
+        listening = [f"tcp/127.0.0.1:{port}", f"tls/127.0.0.1:{port}#root_ca_certificate_file=/etc/ca.pem", private]
+        assert [accepts(one, 1.0) for one in listening] == [True] * 3
+        assert not accepts(f"quic/127.0.0.1:{port}", 1.0)
+    assert [accepts(one, 1.0) for one in listening] == [False] * 3

@@ -17,8 +17,19 @@ AHEAD = 3600.0  # [s] by which the clocks of the others are ahead
 Hearing = Callable[[str, str, float], bool]
 
 
-def run(hears: Hearing, seconds: float, *, hosts: str = "rdm", own: str = "m", tells: bool = True) -> list[float]:
-    """Return when `own` opens its links again [s], if `hears(listener, teller, now)` says who hears whom."""
+def run(
+    hears: Hearing,
+    seconds: float,
+    *,
+    hosts: str = "rdm",
+    own: str = "m",
+    tells: bool = True,
+    ways: Callable[[float], bool] = lambda now: False,
+) -> list[float]:
+    """Return when `own` opens its links again [s], if `hears(listener, teller, now)` says who hears whom.
+
+    `ways` tells when a host that is not heard would accept a connection.
+    """
     links, opened, arrived = DeafLinks(own, 0.0), [], dict[tuple[str, str], float]()
     for step in range(1, round(seconds / PERIOD)):
         now = step * PERIOD
@@ -32,6 +43,8 @@ def run(hears: Hearing, seconds: float, *, hosts: str = "rdm", own: str = "m", t
             is_heard = teller != own and hears(own, teller, now)
             if is_heard and links.hear(teller, _stamp(now), _echoes(arrived, teller), now) is not None:
                 opened.append(now)
+        if links.must_seek(now) and ways(now) and links.find(now):
+            opened.append(now)
     return opened
 
 
@@ -50,6 +63,27 @@ def test_hosts_that_all_hear_each_other_are_left_alone() -> None:
 @given(cut=st.floats(1.0, 20.0), length=st.floats(0.0, 20.0))
 def test_so_are_those_that_were_cut_off(cut: float, length: float) -> None:
     assert run(lambda listener, teller, now: "m" not in (listener, teller) or not cut < now < cut + length, 60.0) == []
+
+
+@given(cut=st.floats(2.0, 20.0), length=st.floats(0.0, 20.0), dialling=st.floats(0.0, 1.0))
+def test_and_those_that_dial_again_when_the_cut_is_over(cut: float, length: float, dialling: float) -> None:
+    def hears(listener: str, teller: str, now: float) -> bool:
+        return "m" not in (listener, teller) or not cut < now < cut + length + dialling
+
+    assert run(hears, 60.0, ways=lambda now: not cut < now < cut + length) == []
+
+
+@pytest.mark.parametrize("hosts", ["rm", "rdm"])
+def test_a_host_that_neither_hears_nor_is_heard_is_found_once_there_is_a_way(hosts: str) -> None:
+    def hears(listener: str, teller: str, now: float) -> bool:
+        return "m" not in (listener, teller) or now < 5.0
+
+    first, *_ = run(hears, 30.0, hosts=hosts, ways=lambda now: now > 9.0)
+    assert 9.0 + PATIENCE < first < 9.0 + PATIENCE + FRESH + 2 * PERIOD
+
+
+def test_one_that_has_never_been_heard_is_waited_for() -> None:
+    assert run(lambda listener, teller, now: "m" not in (listener, teller), 60.0, ways=lambda now: True) == []
 
 
 def test_and_those_one_of_which_has_died() -> None:

@@ -7,7 +7,6 @@ are answered in Zenoh's own thread, because they test the session; signs of life
 
 from __future__ import annotations
 
-import socket
 from collections.abc import Callable
 from contextlib import suppress
 from threading import Thread
@@ -17,6 +16,7 @@ import zenoh
 from rbxcompose.bus.probe import Probe, ProbeResult, probe_key
 from rbxcompose.bus.renewal import RenewableTransport
 from rbxcompose.bus.transport import Question, Transport, TransportReply
+from rbxcompose.endpoints import accepts
 from rbxcompose.runtime.process_group.driver import BEAT
 
 BEATS = 3  # of the process between two probes: three misses and the new session take less than 4 s
@@ -74,7 +74,7 @@ class Lifeline:
             return
         if self._sent is not None:
             heard = self._sent.close()
-            is_router_up = heard is ProbeResult.NOBODY and self._router_is_up()
+            is_router_up = heard is ProbeResult.NOBODY and accepts(self._router, KNOCK)
             if self._probe.judge(heard, is_router_up=is_router_up):
                 self._renew()
                 return
@@ -84,14 +84,6 @@ class Lifeline:
     def heard(self) -> ProbeResult:
         """Return the result of the current probe so far."""
         return self._sent.heard if self._sent is not None else ProbeResult.NOTHING
-
-    def _router_is_up(self) -> bool:
-        host, _, port = self._router.rpartition("/")[2].rpartition(":")
-        try:
-            socket.create_connection((host, int(port)), KNOCK).close()
-        except OSError:
-            return False
-        return True
 
     def _renew(self) -> None:
         self._log("the session on the bus no longer carries anything; opening it again")

@@ -10,6 +10,7 @@ import signal
 import socket
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from threading import Thread
 from types import FrameType
 from typing import TypeVar
 
@@ -20,7 +21,7 @@ from rbxcompose.bus.transport import Closable
 from rbxcompose.bus.zenoh_session import NO_LINK, RouterLink, open_router, tls_settings
 from rbxcompose.bus.zenoh_transport import ZenohTransport
 from rbxcompose.clock import MonotonicClock
-from rbxcompose.endpoints import LOOPBACK, tcp_endpoint, unix_endpoint
+from rbxcompose.endpoints import LOOPBACK, accepts, tcp_endpoint, unix_endpoint
 from rbxcompose.levels import Level
 from rbxcompose.plan.dump import load
 from rbxcompose.plan.model import Exchange, Plan, Share
@@ -38,6 +39,7 @@ from rbxcompose.runtime.records import Record, WriteRecord
 from rbxcompose.scheduler import Scheduler
 
 V = TypeVar("V")
+KNOCK = 0.25  # [s] for another host to accept a connection
 TRIES = 1000  # ports from `bus.port` on; each robot of a machine needs one
 
 
@@ -104,6 +106,8 @@ class Router:
     def beat(self) -> None:
         """Report to the supervisor and the watchdog that the loop runs."""
         self._watchdog.feed()
+        if self._hosts is not None and self._deaf_links.must_seek(self._clock.now()):
+            Thread(target=self._seek, daemon=True).start()  # a host that is not there lets whoever dials it wait
         if self._must_reopen:
             self._reopen()
         self._channel.flush()
@@ -168,6 +172,15 @@ class Router:
         deaf = self._deaf_links.hear(host, sent, heard, self._clock.now())
         if deaf is not None:
             self._warn("robot", f"host '{deaf}' is there, but does not answer; the links are opened again")
+            self._must_reopen = True
+
+    def _seek(self) -> None:
+        if any(accepts(one, KNOCK) for one in self._link.connect):
+            self._inbox.put("", self._find)
+
+    def _find(self) -> None:
+        if self._deaf_links.find(self._clock.now()):
+            self._warn("robot", "another host is there, but none answers; the links are opened again")
             self._must_reopen = True
 
     def _heard(self, report: HostReport) -> None:
