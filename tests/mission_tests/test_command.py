@@ -25,14 +25,6 @@ def test_all_tests_of_the_missions_pass(repository: Path, capsys: pytest.Capture
     assert all(test["passed"] for test in told["tests"])
 
 
-def test_the_mission_runs_alone_in_milliseconds(repository: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    took = []
-    for _ in range(3):
-        assert command(["test", "--json", PATROL]) == 0
-        took += [test["milliseconds"] for test in json.loads(capsys.readouterr().out)["tests"]]
-    assert min(took) < 50
-
-
 def test_a_filter_chooses_by_name(repository: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert command(["test", "missions", "--filter", "after_a_stop"]) == 0
     out = capsys.readouterr().out
