@@ -115,3 +115,13 @@ def network() -> Iterator[Network]:
         if thread not in threads and not isinstance(thread, threading._DummyThread)
     }
     assert not left
+
+
+@pytest.fixture
+def one(network: Network) -> Connected:
+    return network.process()
+
+
+@pytest.fixture
+def other(network: Network) -> Connected:
+    return network.process()

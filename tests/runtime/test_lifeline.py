@@ -24,6 +24,7 @@ from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.msgs.std_srvs import Trigger
 from rbxcompose.qos import Qos
 from rbxcompose.runtime.process_group.lifeline import BEATS, Lifeline, answer
+from rbxcompose.runtime.process_group.roll_caller import RollCaller
 from rbxcompose.scheduler import Scheduler
 from rbxcompose.sdk.bound import Reply
 
@@ -134,7 +135,7 @@ class Proxy:
 class Probed:
     """A process whose session is watched, driven by the thread of the test; it beats only when told to."""
 
-    def __init__(self, port: int) -> None:
+    def __init__(self, port: int, name: str = "robot") -> None:
         router = f"tcp/127.0.0.1:{port}"
         self.log: list[str] = []
         self.clock, self.scheduler = MonotonicClock(), Scheduler()
@@ -147,6 +148,8 @@ class Probed:
             self.transport,
             lambda: self._open(router),
             router,
+            host="",
+            name=name,
             owns_router=True,
             post=self._post,
             log=self.log.append,
@@ -193,7 +196,7 @@ def port() -> Iterator[int]:
     transport.close()
 
 
-def until(holds: Callable[[], object], *processes: Probed | Visitor) -> None:
+def until(holds: Callable[[], object], *processes: Probed | Visitor | Beating) -> None:
     deadline = time.monotonic() + PATIENCE
     while not holds():
         assert time.monotonic() < deadline, "it never came true"
@@ -245,3 +248,57 @@ def test_a_stuck_session_is_opened_again_with_all_that_was_declared(port: int) -
         assert (heard, told, [reply.response is not None for reply in replies]) == ([8.0], [1.0], [True])
         robot.bus.close()
         visitor.bus.close()
+
+
+def lose_link(one: ZenohTransport, other: ZenohTransport) -> None:
+    """Shut the connection between two sessions of this process, which Zenoh made when they learnt of each other."""
+    (link,) = [link for link in one._session.info.links() if str(link.zid) == other.session]
+    ends = {str(end).partition("/")[2] for end in (link.src, link.dst)}
+    for descriptor in map(int, os.listdir("/proc/self/fd")):
+        with suppress(OSError):  # no socket, or one that listens
+            end = socket.socket(fileno=descriptor)
+            try:
+                if {"{}:{}".format(*address) for address in (end.getsockname(), end.getpeername())} == ends:
+                    end.shutdown(socket.SHUT_RDWR)
+            finally:
+                end.detach()  # it is Zenoh's
+
+
+def test_two_that_have_lost_their_link_find_each_other_again(port: int) -> None:
+    router = ZenohTransport(
+        open_client(f"tcp/127.0.0.1:{port}"), lambda owner, callback: None
+    )  # reaches all, as it does
+    roll = RollCaller(router, ROBOT, "", "router")
+    robot, world = Probed(port, "robot"), Probed(port, "world")
+    heard: list[float] = []
+    robot.bus.subscribe("toy", "told", Float32, Qos.EVENT, lambda message: heard.append(message.data))
+    tell = world.bus.publisher("visitor", "told", Float32, Qos.EVENT)
+    until(lambda: robot.sessions[0]._session.info.links() and tell.has_match, robot, world)
+    until(lambda: len(robot.sessions[0]._session.info.links()) == 2, robot, world)
+
+    lose_link(robot.sessions[0], world.sessions[0])
+    until(lambda: not tell.has_match, robot, world)
+    until(lambda: len(robot.log) == 2, Beating(roll, robot, world))
+    assert robot.log[0] == "the session on the bus does not reach world any more, as others do; opening it again"
+    assert (world.log, len(world.sessions)) == ([], 1)
+    until(lambda: tell.has_match, robot, world)
+    tell(Float32(data=1.0))
+    until(lambda: heard, robot, world)
+    for one in (robot.bus, world.bus, router):
+        one.close()
+
+
+class Beating:
+    """The parts of a robot, which beat faster than they do in a process, but so that answers still arrive in time."""
+
+    def __init__(self, roll: RollCaller, *processes: Probed) -> None:
+        self._roll, self._processes, self._due = roll, processes, 0.0
+
+    def turn(self) -> None:
+        for one in self._processes:
+            one.turn()
+        if time.monotonic() > self._due:
+            self._due = time.monotonic() + 0.02
+            self._roll.beat()
+            for one in self._processes:
+                one.lifeline.beat()

@@ -42,6 +42,8 @@ class Fragile:
             self.transport,
             self._open,
             "tcp/127.0.0.1:1",
+            host="",
+            name="robot",
             owns_router=False,
             post=lambda owner, callback: callback(),
             log=self.log.append,

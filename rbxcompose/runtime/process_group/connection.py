@@ -41,6 +41,7 @@ class Connection:
 
 def open_bus(
     plan: Plan,
+    name: str,
     router: str,
     scheduler: Scheduler,
     clock: Clock,
@@ -49,7 +50,7 @@ def open_bus(
     log: Callable[[str, str], None],
     tape: Tape | None = None,
 ) -> Connection:
-    """Open a Zenoh session that finds the robot's other processes at `router`, and the bus over it."""
+    """Open the Zenoh session of process `name`, which finds the robot's others at `router`, and the bus over it."""
 
     def opened() -> ZenohTransport:
         session = _open_lone(router) if plan.bus.links == "router" else open_peer(router)
@@ -73,6 +74,8 @@ def open_bus(
         transport,
         opened,
         router,
+        host=plan.share.host if plan.share else "",
+        name=name,
         owns_router=plan.bus.router is None,
         post=inbox.put,
         log=lambda text: log("robot", text),

@@ -205,7 +205,7 @@ class ProcessGroup:
         tape = self._taping.tape if self._taping else None
         loop = self._scheduler, self._clock, self._inbox, self._turns
         try:
-            connection = open_bus(self._plan, router, *loop, self._complain, tape)
+            connection = open_bus(self._plan, self._name, router, *loop, self._complain, tape)
         except ConnectionRefusedError as error:
             self._channel.send(say.Failed("", str(error.strerror)))
             return

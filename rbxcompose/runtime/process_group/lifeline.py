@@ -3,6 +3,7 @@
 A session can be stuck for hours while Zenoh considers it healthy. So each process sends a probe over the bus to the
 nearest of the others, after a miss to all of them and to the robot's router, and answers the probes of others. Probes
 are answered in Zenoh's own thread, because they test the session; signs of life show whether a process's loop runs.
+That each reaches all others is told by a roll call.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from rbxcompose.bus.renewal import RenewableTransport
 from rbxcompose.bus.transport import Question, Transport, TransportReply
 from rbxcompose.endpoints import accepts
 from rbxcompose.runtime.process_group.driver import BEAT
+from rbxcompose.runtime.process_group.roll_caller import RollCaller
 
 BEATS = 3  # of the process between two probes: three misses and the new session take less than 4 s
 LONGEST_PROBE = 4.0  # [s] for an answer; a probe is over by then
@@ -46,12 +48,15 @@ class Lifeline:
         reopen: Callable[[], Transport],
         router: str,
         *,
+        host: str,
+        name: str,
         owns_router: bool,
         post: Post,
         log: Callable[[str], None],
     ) -> None:
         """Take the endpoint of the router, and whether it is the robot's own, which answers probes.
 
+        `name` is the process, `host` is empty for a robot on one machine.
         `reopen` returns the transport over a new session, `post` runs a callback in the scheduler's thread.
         """
         self._key, self._transport, self._reopen, self._router = probe_key(robot), transport, reopen, router
@@ -63,6 +68,7 @@ class Lifeline:
         self._pause, self._retry = FIRST_PAUSE, 0  # beats
         self._has_hung = False  # the old session, while closing
         transport.serve(self._key, answer)
+        self._roll = RollCaller(transport, robot, host, name)
 
     def beat(self) -> None:
         """Count a beat of the process; when due, evaluate the last probe and send the next one."""
@@ -70,13 +76,16 @@ class Lifeline:
         if self._is_changing:
             self._look_whether_to_try()
             return
+        if lost := self._roll.beat():
+            self._renew(f"does not reach {' and '.join(lost)} any more, as others do")
+            return
         if self._beats % BEATS:
             return
         if self._sent is not None:
             heard = self._sent.close()
             is_router_up = heard is ProbeResult.NOBODY and accepts(self._router, KNOCK)
             if self._probe.judge(heard, is_router_up=is_router_up):
-                self._renew()
+                self._renew("no longer carries anything")
                 return
         self._sent = _Sent(self._transport, self._key, of_all=self._probe.is_in_doubt)
 
@@ -85,8 +94,8 @@ class Lifeline:
         """Return the result of the current probe so far."""
         return self._sent.heard if self._sent is not None else ProbeResult.NOTHING
 
-    def _renew(self) -> None:
-        self._log("the session on the bus no longer carries anything; opening it again")
+    def _renew(self, why: str) -> None:
+        self._log(f"the session on the bus {why}; opening it again")
         self._is_changing, self._sent = True, None
         old = self._transport.detach()
         Thread(target=self._replace, args=(old,), name="renewal", daemon=True).start()

@@ -33,6 +33,7 @@ from rbxcompose.runtime.process_group.driver import RealTimeDriver
 from rbxcompose.runtime.process_group.host_line import HostLine
 from rbxcompose.runtime.process_group.inbox import CallbackInbox
 from rbxcompose.runtime.process_group.lifeline import answer
+from rbxcompose.runtime.process_group.roll_caller import RollCaller
 from rbxcompose.runtime.process_group.turns import Turns
 from rbxcompose.runtime.process_group.watchdog import Watchdog
 from rbxcompose.runtime.records import Record, WriteRecord
@@ -60,10 +61,12 @@ class Router:
         self._watchdog = Watchdog()
         self._transport: ZenohTransport | None = None
         self._hosts: HostLine | None = None
+        self._roll: RollCaller | None = None
         self._exchange: Closable | None = None
         self._scheduler = Scheduler()
         self._link = _link(plan, plan.share) if plan.share else NO_LINK
-        self._deaf_links = DeafLinks(plan.share.host if plan.share else "", clock.now())
+        self._host = plan.share.host if plan.share else ""
+        self._deaf_links = DeafLinks(self._host, clock.now())
         self._must_reopen = False
 
     def run(self) -> None:
@@ -80,7 +83,7 @@ class Router:
             self._exchange.close()
         if self._transport is not None:
             self._transport.close()
-        self._exchange = self._transport = self._hosts = None
+        self._exchange = self._transport = self._hosts = self._roll = None
 
     def handle(self, message: say.ChannelMessage) -> None:
         """Open the router, or end."""
@@ -106,6 +109,8 @@ class Router:
     def beat(self) -> None:
         """Report to the supervisor and the watchdog that the loop runs."""
         self._watchdog.feed()
+        if self._roll is not None:
+            self._roll.beat()  # a process that the router does not reach finds out by itself
         if self._hosts is not None and self._deaf_links.must_seek(self._clock.now()):
             Thread(target=self._seek, daemon=True).start()  # a host that is not there lets whoever dials it wait
         if self._must_reopen:
@@ -129,6 +134,7 @@ class Router:
             self._endpoint = wanted
             self._transport = ZenohTransport(session, self._inbox.put)
             self._transport.serve(probe_key(self._plan.robot), answer)
+            self._roll = RollCaller(self._transport, self._plan.robot, self._host, "router")
             if self._plan.share is not None:
                 told = self._heard, self._fail, self._clock.stamp, self._judge
                 self._hosts = HostLine(self._plan.robot, self._plan.share, self._transport, *told)
