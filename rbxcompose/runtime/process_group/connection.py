@@ -19,6 +19,7 @@ from rbxcompose.dataclass import dataclass
 from rbxcompose.plan.model import Plan
 from rbxcompose.runtime.process_group.inbox import CallbackInbox
 from rbxcompose.runtime.process_group.lifeline import Lifeline
+from rbxcompose.runtime.process_group.roll_caller import RollCaller
 from rbxcompose.runtime.process_group.turns import Turns
 from rbxcompose.runtime.processes import longest_wait, waits_of
 from rbxcompose.scheduler import Scheduler
@@ -52,8 +53,10 @@ def open_bus(
 ) -> Connection:
     """Open the Zenoh session of process `name`, which finds the robot's others at `router`, and the bus over it."""
 
+    is_lone = plan.bus.links == "router"
+
     def opened() -> ZenohTransport:
-        session = _open_lone(router) if plan.bus.links == "router" else open_peer(router)
+        session = _open_lone(router) if is_lone else open_peer(router)
         return ZenohTransport(session, inbox.put, turns)
 
     if reason := shared_memory.problem():
@@ -74,8 +77,7 @@ def open_bus(
         transport,
         opened,
         router,
-        host=plan.share.host if plan.share else "",
-        name=name,
+        roll=None if is_lone else RollCaller(transport, plan.robot, plan.share.host if plan.share else "", name),
         owns_router=plan.bus.router is None,
         post=inbox.put,
         log=lambda text: log("robot", text),

@@ -48,15 +48,14 @@ class Lifeline:
         reopen: Callable[[], Transport],
         router: str,
         *,
-        host: str,
-        name: str,
+        roll: RollCaller | None,
         owns_router: bool,
         post: Post,
         log: Callable[[str], None],
     ) -> None:
         """Take the endpoint of the router, and whether it is the robot's own, which answers probes.
 
-        `name` is the process, `host` is empty for a robot on one machine.
+        `roll` is called over `transport`, where processes have links with each other that may be lost.
         `reopen` returns the transport over a new session, `post` runs a callback in the scheduler's thread.
         """
         self._key, self._transport, self._reopen, self._router = probe_key(robot), transport, reopen, router
@@ -68,7 +67,7 @@ class Lifeline:
         self._pause, self._retry = FIRST_PAUSE, 0  # beats
         self._has_hung = False  # the old session, while closing
         transport.serve(self._key, answer)
-        self._roll = RollCaller(transport, robot, host, name)
+        self._roll = roll
 
     def beat(self) -> None:
         """Count a beat of the process; when due, evaluate the last probe and send the next one."""
@@ -76,7 +75,7 @@ class Lifeline:
         if self._is_changing:
             self._look_whether_to_try()
             return
-        if lost := self._roll.beat():
+        if self._roll is not None and (lost := self._roll.beat()):
             self._renew(f"does not reach {' and '.join(lost)} any more, as others do")
             return
         if self._beats % BEATS:
