@@ -53,9 +53,10 @@ def _answer(name: str, heard: Iterable[str]) -> bytes:
 def _told(answer: bytes) -> tuple[str, list[str]] | None:
     """Return who answered and whom it has heard; None from another version."""
     try:
-        match json.loads(answer):
-            case [str(name), [*heard]]:
-                return name, [one for one in heard if isinstance(one, str)]
+        told = json.loads(answer)
     except (ValueError, RecursionError):
-        pass
+        return None
+    match told:
+        case [str(name), [*heard]]:
+            return name, [one for one in heard if isinstance(one, str)]
     return None
