@@ -11,7 +11,7 @@ from rbxcompose.manifest.options import ComponentOptions
 from rbxcompose.missions.program.goals import typed_fields
 from rbxcompose.qos import Qos
 from rbxcompose.references import PLACE
-from rbxcompose.schema.components import examples_of
+from rbxcompose.schema.entries import examples_of
 from rbxcompose.sdk.component import Component
 from rbxcompose.sdk.ports import In, Looks, Out, Port, ServesAction, ServesTopic
 from rbxcompose.sdk.registry import PLUGINS, component_type
@@ -75,7 +75,7 @@ def facts(cls: type[Component[Any]]) -> str:
 def ports_of(name: str) -> dict[str, Port[Any]]:
     """Return the ports of a type, those that depend on the configuration as its example has them."""
     cls = component_type(name)
-    [written] = examples_of(name)
+    [written] = examples_of(component_type(name))
     options = {"type", *ComponentOptions.model_fields}
     settings = {key: value for key, value in dict(written).items() if key not in options}  # type: ignore[call-overload]
     config = cls.config_type().model_validate(settings, context={PLACE: {"dock": Place("dock", 0, 0, 0)}})

@@ -22,7 +22,7 @@ from rbxcompose.missions.program.moments import Moments
 from rbxcompose.missions.program.registry import StepType, kinds
 from rbxcompose.schema.mission import mission_schema
 from rbxcompose.schema.node_schema import Asking, first_line
-from rbxcompose.schema.scalars import Schema
+from rbxcompose.schema.scalars import SHARED, Schema
 from rbxcompose.schema.settle import referred
 from rbxcompose.sdk.ports import ServesAction, ServesTopic
 from rbxcompose.sdk.registry import PLUGINS, component_type
@@ -142,7 +142,7 @@ class Told(Asking):
 def whole_page() -> str:
     """Return the page."""
     schema = mission_schema(sorted(PLUGINS.shipped))
-    states = {key: referred(one, schema) for key, one in schema["definitions"]["state"]["properties"].items()}
+    states = {key: referred(one, schema) for key, one in schema[SHARED]["state"]["properties"].items()}
     interrupt = schema["properties"]["interrupts"]["additionalProperties"]["properties"]
     return page(
         "Missions",

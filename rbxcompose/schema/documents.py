@@ -13,10 +13,12 @@ from pathlib import Path
 from typing import Any
 
 from rbxcompose.atomic_files import replace_file
+from rbxcompose.manifest.section import OVERLAY, PART, ROBOT
 from rbxcompose.missions.program.program import Skill
 from rbxcompose.schema.mission import mission_schema
+from rbxcompose.schema.overlays import renamed
 from rbxcompose.schema.robot import overlay_schema, part_schema, robot_schema
-from rbxcompose.schema.scalars import Schema
+from rbxcompose.schema.scalars import DEFINITIONS, SHARED, Schema
 from rbxcompose.schema.system import system_schema
 from rbxcompose.schema.trial import trial_schema
 from rbxcompose.sdk import registry
@@ -46,28 +48,41 @@ def schema_for(kind: str, skills: Mapping[str, Skill]) -> Schema:
 
 
 def as_text(schema: Schema) -> str:
-    """Return a schema as the text of its file: anything that fits on one line does, so that diffs are short."""
-    return _text(schema, 0) + "\n"
+    """Return a schema as the text of its file: a line for each key or definition that fits on one."""
+    return _text(schema) + "\n"
 
 
-def _text(value: Any, depth: int) -> str:
-    flat = json.dumps(value, ensure_ascii=False)
-    if len(flat) + depth <= _WIDTH or not value or not isinstance(value, dict | list):
+def _text(value: Any) -> str:
+    flat = json.dumps(value, ensure_ascii=False, separators=(",", ":"))
+    if len(flat) <= _WIDTH or not value or not isinstance(value, dict | list):
         return flat
-    depth += 1
     if isinstance(value, dict):
-        items = [f"{json.dumps(key)}: {_text(one, depth)}" for key, one in value.items()]
-    else:
-        items = [_text(one, depth) for one in value]
-    opening, closing = "{}" if isinstance(value, dict) else "[]"
-    inside = f",\n{' ' * depth}".join(items)
-    return f"{opening}\n{' ' * depth}{inside}\n{' ' * (depth - 1)}{closing}"
+        return "{\n" + ",\n".join(f"{json.dumps(key)}:{_text(one)}" for key, one in value.items()) + "\n}"
+    return "[\n" + ",\n".join(map(_text, value)) + "\n]"
 
 
 def files() -> dict[str, str]:
-    """Return the file name and text of each schema, with the component types that ship with the package."""
+    """Return the file name and text of each schema, with the component types that ship with the package.
+
+    Those of parts and overlays refer to the definitions in that of robots, which is beside them.
+    """
     shipped = sorted(registry.PLUGINS.shipped)
-    return {f"{kind.lower()}.schema.json": as_text(make(shipped)) for kind, make in MAKERS.items()}
+    schemas = {kind: make(shipped) for kind, make in MAKERS.items()}
+    for kind in (PART, OVERLAY):
+        schemas[kind] = _beside(schemas[kind], schemas[ROBOT][SHARED])
+    return {_file(kind): as_text(schema) for kind, schema in schemas.items()}
+
+
+def _file(kind: str) -> str:
+    return f"{kind.lower()}.schema.json"
+
+
+def _beside(schema: Schema, definitions: Mapping[str, Schema]) -> Schema:
+    """Return a schema that refers to the definitions of a robot's instead of having them itself."""
+    own = {name: one for name, one in schema[SHARED].items() if definitions.get(name) != one}
+    there = {f"{DEFINITIONS}{name}": f"{_file(ROBOT)}{DEFINITIONS}{name}" for name in definitions if name not in own}
+    made: Schema = renamed({**schema, SHARED: own}, there)
+    return made if own else {key: one for key, one in made.items() if key != SHARED}
 
 
 def main(folder: Path) -> None:

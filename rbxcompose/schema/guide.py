@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from rbxcompose.manifest.tree import KeyPath, MappingNode, ScalarNode, TreeNode, at
+from rbxcompose.schema.overlays import SECTION, WHOLE
 from rbxcompose.schema.scalars import DIMENSION, Schema
 from rbxcompose.schema.settle import referred
 from rbxcompose.units import DIMENSIONS, Dimension
@@ -70,7 +71,8 @@ class Guide:
 
     def _meant(self, schema: Schema) -> Schema:
         """Return the key of a definition that a schema refers to, or the schema itself."""
-        return referred(schema, self.schema) if "/properties/" in schema.get("$ref", "") else schema
+        is_key = any(part in schema.get("$ref", "") for part in ("/properties/", f"/{SECTION}", f"/{WHOLE}{SECTION}"))
+        return referred(schema, self.schema) if is_key else schema
 
     def _opened(self, schema: Schema, node: TreeNode | None, path: KeyPath, depth: int = 0) -> Iterator[Schema]:
         """Yield a schema, and all those it refers to or combines."""

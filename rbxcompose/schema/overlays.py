@@ -1,92 +1,156 @@
-"""From the schema of a robot's sections to that of an overlay: every key may be omitted or removed."""
+"""What an overlay writes of a section, where every key may be omitted or removed, and what a whole section has.
+
+A definition describes changes, and `whole_` before its name what is complete: it refers to the former, and adds what
+must be there. So each key is described once.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from rbxcompose.manifest.options import OPTIONS
 from rbxcompose.manifest.registry import sections as all_sections
-from rbxcompose.schema.components import COMPONENT
-from rbxcompose.schema.scalars import DEFINITIONS, Schema
+from rbxcompose.schema.entries import COMPONENT, TYPE
+from rbxcompose.schema.scalars import DEFINITIONS, Schema, quantities
 from rbxcompose.sections.components import components
 
-OVER = "overlay_"  # prefix of a definition that differs in an overlay
+WHOLE = "whole_"  # prefix of a definition that allows neither to remove keys nor to omit required ones
+SECTION = "section_"  # prefix of the definition of a section
 REMOVED = "removed"
-_REMOVED: Schema = {"enum": [None, ""], "description": "With the tag `!remove`: removes it from the layers below."}
-_NOT_NEEDED = ("required", "minProperties", "minItems", "default")
-_NOTES = ("description", "x-names", "x-dimension")  # what editors expect at the key itself
+OR_REMOVED = "_or_removed"  # suffix of a definition to which that is added
+PRESENT = "present"
+# No `enum` or `type`: editors would propose `null` and `""` as values of every key.
+_EMPTY: Schema = {"maxLength": 0, "not": {"type": ["number", "boolean", "object", "array"]}}
+_REMOVED: Schema = {**_EMPTY, "description": "With the tag `!remove`: removes it from the layers below."}
+_PRESENT: Schema = {"not": _EMPTY, "errorMessage": "must not be empty"}
+_NOT_NEEDED = ("required", "minProperties", "minItems")
+_NOTES = ("description", "default", "x-names", "x-dimension")  # what editors expect at the key itself
 
 
-def laid_over(
-    sections: Mapping[str, Schema], definitions: Mapping[str, Schema]
-) -> tuple[dict[str, Schema], dict[str, Schema]]:
-    """Return the sections as allowed in an overlay, and all definitions, including those that only overlays need."""
-    over = _Overlay(definitions)
-    schemas = {name: over.of(one) for name, one in sections.items()}
+def laid_over(definitions: Mapping[str, Schema]) -> dict[str, Schema]:
+    """Return the definitions of a robot, which include its sections, as changes and as wholes."""
+    definitions = {**quantities(), **definitions}
+    whole = {f"{WHOLE}{name}": one for name, one in _wholes(definitions).items()}
+    changes = {name: _loose(one) for name, one in definitions.items()}
     for section in all_sections():
         if section.short and section.short.only_over:
             word = {"type": ["string", "number", "boolean", "array"], "description": section.short.only_over}
-            choice = schemas[section.name]["additionalProperties"]
-            schemas[section.name] = {
-                **schemas[section.name],
-                "additionalProperties": {"anyOf": [word, *choice["anyOf"]]},
-            }
-    schemas[components.name] = _told(schemas[components.name], definitions)
-    changed = {f"{OVER}{name}": over.of(definitions[name]) for name in over.changed}
-    return schemas, {**definitions, **changed, REMOVED: _REMOVED}
+            entry = changes[f"{SECTION}{section.name}"]["additionalProperties"]
+            changes[f"{SECTION}{section.name}"]["additionalProperties"] = {"anyOf": [word, entry]}
+    entry = changes[f"{SECTION}{components.name}"]["additionalProperties"]["anyOf"][0]
+    entry["allOf"] = [*entry["allOf"], _untyped(definitions)]
+    removable = {f"{name}{OR_REMOVED}": _removable(name, one) for name, one in changes.items()}
+    return {**changes, **whole, **removable, REMOVED: _REMOVED, PRESENT: _PRESENT}
 
 
-def _told(section: Schema, definitions: Mapping[str, Schema]) -> Schema:
-    """Return the section `components` with descriptions of the keys of an entry that does not repeat its type."""
+def _untyped(definitions: Mapping[str, Schema]) -> Schema:
+    """Return the descriptions of the keys of a component that does not repeat its type."""
     about: dict[str, list[str]] = {}
     for name in (one for one in definitions if one.startswith(COMPONENT)):
         for key, schema in definitions[name]["properties"].items():
-            if key not in ("type", *OPTIONS) and "description" in schema:  # a group of fields may have none
+            if key not in (TYPE, *OPTIONS) and "description" in schema:  # a group of fields may have none
                 about.setdefault(key, []).append(f"Of `{name.removeprefix(COMPONENT)}`: {schema['description']}")
     keys = {key: {"description": "\n\n".join(texts)} for key, texts in sorted(about.items())}
-    changed = {"if": {"not": {"anyOf": [{"required": ["type"]}]}}, "then": {"properties": keys}}
-    entry, removed = section["additionalProperties"]["anyOf"]
-    entry = {**entry, "allOf": [*entry["allOf"], changed]}
-    return {**section, "additionalProperties": {**section["additionalProperties"], "anyOf": [entry, removed]}}
+    return {"if": {"not": {"anyOf": [{"required": [TYPE]}]}}, "then": {"properties": keys}}
 
 
 def or_removed(schema: Schema) -> Schema:
     """Return the schema of something that an overlay may also remove."""
+    if "$ref" in schema:
+        return {**schema, "$ref": schema["$ref"] + OR_REMOVED}
     notes = {key: schema[key] for key in _NOTES if key in schema}
     rest = {key: value for key, value in schema.items() if key not in notes}
     choices = rest["anyOf"] if rest.keys() == {"anyOf"} else rest["allOf"] if rest.keys() == {"allOf"} else [rest]
     return {"anyOf": [*choices, {"$ref": f"{DEFINITIONS}{REMOVED}"}], **notes}
 
 
-class _Overlay:
-    """Turns schemas into those of an overlay; definitions that do not differ are shared with the robot's."""
+def _removable(name: str, schema: Schema) -> Schema:
+    made = or_removed({"anyOf": [{"$ref": f"{DEFINITIONS}{name}"}]})
+    samples = schema.get("examples", ()) if not schema.keys() & {"properties", "allOf"} else ()
+    # Editors write the default of a key, or its only example, into the file; of two they choose none.
+    return {**made, "examples": [*samples, *samples]} if samples else made
 
-    def __init__(self, definitions: Mapping[str, Schema]) -> None:
-        self.changed: set[str] = set()
-        while found := {
-            name for name, one in definitions.items() if name not in self.changed and self._is_changed(one)
-        }:
-            self.changed |= found
 
-    def _is_changed(self, schema: Schema) -> bool:
-        return self.of(schema) != schema
+def _loose(schema: Schema) -> Schema:
+    """Return a schema whose keys may be omitted or removed, at any depth."""
+    made: dict[str, Any] = {}
+    for key, value in schema.items():
+        match key:
+            case "properties":
+                made[key] = {name: one if one is True else or_removed(_loose(one)) for name, one in value.items()}
+            case "additionalProperties" if isinstance(value, dict):
+                made[key] = or_removed(_loose(value))
+            case "allOf" | "anyOf":
+                made[key] = [_loose(one) for one in value]
+            case "then" | "items" if isinstance(value, dict):
+                made[key] = _loose(value)
+            case _ if key not in _NOT_NEEDED:
+                made[key] = value
+    return made
 
-    def of(self, schema: Schema) -> Schema:
-        """Return the form of a schema in an overlay."""
-        made: dict[str, Any] = {}
-        for key, value in schema.items():
-            match key:
-                case "$ref" if value.removeprefix(DEFINITIONS) in self.changed:
-                    made[key] = DEFINITIONS + OVER + value.removeprefix(DEFINITIONS)
-                case "properties":
-                    made[key] = {name: one if one is True else or_removed(self.of(one)) for name, one in value.items()}
-                case "additionalProperties" if isinstance(value, dict):
-                    made[key] = or_removed(self.of(value))
-                case "allOf" | "anyOf":
-                    made[key] = [self.of(one) for one in value]
-                case "then" | "items" if isinstance(value, dict):
-                    made[key] = self.of(value)
-                case _ if key not in _NOT_NEEDED:
-                    made[key] = value
-        return made
+
+def _wholes(definitions: Mapping[str, Schema]) -> dict[str, Schema]:
+    """Return the definitions that differ from the changes to them, which all others refer to."""
+    changed = {name for name, one in definitions.items() if _loose(one) != one}
+    while more := {name for name, one in definitions.items() if changed & {*references(one)}} - changed:
+        changed |= more
+    names = {f"{DEFINITIONS}{name}": f"{DEFINITIONS}{WHOLE}{name}" for name in changed}
+    return {name: _whole(name, definitions, names) for name in sorted(changed)}
+
+
+def _whole(name: str, definitions: Mapping[str, Schema], names: Mapping[str, str]) -> Schema:
+    schema = definitions[name]
+    if schema.get("additionalProperties") is not False:
+        return dict(renamed(schema, names))
+    options = definitions[f"{SECTION}{components.name}"]["additionalProperties"]["properties"]
+    own = {
+        key: _bare(renamed(one, names))
+        for key, one in schema["properties"].items()
+        if _may_be_empty(options[key] if one is True else one, definitions)
+        or (one is not True and (_loose(one) != one or renamed(one, names) != one))
+    }
+    needed = {key: schema[key] for key in _NOT_NEEDED if key in schema}
+    reference = {"allOf": [{"$ref": f"{DEFINITIONS}{name}"}]}
+    return {**reference, **needed, "properties": own, "additionalProperties": {"$ref": f"{DEFINITIONS}{PRESENT}"}}
+
+
+def _bare(schema: Any) -> Any:
+    """Return a schema without its notes, which are those of the changes."""
+    return schema if schema is True else {key: one for key, one in schema.items() if key not in _NOTES}
+
+
+def renamed(schema: Any, names: Mapping[str, str]) -> Any:
+    """Return a schema that refers to other definitions."""
+    if isinstance(schema, list):
+        return [renamed(one, names) for one in schema]
+    if not isinstance(schema, dict):
+        return schema
+    return {key: names.get(one, one) if key == "$ref" else renamed(one, names) for key, one in schema.items()}
+
+
+def _may_be_empty(schema: Schema, definitions: Mapping[str, Schema]) -> bool:
+    """Return whether a schema accepts `null` or an empty text."""
+    if "$ref" in schema:
+        return _may_be_empty(definitions[schema["$ref"].removeprefix(DEFINITIONS)], definitions)
+    if "anyOf" in schema:
+        return any(_may_be_empty(one, definitions) for one in schema["anyOf"])
+    if "enum" in schema:
+        return False
+    types = schema.get("type", "null")
+    is_text = "string" in types and not schema.get("minLength") and re.search(schema.get("pattern", ""), "") is not None
+    return "null" in types or is_text
+
+
+def references(schema: Any) -> Iterator[str]:
+    """Yield the names of the definitions that a schema refers to."""
+    match schema:
+        case {"$ref": str(reference)}:
+            yield reference.removeprefix(DEFINITIONS).partition("/")[0]
+        case dict():
+            for inner in schema.values():
+                yield from references(inner)
+        case list():
+            for inner in schema:
+                yield from references(inner)

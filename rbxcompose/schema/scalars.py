@@ -3,20 +3,34 @@
 from __future__ import annotations
 
 import re
-from typing import Any
+from functools import cache
+from typing import Annotated, Any
 
+from pydantic import TypeAdapter
+
+from rbxcompose.config import Name
 from rbxcompose.expressions.types import Type, TypeKind
+from rbxcompose.manifest.fields import TopicPattern
+from rbxcompose.references import ACTUATOR, ARM, CONTROLLER, FILE, JOINT, LINK, NAMES, OBJECT, PLACE, RUNNING
 from rbxcompose.units import DIMENSIONS, NUMBER_TEXT, Dimension, example, needs_unit, units_of
 
 Schema = dict[str, Any]
 
-DEFINITIONS = "#/definitions/"
+SHARED = "$defs"  # the key of the definitions in a document
+DEFINITIONS = f"#/{SHARED}/"
 DIMENSION = "x-dimension"  # a keyword of ours: the dimension of a value
 FILLED = r"\$\{"  # text that contains this gets its value when the files are composed
-FILL: Schema = {"type": "string", "pattern": FILLED}
+FILL: Schema = {"$ref": f"{DEFINITIONS}filled"}
 COMPUTED = r"[$(*/+]|\s-\s"  # text that contains this is evaluated while the robot runs
 _PLAIN = {"integer": "a whole number", "number": "a number", "boolean": "true or false"}
-_NOTES = ("description", "default", "examples", "x-names")
+OR_NULL = "_or_null"  # suffix of the definition of a scalar that may be null
+_TOPIC: Any = Annotated[str, TopicPattern]
+_WORDS = {"name": TypeAdapter(Name).json_schema(), "topic": TypeAdapter(_TOPIC).json_schema()}
+_NAME_OF = "name_of_"  # prefix of the definition of a text that is the name of something
+_NAMED = (ACTUATOR, ARM, CONTROLLER, FILE, JOINT, LINK, OBJECT, PLACE, RUNNING)
+_TEXT: Schema = {"type": ["string", "number", "boolean"]}
+_BESIDE = {"description", "default"}  # what may stand beside a reference
+_NOTES = ("description", "default", "examples", NAMES)
 
 
 def quantity(dimension: Dimension) -> Schema:
@@ -36,10 +50,16 @@ def computed(wanted: Type, what: str = "") -> Schema:
     return {"type": ["string", "number", "boolean"]}
 
 
+@cache
 def quantities() -> dict[str, Schema]:
-    """Return the definition of each quantity, as a setting and as an expression."""
+    """Return the definition of each quantity, as a setting and as an expression, and of each plain scalar."""
     settings = {one.name: _quantity(one, FILLED) for one in DIMENSIONS.values()}
-    return settings | {_expression(one): _quantity(one, COMPUTED) for one in DIMENSIONS.values()}
+    settings |= {_plain(name): _filled(name) for name in _PLAIN}
+    settings |= {name: {**_patterned(word), "type": ["string"]} for name, word in _WORDS.items()}
+    settings |= {f"{_NAME_OF}{kind}": {**_TEXT, NAMES: kind} for kind in _NAMED}
+    settings |= {"text": _TEXT, "filled": {"type": ["string"], "pattern": FILLED}}
+    optional = {f"{name}{OR_NULL}": {**one, "type": [*one["type"], "null"]} for name, one in settings.items()}
+    return settings | optional | {_expression(one): _quantity(one, COMPUTED) for one in DIMENSIONS.values()}
 
 
 def _expression(dimension: Dimension) -> str:
@@ -76,9 +96,29 @@ def or_filled(schema: Schema) -> Schema:
     if "enum" in rest or "const" in rest or types in ("array", "object"):
         return {"anyOf": [rest, FILL], **notes}
     if types == "string":
+        name = next((name for name, word in _WORDS.items() if word == rest), "")
+        if name and notes.keys() <= _BESIDE:
+            return {"$ref": f"{DEFINITIONS}{name}", **notes}
         if "pattern" in rest:
-            return {**rest, "pattern": f"({rest['pattern']})|{FILLED}", **notes}
-        return {**rest, "type": ["string", "number", "boolean"], **notes}  # a text accepts its scalar as written
+            return {**_patterned(rest), **notes}
+        if rest.keys() == {"type"} and notes.keys() <= {*_BESIDE, NAMES} and notes.get(NAMES) in (None, *_NAMED):
+            name = f"{_NAME_OF}{notes.pop(NAMES)}" if NAMES in notes else "text"
+            return {"$ref": f"{DEFINITIONS}{name}", **notes}
+        return {**rest, **_TEXT, **notes}  # a text accepts its scalar as written
     if types not in _PLAIN:
         return schema
-    return {**rest, "type": [types, "string"], "pattern": FILLED, **_complaint(f"must be {_PLAIN[types]}"), **notes}
+    if rest.keys() == {"type"} and notes.keys() <= _BESIDE:
+        return {"$ref": f"{DEFINITIONS}{_plain(types)}", **notes}
+    return {**rest, **_filled(types), **notes}
+
+
+def _patterned(text: Schema) -> Schema:
+    return {**text, "pattern": f"({text['pattern']})|{FILLED}"}
+
+
+def _plain(name: str) -> str:
+    return f"plain_{name}"
+
+
+def _filled(name: str) -> Schema:
+    return {"type": [name, "string"], "pattern": FILLED, **_complaint(f"must be {_PLAIN[name]}")}

@@ -8,7 +8,7 @@ from typing import Any, Literal
 from pydantic import TypeAdapter
 
 from rbxcompose.manifest.unit_choice import rounder_unit
-from rbxcompose.schema.scalars import DEFINITIONS, DIMENSION, Schema, or_filled, quantities, quantity
+from rbxcompose.schema.scalars import DEFINITIONS, DIMENSION, OR_NULL, Schema, or_filled, quantities, quantity
 from rbxcompose.units import DIMENSIONS, format_quantity
 
 _SIDE: Literal["validation"] = "validation"
@@ -74,7 +74,11 @@ def _any_of(raw: Schema) -> Schema:
     members = [settled(one) for one in raw["anyOf"] if one != {"type": "null"}]
     rest = {key: value for key, value in raw.items() if key != "anyOf"}
     is_optional = len(members) < len(raw["anyOf"])
-    if is_optional and len(members) == 1 and "type" in (only := opened(members[0], quantities())):
+    if is_optional and len(members) == 1:
+        reference = f"{members[0].get('$ref', '')}{OR_NULL}"
+        if reference.removeprefix(DEFINITIONS) in quantities():
+            return {**members[0], "$ref": reference, **rest}
+    if is_optional and len(members) == 1 and "type" in (only := members[0]):
         return {**only, "type": [*_listed(only["type"]), "null"], **rest}
     return {"anyOf": [*members, *([{"type": "null"}] if is_optional else [])], **rest}
 

@@ -10,7 +10,7 @@ from rbxcompose.field_docs import field_docs
 from rbxcompose.manifest.section import TEST
 from rbxcompose.manifest.test_file import SECTIONS, TrialFile
 from rbxcompose.schema.robot import document, or_empty
-from rbxcompose.schema.scalars import Schema
+from rbxcompose.schema.scalars import DEFINITIONS, Schema
 from rbxcompose.schema.settle import opened, schemas_of
 
 STEP = "step"
@@ -26,7 +26,7 @@ def trial_schema(types: Iterable[str]) -> Schema:
     """Return the schema of a test; it is the same for all types of components."""
     schemas, definitions = schemas_of({**WORDS, **SECTIONS, "at": Time})
     sections = {key: or_empty(opened(schemas[key], definitions)) for key in (*WORDS, *SECTIONS)}
-    steps: Schema = {"type": "array", "items": {"$ref": f"#/definitions/{STEP}"}}
+    steps: Schema = {"type": "array", "items": {"$ref": f"{DEFINITIONS}{STEP}"}}
     expect = sections["expect"]
     about = {key: expect["properties"][key]["description"] for key in ("steps", "never")}
     told = {key: {**steps, "description": text} for key, text in about.items()}

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 from jsonschema import Draft7Validator
+from referencing import Registry, Resource
 
 from rbxcompose.cli.main import main as command
 from rbxcompose.config import Config, Length, Time
@@ -21,20 +22,32 @@ from rbxcompose.schema.documents import MAKERS, as_text, files
 from rbxcompose.schema.node_schema import kind_schema
 from rbxcompose.schema.settle import referred
 from rbxcompose.sdk import Component, component
+from rbxcompose.sdk.registry import PLUGINS
 from tests.conftest import ROOT
 
-SCHEMAS: dict[str, Any] = {name.partition(".")[0]: json.loads(text) for name, text in files().items()}
+FILES_WRITTEN: dict[str, Any] = {name: json.loads(text) for name, text in files().items()}
+NEIGHBOURS = Registry().with_resources((name, Resource.from_contents(schema)) for name, schema in FILES_WRITTEN.items())
+SCHEMAS: dict[str, Any] = {
+    kind.lower(): json.loads(as_text(make(sorted(PLUGINS.shipped)))) for kind, make in MAKERS.items()
+}
+"""Each as it is printed: alone."""
 ROBOT = (ROOT / "robots/turtlebot/robot.yaml").read_text(encoding="utf-8")
 MISSION = "rbx: 1\nkind: Mission\nname: m\n"
 
 
 def mistakes(text: str) -> list[str]:
-    """Return where a manifest's schema objects to it."""
+    """Return where a manifest's schema objects to it: the one that is printed, and the file beside its neighbours."""
     node, findings = read_text(text, "file.yaml")
     assert node is not None, findings
     data: Any = json.loads(json.dumps(to_plain(node)))
-    found = Draft7Validator(SCHEMAS[data["kind"].lower()]).iter_errors(data)
-    return [".".join(map(str, error.absolute_path)) for error in found]
+    kind = data["kind"].lower()
+    alone = Draft7Validator(SCHEMAS[kind])
+    beside = Draft7Validator(FILES_WRITTEN[f"{kind}.schema.json"], registry=NEIGHBOURS)
+    found, again = (
+        [".".join(map(str, one.absolute_path)) for one in made.iter_errors(data)] for made in (alone, beside)
+    )
+    assert found == again
+    return found
 
 
 def manifests() -> list[Path]:
@@ -52,9 +65,19 @@ def test_the_schemas_in_the_repository_are_up_to_date() -> None:
     assert written == files(), "run `make docs`"
 
 
+def test_the_files_are_small() -> None:
+    assert sum(len(text.encode()) for text in files().values()) <= 300_000
+
+
 @pytest.mark.parametrize("name", SCHEMAS)
-def test_a_schema_is_one_of_draft_7(name: str) -> None:
-    Draft7Validator.check_schema(SCHEMAS[name])
+def test_a_schema_and_its_definitions_are_of_draft_7(name: str) -> None:
+    for schema in [SCHEMAS[name], *SCHEMAS[name]["$defs"].values()]:
+        Draft7Validator.check_schema(schema)
+
+
+@pytest.mark.parametrize("name", SCHEMAS)
+def test_a_schema_that_is_printed_can_be_used_alone(name: str) -> None:
+    assert all(one["$ref"].startswith("#/") for one in references(SCHEMAS[name]))
 
 
 def maps(schema: object) -> Iterator[dict[str, Any]]:
@@ -75,19 +98,15 @@ def test_every_property_has_a_description(name: str) -> None:
     root = SCHEMAS[name]
     declared = [(key, schema) for keys in maps(root) for key, schema in keys.items()]
     told = {key for key, schema in declared if schema is not True and schema.get("description")}
-    for key, schema in declared:
-        if schema is True:  # what is only allowed here is described for all such maps
-            assert key in told
-        else:
-            assert schema.get("description") or referred(schema, root)["description"]
+    for key, schema in declared:  # what a whole map adds to the changes of it is described there
+        assert key in told or referred(schema, root)["description"]
 
 
 def entries(kind: str) -> Iterator[dict[str, Any]]:
     """Yield each entry of `components`: that of a file alone, and that of a file that changes others."""
     root = SCHEMAS[kind]
-    sections = [root.get("else", root)["properties"], root["definitions"].get("changes", root)["properties"]]
-    for section in sections:
-        entry = section["components"]["additionalProperties"]
+    for keys in [root.get("else", root)["properties"], root.get("then", root)["properties"]]:
+        entry = referred(keys["components"], root)["additionalProperties"]
         yield entry.get("anyOf", [entry])[0]
 
 
@@ -96,7 +115,8 @@ def test_what_every_component_may_have_is_described_at_the_entry(kind: str) -> N
     for entry in entries(kind):
         for chosen in entry["allOf"]:
             if "$ref" in chosen["then"]:
-                keys = referred(chosen["then"], SCHEMAS[kind])["properties"]
+                (changes,) = referred(chosen["then"], SCHEMAS[kind]).get("allOf", [chosen["then"]])
+                keys = referred(changes, SCHEMAS[kind])["properties"]
                 assert {key for key, schema in keys.items() if schema is True} == set(entry["properties"])
 
 
@@ -326,22 +346,22 @@ def test_a_mistake_in_a_mission_is_refused_at_its_place(text: str, place: str) -
     assert place in mistakes(f"{MISSION}{text}\n")
 
 
-@pytest.mark.parametrize("name", sorted(SCHEMAS["robot"]["definitions"]))
+@pytest.mark.parametrize("name", sorted(SCHEMAS["robot"]["$defs"]))
 def test_the_examples_of_a_definition_are_right(name: str) -> None:
-    schema = SCHEMAS["robot"]["definitions"][name]
-    entry, over = entries("robot")
-    whole = over if name.startswith("overlay_component_") else entry if name.startswith("component_") else schema
-    validator = Draft7Validator({**whole, "definitions": SCHEMAS["robot"]["definitions"]})
-    for sample in schema.get("examples", []):
-        validator.validate(sample)
+    shared = SCHEMAS["robot"]["$defs"]
+    for schema in entries("robot") if name.startswith("component_") else [shared.get(f"whole_{name}", shared[name])]:
+        validator = Draft7Validator({**schema, "$defs": shared})
+        for sample in shared[name].get("examples", []):
+            validator.validate(sample)
 
 
 def test_a_component_type_has_its_docstring_as_description_and_its_example() -> None:
-    battery = SCHEMAS["robot"]["definitions"]["component_battery_sim"]
+    battery = SCHEMAS["robot"]["$defs"]["component_battery_sim"]
     assert battery["description"].startswith("A battery that drains evenly")
     assert battery["examples"] == [{"type": "battery_sim", "runtime": "45 s", "warn": "50 %", "error": "20 %"}]
     assert battery["properties"]["warn"]["default"] == "50 %"
-    assert referred(battery["properties"]["warn"], SCHEMAS["robot"])["x-dimension"] == "ratio"
+    warn, _ = referred(battery["properties"]["warn"], SCHEMAS["robot"])["anyOf"]
+    assert referred(warn, SCHEMAS["robot"])["x-dimension"] == "ratio"
 
 
 @pytest.mark.parametrize("kind", MAKERS)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from difflib import unified_diff
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +18,10 @@ from rbxcompose.lsp.definition import define
 from rbxcompose.lsp.document import Document
 from rbxcompose.lsp.hover import describe
 from rbxcompose.lsp.project import Project as OpenProject
+from rbxcompose.manifest import registry
 from rbxcompose.manifest.registry import sections
 from rbxcompose.manifest.section import Section
-from rbxcompose.schema.documents import installed_schema
+from rbxcompose.schema.documents import files, installed_schema
 from tests.parts.project import Project
 
 pytestmark = pytest.mark.usefixtures("lamps")
@@ -219,6 +221,17 @@ def test_schemas_have_it(kind: str) -> None:
     assert not list(validator.iter_errors({**header, "lamps": {"front": "base", "rear": {"driver": "base"}}}))
     wrong = [*validator.iter_errors({**header, "lamps": {"front": {"drivr": "base"}}})]
     assert [list(error.absolute_path)[:2] for error in wrong][:1] == [["lamps", "front"]]
+
+
+def test_schemas_grow_by_few_lines_for_it(lamps: Section[Any, Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    with_it = files()
+    others = {one.name: one for one in sections() if one.name != lamps.name}
+    monkeypatch.setattr(registry, "_SECTIONS", others)
+    without = files()
+    changed = [
+        line for name in with_it for line in unified_diff(without[name].split("\n"), with_it[name].split("\n"), n=0)
+    ]
+    assert len([line for line in changed if line[:1] in "+-" and line[:3] not in ("+++", "---")]) < 60
 
 
 def test_the_reference_has_it_with_its_keys_and_example() -> None:

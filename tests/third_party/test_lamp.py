@@ -139,7 +139,7 @@ def test_its_settings_are_checked_like_ours(installed: Installed) -> None:
 def test_schema_and_editor_know_it(installed: Installed) -> None:
     installed.write(ROBOT)
     schema = json.loads(installed.run("-m", "rbxcompose", "schema", "robot").rpartition("[")[0])
-    assert "brightness" in schema["definitions"]["component_lamp"]["properties"]
+    assert "brightness" in schema["$defs"]["component_lamp"]["properties"]
     types, settings, *_ = installed.run("-c", COMPLETE).splitlines()
     assert "'lamp'" in types
     assert "'period', 'brightness'" in settings
