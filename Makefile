@@ -20,7 +20,7 @@ lint: $(VENV)/.test
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 
-types: $(VENV)/.test
+types: messages
 	$(BIN)/mypy
 
 unit: $(VENV)/.test  ## On all cores; `make unit PYTEST="-n 0 tests/bus"` runs some tests in one process
@@ -41,7 +41,7 @@ docs: $(VENV)/.test  ## Write the generated pages, tables and schemas, and the p
 	$(BIN)/python docs/draw_screens.py
 	$(BIN)/python -m rbxcompose.schema.documents schemas
 
-messages: $(VENV)/.test  ## Write rbxcompose/msgs/ from the interface texts
+messages: $(VENV)/.test  ## Write the stubs of message classes, for mypy and editors, from the interface texts
 	$(BIN)/python -m rbxcompose.msgs.generate
 
 lock: $(VENV)/.test  ## Choose newest versions for the lock files

@@ -13,7 +13,7 @@ import rbxcompose
 from rbxcompose.cli.bus.messages import NO_TYPE, to_json
 from rbxcompose.cli.output.console import refuse, tell
 from rbxcompose.manifest.files import shown_name
-from rbxcompose.msgs.generate import all_structures
+from rbxcompose.msgs.definitions import Structures
 from rbxcompose.msgs.hashes import type_hash
 from rbxcompose.msgs.joined import short
 from rbxcompose.msgs.packages import OWN, all_names, package_files, parts_of, whole_text
@@ -46,7 +46,7 @@ def _show(wanted: str, as_json: bool) -> int:
     if name is None:
         words = f"unknown type '{wanted}'"
         return refuse(NO_TYPE.misspelt(None, words, wanted, [*names, *map(short, names)], "known types"))
-    hashed, text = type_hash(name, all_structures()), whole_text(name)
+    hashed, text = type_hash(name, Structures()), whole_text(name)
     if as_json:
         tell(to_json({"type": name, "hash": hashed, "text": text, "parts": parts_of(name)}))
     else:

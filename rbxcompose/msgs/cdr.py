@@ -13,9 +13,10 @@ from functools import partial
 from operator import attrgetter
 from typing import Any, Protocol, TypeVar
 
+from rbxcompose.msgs import registry
 from rbxcompose.msgs.arrays import ArrayMessage, holds_numbers
 from rbxcompose.msgs.definitions import OCTETS, FieldShape, FieldType, attribute, parse_type
-from rbxcompose.msgs.types import Message, declared
+from rbxcompose.msgs.types import Message
 
 HEADER = b"\x00\x01\x00\x00"  # little-endian CDR, no options
 _LITTLE_ENDIAN = HEADER[:2]
@@ -327,7 +328,7 @@ class _Layout:
 
     def _add_field(self, type_: FieldType, path: str) -> str:
         if type_.shape is FieldShape.SINGLE and type_.is_message:
-            return self._add(declared[type_.base], f"{path}.")
+            return self._add(registry.message(type_.base), f"{path}.")
         if type_.shape is FieldShape.SINGLE and type_.base in _CODES:
             self._numbers.append((path, type_.base))
         else:
@@ -370,7 +371,7 @@ def _codec(type_: FieldType) -> _Codec:
         return _Octets(type_)
     if type_.base == "bool":
         return _Flags(type_)
-    element: _Codec = _layout(declared[type_.base]) if type_.is_message else _Text(type_.text_limit)
+    element: _Codec = _layout(registry.message(type_.base)) if type_.is_message else _Text(type_.text_limit)
     return element if type_.shape is FieldShape.SINGLE else _Elements(type_, element)
 
 

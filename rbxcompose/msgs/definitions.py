@@ -254,3 +254,32 @@ def read(name: str, root: Path = INTERFACES) -> tuple[Structure, ...]:
     """Read the structures written in the text of an interface."""
     package, kind, bare = name.split("/")
     return parse(name, (root / package / kind / f"{bare}.{kind}").read_text(encoding="utf-8"))
+
+
+class Structures(dict[str, Structure]):
+    """Every structure that the texts below a folder define, by name; a text is read when one of it is asked for."""
+
+    def __init__(self, root: Path = INTERFACES) -> None:
+        super().__init__()
+        self._root = root
+
+    def __missing__(self, name: str) -> Structure:
+        interface = _interface(name)
+        try:
+            found = parts(interface, read(interface, self._root))
+        except OSError as error:
+            raise KeyError(name) from error
+        self.update(found)
+        return found[name]
+
+    def __contains__(self, name: object) -> bool:
+        try:
+            return bool(self[str(name)])
+        except KeyError:
+            return False
+
+
+def _interface(structure: str) -> str:
+    """Return the interface of which a structure is a part."""
+    package, kind, bare = structure.split("/")
+    return f"{package}/{kind}/{bare.split('_')[0]}"

@@ -7,9 +7,10 @@ from math import isfinite
 from operator import attrgetter
 from typing import Any
 
+from rbxcompose.msgs import registry
 from rbxcompose.msgs.arrays import holds_numbers
 from rbxcompose.msgs.definitions import FLOATS, FieldShape, FieldType, attribute, parse_type
-from rbxcompose.msgs.types import Message, declared
+from rbxcompose.msgs.types import Message
 
 Get = Callable[[Any], Any]
 Test = Callable[[Any], bool]
@@ -60,7 +61,7 @@ def _collect(message: type[Message], prefix: str, singles: list[str], others: li
     for name, text in message.FIELDS.items():
         type_, path = parse_type(text), prefix + attribute(name)
         if type_.shape is FieldShape.SINGLE and type_.is_message:
-            _collect(declared[type_.base], f"{path}.", singles, others)
+            _collect(registry.message(type_.base), f"{path}.", singles, others)
         elif type_.shape is FieldShape.SINGLE and type_.base in FLOATS:
             singles.append(path)
         elif type_.shape is not FieldShape.SINGLE and (test := _test_of_many(type_)) is not None:

@@ -1,4 +1,7 @@
-"""Write the Python modules of all interfaces in `interfaces/`: `python -m rbxcompose.msgs.generate`."""
+"""Write the classes of interfaces as Python modules, for what reads code: type checkers, editors, other packages.
+
+`python -m rbxcompose.msgs.generate` writes the stubs of all interfaces in `interfaces/`, which are not committed.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from rbxcompose.msgs.arrays import holds_numbers
+from rbxcompose.msgs.classes import class_path
 from rbxcompose.msgs.definitions import (
     FLOATS,
     INTERFACES,
@@ -132,13 +136,7 @@ class _Module:
             yield from _indented(["", *self._message(f"{name}_{part}", f"{part} of `{path}`.")])
 
     def _path(self, name: str) -> str:
-        """Return the path of a structure in its module: `SetBool.Request` for `std_srvs/srv/SetBool_Request`.
-
-        A message that shares its name with an action of its package is told apart: `GripperCommandMessage`.
-        """
-        package, kind, bare = name.split("/")
-        is_shared = kind == "msg" and f"{package}/action/{bare}_Goal" in self.structures
-        return f"{bare}Message" if is_shared else bare.replace("_", ".")
+        return class_path(name, self.structures)
 
     def _message(self, name: str, doc: str) -> Iterator[str]:
         structure = self.structures[name]
@@ -242,9 +240,9 @@ def _indented(lines: Iterable[str]) -> Iterator[str]:
 
 
 def main() -> None:
-    """Write all modules beside this file."""
+    """Write all stubs beside this file."""
     for package, text in modules(all_structures()).items():
-        Path(__file__).with_name(f"{package}.py").write_text(text, encoding="utf-8")
+        Path(__file__).with_name(f"{package}.pyi").write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -12,8 +12,9 @@ from typing import Any, Generic, Protocol, TypeVar
 
 from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Span, kind, suggest
+from rbxcompose.msgs import registry
 from rbxcompose.msgs.definitions import FLOATS, OCTETS, FieldShape, FieldType, attribute, parse_type
-from rbxcompose.msgs.types import Message, declared
+from rbxcompose.msgs.types import Message
 
 M = TypeVar("M", bound=Message)
 Key = str | int
@@ -113,7 +114,8 @@ class _Reading(Generic[M]):
         if type_.shape is not FieldShape.SINGLE:
             return self._list(type_, value, path)
         if type_.is_message:
-            return self.message(declared[type_.base], value, path)
+            nested: type[Any] = registry.message(type_.base)
+            return self.message(nested, value, path)
         if type_.base == "string":
             return self._text(type_, value, path)
         if type_.base == "bool":

@@ -1,15 +1,19 @@
-"""Find messages, services and actions by their ROS names; a package is imported at its first lookup.
+"""The packages of interfaces in `interfaces/` as Python modules, and their classes by ROS name.
 
-Classes of other packages are found, too, once they have been imported.
+`rbxcompose.msgs.geometry_msgs` has no file: it makes the class `Twist` from its text when it is first used. Classes of
+other packages are found by name, too, once they have been imported.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
-from importlib import import_module
+from importlib.machinery import ModuleSpec
+from types import ModuleType
 from typing import Any, TypeVar
 
-from rbxcompose.msgs.definitions import KINDS, interface_names
+from rbxcompose.msgs.classes import class_path, make_class
+from rbxcompose.msgs.definitions import INTERFACES, KINDS, Structures, interface_names
 from rbxcompose.msgs.types import Action, Message, Service, declared
 
 T = TypeVar("T")
@@ -59,13 +63,21 @@ def full_name(name: str, kind: str) -> str:
 
 def _find(name: str, kind: str, base: type[T]) -> type[T]:
     full = full_name(name, kind)
-    package = full.split("/")[0]
-    if full not in declared and package in _shipped_packages():
-        import_module(f"rbxcompose.msgs.{package}")
-    found = declared.get(full)
+    found = _shipped_class(full) or declared.get(full)
     if found is None or not issubclass(found, base):
         raise KeyError(f"no {_WHAT[kind]} {name!r}; there are {', '.join(names(kind))}")
     return found
+
+
+def _shipped_class(full: str) -> type[Any] | None:
+    """Return a class of ours, also that of a part: `std_srvs/srv/SetBool_Request`."""
+    package = PACKAGES.get(full.split("/")[0])
+    if package is None or full.count("/") != 2:
+        return None
+    found: Any = package
+    for part in class_path(full, package.interfaces().values()).split("."):
+        found = getattr(found, part, None)
+    return found if getattr(found, "TYPE", None) == full else None
 
 
 @cache
@@ -73,6 +85,35 @@ def _shipped(kind: str) -> tuple[str, ...]:
     return tuple(interface_names(kind))
 
 
+class _Package(ModuleType):
+    """A ROS package as a Python module: its attributes are classes."""
+
+    def __init__(self, package: str) -> None:
+        super().__init__(f"{__package__}.{package}", f"ROS 2 interfaces of `{package}`.")
+        self.__package__ = __package__
+        self.__spec__ = ModuleSpec(self.__name__, None, origin=str(INTERFACES / package))
+
+    def __getattr__(self, name: str) -> type[Any]:
+        interface = self.interfaces().get(name)
+        if interface is None:
+            raise AttributeError(f"module {self.__name__!r} has no attribute {name!r}")
+        made = make_class(interface, SHIPPED)
+        setattr(self, name, made)
+        return made
+
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *self.interfaces()})
+
+    def interfaces(self) -> Mapping[str, str]:
+        """Return the names of all interfaces by those of their classes."""
+        return _interfaces(self.__name__.rpartition(".")[2])
+
+
 @cache
-def _shipped_packages() -> frozenset[str]:
-    return frozenset(name.split("/")[0] for kind in KINDS for name in _shipped(kind))
+def _interfaces(package: str) -> Mapping[str, str]:
+    names = {f"{package}/{path.parent.name}/{path.stem}" for path in (INTERFACES / package).glob("*/*")}
+    return {class_path(name, names): name for name in names}
+
+
+SHIPPED = Structures()
+PACKAGES = {path.name: _Package(path.name) for path in INTERFACES.iterdir()}

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-from importlib import import_module
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -14,8 +11,9 @@ from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
 from rbxcompose.msgs.arrays import holds_numbers
+from rbxcompose.msgs.classes import make_class
 from rbxcompose.msgs.definitions import OCTETS, FieldShape, FieldType, attribute, parse, parse_type, parts
-from rbxcompose.msgs.generate import all_structures, modules
+from rbxcompose.msgs.generate import all_structures
 from rbxcompose.msgs.types import Message, declared
 
 SAMPLES = {  # every kind of field, and a keyword as a name
@@ -55,21 +53,15 @@ for _name, _text in SAMPLES.items():
     STRUCTURES |= parts(_name, parse(_name, _text))
 
 
-def _load() -> list[type[Message]]:
-    for package, text in modules(STRUCTURES).items():
-        if package == "rbx_samples":
-            module = sys.modules.setdefault("rbx_samples", ModuleType("rbx_samples"))
-            exec(text, vars(module))
-        else:
-            import_module(f"rbxcompose.msgs.{package}")
-    return [
-        found
-        for name, found in sorted(declared.items())
-        if issubclass(found, Message) and name.split("/")[0] in {part.split("/")[0] for part in STRUCTURES}
-    ]
+def _messages() -> list[type[Message]]:
+    """Return all messages of our interfaces and of the samples, parts of services and actions as well."""
+    for name in STRUCTURES:
+        if "_" not in name.split("/")[2]:
+            make_class(name, STRUCTURES, "tests.msgs" if name.startswith("rbx_samples/") else "rbxcompose.msgs")
+    return [found for name, found in sorted(declared.items()) if name in STRUCTURES and issubclass(found, Message)]
 
 
-MESSAGES = _load()
+MESSAGES = _messages()
 EVERYTHING: Any = declared["rbx_samples/msg/Everything"]
 INTEGERS = {
     "byte": (0, 127),  # rosbags takes it for signed

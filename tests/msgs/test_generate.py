@@ -1,12 +1,16 @@
+import copy
 import dataclasses
-from pathlib import Path
-from typing import Any
+import pickle
+import subprocess
+import sys
+from types import ModuleType
+from typing import Any, get_type_hints
 
 import numpy as np
 import pytest
 
-import rbxcompose.msgs as package
-from rbxcompose.msgs.generate import all_structures, modules
+from rbxcompose.msgs import control_msgs, geometry_msgs
+from rbxcompose.msgs.generate import modules
 from rbxcompose.msgs.geometry_msgs import Pose, PoseStamped, PoseWithCovariance, Quaternion, Twist, Vector3
 from rbxcompose.msgs.nav2_msgs import NavigateToPose
 from rbxcompose.msgs.nav_msgs import Odometry
@@ -15,20 +19,74 @@ from rbxcompose.msgs.rcl_interfaces import Log
 from rbxcompose.msgs.std_srvs import SetBool
 from rbxcompose.msgs.types import Action, FeedbackT, GoalT, Message, RequestT, ResponseT, ResultT, Service, declared
 from rbxcompose.msgs.unique_identifier_msgs import UUID
-from tests.msgs.samples import EVERYTHING, MESSAGES
-
-FOLDER = Path(package.__path__[0])
-GENERATED = modules(all_structures())
+from tests.msgs.samples import EVERYTHING, MESSAGES, STRUCTURES
 
 
-@pytest.mark.parametrize("name", sorted(GENERATED))
-def test_a_module_is_what_its_texts_generate(name: str) -> None:
-    assert (FOLDER / f"{name}.py").read_text() == GENERATED[name], "run `python -m rbxcompose.msgs.generate`"
+def test_the_text_of_each_package_has_the_classes_that_are_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    texts = modules(STRUCTURES)
+    made = dict(declared)
+    try:
+        for text in texts.values():
+            module = ModuleType("written")
+            monkeypatch.setitem(sys.modules, "written", module)
+            exec(text, vars(module))
+        written = dict(declared)
+    finally:
+        declared.update(made)
+    assert {name: described(written[name]) for name in STRUCTURES if name in made} == {
+        name: described(made[name]) for name in STRUCTURES if name in made
+    }
 
 
-def test_no_generated_module_is_left_over() -> None:
-    marked = {path.stem for path in FOLDER.glob("*.py") if "do not edit" in path.read_text()[:400]}
-    assert marked - {"generate"} == set(GENERATED)
+def described(found: Any) -> object:
+    constants = {
+        name: value for name, value in vars(found).items() if name.isupper() and name not in ("HASH", "ARRAYS")
+    }
+    fields = dataclasses.fields(found) if issubclass(found, Message) else ()
+    return (
+        found.__qualname__,
+        found.__doc__,
+        found.HASH,
+        constants,
+        [(f.name, str(f.default)) for f in fields],
+        repr(found()) if fields else "",
+    )
+
+
+def test_a_class_is_made_once_by_whatever_way_it_is_found() -> None:
+    script = """
+import sys
+from rbxcompose.msgs import geometry_msgs, registry
+from rbxcompose.msgs.types import declared
+assert not declared
+from rbxcompose.msgs.geometry_msgs import TwistStamped
+assert TwistStamped is geometry_msgs.TwistStamped is registry.message("geometry_msgs/TwistStamped")
+assert set(declared) == {
+    f"{name}" for name in (
+        "builtin_interfaces/msg/Time", "std_msgs/msg/Header", "geometry_msgs/msg/Vector3", "geometry_msgs/msg/Twist",
+        "geometry_msgs/msg/TwistStamped",
+    )
+}
+import rbxcompose.msgs.std_msgs
+assert declared["std_msgs/msg/Header"] is rbxcompose.msgs.std_msgs.Header
+"""
+    subprocess.run([sys.executable, "-c", script], check=True)
+
+
+def test_a_package_knows_the_names_of_its_classes() -> None:
+    assert {"Twist", "Pose"} < set(dir(geometry_msgs))
+    assert {"GripperCommand", "GripperCommandMessage"} < set(dir(control_msgs))
+    assert control_msgs.GripperCommandMessage.TYPE == "control_msgs/msg/GripperCommand"
+    with pytest.raises(AttributeError, match=r"module 'rbxcompose.msgs.geometry_msgs' has no attribute 'Twits'"):
+        geometry_msgs.Twits  # type: ignore[attr-defined]  # noqa: B018
+    with pytest.raises(ImportError, match=r"cannot import name 'Twits' from 'rbxcompose.msgs.geometry_msgs'"):
+        exec("from rbxcompose.msgs.geometry_msgs import Twits")
+
+
+@pytest.mark.parametrize("message", [Twist(), NavigateToPose.Goal(behavior_tree="a"), SetBool.Request(True)], ids=str)
+def test_a_message_is_pickled_copied_and_has_types(message: Any) -> None:
+    assert pickle.loads(pickle.dumps(message)) == copy.deepcopy(message) == message
+    assert set(get_type_hints(type(message))) >= {"TYPE", "HASH", "FIELDS", *type(message).FIELDS}
 
 
 @pytest.mark.parametrize("message", MESSAGES, ids=lambda message: str(message.TYPE))
