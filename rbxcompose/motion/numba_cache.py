@@ -9,9 +9,11 @@ from __future__ import annotations
 import os
 import shutil
 import stat
+import sys
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, TypeVar
@@ -20,6 +22,7 @@ from xxhash import xxh3_64_hexdigest
 
 MOST_FOLDERS = 8
 _PREFIX = "motion-"
+_BLAS = "scipy.linalg.cython_blas"
 F = TypeVar("F", bound=Callable[..., object])
 
 
@@ -36,9 +39,8 @@ def compiled(function: F) -> F:
     Raises:
         ModuleNotFoundError: without numba.
     """
-    import numba
-
-    config: Any = numba.config
+    numba = _numba()
+    config = numba.config
     folder, before = cache_folder(), config.CACHE_DIR
     config.CACHE_DIR = folder  # which numba reads now, and only here: functions of others keep their own place
     try:
@@ -56,11 +58,23 @@ def inlined(function: F) -> F:
     Raises:
         ModuleNotFoundError: without numba.
     """
+    options = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "forceinline": True}
+    made: F = _numba().njit(function, nogil=True, error_model="numpy", **options)
+    return made
+
+
+@cache
+def _numba() -> Any:
+    """Import numba, and what it asks scipy for first: linear algebra, which is not used here and takes 10 MB."""
     import numba
 
-    options: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "forceinline": True}
-    made: F = numba.njit(function, nogil=True, error_model="numpy", **options)
-    return made
+    sys.modules.setdefault(_BLAS, None)  # type: ignore[arg-type] # so that importing it fails
+    try:
+        import_module("numba.np.arraymath")
+    finally:
+        if sys.modules[_BLAS] is None:
+            del sys.modules[_BLAS]
+    return numba
 
 
 @cache

@@ -9,7 +9,11 @@ from __future__ import annotations
 
 import logging
 import math
-from functools import lru_cache
+import sys
+from functools import cache, lru_cache
+from importlib import import_module
+from itertools import pairwise
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -20,7 +24,6 @@ from rbxcompose.motion.jerk_limits import PathTiming, jerks_between
 from rbxcompose.motion.joint_space import JointSpace
 
 Array = NDArray[np.float64]
-Spline = Any  # of an extra, without types
 
 MARGIN = 0.95
 """Share of the limits that is planned with: the rest is left to the limiter of each joint, to catch up."""
@@ -29,6 +32,7 @@ SECONDS_TO_SPEED = 0.5  # [s] in which a joint without a limit of acceleration r
 BEND, LONGEST, LEAST_GRID = 1e-3, 0.05, 100  # [rad or m] of a step of the grid, and how many there are at least
 LEAST_WINDOW, IN_WINDOW = 0.01, 4  # [s] over which speeds are averaged for limits of jerk; samples in this time
 WINDOWS = (1.0, 0.5, 0.25, 0.125)  # shares of the time that keeps them for sure: the one that is done first is taken
+UNUSED = ("matplotlib", "matplotlib.pyplot", "scipy", "scipy.interpolate", "scipy.sparse")  # of what toppra imports
 SAMPLE, LEAST_SAMPLES = 0.05, 12  # [s] between samples, and how many there are at least
 
 
@@ -77,6 +81,80 @@ class Trajectory:
         return np.concatenate(found)
 
 
+class Spline:
+    """The natural cubic spline along waypoints of shape (m, n), by the length [rad or m] of the lines between them.
+
+    It has what toppra asks of a path. That of scipy is the same, but importing it takes 25 MB and 0.2 s.
+    """
+
+    def __init__(self, waypoints: Array) -> None:
+        steps = np.linalg.norm(np.diff(waypoints, axis=0), axis=1)
+        self.knots: Array = np.concatenate([[0.0], np.cumsum(steps)])
+        self.path_interval = self.knots[[0, -1]]
+        self.dof: int = waypoints.shape[1]
+        h = np.diff(self.knots)
+        slopes = np.diff(waypoints, axis=0) / h[:, None]
+        self.bends = _bends(h.tolist(), slopes)
+        """Second derivatives at the knots, of shape (m, n)."""
+        first, last = self.bends[:-1], self.bends[1:]
+        starts = slopes - h[:, None] * (2 * first + last) / 6
+        self._pieces = waypoints[:-1], starts, first / 2, (last - first) / (6 * h[:, None])
+
+    def __call__(self, at: Array, order: int = 0) -> Array:
+        """Return positions, or derivatives of this order up to 2, of shape (k, n)."""
+        index = np.clip(np.searchsorted(self.knots, at, side="right") - 1, 0, len(self.knots) - 2)
+        t = (at - self.knots[index])[:, None]
+        a, b, c, d = (each[index] for each in self._pieces)
+        if order == 0:
+            return a + t * (b + t * (c + t * d))
+        return b + t * (2 * c + 3 * t * d) if order == 1 else 2 * c + 6 * t * d
+
+
+def _bends(h: list[float], slopes: Array) -> Array:
+    """Return second derivatives at all knots, 0 at both ends: Thomas's algorithm for the tridiagonal equations."""
+    bends = np.zeros((len(h) + 1, slopes.shape[1]))
+    bends[1:-1] = 6 * np.diff(slopes, axis=0)
+    diagonal = [1.0, *(2 * (before + after) for before, after in pairwise(h))]
+    for at in range(2, len(h)):
+        factor = h[at - 1] / diagonal[at - 1]
+        diagonal[at] -= factor * h[at - 1]
+        bends[at] -= factor * bends[at - 1]
+    for at in range(len(h) - 1, 0, -1):
+        bends[at] = (bends[at] - h[at] * bends[at + 1]) / diagonal[at]
+    return bends
+
+
+@cache
+def toppra() -> Any:
+    """Import toppra without matplotlib and scipy: 60 MB and 0.8 s for what is never called here.
+
+    Raises:
+        ModuleNotFoundError: if the extra `arm` is not installed.
+    """
+    later = {name: _Later(name) for name in UNUSED if name not in sys.modules}
+    for name, module in later.items():
+        parent, _, own = name.rpartition(".")
+        if parent in later:
+            setattr(later[parent], own, module)
+    sys.modules.update(later)
+    try:
+        found = import_module("toppra")
+    finally:
+        for name in later:
+            del sys.modules[name]
+    logging.getLogger("toppra").setLevel(logging.CRITICAL)  # what it says is told in the result
+    return found
+
+
+class _Later(ModuleType):
+    """Stands for a module that is imported once one of its functions is called."""
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        return lambda *values, **options: getattr(import_module(self.__name__), name)(*values, **options)
+
+
 def speeds_of(space: JointSpace, speed: float, acceleration: float) -> tuple[Array, Array]:
     """Return the greatest speeds and accelerations of joints, scaled by two shares from 0 to 1, each of shape (n,)."""
     fast = np.array([DEFAULT_SPEED if one.limits.velocity is None else one.limits.velocity for one in space.joints])
@@ -92,21 +170,18 @@ def timed(waypoints: Array, velocities: Array, accelerations: Array, jerks: Arra
 
     With limits of jerks it is not quite the fastest one: see `jerk_limits`.
     """
-    from toppra import algorithm
-
-    logging.getLogger("toppra").setLevel(logging.CRITICAL)  # what it says is told in the result
     if np.any(velocities <= 0.0) or np.any(accelerations <= 0.0):
         return "a limit of speed or acceleration is 0"
-    way, path = _spline(waypoints)
+    path = Spline(waypoints)
     constraints = _constraints(tuple(MARGIN * velocities), tuple(MARGIN * accelerations))
-    grid = _grid(way, np.asarray(path(way, 2)))
-    solver = algorithm.TOPPRA(constraints, path, gridpoints=grid, parametrizer="ParametrizeConstAccel")
+    grid = _grid(path.knots, path.bends)
+    solver = toppra().algorithm.TOPPRA(constraints, path, gridpoints=grid, parametrizer="ParametrizeConstAccel")
     found = solver.compute_trajectory(0, 0)
     if found is None or not math.isfinite(found.duration):
         return f"no velocities along {len(waypoints)} points keep the limits"
     if jerks is None:
         times = np.linspace(0.0, found.duration, max(LEAST_SAMPLES, math.ceil(found.duration / SAMPLE)) + 1)
-        made = [Trajectory(times, np.asarray(found(times)), np.asarray(found(times, 1)))]
+        made = [Trajectory(times, found(times), found(times, 1))]
     else:
         timing = PathTiming(grid, np.asarray(solver.problem_data.sd_vec))
         longest = max(LEAST_WINDOW, float(np.max(2.0 * accelerations / jerks)))
@@ -118,24 +193,16 @@ def timed(waypoints: Array, velocities: Array, accelerations: Array, jerks: Arra
 
 def curve(waypoints: Array, step: float) -> Array:
     """Return positions on the curve of `timed`, about `step` [rad or m] apart, of shape (k, n)."""
-    way, path = _spline(waypoints)
-    return np.asarray(path(np.linspace(0.0, way[-1], math.ceil(way[-1] / step) + 1)))
-
-
-def _spline(waypoints: Array) -> tuple[Array, Spline]:
-    """Return a spline along waypoints, and how far along it they are."""
-    import toppra
-
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(waypoints, axis=0), axis=1))])
-    return way, toppra.SplineInterpolator(way, waypoints, bc_type="natural")
+    path = Spline(waypoints)
+    length = path.knots[-1]
+    return path(np.linspace(0.0, length, math.ceil(length / step) + 1))
 
 
 @lru_cache(maxsize=8)
 def _constraints(velocities: tuple[float, ...], accelerations: tuple[float, ...]) -> list[Any]:
     """Return limits as toppra has them: it takes as long to make them as to search a path."""
-    from toppra import constraint
-
     bounds = [np.array([(-most, most) for most in each]) for each in (velocities, accelerations)]
+    constraint = toppra().constraint
     return [constraint.JointVelocityConstraint(bounds[0]), constraint.JointAccelerationConstraint(bounds[1])]
 
 
@@ -143,7 +210,7 @@ def _averaged(path: Spline, timing: PathTiming, window: float) -> Trajectory:
     """Return a trajectory whose pace is a mean over a window [s]."""
     count = math.ceil((float(timing.times[-1]) + window) / min(SAMPLE, window / IN_WINDOW)) + 1
     times, places, paces = timing.mean(window, count)
-    return Trajectory(times, np.asarray(path(places)), np.asarray(path(places, 1)) * paces[:, None])
+    return Trajectory(times, path(places), path(places, 1) * paces[:, None])
 
 
 def _kept(

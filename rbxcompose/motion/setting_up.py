@@ -13,6 +13,7 @@ from rbxcompose.motion.arm_kinematics import ArmKinematics
 from rbxcompose.motion.collisions import MeshChecker, adjacent_pairs
 from rbxcompose.motion.joint_space import JointSpace
 from rbxcompose.motion.matrix import SAMPLES, SEED, unavoidable_pairs
+from rbxcompose.motion.parametrisation import toppra
 
 
 def load_libraries() -> None:
@@ -23,7 +24,7 @@ def load_libraries() -> None:
     """
     atexit.unregister(gc.freeze)  # without a last collection at the exit, OMPL prints all that it had
     import_module("ompl.geometric")
-    import_module("toppra.algorithm")
+    toppra()
 
 
 def always_colliding(
