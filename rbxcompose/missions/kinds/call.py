@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Self
-
 from rbxcompose.dataclass import dataclass
 from rbxcompose.missions.engine.instant_actions import fields_of
 from rbxcompose.missions.engine.leaf import Leaf
 from rbxcompose.missions.engine.task import Site
-from rbxcompose.missions.language.node_reader import NodeReader
+from rbxcompose.missions.language.fields import contents, message
 from rbxcompose.missions.program.families import LeafStep
 from rbxcompose.missions.program.messages import MessageTemplate
 from rbxcompose.missions.program.moments import NodeEffects
@@ -46,7 +44,7 @@ class CallTask(Leaf):
         return RUNNING
 
 
-@kind("call", CallTask, {"request": "The fields of the request; a single value stands for the only field."})
+@kind("call", CallTask)
 @dataclass(frozen=True, slots=True)
 class CallStep(LeafStep):
     """Call a service of the robot; a response with `success: false` is a failure.
@@ -58,17 +56,13 @@ class CallStep(LeafStep):
           timeout: 2 s
     """
 
-    message: MessageTemplate
+    message: MessageTemplate = message("request")
+    request = contents("The fields of the request; a single value stands for the only field.")
 
     waits = True
     has_result = True
     lasts = None
     only_asks = False
-
-    @classmethod
-    def read(cls, reader: NodeReader) -> Self:
-        """Read the service and `request`."""
-        return cls(reader.message(reader.key, "request"))
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return that it may fail: the service may refuse."""
