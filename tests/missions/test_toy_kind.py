@@ -6,8 +6,6 @@ from collections.abc import Iterator
 
 import pytest
 
-from rbxcompose.dataclass import dataclass
-from rbxcompose.expressions.tree import Expression
 from rbxcompose.findings import Report
 from rbxcompose.inspection.mission_html import mission_html
 from rbxcompose.inspection.mission_text import mission_text
@@ -15,20 +13,37 @@ from rbxcompose.mission_tests.coverage import Coverage, SeenWays
 from rbxcompose.mission_tests.explorer import ExplorationLimits, explore
 from rbxcompose.missions.analysis.check_runner import check_program
 from rbxcompose.missions.engine.snapshot import restore, save
-from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.engine.world import Settings
-from rbxcompose.missions.language.fields import child, count, duration
 from rbxcompose.missions.language.reader import read_program
 from rbxcompose.missions.program import registry
-from rbxcompose.missions.program.answers import Advice, NodeFlow
-from rbxcompose.missions.program.families import Deed, Loop
 from rbxcompose.missions.program.linker import link
-from rbxcompose.missions.program.look import NodeLook
-from rbxcompose.missions.program.outcomes import ANY, SUCCEEDS, Outcomes
-from rbxcompose.missions.program.possible import Possibility, started
-from rbxcompose.missions.program.program import Endings, MissionNode, RobotNames
-from rbxcompose.missions.program.registry import kind, kinds
-from rbxcompose.missions.program.statuses import FAILURE, RUNNING, SUCCESS
+from rbxcompose.missions.program.outcomes import SUCCEEDS
+from rbxcompose.missions.program.registry import kinds
+from rbxcompose.missions.sdk import (
+    ANY,
+    FAILURE,
+    RUNNING,
+    SUCCESS,
+    Advice,
+    Deed,
+    Endings,
+    Expression,
+    Loop,
+    MissionNode,
+    NodeFlow,
+    NodeLook,
+    Outcomes,
+    Possibility,
+    RobotNames,
+    Site,
+    Task,
+    child,
+    count,
+    dataclass,
+    duration,
+    kind,
+    started,
+)
 from rbxcompose.missions.view.picture import picture_of
 from rbxcompose.schema.mission import schemas_of_keys
 from tests.missions.simulated import ROBOT, Simulated, program_of, tree
@@ -193,7 +208,7 @@ class Silent(Deed):
 
 
 def test_a_kind_that_leaves_something_unanswered_is_refused_and_a_type_error() -> None:
-    with pytest.raises(TypeError, match="the kind 'silent' does not answer effects, may_end"):
+    with pytest.raises(TypeError, match="the kind 'silent' does not answer may_end"):
         kind("silent", SilentTask)(Silent)  # type: ignore[type-abstract]
     with pytest.raises(TypeError, match="abstract"):
         Silent()  # type: ignore[abstract]

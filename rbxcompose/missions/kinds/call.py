@@ -7,11 +7,11 @@ from rbxcompose.missions.engine.instant_actions import fields_of
 from rbxcompose.missions.engine.leaf import Leaf
 from rbxcompose.missions.engine.task import Site
 from rbxcompose.missions.language.fields import contents, message
-from rbxcompose.missions.program.families import LeafStep
+from rbxcompose.missions.program.families import LeafStep, ends
 from rbxcompose.missions.program.messages import MessageTemplate
 from rbxcompose.missions.program.moments import NodeEffects
-from rbxcompose.missions.program.outcomes import ANY, Outcomes
-from rbxcompose.missions.program.program import Endings, MissionNode
+from rbxcompose.missions.program.outcomes import ANY
+from rbxcompose.missions.program.program import MissionNode
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.statuses import RUNNING
 from rbxcompose.msgs import registry
@@ -64,9 +64,7 @@ class CallStep(LeafStep):
     lasts = None
     only_asks = False
 
-    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
-        """Return that it may fail: the service may refuse."""
-        return ANY
+    may_end = ends(ANY)
 
     def text(self, node: MissionNode) -> str:
         """Return the service."""

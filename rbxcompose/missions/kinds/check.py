@@ -7,10 +7,8 @@ from rbxcompose.expressions.evaluate import holds
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.fields import condition
-from rbxcompose.missions.program.families import LeafStep
-from rbxcompose.missions.program.moments import NO_EFFECTS
-from rbxcompose.missions.program.outcomes import ANY, Outcomes
-from rbxcompose.missions.program.program import Endings, MissionNode
+from rbxcompose.missions.program.families import LeafStep, ends
+from rbxcompose.missions.program.outcomes import ANY
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.statuses import FAILURE, SUCCESS
 
@@ -46,8 +44,5 @@ class CheckStep(LeafStep):
     has_result = False
     lasts = None
     only_asks = True
-    effects = NO_EFFECTS
 
-    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
-        """Return that it may succeed or fail."""
-        return ANY
+    may_end = ends(ANY)

@@ -6,10 +6,8 @@ from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.text import Template
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.fields import choice, text
-from rbxcompose.missions.program.families import Deed
-from rbxcompose.missions.program.moments import NO_EFFECTS
-from rbxcompose.missions.program.outcomes import FAILS, NEVER, SUCCEEDS, Outcomes
-from rbxcompose.missions.program.program import Endings, MissionNode
+from rbxcompose.missions.program.families import Deed, ends
+from rbxcompose.missions.program.outcomes import FAILS, NEVER, SUCCEEDS
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.statuses import FAILURE, RUNNING, SUCCESS
 
@@ -54,11 +52,7 @@ class EndStep(Deed):
     result: str = choice(SUCCEEDS, FAILS)
     message: Template | None = text("A message for the log.", optional=True)
 
-    effects = NO_EFFECTS
-
-    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
-        """Return no outcomes: the node never ends, the mission does."""
-        return NEVER
+    may_end = ends(NEVER)
 
     @property
     def ends_mission(self) -> str:

@@ -9,7 +9,7 @@ from rbxcompose.missions.engine.events import Logged
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.fields import choice, text
 from rbxcompose.missions.program.families import Deed
-from rbxcompose.missions.program.moments import LEVELS, NO_EFFECTS
+from rbxcompose.missions.program.moments import LEVELS
 from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, ANY, Outcomes
 from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.registry import kind
@@ -44,8 +44,6 @@ class LogStep(Deed):
 
     template: Template = text()
     level: str = choice(*LEVELS, help="Its severity.")
-
-    effects = NO_EFFECTS
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return that it fails only if it cannot read a value."""

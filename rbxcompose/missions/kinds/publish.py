@@ -6,11 +6,11 @@ from rbxcompose.dataclass import dataclass
 from rbxcompose.missions.engine.instant_actions import publish
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.fields import contents, message
-from rbxcompose.missions.program.families import Deed
+from rbxcompose.missions.program.families import Deed, ends
 from rbxcompose.missions.program.messages import MessageTemplate
 from rbxcompose.missions.program.moments import NodeEffects
-from rbxcompose.missions.program.outcomes import ANY, Outcomes
-from rbxcompose.missions.program.program import Endings, MissionNode
+from rbxcompose.missions.program.outcomes import ANY
+from rbxcompose.missions.program.program import MissionNode
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.statuses import SUCCESS
 
@@ -46,9 +46,7 @@ class PublishStep(Deed):
     message: MessageTemplate = message("message")
     body = contents("The fields of the message; a single value stands for the only field.", "message")
 
-    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
-        """Return that it may fail: a value may be missing or not fit."""
-        return ANY
+    may_end = ends(ANY)
 
     def text(self, node: MissionNode) -> str:
         """Return the topic."""

@@ -11,10 +11,10 @@ from rbxcompose.missions.engine.task import Site
 from rbxcompose.missions.language.asked import WrittenArgument
 from rbxcompose.missions.language.fields import new_name, record, value, word
 from rbxcompose.missions.language.written import getter
-from rbxcompose.missions.program.families import LeafStep
+from rbxcompose.missions.program.families import LeafStep, ends
 from rbxcompose.missions.program.moments import NodeEffects, WrittenSetting
-from rbxcompose.missions.program.outcomes import ANY, Outcomes
-from rbxcompose.missions.program.program import Endings, MissionNode
+from rbxcompose.missions.program.outcomes import ANY
+from rbxcompose.missions.program.program import MissionNode
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.statuses import RUNNING
 
@@ -91,9 +91,7 @@ class SetParameterStep(LeafStep):
         """Return the value."""
         return (WrittenArgument("value", self.given[2], self.given[2].span),)
 
-    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
-        """Return that it may fail: the component may refuse."""
-        return ANY
+    may_end = ends(ANY)
 
     def text(self, node: MissionNode) -> str:
         """Return the setting and its value."""

@@ -7,7 +7,6 @@ from rbxcompose.expressions.tree import Expression, Number
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.fields import duration
 from rbxcompose.missions.program.families import LeafStep
-from rbxcompose.missions.program.moments import NO_EFFECTS
 from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, ANY, Outcomes
 from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.registry import kind
@@ -51,7 +50,6 @@ class WaitStep(LeafStep):
     waits = True
     has_result = False
     only_asks = False
-    effects = NO_EFFECTS
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return that it always succeeds if the duration is a literal."""

@@ -10,7 +10,6 @@ from rbxcompose.missions.engine.condition_watches import Watched
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.fields import watched
 from rbxcompose.missions.program.families import LeafStep
-from rbxcompose.missions.program.moments import NO_EFFECTS
 from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, ANY, Outcomes
 from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.registry import kind
@@ -61,7 +60,6 @@ class WaitForStep(LeafStep):
     has_result = False
     lasts = None
     only_asks = True
-    effects = NO_EFFECTS
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return that it succeeds; only a condition that cannot be evaluated is a failure."""
