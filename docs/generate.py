@@ -1,7 +1,7 @@
 """Writes what is generated in the documentation, from models, registries and docstrings.
 
-Whole pages: findings and reference. In pages that people write: tables between two comments. Run it with `make docs`; a
-test fails when a page is out of date.
+Whole pages: reference. In pages that people write: tables between two comments, and the line of facts below the title
+of a finding. Run it with `make docs`; a test fails when a page is out of date.
 """
 
 from __future__ import annotations
@@ -11,7 +11,8 @@ from pathlib import Path
 from docs.generating import commands, components, controllers, expressions, findings, missions, robot, sdk, tables
 
 DOCS = Path(__file__).parent
-FOLDERS = ("findings", "reference")  # in them is nothing else
+REFERENCE = "reference"
+FOLDERS = ("findings", REFERENCE)  # in them is nothing else
 
 
 def pages() -> dict[str, str]:
@@ -40,10 +41,11 @@ def written() -> dict[str, str]:
 
 
 def main() -> None:
-    """Write all pages, and remove those of what is gone."""
+    """Write all pages, and remove references of what is gone."""
     made = pages()
     for path in written().keys() - made.keys():
-        (DOCS / path).unlink()
+        if path.startswith(REFERENCE):
+            (DOCS / path).unlink()
     for path, text in made.items():
         (DOCS / path).parent.mkdir(exist_ok=True)
         (DOCS / path).write_text(text, encoding="utf-8")

@@ -14,13 +14,12 @@ from rbxcompose.model.doubts import Doubts, doubts_of
 from rbxcompose.model.robot import Robot
 from rbxcompose.plugins import LEFT_OUT, BrokenPluginError, Plugins
 from rbxcompose.printable import plain
-from rbxcompose.rules import Rule, declared
+from rbxcompose.rules import OUR_CODES, Rule, declared
 
 Check = Rule[Robot]
 Find = Callable[[Robot], Iterable[Finding]]
 
 PLUGINS = Plugins("check", "rbxcompose.checks")
-OWN = "RBX"  # prefix of the codes of this project
 _CODE = re.compile(r"[A-Z]+\d+")
 
 
@@ -46,8 +45,8 @@ def check(
     def declare(find: Find) -> Check:
         if not _CODE.fullmatch(code):
             raise ValueError(f"'{code}' is not a code: a code is capital letters followed by digits")
-        if _is_foreign(find) and code.startswith(OWN):
-            raise ValueError(f"the code {code} starts with {OWN}, which is reserved for this project")
+        if _is_foreign(find) and code.startswith(OUR_CODES):
+            raise ValueError(f"the code {code} starts with {OUR_CODES}, which is reserved for this project")
         CHECKS[code] = declared(find, code, severity, is_fixable, closed)
         return CHECKS[code]
 

@@ -28,19 +28,7 @@ from rbxcompose.per_compile import one_compile
 from rbxcompose.plan.build import build_plan
 from rbxcompose.plan.model import Plan
 
-NOT_TRIED = kind(
-    "RBX7003",
-    """Some profiles were not tried
-
-Without `--profile`, a robot is checked as its file describes it, then again with each of its profiles. With long
-missions or dozens of profiles this would take seconds, so it stops after a number of steps. The profiles that were not
-tried may contain mistakes. Check them by name, one at a time.
-
-Bad: `rbxcompose check`, for a robot with a mission of 9,000 steps and a profile `slow`.
-Good: `rbxcompose check --profile slow`
-""",
-    Severity.WARNING,
-)
+NOT_TRIED = kind("RBX7003", Severity.WARNING)
 
 
 @dataclass(slots=True)

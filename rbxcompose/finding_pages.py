@@ -10,6 +10,7 @@ from pathlib import Path
 import rbxcompose
 from rbxcompose.check_runner import all_checks
 from rbxcompose.findings import KINDS, FindingKind
+from rbxcompose.manifest.library import library_root
 from rbxcompose.missions.analysis.check_runner import mission_checks
 
 FAMILIES = {
@@ -39,6 +40,7 @@ FAMILIES = {
 """Meaning of the first two digits of a code."""
 
 _DECLARES = re.compile(r"^(\w+ = kind\(|@check\()", re.MULTILINE)
+_HEAD = re.compile(r"\A# \w+: (.*)\n(\n\*.*\*\n)?")  # title and, if it is there already, the line of facts
 _BLOCK = re.compile(r"^```\w*\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
@@ -54,14 +56,26 @@ def all_kinds() -> dict[str, FindingKind]:
     return dict(sorted(KINDS.items()))
 
 
+def page_of(kind: FindingKind) -> tuple[str, str]:
+    """Return title and body of a kind's page, from its file or, for a kind of another package, from its docstring."""
+    text = kind.doc or _HEAD.sub(r"\1\n", (page_folder() / f"{kind.code}.md").read_text(encoding="utf-8"))
+    title, _, body = text.strip().partition("\n")
+    return title, body.strip()
+
+
+def page_folder() -> Path:
+    """Return the folder of the pages of this project's kinds."""
+    return library_root() / "docs" / "findings"
+
+
 def title_of(kind: FindingKind) -> str:
-    """Return the first line of a kind's page."""
-    return kind.doc.strip().partition("\n")[0].rstrip(".")
+    """Return the title of a kind's page."""
+    return page_of(kind)[0].rstrip(".")
 
 
 def body_of(kind: FindingKind) -> str:
     """Return a kind's page without its title."""
-    return kind.doc.strip().partition("\n")[2].strip()
+    return page_of(kind)[1]
 
 
 def family_of(kind: FindingKind) -> str:

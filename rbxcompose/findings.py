@@ -8,6 +8,7 @@ from __future__ import annotations
 import difflib
 import heapq
 import re
+import sys
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import field
 from enum import StrEnum
@@ -107,15 +108,17 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class FindingKind:
-    """A kind of finding: a stable code and the text of its docs page (first line: title).
+    """A kind of finding: a stable code and its severity; `docs/findings/CODE.md` is its page.
 
-    `is_fixable` means that `check --fix` corrects at least some of its findings.
+    `is_fixable` means that `check --fix` corrects at least some of its findings. `doc` is the page of a kind of another
+    package (first line: title). `origin` is where it is declared.
     """
 
     code: str
-    doc: str
     severity: Severity = Severity.ERROR
     is_fixable: bool = False
+    doc: str = ""
+    origin: str = ""
 
     def at(
         self,
@@ -162,20 +165,21 @@ def _declared(name: str, valid: Mapping[str, object]) -> Iterator[Related]:
 KINDS: dict[str, FindingKind] = {}  # every kind that has been imported, by code
 
 
-def kind(code: str, doc: str, severity: Severity = Severity.ERROR, *, is_fixable: bool = False) -> FindingKind:
+def kind(code: str, severity: Severity = Severity.ERROR, *, is_fixable: bool = False, doc: str = "") -> FindingKind:
     """Declare a kind of finding beside the code that finds it.
 
     Raises:
         ValueError: if another kind has this code.
     """
-    made = FindingKind(code, doc, severity, is_fixable)
+    caller = sys._getframe(1)
+    made = FindingKind(code, severity, is_fixable, doc, f"{caller.f_globals['__name__']}:{caller.f_lineno}")
     register_kind(made)
     return made
 
 
 def register_kind(made: FindingKind) -> None:
-    """Enter a kind into `KINDS`; a code belongs to one kind only."""
-    if KINDS.setdefault(made.code, made).doc != made.doc:
+    """Enter a kind into `KINDS`; a code belongs to one kind only, whose module may be imported again."""
+    if KINDS.setdefault(made.code, made).origin != made.origin:
         raise ValueError(f"two kinds of finding have the code {made.code}")
 
 

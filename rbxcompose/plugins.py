@@ -20,29 +20,8 @@ if TYPE_CHECKING:
 
 GROUP = "rbxcompose.plugins"
 
-BROKEN = kind(
-    "RBX9301",
-    """A plug-in of another package is broken
-
-The component type exists, but its package cannot be used: importing it raises an error, what it announces is not
-a component type, or two packages announce the same name. The message names the package. Robots that do not use the type
-are not affected.
-
-Upgrade the package, uninstall it, or report it to its authors; `pip list` shows which version is there.
-""",
-)
-LEFT_OUT = kind(
-    "RBX9302",
-    """A plug-in of another package is left out
-
-It has the name of one that ships with the project, which is used instead, or it is a check or a section of the
-manifest that cannot be imported, or a check that raised an error. The message names the package. Everything else
-works without it.
-
-Upgrade the package, uninstall it, or report it to its authors.
-""",
-    Severity.WARNING,
-)
+BROKEN = kind("RBX9301")
+LEFT_OUT = kind("RBX9302", Severity.WARNING)
 
 
 class BrokenPluginError(Exception):

@@ -1,4 +1,4 @@
-"""Rules: functions that find one kind of error, declared by a decorator; the docstring is the docs page of the code.
+"""Rules: functions that find one kind of error, declared by a decorator.
 
 The subject of a rule depends on its family: the checks in `checks/` examine a robot, those in `missions/checks` a
 mission.
@@ -20,6 +20,7 @@ WIRING, NAMES, MISSIONS, OWN, ALL = "wiring", "names", "missions", "own file", "
 """What rules may take for known: all ports with their topics; the names of all components; all missions; the mission
 file that a finding is in; everything. The name of a section means its contents."""
 EVERYTHING = (ALL, WIRING, NAMES, MISSIONS, OWN)
+OUR_CODES = "RBX"  # how the codes of this project begin
 MOST = 100  # findings of one rule about one subject: a thousand things make a million pairs
 
 
@@ -57,14 +58,16 @@ def declared(
     is_fixable: bool,
     closed: tuple[str, ...] | None = None,
 ) -> Rule[S]:
-    """Enter a rule and its docs page under a code.
+    """Enter a rule under a code. The docstring of a rule of another package is its docs page.
 
     Raises:
         ValueError: if it has no docstring, or its code is taken.
     """
     if not find.__doc__:
         raise ValueError(f"check {code} has no docstring, so it would have no docs page")
-    made: Rule[S] = Rule(code, inspect.cleandoc(find.__doc__), severity, is_fixable, find=find, closed=closed)
+    doc = "" if code.startswith(OUR_CODES) else inspect.cleandoc(find.__doc__)
+    origin = f"{find.__module__}.{find.__qualname__}"
+    made: Rule[S] = Rule(code, severity, is_fixable, doc, origin, find=find, closed=closed)
     register_kind(made)
     return made
 
@@ -73,4 +76,4 @@ def belonging(
     find: Callable[[S], Iterable[Finding]], kind: FindingKind, closed: tuple[str, ...] | None = None
 ) -> Rule[S]:
     """Return a rule for a kind of finding that is declared elsewhere, because not only rules find it."""
-    return Rule(kind.code, kind.doc, kind.severity, kind.is_fixable, find=find, closed=closed)
+    return Rule(kind.code, kind.severity, kind.is_fixable, kind.doc, kind.origin, find=find, closed=closed)

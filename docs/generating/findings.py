@@ -1,4 +1,4 @@
-"""One page per code of a finding, and their index."""
+"""One page per code of a finding, written by people but for its line of facts, and their index."""
 
 from __future__ import annotations
 

@@ -6,17 +6,7 @@ from importlib.util import find_spec
 
 from rbxcompose.findings import Finding, kind
 
-NOT_DRAWN = kind(
-    "RBX9042",
-    """The libraries for pictures and meshes are not installed
-
-Pictures of a body are made by trimesh, embreex and Pillow; meshes are simplified by fast-simplification, trimesh and
-Rtree; Collada files (`.dae`) are read by pycollada. Robots do not need them; they are an extra.
-
-Bad: `rbxcompose body picture` without them.
-Good: `pip install 'rbxcompose[picture]'`
-""",
-)
+NOT_DRAWN = kind("RBX9042")
 
 
 class MissingLibraryError(Exception):

@@ -13,17 +13,7 @@ from rbxcompose.findings import Finding, kind
 from rbxcompose.printable import plain
 from rbxcompose.regular_files import open_regular
 
-BAD_MESH = kind(
-    "RBX2015",
-    """A mesh cannot be read
-
-The file of a mesh is too large, cut short, or not of the format that its name says. Viewers and planners would refuse
-it, or take minutes for it.
-
-Bad: `<mesh filename="base.stl"/>`, where `base.stl` is a page that says that the file was not found.
-Good: `<mesh filename="base.stl"/>`, where `base.stl` is a mesh of at most 64 MB.
-""",
-)
+BAD_MESH = kind("RBX2015")
 LARGEST = 64_000_000  # [bytes]
 _HEAD = 8_192  # [bytes] that are read
 _SHOWN = 200

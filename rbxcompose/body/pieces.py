@@ -10,36 +10,7 @@ from rbxcompose.body.xml_reader import XmlElement
 from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Span, kind
 
-NOT_ATTACHED = kind(
-    "RBX2016",
-    """A piece of the body is not attached to the rest
-
-Each piece but one, the base, is attached to a link of another piece or of the robot's own body. Links of the instance
-`head` have the prefix `head_`.
-
-Bad:
-```yaml
-body:
-  urdf: robot.urdf
-  pieces:
-    spare:
-      urdf: robot.urdf
-      attach:
-        to: base_lnk
-```
-Good:
-```yaml
-body:
-  urdf: robot.urdf
-  pieces:
-    spare:
-      urdf: robot.urdf
-      attach:
-        to: base_link
-```
-""",
-    is_fixable=True,
-)
+NOT_ATTACHED = kind("RBX2016", is_fixable=True)
 MOUNT = "mount"
 """The joint that attaches the piece `head` is `head_mount`."""
 _NAMES = {"link": ("name",), "joint": ("name",), "parent": ("link",), "child": ("link",), "mimic": ("joint",),

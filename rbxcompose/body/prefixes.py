@@ -12,34 +12,7 @@ from rbxcompose.manifest.files import shown_name
 from rbxcompose.manifest.library import library_root
 from rbxcompose.printable import plain
 
-NO_PREFIX = kind(
-    "RBX2014",
-    """Tags of xacro without the prefix `xacro:`
-
-ROS 1 read `<macro>`, `<property>`, `<include>`, `<if>` and calls of macros without a prefix. xacro of ROS 2 takes them
-for URDF and leaves them as they are. They are read here as they were meant; `check --fix` writes the prefix, so that
-other programs can read the file, too.
-
-Bad:
-```xml
-<robot name="cart">
-  <property name="side" value="left"/>
-  <macro name="wheel" params="name"><link name="${name}_wheel"/></macro>
-  <wheel name="${side}"/>
-</robot>
-```
-Good:
-```xml
-<robot name="cart" xmlns:xacro="http://www.ros.org/wiki/xacro">
-  <xacro:property name="side" value="left"/>
-  <xacro:macro name="wheel" params="name"><link name="${name}_wheel"/></xacro:macro>
-  <xacro:wheel name="${side}"/>
-</robot>
-```
-""",
-    Severity.WARNING,
-    is_fixable=True,
-)
+NO_PREFIX = kind("RBX2014", Severity.WARNING, is_fixable=True)
 BINDING = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
 _SHOWN = 60  # characters of a name in a message
 

@@ -8,55 +8,8 @@ from rbxcompose.body.model import Body, BodyJoint, BodyLink
 from rbxcompose.findings import MOST_COMPARED, Finding, Related, Span, kind
 from rbxcompose.printable import plain
 
-NO_LINK = kind(
-    "RBX2005",
-    """A joint names a link or a joint that the body does not have
-
-A joint connects a parent link with a child link, and may mimic another joint that moves by itself.
-
-Bad:
-```xml
-<link name="base"/>
-<link name="head"/>
-<joint name="neck" type="fixed">
-  <parent link="bsae"/>
-  <child link="head"/>
-</joint>
-```
-Good:
-```xml
-<link name="base"/>
-<link name="head"/>
-<joint name="neck" type="fixed">
-  <parent link="base"/>
-  <child link="head"/>
-</joint>
-```
-""",
-)
-NO_TREE = kind(
-    "RBX2006",
-    """The links of the body do not form one tree
-
-Each link but one, the root, is the child of exactly one joint, and no joints form a circle. Otherwise a link would be
-at two places, or at none.
-
-Bad:
-```xml
-<link name="base"/>
-<link name="head"/>
-```
-Good:
-```xml
-<link name="base"/>
-<link name="head"/>
-<joint name="neck" type="fixed">
-  <parent link="base"/>
-  <child link="head"/>
-</joint>
-```
-""",
-)
+NO_LINK = kind("RBX2005")
+NO_TREE = kind("RBX2006")
 _SHOWN = 60
 
 

@@ -20,49 +20,8 @@ from rbxcompose.findings import Finding, Related, kind
 from rbxcompose.geometry import Transform3, quaternion_from_rpy
 from rbxcompose.printable import plain
 
-WRONG_VALUE = kind(
-    "RBX2003",
-    """A value in the body is missing or wrong
-
-A URDF describes links and joints by numbers in metres, radians and kilograms. An element lacks something that it needs,
-or a value is not a finite number, or not one of the words that fit there.
-
-Bad:
-```xml
-<joint name="pan" type="revolving">
-  <parent link="base"/>
-  <child link="head"/>
-  <axis xyz="0 0 nan"/>
-</joint>
-```
-Good:
-```xml
-<joint name="pan" type="continuous">
-  <parent link="base"/>
-  <child link="head"/>
-  <axis xyz="0 0 1"/>
-</joint>
-```
-""",
-)
-TWICE = kind(
-    "RBX2004",
-    """Two links or two joints have the same name
-
-Frames, transforms and joint states are found by name. Macros that are used twice need a prefix for their names.
-
-Bad:
-```xml
-<link name="wheel"/>
-<link name="wheel"/>
-```
-Good:
-```xml
-<link name="left_wheel"/>
-<link name="right_wheel"/>
-```
-""",
-)
+WRONG_VALUE = kind("RBX2003")
+TWICE = kind("RBX2004")
 _SIZES = {"sphere": ("radius",), "cylinder": ("radius", "length"), "capsule": ("radius", "length")}
 _GEOMETRIES = ("box", *_SIZES, "mesh")
 _INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")

@@ -15,17 +15,7 @@ from rbxcompose.geometry import Transform3
 from rbxcompose.printable import plain
 
 VirtualKind = Literal["fixed", "planar", "floating"]
-MISFIT = kind(
-    "RBX2249",
-    """A virtual joint has the name of something in the body
-
-Its frame is outside of the body, so no link has that name; and no two joints have one name. If the URDF has a link
-`world` already, leave the virtual joint out.
-
-Bad: `virtual_joint: {frame: base_link}`
-Good: `virtual_joint: {frame: world}`
-""",
-)
+MISFIT = kind("RBX2249")
 
 
 @dataclass(frozen=True, slots=True)

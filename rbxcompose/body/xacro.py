@@ -19,32 +19,7 @@ from rbxcompose.manifest.files import shown_name
 from rbxcompose.printable import plain
 from rbxcompose.regular_files import read_regular
 
-NOT_EXPANDED = kind(
-    "RBX2007",
-    """A xacro file cannot be expanded
-
-An expression is wrong, a macro or a property does not exist, an included file is missing, or the expansion takes more
-than 1.2 s of processor time (more on a slow machine) or 140 MB. `$(find PACKAGE)` looks up `packages:` of the `body`;
-the environment is not read.
-
-A xacro file is a program. It runs in a process of its own without the environment, may read files of the project and of
-its packages only, and writes nothing. That fences it, but does not make a stranger's file safe.
-
-Bad:
-```xml
-<robot name="cart" xmlns:xacro="http://www.ros.org/wiki/xacro">
-  <link name="${prefix}_base"/>
-</robot>
-```
-Good:
-```xml
-<robot name="cart" xmlns:xacro="http://www.ros.org/wiki/xacro">
-  <xacro:property name="prefix" value="left"/>
-  <link name="${prefix}_base"/>
-</robot>
-```
-""",
-)
+NOT_EXPANDED = kind("RBX2007")
 _NAMESPACE = "http://www.ros.org/wiki/xacro"
 _UNKNOWN = (
     (re.compile(r"unknown macro name: (?:xacro:)?(\w+)"), "macro", "macros"),
@@ -56,18 +31,7 @@ _LARGEST = 1_000_000  # [B] of a file whose names are proposed
 _PLACES = re.compile(rf' {PLACE}="[^"]*"')
 
 
-NO_ARGUMENT = kind(
-    "RBX2020",
-    """A xacro file does not declare an argument that it is given
-
-The value would have no effect. A xacro file declares its arguments by `<xacro:arg name="..." default="..."/>`.
-
-Bad: `with: {heigth: 1 m}` for a file with `<xacro:arg name="height" default="0.5"/>`.
-Good: `with: {height: 1 m}`.
-""",
-    Severity.WARNING,
-    is_fixable=True,
-)
+NO_ARGUMENT = kind("RBX2020", Severity.WARNING, is_fixable=True)
 
 
 @dataclass(frozen=True, slots=True)

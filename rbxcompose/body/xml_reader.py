@@ -15,48 +15,8 @@ from rbxcompose.manifest.limits import DEPTH, URDF_ELEMENTS
 from rbxcompose.manifest.yaml_nodes import TOO_LARGE
 from rbxcompose.printable import plain
 
-NOT_XML = kind(
-    "RBX2001",
-    """A URDF file is not valid XML
-
-The file of `body: {urdf: FILE}` must be well-formed XML in UTF-8: each element is closed, each value has quotes.
-A DOCTYPE is refused, since it can make a small file grow without bounds.
-
-Bad:
-```xml
-<robot name="cart">
-  <link name="base">
-</robot>
-```
-Good:
-```xml
-<robot name="cart">
-  <link name="base"/>
-</robot>
-```
-""",
-)
-NOT_URDF = kind(
-    "RBX2002",
-    """A file is not a URDF
-
-The root of a URDF file is the element `robot`. Files of other kinds, such as SDF, and files that xacro has yet to
-expand are not accepted.
-
-Bad:
-```xml
-<robot name="cart" xmlns:xacro="http://www.ros.org/wiki/xacro">
-  <xacro:include filename="wheel.xacro"/>
-</robot>
-```
-Good:
-```xml
-<robot name="cart">
-  <link name="wheel"/>
-</robot>
-```
-""",
-)
+NOT_XML = kind("RBX2001")
+NOT_URDF = kind("RBX2002")
 
 ROOT = "robot"
 XACRO = "xacro:"

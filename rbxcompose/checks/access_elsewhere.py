@@ -11,23 +11,7 @@ from rbxcompose.model.robot import Robot
 
 @check("RBX3025")
 def access_elsewhere(robot: Robot) -> Iterator[Finding]:
-    """The access is restricted at a router that is not the robot's own
-
-    `access: user` lets only this user's programs take part, by Unix sockets of the robot's own router. With `router:`
-    the robot uses an existing one instead, and whoever reaches that one can command the robot.
-
-    Bad:
-    ```yaml
-    bus:
-      access: user
-      router: tcp/192.168.0.2:7447
-    ```
-    Good:
-    ```yaml
-    bus:
-      access: user
-    ```
-    """
+    """The access is restricted at a router that is not the robot's own."""
     bus = robot.manifest.bus
     if bus.access == "user" and bus.router is not None:
         yield access_elsewhere.at(

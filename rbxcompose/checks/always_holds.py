@@ -13,24 +13,7 @@ from rbxcompose.rules import MISSIONS
 
 @check("RBX4123", Severity.WARNING, closed=(MISSIONS,))
 def always_holds(robot: Robot) -> Iterator[Finding]:
-    """A condition always holds
-
-    A battery has 0 % to 100 %, and a distance or an age is never below zero. A condition that is true for every
-    possible value decides nothing.
-
-    Bad:
-    ```yaml
-    do:
-      if: $battery <= 100 %
-      then: recharge
-    ```
-    Good:
-    ```yaml
-    do:
-      if: $battery < 50 %
-      then: recharge
-    ```
-    """
+    """A condition always holds."""
     for mission in robot.missions.values():
         for asked, holds in decided(robot, mission):
             if holds is True:

@@ -15,27 +15,7 @@ REPORTS = 1.0  # [s] between two reports of a component's status
 
 @check("RBX5005")
 def analyzer_timeout(robot: Robot) -> Iterator[Finding]:
-    """An analyzer treats its components as stale between two reports
-
-    Components report once a second. With a shorter `timeout` they become STALE in between.
-
-    Bad:
-    ```yaml
-    diagnostics:
-      analyzers:
-        power:
-          match: [battery, charger]
-          timeout: 500 ms
-    ```
-    Good:
-    ```yaml
-    diagnostics:
-      analyzers:
-        power:
-          match: [battery, charger]
-          timeout: 5 s
-    ```
-    """
+    """An analyzer treats its components as stale between two reports."""
     for path, analyzer in each_analyzer(robot.manifest.diagnostics.analyzers):
         if 0 < analyzer.timeout <= REPORTS:
             yield analyzer_timeout.at(

@@ -15,14 +15,7 @@ from rbxcompose.units import BIT_RATE, format_quantity
 
 @check("RBX2227")
 def baud_of_servo(robot: Robot) -> Iterator[Finding]:
-    """A servo does not have the rate of its bus
-
-    All servos of a bus listen at its one rate, and each model has its own list of rates. An AX-12 goes up to 1000000
-    bit/s, an XL430-W250 up to 4500000 bit/s.
-
-    Bad: `servos: {type: dynamixel, baud: 3000000}` with an AX-12.
-    Good: `servos: {type: dynamixel, baud: 1000000}`
-    """
+    """A servo does not have the rate of its bus."""
     for bus in driven_buses(robot):
         contents = robot.manifest.contents
         own = {name: one for name, one in contents.of(actuators).items() if one.bus == bus.name}

@@ -17,26 +17,7 @@ from rbxcompose.rules import MISSIONS
 
 @check("RBX4132", Severity.WARNING, closed=(MISSIONS,))
 def beyond_list(robot: Robot) -> Iterator[Finding]:
-    """A list item that does not exist
-
-    List items are counted from 0, so the last of two is `$rooms[1]`. If nothing changes the list, an item past its end
-    never exists: a node that needs it fails, and a condition on it never holds.
-
-    Bad:
-    ```yaml
-    data:
-      rooms: [kitchen, window]
-    do:
-      go_to: $rooms[2]
-    ```
-    Good:
-    ```yaml
-    data:
-      rooms: [kitchen, window]
-    do:
-      go_to: $rooms[1]
-    ```
-    """
+    """A list item that does not exist."""
     for mission in robot.missions.values():
         known = constants(mission)
         for scalar, expression in _expressions(mission.program):

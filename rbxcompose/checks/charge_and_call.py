@@ -14,30 +14,7 @@ from rbxcompose.units import RATIO, format_quantity
 
 @check("RBX4121")
 def charge_and_call(robot: Robot) -> Iterator[Finding]:
-    """A charge ends below the level that triggers it
-
-    The charger stops at 99 %. If the interrupt's condition still holds then, the reaction has not removed its cause,
-    and the interrupt cannot fire again.
-
-    Bad:
-    ```yaml
-    interrupts:
-      battery_low:
-        when: $battery < 100 %
-        do: recharge
-    do:
-      go_to: corner_1
-    ```
-    Good:
-    ```yaml
-    interrupts:
-      battery_low:
-        when: $battery < 50 %
-        do: recharge
-    do:
-      go_to: corner_1
-    ```
-    """
+    """A charge ends below the level that triggers it."""
     for mission in robot.missions.values():
         for call in calls(robot, mission):
             until = call.charges.until

@@ -19,32 +19,7 @@ from rbxcompose.sdk.capabilities import Charges
 
 @check("RBX4185", Severity.WARNING, closed=(WIRING, MISSIONS, "places"))
 def charge_anywhere(robot: Robot) -> Iterator[Finding]:
-    """A reaction to a low battery charges wherever the robot is
-
-    The charger works only at its `dock`. An interrupt cuts in anywhere, so its reaction drives to the dock before it
-    charges; else charging is refused, and the mission fails.
-
-    Bad:
-    ```yaml
-    interrupts:
-      battery_low:
-        when: $battery < 30 %
-        do: recharge
-    do:
-      - go_to: corner_1
-      - go_to: dock
-    ```
-    Good:
-    ```yaml
-    interrupts:
-      battery_low:
-        when: $battery < 30 %
-        do: [{go_to: dock}, recharge]
-    do:
-      - go_to: corner_1
-      - go_to: dock
-    ```
-    """
+    """A reaction to a low battery charges wherever the robot is."""
     levels = batteries(robot)
     for mission in robot.missions.values():
         program, ways = mission.program, ways_of(robot, mission)

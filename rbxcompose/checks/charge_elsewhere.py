@@ -15,23 +15,7 @@ from rbxcompose.rules import WIRING
 
 @check("RBX4130", closed=(WIRING, "places"))
 def charge_elsewhere(robot: Robot) -> Iterator[Finding]:
-    """A mission charges where there is no dock
-
-    The charger works only at its `dock`. Just before, the mission has driven to another place, which is out of reach.
-
-    Bad:
-    ```yaml
-    do:
-      - go_to: corner_1
-      - recharge
-    ```
-    Good:
-    ```yaml
-    do:
-      - go_to: dock
-      - recharge
-    ```
-    """
+    """A mission charges where there is no dock."""
     for mission in robot.missions.values():
         ways = ways_of(robot, mission)
         if ways is None:

@@ -17,33 +17,7 @@ from rbxcompose.rules import OWN
 
 @check("RBX4189", Severity.WARNING, closed=(OWN,))
 def charged_before(robot: Robot) -> Iterator[Finding]:
-    """A loop ends at a level before which the battery is charged
-
-    `until` is asked again and again, and an interrupt cuts in as soon as it holds. If it charges at a higher level than
-    the one at which a loop ends, the loop never ends.
-
-    Bad:
-    ```yaml
-    interrupts:
-      battery_low:
-        when: $battery < 30 %
-        do: [{go_to: dock}, recharge]
-    do:
-      repeat: forever
-      until: $battery < 20 %
-      do: {go_to: corner_1}
-    ```
-    Good:
-    ```yaml
-    interrupts:
-      battery_low:
-        when: $battery < 30 %
-        do: [{go_to: dock}, recharge]
-    do:
-      repeat: 5
-      do: {go_to: corner_1}
-    ```
-    """
+    """A loop ends at a level before which the battery is charged."""
     for mission in robot.missions.values():
         known = bounds_of(mission)
         for call in calls(robot, mission):

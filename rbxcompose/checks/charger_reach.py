@@ -16,28 +16,7 @@ _ABSURD = 1.0  # [m] of a tolerance, which is then what is wrong
 
 @check("RBX3505", Severity.WARNING, closed=())
 def charger_reach(robot: Robot) -> Iterator[Finding]:
-    """The robot may stop too far from its dock to be charged
-
-    The component that drives to the dock stops anywhere within its `tolerance`. The `reach` of the charger must not be
-    smaller.
-
-    Bad:
-    ```yaml
-    components:
-      charger:
-        type: charger
-        dock: dock
-        reach: 2 cm
-    ```
-    Good:
-    ```yaml
-    components:
-      charger:
-        type: charger
-        dock: dock
-        reach: 20 cm
-    ```
-    """
+    """The robot may stop too far from its dock to be charged."""
     drivers = [(component, one.tolerance) for component, one in robot.declared(Navigates) if one.tolerance]
     if not drivers:
         return

@@ -16,26 +16,7 @@ from rbxcompose.units import ANGULAR_SPEED, SPEED, Dimension, format_quantity
 
 @check("RBX3503", Severity.WARNING, closed=(WIRING, NAMES))
 def clamped_speed(robot: Robot) -> Iterator[Finding]:
-    """A component drives faster than its base can
-
-    The base clamps each such command to its limit, but the component that sends it plans with a speed that is never
-    reached.
-
-    Bad:
-    ```yaml
-    components:
-      go_to:
-        type: go_to
-        speed: 0.8 m/s
-    ```
-    Good:
-    ```yaml
-    components:
-      go_to:
-        type: go_to
-        speed: 0.4 m/s
-    ```
-    """
+    """A component drives faster than its base can."""
     for one in excesses(robot):
         if not one.is_absurd:
             yield one.finding(robot, clamped_speed, f"can do {one.shown(one.limit)} at most")

@@ -14,26 +14,7 @@ from rbxcompose.units import TIME, format_quantity
 
 @check("RBX3501")
 def command_timeout(robot: Robot) -> Iterator[Finding]:
-    """A base brakes between two commands
-
-    A base brakes when no command arrives within its `command_timeout`. The component that drives it must send more
-    often than that.
-
-    Bad:
-    ```yaml
-    components:
-      base:
-        type: diff_drive_sim
-        command_timeout: 20 ms
-    ```
-    Good:
-    ```yaml
-    components:
-      base:
-        type: diff_drive_sim
-        command_timeout: 0.5 s
-    ```
-    """
+    """A base brakes between two commands."""
     flow = MessageFlow(robot)
     for base, drives in robot.declared(Drives):
         allowed = drives.stops_after

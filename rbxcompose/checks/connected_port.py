@@ -12,25 +12,7 @@ from rbxcompose.sdk.ports import Looks
 
 @check("RBX3007", is_fixable=True)
 def connected_port(robot: Robot) -> Iterator[Finding]:
-    """`connect:` names a port that the component does not have
-
-    Bad:
-    ```yaml
-    components:
-      base:
-        type: diff_drive_sim
-        connect:
-          odometry: wheels/odometry
-    ```
-    Good:
-    ```yaml
-    components:
-      base:
-        type: diff_drive_sim
-        connect:
-          odom: wheels/odometry
-    ```
-    """
+    """`connect:` names a port that the component does not have."""
     for name, entry in robot.manifest.components.items():
         if name not in robot.components:
             continue

@@ -12,31 +12,7 @@ from rbxcompose.model.robot import Robot
 
 @check("RBX5012")
 def count_of_items(robot: Robot) -> Iterator[Finding]:
-    """A group would need more items than it may have
-
-    With `min` above `max` no number is right, and the group is always an ERROR.
-
-    Bad:
-    ```yaml
-    diagnostics:
-      analyzers:
-        power:
-          match: [battery, charger]
-          count: {min: 3, max: 2}
-        motion:
-          match: [base, go_to, cmd_vel]
-    ```
-    Good:
-    ```yaml
-    diagnostics:
-      analyzers:
-        power:
-          match: [battery, charger]
-          count: {min: 2, max: 3}
-        motion:
-          match: [base, go_to, cmd_vel]
-    ```
-    """
+    """A group would need more items than it may have."""
     for path, analyzer in each_analyzer(robot.manifest.diagnostics.analyzers):
         least, most = analyzer.counted or (0, None)
         if most is not None and least > most:

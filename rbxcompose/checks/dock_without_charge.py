@@ -18,34 +18,7 @@ from rbxcompose.sdk.capabilities import Charges
 
 @check("RBX4173", Severity.WARNING, closed=(WIRING, MISSIONS))
 def dock_without_charge(robot: Robot) -> Iterator[Finding]:
-    """A reaction to a low battery does not charge at the dock
-
-    It drives to the place where the robot can be charged, and leaves again without charging, or it charges first, where
-    there is no dock.
-
-    Bad:
-    ```yaml
-    interrupts:
-      battery_low:
-        when: $battery < 30 %
-        do:
-          - recharge
-          - go_to: dock
-    do:
-      go_to: corner_1
-    ```
-    Good:
-    ```yaml
-    interrupts:
-      battery_low:
-        when: $battery < 30 %
-        do:
-          - go_to: dock
-          - recharge
-    do:
-      go_to: corner_1
-    ```
-    """
+    """A reaction to a low battery does not charge at the dock."""
     levels = batteries(robot)
     for mission in robot.missions.values():
         for interrupt in mission.program.interrupts:

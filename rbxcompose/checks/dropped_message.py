@@ -22,24 +22,7 @@ _FIELDS = {("linear", "x"): ("max_speed", SPEED, "m/s"), ("angular", "z"): ("max
 
 @check("RBX4172", closed=(WIRING, NAMES))
 def dropped_message(robot: Robot) -> Iterator[Finding]:
-    """A mission publishes a velocity that the base ignores
-
-    A base treats a command above twice its limit as a fault of the sender and ignores it. Fields of messages are in SI:
-    metres and radians a second.
-
-    Bad:
-    ```yaml
-    do:
-      publish: cmd_vel
-      message: {angular: {z: 30}}
-    ```
-    Good:
-    ```yaml
-    do:
-      publish: cmd_vel
-      message: {angular: {z: 0.5}}
-    ```
-    """
+    """A mission publishes a velocity that the base ignores."""
     limits = {key: _dropped_above(robot, name) for key, (name, _, _) in _FIELDS.items()}
     for mission in robot.missions.values() if not all(map(math.isinf, limits.values())) else ():
         sent = (message for node in mission.program.nodes for message in published(node))

@@ -18,14 +18,7 @@ ROUNDING = 1e-3  # of an effort
 
 @check("RBX2240", Severity.WARNING, closed=(WIRING,))
 def effort_out_of_reach(robot: Robot) -> Iterator[Finding]:
-    """A limit of the effort that servos do not reach
-
-    Even when they stall, the servos of the joint exert less. So the limit changes nothing, and whoever wrote it expects
-    more of the joint than it can do. The stall torques of the e-manual count, as far as gears multiply them.
-
-    Bad: `limits: {effort: 4 Nm}` of a joint that one AX-12 turns: it has 1.5 Nm.
-    Good: `limits: {effort: 1 Nm}`
-    """
+    """A limit of the effort that servos do not reach."""
     contents = robot.manifest.contents
     servos = contents.of(actuators)
     for name, one in contents.of(joints).items():

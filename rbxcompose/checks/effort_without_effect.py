@@ -17,14 +17,7 @@ from rbxcompose.sections.joints import joints
 
 @check("RBX2241", Severity.WARNING, closed=(WIRING,))
 def effort_without_effect(robot: Robot) -> Iterator[Finding]:
-    """A limit of the effort that has no effect
-
-    A servo is told the share of its torque that it may use. Where the e-manual gives no stall torque for its model, as
-    in the P series, nobody can tell which share a torque is. `torque` of the servo limits it without this.
-
-    Bad: `limits: {effort: 4 Nm}` of a joint that a PH54-200 turns.
-    Good: `torque: 20 %` of that servo, under `actuators`.
-    """
+    """A limit of the effort that has no effect."""
     contents = robot.manifest.contents
     servos = contents.of(actuators)
     for name, one in contents.of(joints).items():

@@ -12,30 +12,7 @@ from rbxcompose.model.robot import Robot
 
 @check("RBX5011")
 def empty_analyzer(robot: Robot) -> Iterator[Finding]:
-    """An analyzer does not say what belongs to it
-
-    Its group would be empty, and so STALE for ever.
-
-    Bad:
-    ```yaml
-    diagnostics:
-      analyzers:
-        power:
-          timeout: 10 s
-        motion:
-          match: [base, go_to, cmd_vel]
-    ```
-    Good:
-    ```yaml
-    diagnostics:
-      analyzers:
-        power:
-          match: [battery, charger]
-          timeout: 10 s
-        motion:
-          match: [base, go_to, cmd_vel]
-    ```
-    """
+    """An analyzer does not say what belongs to it."""
     for path, analyzer in each_analyzer(robot.manifest.diagnostics.analyzers):
         place = robot.key("diagnostics", "analyzers", *path)
         if analyzer.kind == "group" and not analyzer.analyzers:

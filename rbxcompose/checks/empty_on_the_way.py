@@ -21,34 +21,7 @@ _LASTS = "how long a full battery lasts"
 
 @check("RBX4124", Severity.WARNING)
 def empty_on_the_way(robot: Robot) -> Iterator[Finding]:
-    """The battery may be empty before the robot reaches its dock
-
-    At the level at which the mission is interrupted, the charge must last for the way from the farthest place to the
-    dock.
-
-    Bad:
-    ```yaml
-    interrupts:
-      battery_low:
-        when: $battery < 3 %
-        do:
-          - go_to: dock
-          - recharge
-    do:
-      go_to: corner_1
-    ```
-    Good:
-    ```yaml
-    interrupts:
-      battery_low:
-        when: $battery < 30 %
-        do:
-          - go_to: dock
-          - recharge
-    do:
-      go_to: corner_1
-    ```
-    """
+    """The battery may be empty before the robot reaches its dock."""
     for mission in robot.missions.values():
         ways, known = ways_of(robot, mission), constants(mission)
         if ways is None:

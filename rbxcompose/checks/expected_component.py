@@ -13,28 +13,7 @@ from rbxcompose.rules import NAMES
 
 @check("RBX5003", is_fixable=True, closed=(NAMES,))
 def expected_component(robot: Robot) -> Iterator[Finding]:
-    """An analyzer expects a component that the robot does not have
-
-    A component that is expected but never reports is STALE for ever, and so is its group. `expected` takes names, not
-    patterns. With `profile: ros1` it may also have names that programs of ROS report, which nobody knows here.
-
-    Bad:
-    ```yaml
-    diagnostics:
-      analyzers:
-        power:
-          match: [battery]
-          expected: [chargr]
-    ```
-    Good:
-    ```yaml
-    diagnostics:
-      analyzers:
-        power:
-          match: [battery]
-          expected: [charger]
-    ```
-    """
+    """An analyzer expects a component that the robot does not have."""
     if robot.manifest.diagnostics.profile == "ros1":
         return
     known = {*robot.components, *robot.written, *robot.brought}

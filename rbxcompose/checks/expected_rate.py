@@ -15,23 +15,7 @@ from rbxcompose.units import FREQUENCY, format_quantity
 
 @check("RBX5016", Severity.WARNING)
 def expected_rate(robot: Robot) -> Iterator[Finding]:
-    """A monitor expects another rate than its source declares
-
-    An output declares how often it publishes. A monitor that expects more messages, or fewer, warns all the time.
-
-    Bad:
-    ```yaml
-    components:
-      battery: {type: battery_sim, runtime: 1 h}
-      charge_watch: {type: topic_monitor, topic: battery_level, message: std_msgs/Float32, rate: 100 Hz}
-    ```
-    Good:
-    ```yaml
-    components:
-      battery: {type: battery_sim, runtime: 1 h}
-      charge_watch: {type: topic_monitor, topic: battery_level, message: std_msgs/Float32, rate: 1 Hz}
-    ```
-    """
+    """A monitor expects another rate than its source declares."""
     for monitor, expects in robot.declared(ExpectsRate):
         end = monitor.end(expects.port)
         for writer in robot.writers.get(end.topic, ()) if end else ():

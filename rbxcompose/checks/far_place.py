@@ -19,25 +19,7 @@ _TIMES = 50.0  # as far away as the others are from each other
 
 @check("RBX3512", Severity.WARNING, closed=("places",))
 def far_place(robot: Robot) -> Iterator[Finding]:
-    """A place is far from all the others
-
-    All places lie within a house, and one lies out of town: probably its unit is wrong, or a decimal point is missing.
-
-    Bad:
-    ```yaml
-    places:
-      door: {x: 2 m, y: 1 m}
-      window: {x: 2 m, y: 3 m}
-      table: {x: 1000 m, y: 2 m}
-    ```
-    Good:
-    ```yaml
-    places:
-      door: {x: 2 m, y: 1 m}
-      window: {x: 2 m, y: 3 m}
-      table: {x: 1000 mm, y: 2 m}
-    ```
-    """
+    """A place is far from all the others."""
     for place in far_places(robot):
         away = min(distance(place, one) for name, one in robot.manifest.places.items() if name != place.name)
         yield far_place.at(

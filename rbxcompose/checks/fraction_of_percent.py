@@ -20,23 +20,7 @@ _PERCENT = "%"
 
 @check("RBX4188", Severity.WARNING, closed=(WIRING,))
 def fraction_of_percent(robot: Robot) -> Iterator[Finding]:
-    """A mission sends a fraction to what counts in percent
-
-    Messages have numbers without units. The level of a battery goes from 0 to 100, so 1 is almost empty, not full.
-
-    Bad:
-    ```yaml
-    do:
-      call: set_battery_level
-      request: {value: 1}
-    ```
-    Good:
-    ```yaml
-    do:
-      call: set_battery_level
-      request: {value: 100}
-    ```
-    """
+    """A mission sends a fraction to what counts in percent."""
     takers = {(type(one.port) is Serves, one.topic): one for one in robot.ends if _unit(one) == _PERCENT}
     for mission in robot.missions.values() if takers else ():
         known = constants(mission)

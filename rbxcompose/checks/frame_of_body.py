@@ -16,24 +16,7 @@ from rbxcompose.sdk.ports import Looks
 
 @check("RBX2019", Severity.WARNING, closed=(WIRING,))
 def frame_of_body(robot: Robot) -> Iterator[Finding]:
-    """A component uses a frame that the body does not have
-
-    A base moves a frame in `odom`, and everything that the body carries should move with it. If no link has the name of
-    that frame, the body stays where it is. A look-up of a frame that nobody places has no answer.
-
-    Bad:
-    ```yaml
-    body:
-      pieces:
-        cart:
-          urdf: robot.urdf
-    ```
-    Good:
-    ```yaml
-    body:
-      urdf: robot.urdf
-    ```
-    """
+    """A component uses a frame that the body does not have."""
     description = robot.manifest.body
     if description is None or not description.body.links:
         return

@@ -14,14 +14,7 @@ from rbxcompose.sections.scene import scene
 
 @check("RBX2379", Severity.WARNING, closed=(WIRING, NAMES, "scene"))
 def frame_of_object(robot: Robot) -> Iterator[Finding]:
-    """A thing of the scene stands in a frame outside of a body that nobody places there
-
-    A thing in `map` is found by where the robot is in the map, which a base tells, or a localisation. On a robot
-    without both, every goal of an arm ends with `unknown_scene`.
-
-    Bad: `shelf: {box: [20 cm, 60 cm, 1 cm], frame: map, at: {x: 30 cm}}`, for an arm that is fixed to a table.
-    Good: `shelf: {box: [20 cm, 60 cm, 1 cm], at: {x: 30 cm}}`
-    """
+    """A thing of the scene stands in a frame outside of a body that nobody places there."""
     description, written = robot.manifest.body, robot.declared(WritesFrame)
     if description is None or robot.declared(Drives):
         return  # RBX2286

@@ -13,21 +13,7 @@ from rbxcompose.units import ANGLE, format_quantity
 
 @check("RBX3507", Severity.WARNING, closed=())
 def full_turn(robot: Robot) -> Iterator[Finding]:
-    """The heading of a place is beyond a full turn
-
-    Headings lie between -360 deg and 360 deg. A heading beyond that was probably meant in another unit.
-
-    Bad:
-    ```yaml
-    places:
-      window: {x: 2 m, y: 1 m, heading: 90 rad}
-    ```
-    Good:
-    ```yaml
-    places:
-      window: {x: 2 m, y: 1 m, heading: 90 deg}
-    ```
-    """
+    """The heading of a place is beyond a full turn."""
     for name, place in robot.manifest.places.items():
         if abs(place.heading) > math.tau + 1e-9:
             yield full_turn.at(

@@ -40,14 +40,7 @@ class GoalRange:
 
 @check("RBX4163", closed=(WIRING,))
 def goal_beyond_limits(robot: Robot) -> Iterator[Finding]:
-    """A skill is asked for what is beyond the limits
-
-    A joint, a lift or a gripper goes to positions within its limits only. Its controller refuses a goal beyond them, so
-    the step would fail each time. An input counts with its default, unless the robot gives another value.
-
-    Bad: `lift: 80 cm`, where the lift goes up to 10 cm.
-    Good: `lift: 10 cm`
-    """
+    """A skill is asked for what is beyond the limits."""
     bounded, told = _bounded(robot), set[Span | None]()
     for mission in robot.missions.values() if bounded else ():
         known = constants(mission)

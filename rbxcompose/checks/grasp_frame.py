@@ -14,14 +14,7 @@ from rbxcompose.sections.body import body
 
 @check("RBX2340")
 def grasp_frame(robot: Robot) -> Iterator[Finding]:
-    """The frame between the fingers of an arm does not move with its tip
-
-    An arm brings the frame `grasp` to things. So the tip of the arm carries it, without a joint in between that moves:
-    a finger opens and closes, and cannot be the frame.
-
-    Bad: `right_arm: {gripper: hand, grasp: right_gripper_finger_link}`
-    Good: `right_arm: {gripper: hand, grasp: right_gripper_grasp}`
-    """
+    """The frame between the fingers of an arm does not move with its tip."""
     description = robot.manifest.contents.of(body)
     for name, arm in robot.manifest.contents.of(arms).items():
         link = arm.model.grasp

@@ -12,14 +12,7 @@ from rbxcompose.sections.arms import arms
 
 @check("RBX2341")
 def hand_without_gripper(robot: Robot) -> Iterator[Finding]:
-    """An arm without a gripper can neither pick nor place
-
-    `grasp`, `squeeze`, `grasps` and `spots` are for the skills `pick_NAME` and `place_NAME`, which an arm has only if
-    `gripper` names the controller of its gripper. So are further `processes` of its planner.
-
-    Bad: `right_arm: {controller: right_arm_controller, spots: {left: {x: 20 cm, y: 10 cm, z: 70 cm}}}`
-    Good: the same with `gripper: right_gripper_controller`.
-    """
+    """An arm without a gripper can neither pick nor place."""
     for name, arm in robot.manifest.contents.of(arms).items():
         for key in ("grasp", "squeeze", "grasps", "spots"):
             if getattr(arm.model, key) and arm.model.gripper is None:

@@ -40,14 +40,7 @@ class JointMover:
 
 @check("RBX4166", Severity.WARNING, closed=(WIRING,))
 def hasty_motion(robot: Robot) -> Iterator[Finding]:
-    """A motion is too fast for a joint
-
-    A step gives a time for the way from where the step before it has left the joint. Even at its greatest speed, the
-    joint needs longer. Its controller refuses the motion, so the step would fail each time.
-
-    Bad: `- head: {pan_joint: 90 deg, duration: 2 s}`, then `- head: {pan_joint: -90 deg, duration: 0.1 s}`
-    Good: `- head: {pan_joint: 90 deg, duration: 2 s}`, then `- head: {pan_joint: -90 deg, duration: 4 s}`
-    """
+    """A motion is too fast for a joint."""
     movers = _movers(robot)
     for mission in robot.missions.values() if movers else ():
         for node in mission.program.nodes:

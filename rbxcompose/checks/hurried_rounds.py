@@ -15,30 +15,7 @@ from rbxcompose.units import TIME, format_quantity
 
 @check("RBX4168", Severity.WARNING)
 def hurried_rounds(robot: Robot) -> Iterator[Finding]:
-    """The rounds of a loop take longer than the time between their starts
-
-    A round never begins before the one before it has ended. So with ways and waits that take longer than `every`, that
-    has no effect.
-
-    Bad:
-    ```yaml
-    do:
-      repeat: 3
-      every: 1 s
-      do:
-        - go_to: corner_1
-        - wait: 60 s
-    ```
-    Good:
-    ```yaml
-    do:
-      repeat: 3
-      every: 2 min
-      do:
-        - go_to: corner_1
-        - wait: 60 s
-    ```
-    """
+    """The rounds of a loop take longer than the time between their starts."""
     for mission in robot.missions.values():
         if (ways := ways_of(robot, mission)) is None:
             continue

@@ -22,33 +22,7 @@ _WITHOUT_EFFECT = {
 
 @check("RBX5010")
 def idle_analyzer_key(robot: Robot) -> Iterator[Finding]:
-    """A key of an analyzer has no effect
-
-    A group has no items of its own, what is discarded has no level, and ROS 1's rules know neither `debounce` nor
-    `latch` nor `suppressed_by`.
-
-    Bad:
-    ```yaml
-    diagnostics:
-      profile: ros1
-      analyzers:
-        power:
-          match: [battery, charger]
-          latch: true
-        motion:
-          match: [base, go_to, cmd_vel]
-    ```
-    Good:
-    ```yaml
-    diagnostics:
-      analyzers:
-        power:
-          match: [battery, charger]
-          latch: true
-        motion:
-          match: [base, go_to, cmd_vel]
-    ```
-    """
+    """A key of an analyzer has no effect."""
     is_ros1 = robot.manifest.diagnostics.profile == "ros1"
     for path, analyzer in each_analyzer(robot.manifest.diagnostics.analyzers):
         for key, why, cure in _idle(analyzer, is_ros1):

@@ -17,15 +17,7 @@ from rbxcompose.sections.scene import scene
 
 @check("RBX2376", Severity.WARNING, closed=(WIRING, MISSIONS, "scene"))
 def idle_grasps(robot: Robot) -> Iterator[Finding]:
-    """Grasps are those of an object that there is not
-
-    Grasps belong to an object by its name. Where none has it, they are never used, and those of the object that was
-    meant follow from its shape. Arms are reported whose missions pick objects by name, and none by this one, unless a
-    component puts what it sees into the scene.
-
-    Bad: `grasps: {mug: [...]}`, where the scene has a `cup`, and a mission does `pick_arm: cup`.
-    Good: `grasps: {cup: [...]}`
-    """
+    """Grasps are those of an object that there is not."""
     contents = robot.manifest.contents
     objects = [one.name for one in contents.of(scene).objects]
     if not objects or any(isinstance(end.port, Out) and end.port.interface is CollisionObject for end in robot.ends):

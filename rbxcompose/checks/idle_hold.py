@@ -18,26 +18,7 @@ ENDINGS = ("on_idle", "on_lock")
 
 @check("RBX3514", Severity.WARNING, closed=(WIRING,))
 def idle_hold(robot: Robot) -> Iterator[Finding]:
-    """A mux holds a command for longer than the base follows it
-
-    `hold` repeats nothing: it only delays the stop. A base brakes by itself when no command has come for its
-    `command_timeout`, so a longer `hold` does nothing.
-
-    Bad:
-    ```yaml
-    muxes:
-      cmd_vel:
-        on_idle: {hold: 5 s}
-        inputs: {navigation: {from: go_to, priority: 10, timeout: 0.5 s}}
-    ```
-    Good:
-    ```yaml
-    muxes:
-      cmd_vel:
-        on_idle: {hold: 0.2 s}
-        inputs: {navigation: {from: go_to, priority: 10, timeout: 0.5 s}}
-    ```
-    """
+    """A mux holds a command for longer than the base follows it."""
     bases = list(_bases(robot))
     for mux, entry in robot.manifest.muxes.items():
         for ending in ENDINGS:

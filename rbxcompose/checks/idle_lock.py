@@ -11,40 +11,7 @@ from rbxcompose.model.robot import Robot
 
 @check("RBX3105")
 def idle_lock(robot: Robot) -> Iterator[Finding]:
-    """A lock of a mux blocks no input
-
-    A silent lock blocks the inputs with a lower priority than its own. If there are none, the robot drives as if the
-    lock did not exist.
-
-    Bad:
-    ```yaml
-    muxes:
-      cmd_vel:
-        inputs:
-          navigation:
-            from: go_to
-            priority: 10
-            timeout: 0.5 s
-        locks:
-          door:
-            priority: 5
-            timeout: 0.3 s
-    ```
-    Good:
-    ```yaml
-    muxes:
-      cmd_vel:
-        inputs:
-          navigation:
-            from: go_to
-            priority: 10
-            timeout: 0.5 s
-        locks:
-          door:
-            priority: 200
-            timeout: 0.3 s
-    ```
-    """
+    """A lock of a mux blocks no input."""
     for mux, entry in robot.manifest.muxes.items():
         ranks = entry.ranks
         lowest = min(ranks, key=lambda name: ranks[name], default="")

@@ -15,27 +15,7 @@ from rbxcompose.model.robot import Robot
 
 @check("RBX7001", Severity.WARNING, closed=())
 def idle_overlay(robot: Robot) -> Iterator[Finding]:
-    """A profile or an overlay sets a value to what it already is
-
-    It changes nothing. Perhaps you meant another value, or the robot has changed since.
-
-    Bad:
-    ```yaml
-    profiles:
-      tired:
-        components:
-          battery:
-            runtime: 45 s
-    ```
-    Good:
-    ```yaml
-    profiles:
-      tired:
-        components:
-          battery:
-            runtime: 30 s
-    ```
-    """
+    """A profile or an overlay sets a value to what it already is."""
     for before, after, path in changes(robot):
         match before.node, after.node:
             case ScalarNode(text=old, plain=was_plain), ScalarNode(text=new, plain=is_plain):

@@ -14,26 +14,7 @@ _LIMITS = ("max", "within", "backoff")
 
 @check("RBX3508", Severity.WARNING, closed=())
 def idle_restart(robot: Robot) -> Iterator[Finding]:
-    """A limit of restarts that never happen
-
-    `max`, `within` and `backoff` say how often and after which pause a component is restarted. With `when: never` it is
-    not restarted at all.
-
-    Bad:
-    ```yaml
-    components:
-      base:
-        type: diff_drive_sim
-        restart: {when: never, max: 3}
-    ```
-    Good:
-    ```yaml
-    components:
-      base:
-        type: diff_drive_sim
-        restart: {when: on_failure, max: 3}
-    ```
-    """
+    """A limit of restarts that never happen."""
     for component in robot.components.values():
         path = (*component.path, "restart")
         if component.restart.when != "never" or at(robot.manifest.root, path) is None:

@@ -12,38 +12,7 @@ from rbxcompose.model.robot import Robot
 
 @check("RBX5014", Severity.WARNING, closed=())
 def ignored_analyzer(robot: Robot) -> Iterator[Finding]:
-    """What is to be ignored is shown in `Other`
-
-    ROS 1's `IgnoreAnalyzer` matches nothing, so that its items belong to no group and land in `Other`. There, `discard`
-    is the type that shows them nowhere.
-
-    Bad:
-    ```yaml
-    diagnostics:
-      profile: ros1
-      analyzers:
-        noise:
-          type: ignore
-          match: [charger]
-        power:
-          match: [battery]
-        motion:
-          match: [base, go_to, cmd_vel]
-    ```
-    Good:
-    ```yaml
-    diagnostics:
-      profile: ros1
-      analyzers:
-        noise:
-          type: discard
-          match: [charger]
-        power:
-          match: [battery]
-        motion:
-          match: [base, go_to, cmd_vel]
-    ```
-    """
+    """What is to be ignored is shown in `Other`."""
     if robot.manifest.diagnostics.profile != "ros1":
         return
     for path, analyzer in each_analyzer(robot.manifest.diagnostics.analyzers):

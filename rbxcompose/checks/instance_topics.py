@@ -15,31 +15,7 @@ from rbxcompose.sdk.ports import Out
 
 @check("RBX3023", closed=(WIRING,))
 def instance_topics(robot: Robot) -> Iterator[Finding]:
-    """Two instances of a part publish on the same topic
-
-    A subscriber would receive both and could not tell them apart. Topics do not contain instance names: rename the
-    topics of one instance with `connect:`. Absolute topics such as `/tf` are shared on purpose.
-
-    Bad:
-    ```yaml
-    include:
-      front: rbx:parts/base.yaml
-      rear:
-        part: rbx:parts/base.yaml
-        connect:
-          cmd_vel: rear_cmd_vel
-    ```
-    Good:
-    ```yaml
-    include:
-      front: rbx:parts/base.yaml
-      rear:
-        part: rbx:parts/base.yaml
-        connect:
-          cmd_vel: rear_cmd_vel
-          odom: rear/odom
-    ```
-    """
+    """Two instances of a part publish on the same topic."""
     first: dict[tuple[str, str], str] = {}  # file and topic -> instance
     for part in robot.manifest.parts.values():
         told = {

@@ -19,13 +19,7 @@ _KEEP, _ENDS = "keep", ("lower", "upper")
 
 @check("RBX2375")
 def kept_bounds(robot: Robot) -> Iterator[Finding]:
-    """The bounds that an arm is to keep on its way are the wrong way round
-
-    A range goes from less to more. A goal with another one is refused each time.
-
-    Bad: `keep: {z: [90 cm, 70 cm]}`
-    Good: `keep: {z: [70 cm, 90 cm]}`
-    """
+    """The bounds that an arm is to keep on its way are the wrong way round."""
     for verb in ("reach", "move"):
         for goal in written_reaches(robot, verb):
             if _KEEP in goal.arguments:

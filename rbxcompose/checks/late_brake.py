@@ -18,28 +18,7 @@ FARTHEST = 2.0  # [m] driven blind; the usual 0.5 s are that far at 4 m/s only
 
 @check("RBX3509", Severity.WARNING, closed=())
 def late_brake(robot: Robot) -> Iterator[Finding]:
-    """A base goes on long after the last command
-
-    A base brakes when no command has arrived for its `command_timeout`: then whatever drives it has failed. Until then
-    it goes on with the last velocity: more than 2 m at full speed, or for 10 s, is told. Commands come many times a
-    second. A bare number counts in seconds: `500` is more than eight minutes. A controller of wheels takes 0 for
-    "never".
-
-    Bad:
-    ```yaml
-    components:
-      base:
-        type: diff_drive_sim
-        command_timeout: 500
-    ```
-    Good:
-    ```yaml
-    components:
-      base:
-        type: diff_drive_sim
-        command_timeout: 500 ms
-    ```
-    """
+    """A base goes on long after the last command."""
     for base, drives in robot.declared(Drives):
         allowed = drives.stops_after
         is_chosen = allowed is not None and is_written(robot, base, allowed.field)

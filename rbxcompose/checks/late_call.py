@@ -15,34 +15,7 @@ from rbxcompose.units import RATIO, format_quantity
 
 @check("RBX4160", Severity.WARNING)
 def late_call(robot: Robot) -> Iterator[Finding]:
-    """The battery is in error before the mission charges it
-
-    Below its `error` the status of a battery is ERROR. A mission that charges it below that level lets the robot be in
-    error each time. A battery whose `error` is not written is not looked at.
-
-    Bad:
-    ```yaml
-    interrupts:
-      battery_low:
-        when: $battery < 15 %
-        do:
-          - go_to: dock
-          - recharge
-    do:
-      go_to: corner_1
-    ```
-    Good:
-    ```yaml
-    interrupts:
-      battery_low:
-        when: $battery < 30 %
-        do:
-          - go_to: dock
-          - recharge
-    do:
-      go_to: corner_1
-    ```
-    """
+    """The battery is in error before the mission charges it."""
     for mission in robot.missions.values():
         for call in calls(robot, mission):
             error = call.drains.error

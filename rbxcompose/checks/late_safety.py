@@ -16,24 +16,7 @@ _LONGEST = 10.0  # [s]
 
 @check("RBX2244", Severity.WARNING, closed=())
 def late_safety(robot: Robot) -> Iterator[Finding]:
-    """A limit of safety comes too late
-
-    Servos shut down at 70 degC to 85 degC by themselves: a higher `thermal: limit` lets no joint rest before. An
-    emergency stop sends all the time, and when it falls silent, its cable is cut or its battery empty: for the whole
-    `deadline`, nobody can stop the robot with it. The same goes for the `timeout` of a lock of a mux, which waits for
-    the heartbeat of a dead-man switch or a door.
-
-    Bad:
-    ```yaml
-    safety:
-      estop: {topic: estop, deadline: 60 s}
-    ```
-    Good:
-    ```yaml
-    safety:
-      estop: {topic: estop, deadline: 0.5 s}
-    ```
-    """
+    """A limit of safety comes too late."""
     care = robot.manifest.contents.of(safety)
     if care.thermal.limit > _HOTTEST:
         yield late_safety.at(

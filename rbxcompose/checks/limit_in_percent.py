@@ -16,28 +16,7 @@ _PERCENT = "%"
 
 @check("RBX3511", Severity.WARNING, closed=(WIRING,))
 def limit_in_percent(robot: Robot) -> Iterator[Finding]:
-    """A limit is a fraction, but the number is in percent
-
-    Messages have numbers without units. The level of a battery goes from 0 to 100, so a limit of 0.3 is passed when
-    nothing is left.
-
-    Bad:
-    ```yaml
-    components:
-      level:
-        type: threshold
-        topic: battery_level
-        warn_below: 0.3
-    ```
-    Good:
-    ```yaml
-    components:
-      level:
-        type: threshold
-        topic: battery_level
-        warn_below: 30
-    ```
-    """
+    """A limit is a fraction, but the number is in percent."""
     for component, warns in robot.declared(Warns):
         limits = [one for one in (warns.warn, warns.error) if one is not None and 0 < one.value < 1]
         for limit in limits if limits and component.is_sound else ():

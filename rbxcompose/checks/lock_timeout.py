@@ -13,14 +13,7 @@ from rbxcompose.units import TIME, format_quantity
 
 @check("RBX3109")
 def lock_timeout(robot: Robot) -> Iterator[Finding]:
-    """A lock of a mux engages between two of its heartbeats
-
-    A lock engages when its `timeout` has passed since the last heartbeat. If heartbeats come less often than that, the
-    robot stops after each of them. With a timeout below two periods, a single late or lost heartbeat stops it.
-
-    Bad: `locks: {door: {priority: 200, timeout: 50 ms}}`, where the component `door` sends every 100 ms.
-    Good: `locks: {door: {priority: 200, timeout: 1 s}}`
-    """
+    """A lock of a mux engages between two of its heartbeats."""
     for mux, entry in robot.manifest.muxes.items():
         for name, lock in entry.locks.items():
             end = robot.components[mux].end(f"lock_{name}") if mux in robot.components else None

@@ -17,33 +17,7 @@ LONGEST = 60.0  # [s]: commands come many times a second
 
 @check("RBX3108", Severity.WARNING, closed=(WIRING, NAMES))
 def long_timeout(robot: Robot) -> Iterator[Finding]:
-    """An input of a mux stays live long after its source fell silent
-
-    An input is live until its `timeout` has passed since its last message. Until then it blocks inputs of a lower
-    priority. Commands come many times a second; a source that has been silent for a minute will not continue. A bare
-    number counts in seconds: `500` is more than eight minutes.
-
-    Bad:
-    ```yaml
-    muxes:
-      cmd_vel:
-        inputs:
-          navigation:
-            from: go_to
-            priority: 10
-            timeout: 500
-    ```
-    Good:
-    ```yaml
-    muxes:
-      cmd_vel:
-        inputs:
-          navigation:
-            from: go_to
-            priority: 10
-            timeout: 500 ms
-    ```
-    """
+    """An input of a mux stays live long after its source fell silent."""
     for mux, entry in robot.manifest.muxes.items():
         for name, one in entry.inputs.items():
             end = robot.components[mux].end(name)

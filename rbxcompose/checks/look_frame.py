@@ -14,14 +14,7 @@ from rbxcompose.sections.scene import scene
 
 @check("RBX2377", closed=("heads", "scene"))
 def look_frame(robot: Robot) -> Iterator[Finding]:
-    """A head is to look at a point in a frame that it does not know
-
-    Points are in the frame of a link, or in a frame outside of the body that is listed below `frames` of the head or of
-    the scene.
-
-    Bad: `look_at: {x: 4 m, frame: map}`, for `head: {camera: camera_link, controller: neck}`
-    Good: the same, for `head: {camera: camera_link, controller: neck, frames: [map]}`
-    """
+    """A head is to look at a point in a frame that it does not know."""
     contents, description = robot.manifest.contents, robot.manifest.body
     found = contents.of(heads)
     if description is None:

@@ -12,29 +12,7 @@ from rbxcompose.model.robot import Robot
 
 @check("RBX5004", Severity.WARNING, closed=())
 def matched_twice(robot: Robot) -> Iterator[Finding]:
-    """Two analyzers name the same component
-
-    The component would appear in both groups, and its faults would count twice.
-
-    Bad:
-    ```yaml
-    diagnostics:
-      analyzers:
-        power:
-          match: [battery, charger]
-        motion:
-          match: [base, go_to, cmd_vel, battery]
-    ```
-    Good:
-    ```yaml
-    diagnostics:
-      analyzers:
-        power:
-          match: [battery, charger]
-        motion:
-          match: [base, go_to, cmd_vel]
-    ```
-    """
+    """Two analyzers name the same component."""
     first: dict[str, tuple[tuple[str, ...], int]] = {}
     for path, analyzer in each_analyzer(robot.manifest.diagnostics.analyzers):
         shown = analyzer.conditions if analyzer.kind in SHOWN else ()

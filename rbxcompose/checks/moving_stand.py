@@ -13,14 +13,7 @@ from rbxcompose.sdk.capabilities import PutsThings
 
 @check("RBX2378", Severity.WARNING, closed=())
 def moving_stand(robot: Robot) -> Iterator[Finding]:
-    """Seen things are to stand in a frame that a joint moves
-
-    A thing stays where it is in its frame. If that is a link of a head or an arm, each motion of these moves all things
-    that were seen.
-
-    Bad: `seeing: {type: seen_objects, frame: camera_optical_frame, stands_in: camera_link}`, on a head.
-    Good: `seeing: {type: seen_objects, frame: camera_optical_frame, stands_in: base_link}`
-    """
+    """Seen things are to stand in a frame that a joint moves."""
     description = robot.manifest.body
     for component, puts in robot.declared(PutsThings) if description else ():
         body = description.body if description else Body("")

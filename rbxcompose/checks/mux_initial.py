@@ -12,31 +12,7 @@ from rbxcompose.mux.requests import NONE
 
 @check("RBX3132", is_fixable=True)
 def mux_initial(robot: Robot) -> Iterator[Finding]:
-    """What a mux selects first is not one of its inputs
-
-    `initial` names an input, or is `__none`. Without it, the first input is selected.
-
-    Bad:
-    ```yaml
-    muxes:
-      cmd_vel:
-        mode: select
-        initial: teelop
-        inputs:
-          teleop: {}
-          camera: {}
-    ```
-    Good:
-    ```yaml
-    muxes:
-      cmd_vel:
-        mode: select
-        initial: teleop
-        inputs:
-          teleop: {}
-          camera: {}
-    ```
-    """
+    """What a mux selects first is not one of its inputs."""
     for mux, entry in robot.manifest.muxes.items():
         if entry.works_by == "select" and entry.initial is not None and entry.initial not in (NONE, *entry.inputs):
             span = robot.value("muxes", mux, "initial")

@@ -11,30 +11,7 @@ from rbxcompose.model.robot import Robot
 
 @check("RBX3136")
 def mux_no_time(robot: Robot) -> Iterator[Finding]:
-    """A timeout of a mux is 0
-
-    An input that is silent at once never holds the output, and a lock would always be engaged. Only two profiles know
-    the timeout 0: in `twist_mux` such an input never expires, in `yocs` it lets go after each message.
-
-    Bad:
-    ```yaml
-    muxes:
-      cmd_vel:
-        inputs:
-          teleop:
-            priority: 100
-            timeout: 0 s
-    ```
-    Good:
-    ```yaml
-    muxes:
-      cmd_vel:
-        inputs:
-          teleop:
-            priority: 100
-            timeout: 0.5 s
-    ```
-    """
+    """A timeout of a mux is 0."""
     for mux, entry in robot.manifest.muxes.items():
         timeouts = [("inputs", name, one.timeout) for name, one in entry.inputs.items()]
         timeouts += [("locks", name, one.timeout) for name, one in entry.locks.items()]

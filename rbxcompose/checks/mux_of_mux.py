@@ -11,36 +11,7 @@ from rbxcompose.model.robot import Robot
 
 @check("RBX3111")
 def mux_of_mux(robot: Robot) -> Iterator[Finding]:
-    """An input of a mux takes from a mux
-
-    A mux publishes on the topic that it is named after, and `from:` cannot give its output another one, so nothing
-    would arrive. With its own output it would command itself.
-
-    Bad:
-    ```yaml
-    muxes:
-      cmd_vel:
-        inputs:
-          again:
-            from: cmd_vel
-            priority: 20
-            timeout: 0.5 s
-          navigation:
-            from: go_to
-            priority: 10
-            timeout: 0.5 s
-    ```
-    Good:
-    ```yaml
-    muxes:
-      cmd_vel:
-        inputs:
-          navigation:
-            from: go_to
-            priority: 10
-            timeout: 0.5 s
-    ```
-    """
+    """An input of a mux takes from a mux."""
     muxes = robot.manifest.muxes
     for mux, entry in muxes.items():
         for name, one in entry.inputs.items():

@@ -11,37 +11,7 @@ from rbxcompose.model.robot import Robot
 
 @check("RBX3104")
 def mux_priority(robot: Robot) -> Iterator[Finding]:
-    """Two inputs of a mux have the same priority
-
-    When both are live, nothing says which one should win.
-
-    Bad:
-    ```yaml
-    muxes:
-      cmd_vel:
-        inputs:
-          teleop:
-            priority: 10
-            timeout: 0.5 s
-          navigation:
-            from: go_to
-            priority: 10
-            timeout: 0.5 s
-    ```
-    Good:
-    ```yaml
-    muxes:
-      cmd_vel:
-        inputs:
-          teleop:
-            priority: 100
-            timeout: 0.5 s
-          navigation:
-            from: go_to
-            priority: 10
-            timeout: 0.5 s
-    ```
-    """
+    """Two inputs of a mux have the same priority."""
     for mux, entry in robot.manifest.muxes.items():
         first: dict[int, str] = {}
         for name, priority in entry.ranks.items() if entry.profile == "default" else ():

@@ -12,34 +12,7 @@ from rbxcompose.mux.words import HIGHEST
 
 @check("RBX3134", Severity.WARNING)
 def mux_rank_range(robot: Robot) -> Iterator[Finding]:
-    """A priority beyond those of the profile `twist_mux`
-
-    That program has priorities from 1 to 255. It brings others into this range without a word, and an input with the
-    priority 0 never gets through.
-
-    Bad:
-    ```yaml
-    muxes:
-      cmd_vel:
-        profile: twist_mux
-        inputs:
-          navigation:
-            from: go_to
-            priority: 0
-            timeout: 0.5 s
-    ```
-    Good:
-    ```yaml
-    muxes:
-      cmd_vel:
-        profile: twist_mux
-        inputs:
-          navigation:
-            from: go_to
-            priority: 1
-            timeout: 0.5 s
-    ```
-    """
+    """A priority beyond those of the profile `twist_mux`."""
     for mux, entry in robot.manifest.muxes.items():
         if entry.profile != "twist_mux":
             continue

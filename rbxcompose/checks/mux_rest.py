@@ -15,35 +15,7 @@ from rbxcompose.sections.muxes import MuxModel
 
 @check("RBX3135", closed=(WIRING,))
 def mux_rest(robot: Robot) -> Iterator[Finding]:
-    """A mux is to stop what zeros do not stop
-
-    A mux stops by a message of zeros. For a velocity that is rest. A position, a pose or a flag of zeros is a command
-    like any other, so the mux never makes one up: the receiver must stop by itself when commands stay away. If zeros
-    are rest for the receiver, as for velocities of joints, say so with `zero_stops: true`. A `handover` is for `Twist`
-    alone.
-
-    Bad:
-    ```yaml
-    muxes:
-      cmd_vel:
-        zero_stops: false
-        on_idle: stop
-        inputs:
-          teleop:
-            priority: 100
-            timeout: 0.5 s
-    ```
-    Good:
-    ```yaml
-    muxes:
-      cmd_vel:
-        on_idle: stop
-        inputs:
-          teleop:
-            priority: 100
-            timeout: 0.5 s
-    ```
-    """
+    """A mux is to stop what zeros do not stop."""
     for mux, entry in robot.manifest.muxes.items():
         config = _config(robot.components.get(mux))
         if config is None:

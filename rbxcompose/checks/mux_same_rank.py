@@ -11,40 +11,7 @@ from rbxcompose.model.robot import Robot
 
 @check("RBX3137", Severity.WARNING)
 def mux_same_rank(robot: Robot) -> Iterator[Finding]:
-    """Two inputs of a mux have the same priority, and the one that holds it keeps it
-
-    In the profile `yocs`, among inputs of one priority the one that holds the output keeps it until its timeout: who
-    that is depends on who came first.
-
-    Bad:
-    ```yaml
-    muxes:
-      cmd_vel:
-        profile: yocs
-        inputs:
-          teleop:
-            priority: 10
-            timeout: 0.5 s
-          navigation:
-            from: go_to
-            priority: 10
-            timeout: 0.5 s
-    ```
-    Good:
-    ```yaml
-    muxes:
-      cmd_vel:
-        profile: yocs
-        inputs:
-          teleop:
-            priority: 100
-            timeout: 0.5 s
-          navigation:
-            from: go_to
-            priority: 10
-            timeout: 0.5 s
-    ```
-    """
+    """Two inputs of a mux have the same priority, and the one that holds it keeps it."""
     for mux, entry in robot.manifest.muxes.items():
         first: dict[int, str] = {}
         for name, rank in entry.ranks.items() if entry.profile == "yocs" else ():

@@ -14,32 +14,7 @@ from rbxcompose.sdk.ports import Out
 
 @check("RBX3003", is_fixable=True, closed=(NAMES,))
 def mux_source(robot: Robot) -> Iterator[Finding]:
-    """The `from:` of a mux input names no output
-
-    `from:` names a component, or `component.port`, that publishes the type of the mux. Without `from:`, an input is
-    open to the outside.
-
-    Bad:
-    ```yaml
-    muxes:
-      cmd_vel:
-        inputs:
-          navigation:
-            from: goto
-            priority: 10
-            timeout: 0.5 s
-    ```
-    Good:
-    ```yaml
-    muxes:
-      cmd_vel:
-        inputs:
-          navigation:
-            from: go_to
-            priority: 10
-            timeout: 0.5 s
-    ```
-    """
+    """The `from:` of a mux input names no output."""
     for mux, entry in robot.manifest.muxes.items():
         for name, source in entry.inputs.items():
             if source.source is None:

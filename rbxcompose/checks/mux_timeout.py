@@ -13,33 +13,7 @@ from rbxcompose.units import TIME, format_quantity
 
 @check("RBX3101")
 def mux_timeout(robot: Robot) -> Iterator[Finding]:
-    """An input of a mux times out between two of its messages
-
-    An input is live until its `timeout` has passed since its last message. If the source publishes less often than
-    that, the input times out after each message: the robot jerks, or a source of a lower priority drives in between.
-    With a timeout below two periods, a single late or lost message is enough for that.
-
-    Bad:
-    ```yaml
-    muxes:
-      cmd_vel:
-        inputs:
-          navigation:
-            from: go_to
-            priority: 10
-            timeout: 20 ms
-    ```
-    Good:
-    ```yaml
-    muxes:
-      cmd_vel:
-        inputs:
-          navigation:
-            from: go_to
-            priority: 10
-            timeout: 0.5 s
-    ```
-    """
+    """An input of a mux times out between two of its messages."""
     for mux, entry in robot.manifest.muxes.items():
         for name, source in entry.inputs.items():
             component = robot.components.get((source.source or "").partition(".")[0])

@@ -12,31 +12,7 @@ from rbxcompose.rules import WIRING
 
 @check("RBX3107", closed=(WIRING,))
 def mux_type(robot: Robot) -> Iterator[Finding]:
-    """A mux input takes an output of another type
-
-    A mux forwards messages of one type: that of its subscribers.
-
-    Bad:
-    ```yaml
-    muxes:
-      cmd_vel:
-        inputs:
-          power:
-            from: battery
-            priority: 10
-            timeout: 5 s
-    ```
-    Good:
-    ```yaml
-    muxes:
-      cmd_vel:
-        inputs:
-          navigation:
-            from: go_to
-            priority: 10
-            timeout: 0.5 s
-    ```
-    """
+    """A mux input takes an output of another type."""
     for mux, entry in robot.manifest.muxes.items():
         for name, one in entry.inputs.items():
             own = robot.components[mux].end(name)

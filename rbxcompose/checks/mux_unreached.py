@@ -13,40 +13,7 @@ _MOST_SHOWN = 8  # inputs that are pointed at
 
 @check("RBX3133", Severity.WARNING)
 def mux_unreached(robot: Robot) -> Iterator[Finding]:
-    """An input of a mux never gets through
-
-    In the profile `twist_mux`, an input whose `timeout` is 0 never expires: it holds back what is not above it, even
-    before its first message. That program does so, and the profile follows it.
-
-    Bad:
-    ```yaml
-    muxes:
-      cmd_vel:
-        profile: twist_mux
-        inputs:
-          teleop:
-            priority: 100
-            timeout: 0 s
-          navigation:
-            from: go_to
-            priority: 10
-            timeout: 0.5 s
-    ```
-    Good:
-    ```yaml
-    muxes:
-      cmd_vel:
-        profile: twist_mux
-        inputs:
-          teleop:
-            priority: 100
-            timeout: 0.5 s
-          navigation:
-            from: go_to
-            priority: 10
-            timeout: 0.5 s
-    ```
-    """
+    """An input of a mux never gets through."""
     for mux, entry in robot.manifest.muxes.items():
         ranks = entry.ranks if entry.profile == "twist_mux" else {}
         endless = [name for name, rank in ranks.items() if rank > 0 and not entry.inputs[name].timeout]

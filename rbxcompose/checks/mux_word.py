@@ -13,31 +13,7 @@ from rbxcompose.sections.muxes import MuxModel
 
 @check("RBX3131")
 def mux_word(robot: Robot) -> Iterator[Finding]:
-    """A key of a mux has no meaning in its mode
-
-    Priorities count in the mode `priority` alone, `initial` and `lazy` in the mode `select`. A profile other than
-    `default` has the mode of the program whose rules it follows.
-
-    Bad:
-    ```yaml
-    muxes:
-      cmd_vel:
-        mode: latest
-        inputs:
-          teleop:
-            priority: 100
-            timeout: 0.5 s
-    ```
-    Good:
-    ```yaml
-    muxes:
-      cmd_vel:
-        mode: latest
-        inputs:
-          teleop:
-            timeout: 0.5 s
-    ```
-    """
+    """A key of a mux has no meaning in its mode."""
     for mux, entry in robot.manifest.muxes.items():
         if entry.profile != "default" and entry.works_by != MODE_OF[entry.profile]:
             message = f"the profile '{entry.profile}' of mux '{mux}' has the mode '{MODE_OF[entry.profile]}'"

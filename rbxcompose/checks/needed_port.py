@@ -19,30 +19,7 @@ SERVED_BY = {Calls: Serves, CallsAction: ServesAction, In: Out}
 
 @check("RBX3010", Severity.WARNING, closed=(WIRING, NAMES))
 def needed_port(robot: Robot) -> Iterator[Finding]:
-    """A component needs something that nothing in the robot provides
-
-    An input without a publisher stays silent, and a service without a server never responds. Often the component that
-    should provide it uses another topic, or is missing.
-
-    Bad:
-    ```yaml
-    components:
-      battery:
-        type: battery_sim
-        runtime: 45 s
-        connect:
-          battery_level: power/battery_level
-    values:
-      battery: battery.battery_level
-    ```
-    Good:
-    ```yaml
-    components:
-      battery:
-        type: battery_sim
-        runtime: 45 s
-    ```
-    """
+    """A component needs something that nothing in the robot provides."""
     given = {(type(end.port), end.topic) for end in robot.ends}
     lost = {end.type_name for ends in robot.writers.values() for end in ends if is_unheard(robot, end)}
     for component in robot.components.values():

@@ -17,24 +17,7 @@ _LEVEL = "compare with a level that can be reached"
 
 @check("RBX4122", closed=(OWN,))
 def never_holds(robot: Robot) -> Iterator[Finding]:
-    """A condition can never hold
-
-    A battery has 0 % to 100 %, and a distance or an age is never below zero. If a condition asks for a value beyond
-    that, or if one half of it contradicts the other, nothing that depends on it ever happens.
-
-    Bad:
-    ```yaml
-    do:
-      if: $battery < -10 %
-      then: recharge
-    ```
-    Good:
-    ```yaml
-    do:
-      if: $battery < 50 %
-      then: recharge
-    ```
-    """
+    """A condition can never hold."""
     for mission in robot.missions.values():
         for asked, holds in decided(robot, mission):
             if holds is False:

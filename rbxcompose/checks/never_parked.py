@@ -12,13 +12,7 @@ from rbxcompose.sections.safety import safety
 
 @check("RBX2248", Severity.WARNING, closed=())
 def never_parked(robot: Robot) -> Iterator[Finding]:
-    """Joints have places to be parked at, and are never parked
-
-    Only `on_shutdown: park` moves joints there. With `relax`, which is the default, an arm drops where it is.
-
-    Bad: `safety: {on_shutdown: relax, park: {pan_joint: 0 deg}}`
-    Good: `safety: {on_shutdown: park, park: {pan_joint: 0 deg}}`
-    """
+    """Joints have places to be parked at, and are never parked."""
     care = robot.manifest.contents.of(safety)
     if care.park and care.on_shutdown != "park":
         yield never_parked.at(

@@ -12,26 +12,7 @@ from rbxcompose.sdk.capabilities import Warns
 
 @check("RBX3510", Severity.WARNING, closed=())
 def no_limit(robot: Robot) -> Iterator[Finding]:
-    """A component compares a number with no limit
-
-    It would only tell when messages stay away, and that is what a `topic_monitor` is for.
-
-    Bad:
-    ```yaml
-    components:
-      level:
-        type: threshold
-        topic: battery_level
-    ```
-    Good:
-    ```yaml
-    components:
-      level:
-        type: threshold
-        topic: battery_level
-        warn_below: 30
-    ```
-    """
+    """A component compares a number with no limit."""
     for component in robot.components.values():
         limits = component.declared(Warns)
         if limits and component.is_sound and all(one.warn is None and one.error is None for one in limits):

@@ -13,14 +13,7 @@ from rbxcompose.rules import WIRING
 
 @check("RBX2229", Severity.WARNING, closed=(WIRING,))
 def no_speed_limit(robot: Robot) -> Iterator[Finding]:
-    """A joint has no limit of its speed
-
-    Neither the body nor the manifest has one. A single command, or a trajectory with a point at 0 s, then moves the
-    joint as fast as its servo can.
-
-    Bad: `pan_joint: {actuator: pan_servo}`, where the URDF has no `velocity` for it.
-    Good: `pan_joint: {actuator: pan_servo, limits: {velocity: 90 deg/s}}`
-    """
+    """A joint has no limit of its speed."""
     for one in driven_joints(robot):
         if one.joint.mode == "position" and one.joint.limits.velocity is None and not one.mimics:
             yield no_speed_limit.at(

@@ -11,39 +11,7 @@ from rbxcompose.model.robot import Robot
 
 @check("RBX3141", Severity.WARNING)
 def no_take_over(robot: Robot) -> Iterator[Finding]:
-    """Nobody can take over from a component that drives
-
-    An input without `from` is open to whoever publishes on its topic, such as a person with a joystick. If all inputs
-    `from` components are above it, that person is heard only while the robot does not drive by itself. One open input
-    above them is enough.
-
-    Bad:
-    ```yaml
-    muxes:
-      cmd_vel:
-        inputs:
-          teleop:
-            priority: 5
-            timeout: 0.5 s
-          navigation:
-            from: go_to
-            priority: 10
-            timeout: 0.5 s
-    ```
-    Good:
-    ```yaml
-    muxes:
-      cmd_vel:
-        inputs:
-          teleop:
-            priority: 100
-            timeout: 0.5 s
-          navigation:
-            from: go_to
-            priority: 10
-            timeout: 0.5 s
-    ```
-    """
+    """Nobody can take over from a component that drives."""
     for mux, entry in robot.manifest.muxes.items():
         ranks = entry.ranks if entry.profile == "default" else {}
         driving = {name: rank for name, rank in ranks.items() if entry.inputs[name].source}

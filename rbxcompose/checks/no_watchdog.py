@@ -13,14 +13,7 @@ from rbxcompose.model.robot import Robot
 
 @check("RBX2243", Severity.WARNING, closed=())
 def no_watchdog(robot: Robot) -> Iterator[Finding]:
-    """Servos that turn wheels have no watchdog
-
-    A servo that is given velocities goes on with the last one. When the process of its bus is killed, or the machine
-    loses its supply, only the watchdog within the servo stops it. With `watchdog: 0` it has none.
-
-    Bad: `servos: {type: dynamixel, watchdog: 0 s}`, with an actuator in `mode: velocity`.
-    Good: `servos: {type: dynamixel, watchdog: 0.2 s}`
-    """
+    """Servos that turn wheels have no watchdog."""
     for component in robot.components.values():
         bus: Any = component.config
         if component.path[:1] == BUSES and component.is_sound and not bus.watchdog:

@@ -26,15 +26,7 @@ _SOLID = ("box", "cylinder", "capsule", "sphere")
 
 @check("RBX2246", Severity.WARNING, closed=())
 def object_in_robot(robot: Robot) -> Iterator[Finding]:
-    """A thing of the scene is where the robot is
-
-    The middle of a link is inside of the thing, however the joints stand, or the thing reaches into a link that no
-    joint moves. An arm that collides at its start goes nowhere. A thing with a box stands with its middle where `at`
-    says.
-
-    Bad: `wall: {box: [2 cm, 1 m, 1 m], at: {z: 50 cm}}`, around the arm itself.
-    Good: `wall: {box: [2 cm, 1 m, 1 m], at: {x: 60 cm, z: 50 cm}}`
-    """
+    """A thing of the scene is where the robot is."""
     contents, description = robot.manifest.contents, robot.manifest.body
     if description is None or not contents.of(arms):
         return

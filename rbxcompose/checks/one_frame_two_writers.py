@@ -18,43 +18,7 @@ STATIC = "_static"  # suffix of the topic of static transforms; both topics desc
 
 @check("RBX3014", Severity.WARNING, closed=(WIRING, NAMES))
 def one_frame_two_writers(robot: Robot) -> Iterator[Finding]:
-    """Two components write the pose of the same frame
-
-    A frame has one pose in one other frame. If two components write it, a look-up returns now one pose, now the other,
-    and the robot drives by the wrong one. This happens with two bases even if each follows commands of its own.
-
-    Bad:
-    ```yaml
-    components:
-      trailer:
-        type: diff_drive_sim
-        connect:
-          cmd_vel: trailer_vel
-          odom: trailer/odom
-    muxes:
-      trailer_vel:
-        inputs:
-          teleop:
-            priority: 100
-            timeout: 0.5 s
-    ```
-    Good:
-    ```yaml
-    components:
-      trailer:
-        type: diff_drive_sim
-        connect:
-          cmd_vel: trailer_vel
-          odom: trailer/odom
-          tf: trailer/tf
-    muxes:
-      trailer_vel:
-        inputs:
-          teleop:
-            priority: 100
-            timeout: 0.5 s
-    ```
-    """
+    """Two components write the pose of the same frame."""
     first: dict[tuple[str, str], FrameWriter] = {}
     for one in sorted(_writers(robot), key=lambda one: one.component.name in robot.written):
         other = first.setdefault((one.end.topic.removesuffix(STATIC), one.frame.child.value), one)

@@ -18,27 +18,7 @@ TYPE = "message"  # the setting of those whose type is chosen
 
 @check("RBX3002", closed=(WIRING,))
 def one_topic_two_types(robot: Robot) -> Iterator[Finding]:
-    """Two ports of one topic have different types
-
-    The type is part of the address on the wire. The two would never find each other, and nothing would report it.
-
-    Bad:
-    ```yaml
-    components:
-      base:
-        type: diff_drive_sim
-        connect:
-          odom: cmd_vel
-    ```
-    Good:
-    ```yaml
-    components:
-      base:
-        type: diff_drive_sim
-        connect:
-          odom: wheel_odometry
-    ```
-    """
+    """Two ports of one topic have different types."""
     taken = {
         (resolve(f"{mux}/{name}", robot.manifest.bus.namespace or ""), one.source.partition(".")[0])
         for mux, entry in robot.manifest.muxes.items()

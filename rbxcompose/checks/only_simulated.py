@@ -11,19 +11,7 @@ from rbxcompose.model.robot import Robot
 
 @check("RBX8001")
 def only_simulated(robot: Robot) -> Iterator[Finding]:
-    """A component that exists only in simulation cannot run on the real robot
-
-    `--real` runs drivers. A type such as `battery_sim` has none.
-
-    Bad: `rbxcompose up robot.yaml --real`, with
-    ```yaml
-    components:
-      battery:
-        type: battery_sim
-        runtime: 45 s
-    ```
-    Good: leave out `--real`, or take a type that has a driver.
-    """
+    """A component that exists only in simulation cannot run on the real robot."""
     if robot.manifest.is_simulated:
         return
     for component in robot.components.values():

@@ -14,14 +14,7 @@ _OPTICAL = "_optical"  # by REP 103, such a frame is that of its camera, with th
 
 @check("RBX2371", Severity.WARNING, closed=())
 def optical_camera(robot: Robot) -> Iterator[Finding]:
-    """The camera of a head is an optical frame
-
-    A head points the x axis of its camera at things. An optical frame looks along its z axis, so the head would look
-    past them by 90 degrees.
-
-    Bad: `head: {camera: camera_depth_optical_frame, controller: head_controller}`
-    Good: `head: {camera: camera_depth_frame, controller: head_controller}`
-    """
+    """The camera of a head is an optical frame."""
     contents, description = robot.manifest.contents, robot.manifest.body
     if description is None:
         return

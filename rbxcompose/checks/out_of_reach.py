@@ -19,15 +19,7 @@ _TICK = 1.01  # ticks that a limit may lie outside: that of 150 deg is one beyon
 
 @check("RBX2225", Severity.WARNING, closed=(WIRING,))
 def out_of_reach(robot: Robot) -> Iterator[Finding]:
-    """A joint may go where its servo cannot
-
-    The ticks of a servo end: an AX-12 turns 150 deg to each side of its middle. The tick at which the joint is at 0
-    (`neutral`, `offset`), a gear (`ratio`, `travel`) or a `calibration` shift and scale that. The servo stops at its
-    end, whatever is commanded, and a trajectory that leads beyond fails.
-
-    Bad: `limits: {position: [-180 deg, 180 deg]}` of a joint with an AX-12.
-    Good: `limits: {position: [-150 deg, 149 deg]}`
-    """
+    """A joint may go where its servo cannot."""
     for one in driven_joints(robot):
         if one.joint.mode == "position":
             yield from _told(one)

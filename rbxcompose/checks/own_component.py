@@ -11,23 +11,7 @@ from rbxcompose.model.robot import Robot
 
 @check("RBX3016", Severity.WARNING, closed=())
 def own_component(robot: Robot) -> Iterator[Finding]:
-    """A component is listed that a section runs by itself
-
-    Some types need what only their section knows: which joints an emergency stop relaxes, what a mux forwards. Listed
-    under `components`, they run without it.
-
-    Bad:
-    ```yaml
-    components:
-      estop:
-        type: estop
-    ```
-    Good:
-    ```yaml
-    safety:
-      estop: {topic: estop}
-    ```
-    """
+    """A component is listed that a section runs by itself."""
     for component in robot.components.values():
         if component.path[:1] == ("components",) and component.cls.made_by:
             yield own_component.at(

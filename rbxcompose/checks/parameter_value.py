@@ -22,22 +22,7 @@ from rbxcompose.rules import NAMES
 
 @check("RBX7011", closed=(NAMES,))
 def parameter_value(robot: Robot) -> Iterator[Finding]:
-    """A mission gives a setting a value that it cannot have
-
-    The value has the type of the setting. One that is written out must also lie within the limits of the setting, and
-    of the argument from which the manifest takes it.
-
-    Bad:
-    ```yaml
-    do:
-      set_parameter: {component: battery, parameter: warn, value: 120 %}
-    ```
-    Good:
-    ```yaml
-    do:
-      set_parameter: {component: battery, parameter: warn, value: 60 %}
-    ```
-    """
+    """A mission gives a setting a value that it cannot have."""
     for mission in robot.missions.values():
         for view in Examined(mission.program, robot.names).views:
             setting = view.node.step.effects.setting

@@ -16,14 +16,7 @@ from rbxcompose.units import ANGLE, LENGTH, Quantity
 
 @check("RBX2228", closed=(WIRING,))
 def parked_joint(robot: Robot) -> Iterator[Finding]:
-    """A joint cannot be parked there
-
-    Only a joint whose servos take positions is parked, at a position within its limits: an angle if it turns, a length
-    if it slides.
-
-    Bad: `park: {arm_lift_joint: -120 deg}`, where the joint goes down to -90 deg.
-    Good: `park: {arm_lift_joint: -85 deg}`
-    """
+    """A joint cannot be parked there."""
     driven = {one.name: one for one in driven_joints(robot)}
     for name, position in robot.manifest.contents.of(safety).park.items():
         key = robot.key("safety", "park", name)

@@ -19,26 +19,7 @@ WIRES: tuple[tuple[type[Port[Any]], type[Port[Any]]], ...] = ((Out, In), (Calls,
 
 @check("RBX3021", closed=(WIRING, NAMES))
 def part_needs(robot: Robot) -> Iterator[Finding]:
-    """A part needs a topic that nothing else provides
-
-    `needs:` of a part lists topics with their types. Something outside the part must subscribe to what the part
-    publishes, publish what it subscribes to, or serve what it calls.
-
-    Bad:
-    ```yaml
-    include:
-      nav:
-        part: rbx:parts/navigation.yaml
-        connect:
-          cmd_vel: wheels_cmd
-    ```
-    Good:
-    ```yaml
-    include:
-      nav: rbx:parts/navigation.yaml
-      wheels: rbx:parts/base.yaml
-    ```
-    """
+    """A part needs a topic that nothing else provides."""
     for part in robot.manifest.parts.values():
         for need in part.claims:
             if need.about is not About.NEED:

@@ -18,32 +18,7 @@ from rbxcompose.sdk.ports import Serves, ServesAction, ServesTopic
 
 @check("RBX3022", closed=(WIRING, NAMES, "values"))
 def part_provides(robot: Robot) -> Iterator[Finding]:
-    """A part lacks something that it says it provides
-
-    `provides:` of a part lists the topics with their types, the skills and the values that it offers to the rest of the
-    robot. A file that includes the part relies on them.
-
-    Bad:
-    ```yaml
-    include:
-      spare:
-        part: rbx:parts/battery.yaml
-        with:
-          dock: dock
-          runtime: 45 s
-    components:
-      spare_charger: !remove
-    ```
-    Good:
-    ```yaml
-    include:
-      spare:
-        part: rbx:parts/battery.yaml
-        with:
-          dock: dock
-          runtime: 45 s
-    ```
-    """
+    """A part lacks something that it says it provides."""
     for part in robot.manifest.parts.values():
         ends = [end for name in own_instances(part) & robot.components.keys() for end in robot.components[name].ends]
         if (part.components & robot.written) - robot.components.keys():

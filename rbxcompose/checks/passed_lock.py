@@ -11,46 +11,7 @@ from rbxcompose.model.robot import Robot
 
 @check("RBX3110", Severity.WARNING)
 def passed_lock(robot: Robot) -> Iterator[Finding]:
-    """A lock of a mux does not hold back a component that drives
-
-    A silent lock holds back the inputs with a lower priority than its own. A person at an open input, such as a
-    joystick, may be above it. An input `from` a component above it drives by itself, whatever the lock guards.
-
-    Bad:
-    ```yaml
-    muxes:
-      cmd_vel:
-        inputs:
-          teleop:
-            priority: 10
-            timeout: 0.5 s
-          navigation:
-            from: go_to
-            priority: 50
-            timeout: 0.5 s
-        locks:
-          door:
-            priority: 20
-            timeout: 0.3 s
-    ```
-    Good:
-    ```yaml
-    muxes:
-      cmd_vel:
-        inputs:
-          teleop:
-            priority: 100
-            timeout: 0.5 s
-          navigation:
-            from: go_to
-            priority: 10
-            timeout: 0.5 s
-        locks:
-          door:
-            priority: 20
-            timeout: 0.3 s
-    ```
-    """
+    """A lock of a mux does not hold back a component that drives."""
     for mux, entry in robot.manifest.muxes.items():
         ranks = entry.ranks
         for name, priority in entry.lock_ranks.items():

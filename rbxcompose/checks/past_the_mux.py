@@ -14,25 +14,7 @@ from rbxcompose.sdk.ports import In, Out
 
 @check("RBX3102")
 def past_the_mux(robot: Robot) -> Iterator[Finding]:
-    """A component subscribes to an input of a mux instead of its output
-
-    It would follow this one source regardless of priority, even while the robot is stopped.
-
-    Bad:
-    ```yaml
-    components:
-      base:
-        type: diff_drive_sim
-        connect:
-          cmd_vel: cmd_vel/navigation
-    ```
-    Good:
-    ```yaml
-    components:
-      base:
-        type: diff_drive_sim
-    ```
-    """
+    """A component subscribes to an input of a mux instead of its output."""
     outputs = {name: _outputs(component) for name, component in robot.components.items()}
     for topic, ends in robot.readers.items():
         inputs = [end for end in ends if end.name in outputs[end.instance]]

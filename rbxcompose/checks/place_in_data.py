@@ -20,32 +20,7 @@ from rbxcompose.model.robot import Robot
 
 @check("RBX4131", closed=("places",))
 def place_in_data(robot: Robot) -> Iterator[Finding]:
-    """The data of a mission name a place that the robot does not know
-
-    Text in `data:` becomes a place where a skill needs one. Nothing changes these data, so the skill would fail each
-    time.
-
-    Bad:
-    ```yaml
-    data:
-      rooms: [corner_1, corner_9]
-    do:
-      for: room
-      in: $rooms
-      do:
-        go_to: $room
-    ```
-    Good:
-    ```yaml
-    data:
-      rooms: [corner_1, corner_2]
-    do:
-      for: room
-      in: $rooms
-      do:
-        go_to: $room
-    ```
-    """
+    """The data of a mission name a place that the robot does not know."""
     places = robot.manifest.places
     for mission in robot.missions.values():
         program, known = mission.program, {**_shortened(mission.program), **constants(mission)}

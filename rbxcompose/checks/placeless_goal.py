@@ -15,14 +15,7 @@ _AXES = ("x", "y", "z")
 
 @check("RBX2359", Severity.ERROR, closed=(WIRING,))
 def placeless_goal(robot: Robot) -> Iterator[Finding]:
-    """A step does not say where the tip of an arm should be
-
-    A position has at least one of `x`, `y` and `z`; the others are 0. Without any of them the tip would go to the
-    origin of the frame, which is mostly within the robot. If only the orientation counts, `any_position` says so.
-
-    Bad: `reach_arm: {pitch: 90 deg}`
-    Good: `reach_arm: {pitch: 90 deg, any_position: true}`
-    """
+    """A step does not say where the tip of an arm should be."""
     for reach in written_reaches(robot):
         any_position = "any_position" in reach.arguments and word_of(reach, "any_position")[0] != "false"
         if not any_position and not reach.arguments.keys() & set(_AXES):

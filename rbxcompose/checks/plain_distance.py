@@ -21,23 +21,7 @@ _LEAST = 5.0  # [m] of a number that was probably not meant in metres
 
 @check("RBX4165", Severity.WARNING, closed=("places",))
 def plain_distance(robot: Robot) -> Iterator[Finding]:
-    """A distance without a unit is larger than all ways between places
-
-    A number without a unit is in metres. Compared with that, the robot is always near, wherever it is.
-
-    Bad:
-    ```yaml
-    do:
-      if: distance($pose, dock) < 15
-      then: recharge
-    ```
-    Good:
-    ```yaml
-    do:
-      if: distance($pose, dock) < 15 cm
-      then: recharge
-    ```
-    """
+    """A distance without a unit is larger than all ways between places."""
     places = list(robot.manifest.places.values())
     most = max((distance(one, other) for one, other in combinations(places[:_MOST_PLACES], 2)), default=0.0)
     for mission in robot.missions.values() if most and len(places) <= _MOST_PLACES else ():

@@ -17,25 +17,7 @@ _MOST = {SPEED: (30.0, "m/s", "cm/s"), ANGULAR_SPEED: (15.0, "rad/s", "deg/s")}
 
 @check("RBX3513", Severity.WARNING, closed=())
 def plain_number(robot: Robot) -> Iterator[Finding]:
-    """A speed without a unit is faster than robots are
-
-    A number without a unit is in SI: metres and radians a second. 90 rad/s would be fourteen turns a second.
-
-    Bad:
-    ```yaml
-    components:
-      base:
-        type: diff_drive_sim
-        max_turn_rate: 90
-    ```
-    Good:
-    ```yaml
-    components:
-      base:
-        type: diff_drive_sim
-        max_turn_rate: 90 deg/s
-    ```
-    """
+    """A speed without a unit is faster than robots are."""
     for component in robot.components.values():
         speeds: list[Drives | CommandsMotion] = [*component.declared(Drives), *component.declared(CommandsMotion)]
         for one in speeds if component.is_sound else ():

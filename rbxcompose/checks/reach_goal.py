@@ -24,15 +24,7 @@ _TURNS = ("roll", "pitch", "yaw")
 
 @check("RBX4167", Severity.WARNING, closed=(WIRING,))
 def reach_goal(robot: Robot) -> Iterator[Finding]:
-    """An arm is to reach what it cannot reach
-
-    The pose is farther from the arm than all its links together are long, or it counts in a frame that is no link of
-    the body, or the tip is to have an orientation for which the arm has too few joints. The step would fail each time,
-    which is fine where something else is done then.
-
-    Bad: `reach_neck: {x: 22, any_orientation: true}`, where the arm is 22 cm long.
-    Good: `reach_neck: {x: 22 cm, any_orientation: true}`
-    """
+    """An arm is to reach what it cannot reach."""
     description = robot.manifest.body
     for reach in written_reaches(robot) if description else ():
         if description:

@@ -11,23 +11,7 @@ from rbxcompose.model.robot import Robot
 
 @check("RBX3506", Severity.WARNING, closed=("places",))
 def same_place(robot: Robot) -> Iterator[Finding]:
-    """Two places have the same pose
-
-    One of them was probably copied and not changed.
-
-    Bad:
-    ```yaml
-    places:
-      window: {x: 2 m, y: 1 m}
-      door: {x: 2 m, y: 1 m}
-    ```
-    Good:
-    ```yaml
-    places:
-      window: {x: 2 m, y: 1 m}
-      door: {x: 2 m, y: 3 m}
-    ```
-    """
+    """Two places have the same pose."""
     first: dict[tuple[float, float, float], str] = {}
     for name, place in robot.manifest.places.items():
         other = first.setdefault((place.x, place.y, place.heading), name)

@@ -15,25 +15,7 @@ _SHOWN = 3
 
 @check("RBX2354", Severity.WARNING, closed=())
 def seen_only(robot: Robot) -> Iterator[Finding]:
-    """A link is seen, and arms move through it
-
-    It has visual shapes and no collision shape, so no plan keeps it free: a camera on the arm is driven into the table.
-    Give it a collision shape, or let all that is seen count, with `cover: visual` under `body`.
-
-    Bad:
-    ```xml
-    <link name="lamp">
-      <visual><geometry><cylinder radius="0.03" length="0.2"/></geometry></visual>
-    </link>
-    ```
-    Good:
-    ```xml
-    <link name="lamp">
-      <visual><geometry><cylinder radius="0.03" length="0.2"/></geometry></visual>
-      <collision><geometry><cylinder radius="0.03" length="0.2"/></geometry></collision>
-    </link>
-    ```
-    """
+    """A link is seen, and arms move through it."""
     description = robot.manifest.body
     if description is None or not robot.manifest.contents.of(arms):
         return

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-from rbxcompose.check_runner import OWN, all_checks, check
+from rbxcompose.check_runner import all_checks, check
 from rbxcompose.checks.parameter_value import config_with, parameter_value
 from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.types import Type
@@ -14,26 +14,12 @@ from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.analysis.facts import Constants
 from rbxcompose.model.charge import constants
 from rbxcompose.model.robot import Robot
+from rbxcompose.rules import OUR_CODES
 
 
 @check("RBX4186", Severity.WARNING)
 def setting_breaks_rule(robot: Robot) -> Iterator[Finding]:
-    """A mission gives a setting a value that does not fit the rest of the robot
-
-    A value that is written out is checked as if it stood in the manifest: with it, the rules about the whole robot must
-    hold as they do without it. A robot that runs asks the same rules and refuses the change, so the step fails.
-
-    Bad:
-    ```yaml
-    do:
-      set_parameter: {component: go_to, parameter: speed, value: 0.9 m/s}
-    ```
-    Good:
-    ```yaml
-    do:
-      set_parameter: {component: go_to, parameter: speed, value: 0.2 m/s}
-    ```
-    """
+    """A mission gives a setting a value that does not fit the rest of the robot."""
     written = list({(one.place, one.value.text): one for one in _written(robot)}.values())
     before = {(one.code, one.span) for one in _found(robot)} if written else set()
     refused = {span for code, span in before if code == parameter_value.code}
@@ -101,7 +87,7 @@ def _with(robot: Robot, change: _Change) -> Robot:
 def _found(robot: Robot) -> Iterator[Finding]:
     """Yield what our other rules about the robot find."""
     for one in all_checks():
-        if one.code.startswith(OWN) and one.code != setting_breaks_rule.code:
+        if one.code.startswith(OUR_CODES) and one.code != setting_breaks_rule.code:
             yield from one(robot)
 
 

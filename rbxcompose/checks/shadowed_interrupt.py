@@ -17,37 +17,7 @@ _ITS_OWN = ("new", "age")  # their answers depend on when the interrupt acted la
 
 @check("RBX4184", Severity.WARNING, closed=())
 def shadowed_interrupt(robot: Robot) -> Iterator[Finding]:
-    """An interrupt cannot cut in, because an earlier one always does first
-
-    The first interrupt that holds wins, and a later one never cuts its reaction short. If the condition of the earlier
-    one holds whenever that of the later one does, the later one waits until that reaction is over; if the earlier one
-    ends the mission, it never acts.
-
-    Bad:
-    ```yaml
-    interrupts:
-      battery_low:
-        when: $battery < 30 %
-        do: [{go_to: dock}, recharge]
-      battery_empty:
-        when: $battery < 10 %
-        do: {end: failure}
-    do:
-      go_to: corner_1
-    ```
-    Good:
-    ```yaml
-    interrupts:
-      battery_empty:
-        when: $battery < 10 %
-        do: {end: failure}
-      battery_low:
-        when: $battery < 30 %
-        do: [{go_to: dock}, recharge]
-    do:
-      go_to: corner_1
-    ```
-    """
+    """An interrupt cannot cut in, because an earlier one always does first."""
     for mission in robot.missions.values():
         known = bounds_of(mission)
         for index, later in enumerate(mission.program.interrupts):

@@ -13,24 +13,7 @@ from rbxcompose.sdk.capabilities import ConnectedBy
 
 @check("RBX2247", closed=())
 def shared_port(robot: Robot) -> Iterator[Finding]:
-    """Two components use the same serial port
-
-    A serial port belongs to one program: a second one would take replies that are not meant for it, or cannot open the
-    port at all.
-
-    Bad:
-    ```yaml
-    buses:
-      arm: {type: dynamixel, port: /dev/ttyUSB0}
-      neck: {type: dynamixel, port: /dev/ttyUSB0}
-    ```
-    Good:
-    ```yaml
-    buses:
-      arm: {type: dynamixel, port: /dev/ttyUSB0}
-      neck: {type: dynamixel, port: /dev/ttyUSB1}
-    ```
-    """
+    """Two components use the same serial port."""
     first: dict[str, tuple[str, str]] = {}
     for component, connected in robot.declared(ConnectedBy):
         port, field = connected.port.value, connected.port.field

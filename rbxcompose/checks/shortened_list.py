@@ -15,32 +15,7 @@ from rbxcompose.model.robot import Robot
 
 @check("RBX7002", Severity.WARNING, closed=())
 def shortened_list(robot: Robot) -> Iterator[Finding]:
-    """A profile or an overlay adds to a list and drops its old items
-
-    Maps are merged, but a list replaces the one below it. A list with new items that lacks some of the old ones was
-    probably meant to extend them. `!replace` before the list says that you mean it.
-
-    Bad:
-    ```yaml
-    profiles:
-      spare:
-        diagnostics:
-          analyzers:
-            power:
-              match: [base]
-    ```
-    Good:
-    ```yaml
-    profiles:
-      spare:
-        diagnostics:
-          analyzers:
-            power:
-              match: !replace [base]
-            motion:
-              match: [base, go_to, cmd_vel, battery, charger]
-    ```
-    """
+    """A profile or an overlay adds to a list and drops its old items."""
     for before, after, path in changes(robot):
         if words := lost(before.node, after.node):
             yield shortened_list.at(

@@ -13,28 +13,7 @@ from rbxcompose.units import TIME, format_quantity
 
 @check("RBX5006", Severity.WARNING)
 def shortened_pause(robot: Robot) -> Iterator[Finding]:
-    """The pause before a restart is longer than it can be
-
-    A component is given up at its failure number `max` within the time `within`. With longer pauses there would never
-    be so many, so no pause is longer than `within` divided by `max`.
-
-    Bad:
-    ```yaml
-    components:
-      battery:
-        type: battery_sim
-        runtime: 45 s
-        restart: {max: 5, within: 10 s, backoff: 5 s}
-    ```
-    Good:
-    ```yaml
-    components:
-      battery:
-        type: battery_sim
-        runtime: 45 s
-        restart: {max: 5, within: 2 min, backoff: 5 s}
-    ```
-    """
+    """The pause before a restart is longer than it can be."""
     for component in robot.components.values():
         limits = component.restart
         longest = limits.within / limits.max

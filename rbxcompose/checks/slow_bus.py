@@ -19,16 +19,7 @@ from rbxcompose.units import BIT_RATE, FREQUENCY, TIME, format_quantity
 
 @check("RBX2226", Severity.WARNING, closed=(WIRING,))
 def slow_bus(robot: Robot) -> Iterator[Finding]:
-    """A cycle of a bus does not fit into its period
-
-    In each cycle all servos are read and written. Each byte takes ten bits on the wire, and each reply comes after the
-    return delay of its servo, which is 500 us as they are sold; AX and RX servos are asked one by one. The bus then
-    skips periods, so joints move in coarser steps than `rate` promises. A USB adapter adds its own latency to each
-    request. Simulated servos are not slower for it, unless they are simulated with `sim: pty`.
-
-    Bad: `servos: {type: dynamixel, baud: 57600, rate: 100 Hz}` with six AX-12.
-    Good: `servos: {type: dynamixel, baud: 1000000, rate: 100 Hz}`
-    """
+    """A cycle of a bus does not fit into its period."""
     for bus in driven_buses(robot):
         delay = FACTORY_DELAY if bus.delay is None else bus.delay
         load, period = cycle_load(bus.servos), 1.0 / bus.rate

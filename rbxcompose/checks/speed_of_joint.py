@@ -15,14 +15,7 @@ from rbxcompose.sdk.capabilities import BoundsGoals
 
 @check("RBX2245", Severity.WARNING, closed=(WIRING,))
 def speed_of_joint(robot: Robot) -> Iterator[Finding]:
-    """A controller is to be faster than its joint
-
-    The joint has a limit, in the URDF or under `joints`. It is never faster than that, so the speed is not reached, and
-    what counts on it comes too late.
-
-    Bad: `lift: {type: linear, joint: lift_joint, speed: 50 cm/s}`, where the URDF has `velocity="0.05"` for the joint.
-    Good: `lift: {type: linear, joint: lift_joint, speed: 5 cm/s}`
-    """
+    """A controller is to be faster than its joint."""
     declared = [(one, bounds) for one, bounds in robot.declared(BoundsGoals) if bounds.speed and bounds.joints]
     led = {one.name: one for one in driven_joints(robot)} if declared else {}
     for component, bounds in declared:

@@ -25,14 +25,7 @@ _ROUNDING = 1e-6  # [m]
 
 @check("RBX2380", Severity.WARNING, closed=(WIRING, "scene"))
 def spot_beside(robot: Robot) -> Iterator[Finding]:
-    """A spot is beside what the thing is to be put on
-
-    The place of a spot counts from the middle of the upper face of what it is `on`. It is beyond the edge of that face,
-    so the thing would fall.
-
-    Bad: `left: {on: shelf, y: 50 cm}`, where the shelf is 60 cm wide.
-    Good: `left: {on: shelf, y: 15 cm}`
-    """
+    """A spot is beside what the thing is to be put on."""
     contents = robot.manifest.contents
     things = {one.name: one for one in contents.of(scene).objects}
     for arm, one in contents.of(arms).items():

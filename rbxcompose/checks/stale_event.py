@@ -14,26 +14,7 @@ from rbxcompose.rules import WIRING
 
 @check("RBX4181", Severity.WARNING, closed=(WIRING,))
 def stale_event(robot: Robot) -> Iterator[Finding]:
-    """An old message would end a wait at once
-
-    A mission waits for a flag that comes from outside the robot. The last message counts, however old: if somebody
-    confirmed yesterday, the wait is over at once, and the mission does not even begin before the first message. With
-    `event: true`, a message counts only if it comes during the wait. If the flag tells a state, such as whether a door
-    is open, and the last message is to count, write `event: false`.
-
-    Bad:
-    ```yaml
-    values:
-      confirmed: {topic: button, type: flag}
-    ```
-    with the mission step `wait_for: $confirmed`.
-
-    Good:
-    ```yaml
-    values:
-      confirmed: {topic: button, type: flag, event: true}
-    ```
-    """
+    """An old message would end a wait at once."""
     doubtful = [name for name in robot.values if _may_be_stale(robot, name)]
     for mission in robot.missions.values() if doubtful else ():
         own = {*mission.program.data, *mission.program.inputs}

@@ -19,21 +19,7 @@ _ENDING = ".yaml"
 
 @check("RBX3009", is_fixable=True)
 def start_mission(robot: Robot) -> Iterator[Finding]:
-    """`start:` names a mission that the robot does not have
-
-    Bad:
-    ```yaml
-    missions:
-      patrol: ../../missions/patrol.yaml
-    start: patrl
-    ```
-    Good:
-    ```yaml
-    missions:
-      patrol: ../../missions/patrol.yaml
-    start: patrol
-    ```
-    """
+    """`start:` names a mission that the robot does not have."""
     start = robot.manifest.start
     if start is None or start in robot.manifest.missions or robot.manifest.contents.may_have(MISSIONS, start):
         return

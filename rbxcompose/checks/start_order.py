@@ -13,25 +13,7 @@ from rbxcompose.rules import NAMES
 
 @check("RBX3006", is_fixable=True, closed=(NAMES,))
 def start_order(robot: Robot) -> Iterator[Finding]:
-    """`starts_after:` names no component, or forms a circle
-
-    Each name must be a component of the robot, and the names must not form a circle.
-
-    Bad:
-    ```yaml
-    components:
-      base:
-        type: diff_drive_sim
-        starts_after: [base]
-    ```
-    Good:
-    ```yaml
-    components:
-      base:
-        type: diff_drive_sim
-        starts_after: [battery]
-    ```
-    """
+    """`starts_after:` names no component, or forms a circle."""
     after = {name: component.starts_after for name, component in robot.components.items()}
     for name, component in robot.components.items():
         for index, other in enumerate(component.starts_after):

@@ -14,14 +14,7 @@ from rbxcompose.sections.actuators import actuators, model_of
 
 @check("RBX2242", Severity.WARNING, closed=(WIRING,))
 def supply_voltage(robot: Robot) -> Iterator[Finding]:
-    """Servos on one bus need different voltages
-
-    The cable of a bus carries the supply, too. An XL330 takes at most 6 V and an XM430 at least 10 V: with either
-    supply, one of them is broken or dead, unless it has a cable of its own for that.
-
-    Bad: an `XL330-M288` and an `XM430-W350` on the bus `servos`.
-    Good: each on a bus of its own: `servos: {type: dynamixel, ...}` and `small_servos: {type: dynamixel, ...}`.
-    """
+    """Servos on one bus need different voltages."""
     for bus in driven_buses(robot):
         contents = robot.manifest.contents
         own = {name: one for name, one in contents.of(actuators).items() if one.bus == bus.name}

@@ -15,32 +15,7 @@ GroupPath = tuple[str, ...]
 
 @check("RBX5013", is_fixable=True, closed=(ANALYZER,))
 def suppression(robot: Robot) -> Iterator[Finding]:
-    """A group is silenced by one that does not exist, or by itself
-
-    `suppressed_by` names a group beside this one, or beside one above it. Groups must not silence each other in a
-    circle, and none may be silenced by what contains it: its own level counts there.
-
-    Bad:
-    ```yaml
-    diagnostics:
-      analyzers:
-        power:
-          match: [battery, charger]
-        motion:
-          match: [base, go_to, cmd_vel]
-          suppressed_by: powr
-    ```
-    Good:
-    ```yaml
-    diagnostics:
-      analyzers:
-        power:
-          match: [battery, charger]
-        motion:
-          match: [base, go_to, cmd_vel]
-          suppressed_by: power
-    ```
-    """
+    """A group is silenced by one that does not exist, or by itself."""
     groups = dict(_groups(robot.manifest.diagnostics.analyzers, ()))
     for path, one in groups.items():
         name = one.suppressed_by

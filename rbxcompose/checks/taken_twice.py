@@ -11,35 +11,7 @@ from rbxcompose.model.robot import Robot
 
 @check("RBX3106")
 def taken_twice(robot: Robot) -> Iterator[Finding]:
-    """Two mux inputs take the same output
-
-    An output publishes on one topic, so only one of the inputs would ever receive it.
-
-    Bad:
-    ```yaml
-    muxes:
-      cmd_vel:
-        inputs:
-          navigation:
-            from: go_to
-            priority: 10
-            timeout: 0.5 s
-          docking:
-            from: go_to
-            priority: 20
-            timeout: 0.5 s
-    ```
-    Good:
-    ```yaml
-    muxes:
-      cmd_vel:
-        inputs:
-          navigation:
-            from: go_to
-            priority: 10
-            timeout: 0.5 s
-    ```
-    """
+    """Two mux inputs take the same output."""
     first: dict[str, tuple[str, str]] = {}
     for mux, entry in robot.manifest.muxes.items():
         for name, one in entry.inputs.items():

@@ -14,30 +14,7 @@ from rbxcompose.units import RATIO, format_quantity
 
 @check("RBX3502")
 def threshold_order(robot: Robot) -> Iterator[Finding]:
-    """An error is reported before a warning
-
-    Below `warn` the status of a battery is WARN, below `error` it is ERROR. With `error` above `warn`, there is never a
-    warning. It is the same with other limits; of those above which something is wrong, `error` is the larger one.
-
-    Bad:
-    ```yaml
-    components:
-      battery:
-        type: battery_sim
-        runtime: 45 s
-        warn: 20 %
-        error: 50 %
-    ```
-    Good:
-    ```yaml
-    components:
-      battery:
-        type: battery_sim
-        runtime: 45 s
-        warn: 50 %
-        error: 20 %
-    ```
-    """
+    """An error is reported before a warning."""
     for component, drains in robot.declared(Drains):
         yield from _disorder(robot, component, drains.warn, drains.error, "below", lambda x: format_quantity(x, RATIO))
     for component, warns in robot.declared(Warns):

@@ -16,27 +16,7 @@ from rbxcompose.units import LENGTH, TIME, format_quantity
 
 @check("RBX4120", Severity.WARNING)
 def timeout_and_way(robot: Robot) -> Iterator[Finding]:
-    """A timeout is shorter than the step it limits
-
-    The way from one place to the next takes longer than the step's timeout, even if nothing is in the way, so the step
-    would fail each time. Turns, speeding up and braking count; a drive in the simulated world takes at most a quarter
-    longer than this least time. Waits are checked in the same way.
-
-    Bad:
-    ```yaml
-    do:
-      - go_to: corner_1
-      - go_to: corner_3
-        timeout: 2 s
-    ```
-    Good:
-    ```yaml
-    do:
-      - go_to: corner_1
-      - go_to: corner_3
-        timeout: 20 s
-    ```
-    """
+    """A timeout is shorter than the step it limits."""
     far = far_places(robot)  # told as RBX3512
     for mission in robot.missions.values():
         ways = ways_of(robot, mission)

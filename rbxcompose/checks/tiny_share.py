@@ -17,25 +17,7 @@ _LEAST = 0.01
 
 @check("RBX3515", Severity.WARNING, closed=())
 def tiny_share(robot: Robot) -> Iterator[Finding]:
-    """A limit is less than one percent
-
-    A share is written as a percentage, `90 %`, or as a fraction, `0.9`. Both together, `0.9 %`, is almost nothing.
-
-    Bad:
-    ```yaml
-    components:
-      cpu:
-        type: cpu_monitor
-        warn: 0.9 %
-    ```
-    Good:
-    ```yaml
-    components:
-      cpu:
-        type: cpu_monitor
-        warn: 90 %
-    ```
-    """
+    """A limit is less than one percent."""
     for component in robot.components.values():
         levels: list[Warns | Drains] = [*component.declared(Warns), *component.declared(Drains)]
         for limit in (each for one in levels for each in (one.warn, one.error) if component.is_sound):

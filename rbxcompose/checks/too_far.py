@@ -34,16 +34,7 @@ _MOVES_THINGS = "moveit_msgs/msg/CollisionObject"
 
 @check("RBX2382", Severity.WARNING, closed=(WIRING, "scene"))
 def too_far(robot: Robot) -> Iterator[Finding]:
-    """An arm is to pick or place something where it does not reach
-
-    The thing, or the spot or the place for it, is farther from the arm than all its links together with its fingers are
-    long, even if it holds the thing by its end. A spot that no mission names is told, too. What stands in a frame
-    outside of the body, such as `map`, may come nearer when the robot drives, and is not told; nor are things that
-    something else brings: another arm, `attach`, or what sees them.
-
-    Bad: `pick_arm: cup`, where the cup is 2 m away and the arm is 40 cm long.
-    Good: `pick_arm: cup`, where the cup is 30 cm away.
-    """
+    """An arm is to pick or place something where it does not reach."""
     description = robot.manifest.body
     if description is not None:
         yield from _Reaches(robot, description.body).findings()

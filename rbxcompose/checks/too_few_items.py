@@ -16,32 +16,7 @@ from rbxcompose.sdk.ports import Out
 
 @check("RBX5015", Severity.WARNING, closed=(NAMES,))
 def too_few_items(robot: Robot) -> Iterator[Finding]:
-    """A group needs more items than its components report
-
-    With `count`, a group with fewer items is an ERROR. Each component that it matches is one item, and so is each of
-    its outputs with a declared rate.
-
-    Bad:
-    ```yaml
-    diagnostics:
-      analyzers:
-        power:
-          match: [battery, charger]
-          count: 9
-        motion:
-          match: [base, go_to, cmd_vel]
-    ```
-    Good:
-    ```yaml
-    diagnostics:
-      analyzers:
-        power:
-          match: [battery, charger]
-          count: 2
-        motion:
-          match: [base, go_to, cmd_vel]
-    ```
-    """
+    """A group needs more items than its components report."""
     for path, analyzer in each_analyzer(robot.manifest.diagnostics.analyzers):
         least, _ = analyzer.counted or (0, None)
         is_plain = all(isinstance(one, str) and one in robot.components for one in analyzer.conditions)

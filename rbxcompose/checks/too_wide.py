@@ -22,14 +22,7 @@ _BEARINGS = 16  # directions from which an arm may come
 
 @check("RBX2381", Severity.WARNING, closed=(WIRING, "scene"))
 def too_wide(robot: Robot) -> Iterator[Finding]:
-    """A gripper is to pick what is wider than it opens
-
-    Fingers close on two sides of a thing that are level, across it. The thing is wider there, or all its `grasps` are,
-    than the gripper of the arm opens. The step would fail each time, which is fine where something else is done then.
-
-    Bad: `pick_arm: cup`, where the cup has a radius of 8 cm and the gripper opens 11 cm.
-    Good: `pick_arm: cup`, where the cup has a radius of 3 cm.
-    """
+    """A gripper is to pick what is wider than it opens."""
     contents, description = robot.manifest.contents, robot.manifest.body
     if description is None:
         return

@@ -14,28 +14,7 @@ from rbxcompose.sdk.capabilities import Drives
 
 @check("RBX3013", closed=(WIRING,))
 def two_bases(robot: Robot) -> Iterator[Finding]:
-    """Two bases follow the same commands
-
-    A base takes commands and publishes its position as odometry. If two bases follow one topic, both move and both
-    report where the robot is: a component that drives to a place would receive two poses in turn.
-
-    Bad:
-    ```yaml
-    components:
-      base:
-        type: diff_drive_sim
-      spare:
-        type: diff_drive_sim
-        connect:
-          odom: spare/odom
-    ```
-    Good:
-    ```yaml
-    components:
-      base:
-        type: diff_drive_sim
-    ```
-    """
+    """Two bases follow the same commands."""
     for topic, ends in robot.readers.items():
         bases = [end for end in ends if _moves(robot, end)]
         for other in bases[1:]:

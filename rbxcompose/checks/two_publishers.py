@@ -19,36 +19,7 @@ _STATES = (Qos.STATE, Qos.LATCHED)
 
 @check("RBX3015", Severity.WARNING, closed=(WIRING, NAMES))
 def two_publishers(robot: Robot) -> Iterator[Finding]:
-    """Two components write numbers on one topic
-
-    The messages do not tell who sends them, so who reads the topic sees now the one number and now the other.
-
-    Bad:
-    ```yaml
-    components:
-      battery:
-        type: battery_sim
-        runtime: 45 s
-      spare:
-        type: battery_sim
-        runtime: 45 s
-        connect:
-          set_battery_level: spare/set_battery_level
-    ```
-    Good:
-    ```yaml
-    components:
-      battery:
-        type: battery_sim
-        runtime: 45 s
-      spare:
-        type: battery_sim
-        runtime: 45 s
-        connect:
-          battery_level: spare/battery_level
-          set_battery_level: spare/set_battery_level
-    ```
-    """
+    """Two components write numbers on one topic."""
     for topic, ends in robot.writers.items():
         nameless = [end for end in ends if _is_nameless(end)]
         first = nameless[0].instance if nameless else ""

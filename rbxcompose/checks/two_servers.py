@@ -16,34 +16,7 @@ from rbxcompose.sdk.ports import Out
 
 @check("RBX3008", closed=(WIRING,))
 def two_servers(robot: Robot) -> Iterator[Finding]:
-    """Two components serve the same service or action
-
-    Either of them might respond to a client; which one is undefined.
-
-    Bad:
-    ```yaml
-    components:
-      battery:
-        type: battery_sim
-        runtime: 45 s
-      spare:
-        type: battery_sim
-        runtime: 45 s
-    ```
-    Good:
-    ```yaml
-    components:
-      battery:
-        type: battery_sim
-        runtime: 45 s
-      spare:
-        type: battery_sim
-        runtime: 45 s
-        connect:
-          battery_level: spare/battery_level
-          set_battery_level: spare/set_battery_level
-    ```
-    """
+    """Two components serve the same service or action."""
     first: dict[str, str] = {}
     instances: dict[tuple[str, str], tuple[IncludedPart, IncludedPart]] = {}
     for end in robot.ends:

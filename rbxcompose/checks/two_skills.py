@@ -14,30 +14,7 @@ from rbxcompose.sdk.ports import ServesAction, ServesTopic
 
 @check("RBX3024", closed=(WIRING,))
 def two_skills(robot: Robot) -> Iterator[Finding]:
-    """Two actions are the same skill
-
-    A skill is named after the last word of the topic of its action, or of the topic that receives its orders. Missions
-    could not tell the two apart.
-
-    Bad:
-    ```yaml
-    components:
-      spare:
-        type: charger
-        dock: dock
-        connect:
-          recharge: spare/recharge
-    ```
-    Good:
-    ```yaml
-    components:
-      spare:
-        type: charger
-        dock: dock
-        connect:
-          recharge: recharge_spare
-    ```
-    """
+    """Two actions are the same skill."""
     first: dict[str, PortEnd] = {}
     for end in robot.ends:
         if not isinstance(end.port, ServesAction | ServesTopic) or not (skill := end.skill):

@@ -20,44 +20,7 @@ from rbxcompose.sdk.ports import In, Out
 
 @check("RBX3001", closed=(WIRING, NAMES))
 def two_writers(robot: Robot) -> Iterator[Finding]:
-    """Two components write commands on one topic without a mux
-
-    A subscriber would follow whichever published last, so the robot jerks between the two. A mux decides by priority
-    which one gets through. What is a command follows from who reads it, not from the QoS class of who writes it. A
-    mission that publishes on the output of a mux passes it by; it must publish on an open input.
-
-    Bad:
-    ```yaml
-    components:
-      go_to:
-        type: go_to
-      follow:
-        type: go_to
-        connect:
-          go_to: follow
-    ```
-    Good:
-    ```yaml
-    components:
-      go_to:
-        type: go_to
-      follow:
-        type: go_to
-        connect:
-          go_to: follow
-    muxes:
-      cmd_vel:
-        inputs:
-          navigation:
-            from: go_to
-            priority: 10
-            timeout: 0.5 s
-          follow:
-            from: follow
-            priority: 20
-            timeout: 0.5 s
-    ```
-    """
+    """Two components write commands on one topic without a mux."""
     commands = sorted(commands_of(robot), key=lambda end: end.topic)
     for topic, ends in groupby(commands, key=lambda end: end.topic):
         mux = robot.manifest.muxes.get(topic.strip("/"))

@@ -15,14 +15,7 @@ _COUNTS = {"any_position": ("x", "y", "z", "tolerance"), "any_orientation": ("ro
 
 @check("RBX2358", Severity.WARNING, closed=(WIRING,))
 def uncounted_goal(robot: Robot) -> Iterator[Finding]:
-    """A step says where the tip should be, and that this does not count
-
-    With `any_position` only the orientation of the tip counts, with `any_orientation` only its position. What is
-    written of the other one beside it does nothing. With both nothing counts, and the step fails each time.
-
-    Bad: `reach_arm: {x: 20 cm, pitch: 90 deg, any_position: true}`
-    Good: `reach_arm: {pitch: 90 deg, any_position: true}`
-    """
+    """A step says where the tip should be, and that this does not count."""
     for reach in written_reaches(robot):
         said = [one for one in _COUNTS if word_of(reach, one)[0] == "true"]
         if len(said) > 1:

@@ -21,26 +21,7 @@ _MOST_SHOWN = 8  # subscribers that are pointed at
 
 @check("RBX3011", Severity.WARNING, closed=(WIRING, NAMES))
 def unheard_command(robot: Robot) -> Iterator[Finding]:
-    """Commands are published on a topic without a subscriber
-
-    The publisher assumes that it drives the robot, but nothing moves. A mux is named after the topic that it publishes;
-    a base subscribes to `cmd_vel`.
-
-    Bad:
-    ```yaml
-    components:
-      base:
-        type: diff_drive_sim
-        connect:
-          cmd_vel: wheels/cmd_vel
-    ```
-    Good:
-    ```yaml
-    components:
-      base:
-        type: diff_drive_sim
-    ```
-    """
+    """Commands are published on a topic without a subscriber."""
     waiting: dict[str, list[PortEnd]] = {}  # by the type of their messages
     for one in (one for topic, ends in robot.readers.items() if topic not in robot.writers for one in ends):
         waiting.setdefault(one.type_name, []).append(one)

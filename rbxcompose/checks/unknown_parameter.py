@@ -14,22 +14,7 @@ from rbxcompose.rules import NAMES
 
 @check("RBX7010", is_fixable=True, closed=(NAMES,))
 def unknown_parameter(robot: Robot) -> Iterator[Finding]:
-    """A mission changes a setting that the robot does not have, or that cannot change while it runs
-
-    `set_parameter` takes the name of a component and of one of its settings. `rbxcompose param ls` shows as `live` what
-    may change while the robot runs, and so does the reference of components.
-
-    Bad:
-    ```yaml
-    do:
-      set_parameter: {component: battery, parameter: runtme, value: 30 s}
-    ```
-    Good:
-    ```yaml
-    do:
-      set_parameter: {component: battery, parameter: runtime, value: 30 s}
-    ```
-    """
+    """A mission changes a setting that the robot does not have, or that cannot change while it runs."""
     for mission in robot.missions.values():
         for node in mission.program.nodes:
             if (setting := node.step.effects.setting) is not None:

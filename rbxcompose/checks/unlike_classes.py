@@ -13,15 +13,7 @@ from rbxcompose.sdk.ports import In, Out
 
 @check("RBX3120", Severity.WARNING, closed=())
 def unlike_classes(robot: Robot) -> Iterator[Finding]:
-    """A port reads messages of another QoS class than they are published in
-
-    The class says what matters about messages. Who reads a `state` topic as `latched` waits for a last message that
-    nobody keeps; who reads commands as `event` handles old ones, too. The classes are in the ports of both components.
-
-    Bad: `odom = Out(Odometry, "odom", qos=Qos.STATE)`, and `odom = In(Odometry, "odom", qos=Qos.LATCHED)` in another
-    component.
-    Good: `qos=Qos.STATE` in both.
-    """
+    """A port reads messages of another QoS class than they are published in."""
     for topic, readers in robot.readers.items():
         writers = robot.writers.get(topic, [])
         for reader in readers:

@@ -18,25 +18,7 @@ _MOST_COMPARED = 200_000  # of patterns with names
 
 @check("RBX5001", is_fixable=True, closed=(NAMES,))
 def unmatched_analyzer(robot: Robot) -> Iterator[Finding]:
-    """A pattern of an analyzer matches no component
-
-    The group would stay empty, or miss what it was meant to show.
-
-    Bad:
-    ```yaml
-    diagnostics:
-      analyzers:
-        power:
-          match: [batery]
-    ```
-    Good:
-    ```yaml
-    diagnostics:
-      analyzers:
-        power:
-          match: [battery]
-    ```
-    """
+    """A pattern of an analyzer matches no component."""
     there = {*robot.components, *robot.written, *robot.brought}
     known = {name for name in there if name.isidentifier()}
     meant = {

@@ -14,14 +14,7 @@ from rbxcompose.sdk.ports import Looks
 
 @check("RBX2286", Severity.WARNING, closed=(WIRING, NAMES))
 def unplaced_base(robot: Robot) -> Iterator[Finding]:
-    """Somebody looks up where the robot is, and nobody tells
-
-    A look-up of a link in `map` or `odom` has an answer only if something publishes the frame of the base there: the
-    base itself, or a localisation. Without it, every goal ends with `the position of the base is unknown`.
-
-    Bad: `wheels: {type: diff_drive, odometry: {tf: false}, ...}` in a robot with `go_to`.
-    Good: `wheels: {type: diff_drive, ...}`
-    """
+    """Somebody looks up where the robot is, and nobody tells."""
     description, bases = robot.manifest.body, robot.declared(Drives)
     if description is None or not description.body.links or not bases:
         return

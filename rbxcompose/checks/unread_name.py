@@ -12,30 +12,7 @@ from rbxcompose.rules import OWN
 
 @check("RBX4129", Severity.WARNING, closed=(OWN,))
 def unread_name(robot: Robot) -> Iterator[Finding]:
-    """A mission never reads one of its inputs or data
-
-    Changing its value would change nothing. It is left over, or a number stands where its name should. The same applies
-    to a result that `save` keeps and nothing reads.
-
-    Bad:
-    ```yaml
-    inputs:
-      low:
-        type: ratio
-        default: 50 %
-    do:
-      wait_for: $battery < 50 %
-    ```
-    Good:
-    ```yaml
-    inputs:
-      low:
-        type: ratio
-        default: 50 %
-    do:
-      wait_for: $battery < $low
-    ```
-    """
+    """A mission never reads one of its inputs or data."""
     seen = set()
     for mission in robot.missions.values():
         program = mission.program

@@ -12,23 +12,7 @@ from rbxcompose.rules import MISSIONS
 
 @check("RBX3012", Severity.WARNING, closed=(MISSIONS,))
 def unread_value(robot: Robot) -> Iterator[Finding]:
-    """A value that no mission reads
-
-    `values:` are names for missions. A value that none of them reads is left over, or a mission reads the wrong one.
-    Unread values that a part brings are fine.
-
-    Bad:
-    ```yaml
-    values:
-      battery: battery.battery_level
-      charge: battery.battery_level
-    ```
-    Good:
-    ```yaml
-    values:
-      battery: battery.battery_level
-    ```
-    """
+    """A value that no mission reads."""
     read = frozenset[str]().union(*(mission.program.reads for mission in robot.missions.values()))
     given = frozenset[str]().union(*(part.values for part in robot.manifest.parts.values()))
     for name in robot.manifest.values if robot.missions else ():

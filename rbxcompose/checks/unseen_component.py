@@ -16,36 +16,7 @@ from rbxcompose.model.robot import Robot
 
 @check("RBX5002", Severity.WARNING)
 def unseen_component(robot: Robot) -> Iterator[Finding]:
-    """A component belongs to no group of the diagnostics
-
-    As soon as there are analyzers, every component that none of them matches goes into the group `Other`, where nobody
-    looks for it.
-
-    Bad:
-    ```yaml
-    components:
-      spare:
-        type: go_to
-        connect:
-          go_to: spare
-          cmd_vel: cmd_vel/teleop
-    ```
-    Good:
-    ```yaml
-    components:
-      spare:
-        type: go_to
-        connect:
-          go_to: spare
-          cmd_vel: cmd_vel/teleop
-    diagnostics:
-      analyzers:
-        power:
-          match: [battery, charger]
-        motion:
-          match: [base, go_to, spare, cmd_vel]
-    ```
-    """
+    """A component belongs to no group of the diagnostics."""
     settings = robot.manifest.diagnostics
     groups = [one for _, one in each_analyzer(settings.analyzers)]
     told = [one for group in groups for one in (*group.conditions, *group.expected)]

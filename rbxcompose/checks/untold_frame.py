@@ -13,15 +13,7 @@ from rbxcompose.sdk.capabilities import WritesFrame
 
 @check("RBX2352", Severity.WARNING, closed=(WIRING, NAMES))
 def untold_frame(robot: Robot) -> Iterator[Finding]:
-    """Nobody tells where the robot is in the frame of its virtual joint
-
-    The root of the body moves in the frame of a virtual joint that is `planar` or `floating`. A base tells where it is
-    in `odom`, a localisation where that is in `map`. Without them, whoever needs the frame has to wait. A robot that
-    stands still has a `fixed` joint.
-
-    Bad: `virtual_joint: {frame: world, type: planar}`, for an arm on a table.
-    Good: `virtual_joint: {frame: world, type: fixed}`
-    """
+    """Nobody tells where the robot is in the frame of its virtual joint."""
     description = robot.manifest.body
     if description is None or description.virtual is None or description.virtual.kind == "fixed":
         return

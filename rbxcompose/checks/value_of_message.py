@@ -20,26 +20,7 @@ _WORDS = {TypeKind.TEXT: "write 'type: text'", TypeKind.FLAG: "write 'type: flag
 
 @check("RBX4161", is_fixable=True)
 def value_of_message(robot: Robot) -> Iterator[Finding]:
-    """A value does not fit its message
-
-    The `field` of a value is one of the message on its `topic`, and its `type` is what that field holds: a text, a flag
-    or a number. The `unit` is one of that type. A `port` has all of this already.
-
-    Bad:
-    ```yaml
-    values:
-      level:
-        topic: battery_level
-        field: dta
-    ```
-    Good:
-    ```yaml
-    values:
-      level:
-        topic: battery_level
-        field: data
-    ```
-    """
+    """A value does not fit its message."""
     for name, entry in robot.manifest.values.items():
         source = robot.values.get(name)
         if entry.port is not None:

@@ -14,21 +14,7 @@ from rbxcompose.sdk.ports import In, Out
 
 @check("RBX3005", is_fixable=True, closed=(NAMES,))
 def value_source(robot: Robot) -> Iterator[Finding]:
-    """A value names no output of a component
-
-    A value is `component.port`: the newest message of that output. For data from outside the robot, name its topic.
-
-    Bad:
-    ```yaml
-    values:
-      battery: batery.battery_level
-    ```
-    Good:
-    ```yaml
-    values:
-      battery: battery.battery_level
-    ```
-    """
+    """A value names no output of a component."""
     for name, entry in robot.manifest.values.items():
         if entry.port is not None and (wrong := _missing(robot, name, entry.port)):
             span = robot.value("values", name, "port")

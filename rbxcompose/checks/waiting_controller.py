@@ -15,15 +15,7 @@ from rbxcompose.sections.controllers import controllers
 
 @check("RBX2284", Severity.WARNING, closed=(WIRING, NAMES))
 def waiting_controller(robot: Robot) -> Iterator[Finding]:
-    """A controller is commanded, but waits
-
-    With `start: inactive`, a controller ignores commands until `rbxcompose controller switch` makes it active. That is
-    for an alternative to a controller that has its joints. If no active one has them, those who command it get nothing,
-    and nothing moves.
-
-    Bad: `wheels: {type: diff_drive, start: inactive, ...}`, the only controller of its wheels, and `go_to` drives.
-    Good: `wheels: {type: diff_drive, ...}`
-    """
+    """A controller is commanded, but waits."""
     known = robot.manifest.contents.of(controllers)
     led = {joint for one in known.values() if one.start == "active" for joint in one.claimed}
     for name, one in known.items():

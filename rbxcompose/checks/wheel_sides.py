@@ -14,15 +14,7 @@ from rbxcompose.rules import WIRING
 
 @check("RBX2282", Severity.WARNING, closed=(WIRING,))
 def wheel_sides(robot: Robot) -> Iterator[Finding]:
-    """A wheel is on the other side, or turns backwards
-
-    The base turns to the wrong side if its wheels are mistaken for each other. In the URDF, y points to the left, and
-    the axis of a wheel's joint, too, so that its positive direction is forwards. Whether a servo is mounted the other
-    way round is said by `invert` of its actuator.
-
-    Bad: `left: right_wheel_joint`, `right: left_wheel_joint`
-    Good: `left: left_wheel_joint`, `right: right_wheel_joint`
-    """
+    """A wheel is on the other side, or turns backwards."""
     for base in rolling_bases(robot):
         component, left = base.component, base.left
         if base.wheel_distance < 0.0:

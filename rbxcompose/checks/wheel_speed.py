@@ -20,14 +20,7 @@ ROUNDING = 1e-3  # of a speed
 
 @check("RBX2283", Severity.WARNING, closed=(WIRING,))
 def wheel_speed(robot: Robot) -> Iterator[Finding]:
-    """A base is to be faster than its wheels can turn
-
-    Its wheels have a limit, in the URDF or under `joints`. Commands above it are slowed down, and who sends them plans
-    with a speed that is never reached.
-
-    Bad: `max_speed: 0.5 m/s` and `wheel_radius: 4 cm`, where the URDF has `<limit velocity="6" .../>` for the wheels.
-    Good: `max_speed: 0.2 m/s`
-    """
+    """A base is to be faster than its wheels can turn."""
     for base in rolling_bases(robot):
         rolls, slowest = base.rolls, min(base.wheels, key=lambda one: _limit(robot, one))
         limit = _limit(robot, slowest)

@@ -15,14 +15,7 @@ from rbxcompose.units import LENGTH, format_quantity
 
 @check("RBX2281", Severity.WARNING, closed=(WIRING,))
 def wheels_of_body(robot: Robot) -> Iterator[Finding]:
-    """The wheels of a base are others than those of its body
-
-    The odometry of a base comes from the radius and the distance of its wheels. If the URDF has other ones, one of both
-    is wrong: the robot turns too far, or not far enough, and does not know it. Lengths that differ by 2 % are told.
-
-    Bad: `wheel_distance: 26 cm`, where the joints of the wheels are at `xyz="0 0.1 0"` and `xyz="0 -0.1 0"`.
-    Good: `wheel_distance: 20 cm`
-    """
+    """The wheels of a base are others than those of its body."""
     for base in rolling_bases(robot):
         rolls, left = base.rolls, base.left
         lengths = [("wheels are %s apart", rolls.wheel_distance, abs(base.wheel_distance))]

@@ -21,14 +21,7 @@ _WORDS = {"lower": "least position", "upper": "greatest position", "velocity": "
 
 @check("RBX2223", Severity.WARNING, closed=(WIRING,))
 def wider_limit(robot: Robot) -> Iterator[Finding]:
-    """A limit of a joint is wider than that of the body
-
-    The tighter limit holds, so what is written below `joints` has no effect. Either it is a slip, or the URDF is too
-    strict.
-
-    Bad: `limits: {velocity: 180 deg/s}`, where the URDF has `<limit ... velocity="2"/>`, which is 115 deg/s.
-    Good: `limits: {velocity: 90 deg/s}`
-    """
+    """A limit of a joint is wider than that of the body."""
     for one in driven_joints(robot):
         for name in limits_of(one.written, one.body).wider:
             yield from _told(one, name)

@@ -13,26 +13,7 @@ WORLD = "world"
 
 @check("RBX6001", Severity.WARNING, closed=())
 def world_group(robot: Robot) -> Iterator[Finding]:
-    """The process group `world` is for simulated truth only
-
-    Simulated truth (where the robot is, how much charge it has) lives in the process group `world`, so that the death
-    of any other process never changes it. A component of the robot itself does not belong there: if the process `world`
-    fails, the robot goes down. Only a robot that has a single process, by `process: world`, has all of them there.
-
-    Bad:
-    ```yaml
-    components:
-      go_to:
-        type: go_to
-        process: world
-    ```
-    Good:
-    ```yaml
-    components:
-      go_to:
-        type: go_to
-    ```
-    """
+    """The process group `world` is for simulated truth only."""
     for component in robot.components.values():
         if component.process == component.cls.process or WORLD not in (component.process, component.cls.process):
             continue

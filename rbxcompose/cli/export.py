@@ -27,17 +27,7 @@ from rbxcompose.systems.bundle import files_of
 from rbxcompose.systems.model import System
 from rbxcompose.systems.reader import compile_system
 
-NOT_EXPORTED = kind(
-    "RBX6115",
-    """The system cannot be exported there
-
-`export` writes to a new or empty folder, so that nothing of yours is overwritten. It takes the file of a system: a
-robot on a single host is a system with one host. A ConfigMap of Kubernetes holds at most a megabyte.
-
-Bad: `rbxcompose export systemd systems/two_hosts.yaml --out robots`
-Good: `rbxcompose export systemd systems/two_hosts.yaml --out units`
-""",
-)
+NOT_EXPORTED = kind("RBX6115")
 SRDF, ROS2 = "srdf", "ros2"
 PROGRAMS = ("systemd", "compose", "k8s", ROS2, SRDF)
 

@@ -12,14 +12,7 @@ from importlib.util import find_spec
 from rbxcompose.cli.output.console import refuse
 from rbxcompose.findings import kind
 
-NOT_INSTALLED = kind(
-    "RBX9010",
-    """The language server is not installed
-
-`rbxcompose lsp` needs a package that robots do not need; it is an extra:
-`pip install 'rbxcompose[lsp]'`.
-""",
-)
+NOT_INSTALLED = kind("RBX9010")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

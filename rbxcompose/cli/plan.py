@@ -24,17 +24,7 @@ from rbxcompose.plan.dump import PlanTextError, dump, load
 from rbxcompose.plan.model import Plan
 from rbxcompose.regular_files import read_regular
 
-NO_PLAN = kind(
-    "RBX9012",
-    """The file is not a plan
-
-`plan --diff FILE` compares with a plan that was written by `plan --json`, or with the plan of another manifest.
-
-Bad: `rbxcompose plan robots/turtlebot --diff notes.json`
-Good: `rbxcompose plan robots/turtlebot --json > before.json`, and later
-`rbxcompose plan robots/turtlebot --diff before.json`
-""",
-)
+NO_PLAN = kind("RBX9012")
 SAVED = ".json"
 USAGE = 2
 

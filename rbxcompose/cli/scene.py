@@ -43,17 +43,7 @@ from rbxcompose.scene_requests import (
 from rbxcompose.sections.scene import NO_MESH, ObjectModel, mesh_mistake, scene_of
 from rbxcompose.typed_json import to_data
 
-NO_PAIR = kind(
-    "RBX9426",
-    """An arm does not watch this
-
-Only what an arm moves relative to something else is watched: links that a joint connects are not, nor are things that
-stand beside each other.
-
-Bad: `rbxcompose scene distance table floor`
-Good: `rbxcompose scene distance right_arm_tip table`
-""",
-)
+NO_PAIR = kind("RBX9426")
 ON_SYSTEM = SCENE
 _SHOWN = "OBJECT"  # name of the object's text in findings
 Actions = Callable[[argparse.Namespace], int]

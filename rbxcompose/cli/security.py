@@ -40,17 +40,7 @@ from rbxcompose.systems.model import System
 from rbxcompose.systems.reader import compile_system
 from rbxcompose.typed_json import to_data
 
-NOT_MADE = kind(
-    "RBX6116",
-    """Certificates cannot be made or brought to a host
-
-`security init` needs OpenSSL, a folder that it may write to, and `ssh` to the hosts that have it. A host without `ssh`
-keeps its files on this machine, or gets a copy of its folder by hand.
-
-Bad: `rbxcompose security init robots/turtlebot/robot.yaml`
-Good: `rbxcompose security init systems/two_hosts.yaml`
-""",
-)
+NOT_MADE = kind("RBX6116")
 _RECEIVE = """set -e; umask 077
 d="${XDG_CONFIG_HOME:-$HOME/.config}/rbxcompose/systems/NAME/HOST"
 mkdir -p "$d"; tar -xf - -C "$d"

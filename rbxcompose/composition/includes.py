@@ -29,48 +29,8 @@ from rbxcompose.references import COMPONENT, VALUE
 from rbxcompose.sections.args import args
 from rbxcompose.sections.include import Include, include
 
-CIRCLE = kind(
-    "RBX1308",
-    """Parts that include each other in a circle
-
-A part can include other parts, but not itself, directly or through others: it would never end.
-
-Bad: `arm.yaml` includes `hand.yaml`, which includes `arm.yaml`.
-Good: `arm.yaml` includes `hand.yaml`, and both include `camera.yaml`.
-""",
-)
-NO_TOPIC = kind(
-    "RBX1309",
-    """`connect:` of an instance names a topic that the part does not have
-
-`connect:` gives topics of a part other names: those of its components' ports, of its muxes, and `MUX/INPUT` for an
-input or a lock of a mux.
-
-Bad:
-```yaml
-include:
-  spare:
-    part: rbx:parts/battery.yaml
-    with:
-      dock: dock
-      runtime: 45 s
-    connect:
-      batery_level: spare/battery_level
-```
-Good:
-```yaml
-include:
-  spare:
-    part: rbx:parts/battery.yaml
-    with:
-      dock: dock
-      runtime: 45 s
-    connect:
-      battery_level: spare/battery_level
-```
-""",
-    is_fixable=True,
-)
+CIRCLE = kind("RBX1308")
+NO_TOPIC = kind("RBX1309", is_fixable=True)
 
 
 @dataclass(frozen=True, slots=True)

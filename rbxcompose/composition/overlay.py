@@ -17,80 +17,10 @@ from rbxcompose.manifest.tree import BROKEN, Entry, KeyPath, MappingNode, Scalar
 from rbxcompose.manifest.validate import WRONG_TYPE, label_of
 from rbxcompose.manifest.walk import REMOVE
 
-NOTHING_TO_CHANGE = kind(
-    "RBX1302",
-    """A profile, an overlay or `--set` changes something that does not exist
+NOTHING_TO_CHANGE = kind("RBX1302", is_fixable=True)
+NOT_AN_OVERLAY = kind("RBX1305")
 
-An overlay may add a new entry to a section, such as a component with its `type:`. What it changes or removes must
-exist; perhaps the name is misspelt.
-
-Bad:
-```yaml
-profiles:
-  tired:
-    components:
-      batery:
-        runtime: 30 s
-```
-Good:
-```yaml
-profiles:
-  tired:
-    components:
-      battery:
-        runtime: 30 s
-```
-""",
-    is_fixable=True,
-)
-NOT_AN_OVERLAY = kind(
-    "RBX1305",
-    """`!remove` with nothing to remove
-
-In a profile or an overlay, `!remove` takes something out of the robot; in the robot's file, something that a part
-brought. Here there is nothing to remove.
-
-Bad:
-```yaml
-components:
-  charger: !remove
-```
-Good:
-```yaml
-profiles:
-  bare:
-    components:
-      charger: !remove
-```
-""",
-)
-
-TWO_PARTS = kind(
-    "RBX1307",
-    """Two parts bring the same thing
-
-Names from a part get the name of its instance as a prefix, but topics do not: two parts may not bring the same input
-or lock of a mux. `connect:` gives one of them another topic.
-
-Bad:
-```yaml
-include:
-  gamepad: rbx:parts/teleop.yaml
-  keyboard: rbx:parts/teleop.yaml
-```
-Good:
-```yaml
-include:
-  gamepad: rbx:parts/teleop.yaml
-  keyboard:
-    part: rbx:parts/teleop.yaml
-    with:
-      priority: 90
-    connect:
-      cmd_vel/teleop: cmd_vel/keyboard
-```
-""",
-)
+TWO_PARTS = kind("RBX1307")
 
 SET = "--set"
 ENTRY = 2  # keys of the path of an entry of a section

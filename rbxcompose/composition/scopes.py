@@ -22,27 +22,7 @@ from rbxcompose.manifest.validate import UNKNOWN_KEY
 from rbxcompose.references import ARGUMENT
 from rbxcompose.sections.args import args
 
-NO_VALUE = kind(
-    "RBX1206",
-    """An argument without a value
-
-An argument gets its value from `default:`, a profile, or `--set args.NAME=VALUE`; that of a part from `with:`.
-
-Bad:
-```yaml
-args:
-  speed:
-    type: speed
-```
-Good:
-```yaml
-args:
-  speed:
-    type: speed
-    default: 0.3 m/s
-```
-""",
-)
+NO_VALUE = kind("RBX1206")
 
 
 @dataclass(frozen=True, slots=True)

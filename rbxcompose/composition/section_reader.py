@@ -17,29 +17,7 @@ from rbxcompose.manifest.section import ROBOT, Contents, Section
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, at, key_span
 from rbxcompose.references import COMPONENT
 
-TAKEN_NAME = kind(
-    "RBX1007",
-    """The name is taken
-
-Everything that runs has its own name. A component cannot have the name of a section, of a mux, or of a component that
-every robot runs.
-
-Bad:
-```yaml
-components:
-  diagnostics:
-    type: battery_sim
-    runtime: 45 s
-```
-Good:
-```yaml
-components:
-  battery:
-    type: battery_sim
-    runtime: 45 s
-```
-""",
-)
+TAKEN_NAME = kind("RBX1007")
 ALWAYS_THERE = ("transforms", "mission")
 """Components that every robot runs, beside `diagnostics`."""
 

@@ -12,17 +12,7 @@ from rbxcompose.manifest.section import ROBOT, SetScope
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode
 from rbxcompose.sections.include import include
 
-BAD_SET = kind(
-    "RBX1303",
-    """A `--set` that cannot be read
-
-`--set` takes a path and a value with `=` between them. The path starts with a component or a section; the value is
-YAML, as in the file.
-
-Bad: `--set battery.runtime`
-Good: `--set battery.runtime="30 s"`
-""",
-)
+BAD_SET = kind("RBX1303")
 
 HEADER = ("about",)  # keys of the header that it may change
 

@@ -8,37 +8,7 @@ from collections.abc import Iterator
 from rbxcompose.findings import Finding, Severity, kind
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode, children
 
-UNREAD_ARGUMENT = kind(
-    "RBX1209",
-    """An argument that nothing reads
-
-The file declares an argument, but has no `${args.NAME}`: whatever is given to it, nothing changes.
-
-Bad:
-```yaml
-args:
-  speed:
-    type: speed
-    default: 0.3 m/s
-components:
-  go_to:
-    type: go_to
-    speed: 0.3 m/s
-```
-Good:
-```yaml
-args:
-  speed:
-    type: speed
-    default: 0.3 m/s
-components:
-  go_to:
-    type: go_to
-    speed: ${args.speed}
-```
-""",
-    Severity.WARNING,
-)
+UNREAD_ARGUMENT = kind("RBX1209", Severity.WARNING)
 _NAME = re.compile(r"\bargs\.([a-z][a-z0-9_]*)")
 
 

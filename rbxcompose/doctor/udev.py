@@ -17,62 +17,11 @@ from rbxcompose.doctor.serial_ports import LookAt
 from rbxcompose.findings import Finding, Severity, Span, kind
 from rbxcompose.printable import plain
 
-NO_LINK = kind(
-    "RBX9413",
-    """A device that is plugged in has no link with its name
-
-The rules are installed, but udev has not applied them since the device was plugged in.
-
-Bad: `/dev/arm` does not exist, after rules were copied by hand.
-Good: unplug the adapter and plug it in again, or run the commands that `rbxcompose udev install` shows.
-""",
-    Severity.WARNING,
-)
-OTHER_RULES = kind(
-    "RBX9414",
-    """The rules of udev are not those of the robot
-
-They are not installed, or `devices:` has changed since. `port: dev:NAME` works without rules: they give `/dev/NAME` to
-other programs, and the device to the group `dialout`.
-
-Bad: `/etc/udev/rules.d/99-rbxcompose-arm.rules` with the serial number of the old adapter.
-Good: `sudo rbxcompose udev install robots/arm`
-""",
-    Severity.WARNING,
-)
-SAME_SERIAL = kind(
-    "RBX9415",
-    """Several adapters tell the same serial number
-
-Cheap adapters do: all of them say `0001`. A name by serial number then means all of them.
-
-Bad: `{vendor: 10c4, product: ea60, serial: "0001"}`, with two such adapters plugged in.
-Good: `{vendor: 10c4, product: ea60, usb_port: 1-1.4}`, always in that socket.
-""",
-    Severity.WARNING,
-)
-NOT_IN_GROUP = kind(
-    "RBX9416",
-    """This user is not in the group of serial ports
-
-Rules give devices to a group, usually `dialout`. Whoever joins it must log in again.
-
-Bad: `id -nG` does not show `dialout`.
-Good: `sudo usermod -aG dialout $USER`, then log in again.
-""",
-    Severity.WARNING,
-)
-OTHER_LINK = kind(
-    "RBX9417",
-    """A link with the name of a device leads to another one
-
-Another rule makes the same link, or the link is left from an old rule. The robot takes the right device nevertheless,
-but other programs that open `/dev/NAME` do not.
-
-Bad: two files in `/etc/udev/rules.d` with `SYMLINK+="arm"`.
-Good: one of them.
-""",
-)
+NO_LINK = kind("RBX9413", Severity.WARNING)
+OTHER_RULES = kind("RBX9414", Severity.WARNING)
+SAME_SERIAL = kind("RBX9415", Severity.WARNING)
+NOT_IN_GROUP = kind("RBX9416", Severity.WARNING)
+OTHER_LINK = kind("RBX9417")
 
 
 @dataclass(frozen=True, slots=True)

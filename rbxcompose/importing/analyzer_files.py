@@ -14,28 +14,8 @@ from rbxcompose.importing.ros_parameters import NodeParameters, parameters_with
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode
 from rbxcompose.printable import plain
 
-REFUSED = kind(
-    "RBX2296",
-    """An analyzer that the aggregator refuses
-
-It has no type, no path, or says nothing about the names that it matches. The aggregator tells that while it runs, and
-leaves the analyzer out; so does the import.
-
-Bad: `motors: {type: diagnostic_aggregator/GenericAnalyzer, path: Motors, startwith: [motor]}`
-Good: `motors: {type: diagnostic_aggregator/GenericAnalyzer, path: Motors, startswith: [motor]}`
-""",
-    Severity.WARNING,
-)
-NO_REGEX = kind(
-    "RBX2297",
-    """A regular expression that Python does not have
-
-ROS takes those of C++, which are the same but for a few signs. The expression is left out.
-
-Bad: `regex: "[[:alpha:"`
-Good: `regex: "[a-z]+"`
-""",
-)
+REFUSED = kind("RBX2296", Severity.WARNING)
+NO_REGEX = kind("RBX2297")
 
 TYPES = {
     "GenericAnalyzer": "generic",

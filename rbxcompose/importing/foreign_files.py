@@ -30,18 +30,7 @@ from rbxcompose.units import MOST
 
 T = TypeVar("T")
 
-PYTHON_OBJECT = kind(
-    "RBX2292",
-    """An imported file asks for an object of Python
-
-Tags such as `!!python/object/apply` make a reader of YAML call functions of Python. Nothing is called here: what is
-below the tag is read as plain data. The tags that `dynparam dump` writes around its values are known, and not told.
-
-Bad: `level: !!python/object/apply:eval ["3"]`
-Good: `level: 3`
-""",
-    Severity.WARNING,
-)
+PYTHON_OBJECT = kind("RBX2292", Severity.WARNING)
 
 _XML = (".srdf", ".urdf")
 _PYTHON = "!!python/"

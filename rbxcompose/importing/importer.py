@@ -10,49 +10,11 @@ from rbxcompose.findings import Finding, Report, Severity, kind
 from rbxcompose.importing.foreign_files import ForeignFile
 from rbxcompose.plugins import LEFT_OUT, BrokenPluginError, Plugins
 
-NOT_CARRIED_OVER = kind(
-    "RBX2230",
-    """Something of an imported file has no place in the manifest
+NOT_CARRIED_OVER = kind("RBX2230", Severity.WARNING)
+OTHER_PROGRAM = kind("RBX2231")
+DISAGREES = kind("RBX2232")
 
-It is understood, but a manifest has nothing for it, or what it asks for is decided elsewhere. The message says why. The
-rest of the file is imported as if it were not there.
-
-Bad: `hand_joint: {type: hobby_servo, id: 3}` in a file of ArbotiX: its board makes the pulses for that servo.
-Good: a Dynamixel servo in its place.
-""",
-    Severity.WARNING,
-)
-OTHER_PROGRAM = kind(
-    "RBX2231",
-    """A file that is not one of the program it is imported from
-
-Nothing in it is what files of that program have. `rbxcompose import --help` lists the programs.
-
-Bad: `rbxcompose import arbotix diagnostics.yaml`
-Good: `rbxcompose import arbotix arbotix.yaml`, a file with `joints:`, `controllers:` or a gripper's `model:`.
-""",
-)
-DISAGREES = kind(
-    "RBX2232",
-    """Two imported files disagree
-
-The files of one import make one robot. They may say the same thing twice, but not two things; the first one counts.
-
-Bad: `head_pan_joint: {id: 1}` in one file, `head_pan_joint: {id: 2}` in the next one.
-Good: `head_pan_joint: {id: 1}` in one of them.
-""",
-)
-
-NOTHING_LEFT = kind(
-    "RBX2238",
-    """Nothing of the files could be imported
-
-They are files of the program, but nothing in them has a place in a manifest, so none is written.
-
-Bad: a file of ArbotiX with a port, but without joints and controllers.
-Good: one with `joints:`
-""",
-)
+NOTHING_LEFT = kind("RBX2238")
 
 PLUGINS = Plugins("importer", "rbxcompose.importing.importers")
 

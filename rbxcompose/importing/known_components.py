@@ -19,18 +19,7 @@ from rbxcompose.printable import plain
 from rbxcompose.sdk.registry import component_type, usable_names
 from rbxcompose.units import UNITS, Dimension
 
-GUESSED_TYPE = kind(
-    "RBX2293",
-    """The type of a component is a guess
-
-Files of parameters name nodes, but not what they are. All parameters of this one are settings of one component type,
-so it is taken for one; numbers are in SI, as ROS has them.
-
-Bad: a node of another program with the same parameters, imported as a component.
-Good: without this component in the manifest.
-""",
-    Severity.WARNING,
-)
+GUESSED_TYPE = kind("RBX2293", Severity.WARNING)
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,18 +12,7 @@ from rbxcompose.body.virtual_joint import VirtualKind
 from rbxcompose.findings import Report, Severity, kind
 from rbxcompose.printable import plain
 
-UNUSED = kind(
-    "RBX2353",
-    """A virtual joint of an SRDF does not place the robot
-
-It connects a frame outside of the URDF with the root of the URDF, and there is one. MoveIt takes the first that does,
-leaves out all others, and takes a type that it does not know for `fixed`. So does the import.
-
-Bad: `<virtual_joint name="base" type="fixed" parent_frame="world" child_link="gripper"/>`
-Good: `<virtual_joint name="base" type="fixed" parent_frame="world" child_link="base_link"/>`
-""",
-    Severity.WARNING,
-)
+UNUSED = kind("RBX2353", Severity.WARNING)
 _KINDS: tuple[str, ...] = get_args(VirtualKind)
 
 

@@ -18,28 +18,9 @@ _INCH = 72.0  # [px]
 _GRAPH = {"rankdir": "LR", "nodesep": "0.2", "ranksep": "0.5"}
 _NODE = {"fixedsize": "true", "label": ""}
 
-NO_GRAPHVIZ = kind(
-    "RBX9013",
-    """Graphviz is not installed
+NO_GRAPHVIZ = kind("RBX9013")
 
-The pictures of `graph --format html`, of machines in `mission show --format html`, and of `body tree --format svg` are
-laid out by Graphviz, which robots do not need; it is an extra: `pip install 'rbxcompose[graph]'`. `--format dot`,
-`--format mermaid` and `--format text` work without it.
-""",
-)
-
-TOO_TANGLED = kind(
-    "RBX9014",
-    """A machine has too many transitions for a picture
-
-Graphviz would take minutes to place the states of a machine with hundreds of transitions that lead back and across, and
-nobody could follow the lines. `--format text`, `--format dot` and `--format mermaid` show such a mission nevertheless.
-
-Bad: `rbxcompose mission show patrol robots/turtlebot --format html` with 200 states that each lead to two others
-
-Good: `rbxcompose mission show patrol robots/turtlebot --format text`
-""",
-)
+TOO_TANGLED = kind("RBX9014")
 MOST_EFFORT = 25_000  # takes about a second
 
 Edge = tuple[str, str]

@@ -15,17 +15,7 @@ from rbxcompose.references import COMPONENT
 from rbxcompose.schema.guide import Guide
 from rbxcompose.sections.include import include
 
-NO_SUCH_PATH = kind(
-    "RBX9011",
-    """`why` asks for something that the robot does not have
-
-A path starts with a component, a mux or a section, as for `--set`; then come the keys, with dots between them. A
-component is also followed by one of its ports.
-
-Bad: `rbxcompose why battery.runtme robots/turtlebot`
-Good: `rbxcompose why battery.runtime robots/turtlebot`
-""",
-)
+NO_SUCH_PATH = kind("RBX9011")
 
 
 def path_of(robot: Robot, text: str) -> KeyPath:

@@ -18,25 +18,7 @@ from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode
 from rbxcompose.manifest.validate import KEYS, UNKNOWN_KEY, validate, where
 from rbxcompose.printable import plain
 
-OTHER_KIND = kind(
-    "RBX1304",
-    """The wrong kind of manifest
-
-Every manifest says what it describes: `kind: Robot`, `kind: Mission` and so on. This file is not what is needed here.
-
-Bad:
-```yaml
-missions:
-  patrol: robot.yaml
-```
-Good:
-```yaml
-missions:
-  patrol: ../../missions/patrol.yaml
-```
-""",
-    is_fixable=True,
-)
+OTHER_KIND = kind("RBX1304", is_fixable=True)
 
 
 @dataclass(slots=True)

@@ -15,26 +15,7 @@ from rbxcompose.printable import plain
 
 PROFILE = "--profile"
 """What stands for a file in findings about profiles that a command chooses."""
-OUTSIDE = kind(
-    "RBX1306",
-    """A path outside the project
-
-A robot's files are together: below the nearest folder with `robots/` or `missions/`, or in the shipped library
-(`rbx:...`). A path may not leave it, neither by `..` nor by a link. Nor may the file that a command names be a link
-that leaves it.
-
-Bad:
-```yaml
-missions:
-  patrol: /home/someone/patrol.yaml
-```
-Good:
-```yaml
-missions:
-  patrol: ../../missions/patrol.yaml
-```
-""",
-)
+OUTSIDE = kind("RBX1306")
 ROBOT_FILE = "robot.yaml"  # the file that a folder means
 _ROBOTS = "robots"  # the folder of a project's robots
 _ENDINGS = (".yaml", ".yml")

@@ -30,120 +30,14 @@ from rbxcompose.manifest.yaml_nodes import TOO_LARGE
 from rbxcompose.printable import plain
 from rbxcompose.units import NUMBER, QUOTIENT, Quantity
 
-SYNTAX = kind(
-    "RBX1201",
-    """`${...}` that cannot be read
+SYNTAX = kind("RBX1201", is_fixable=True)
+UNKNOWN_NAME = kind("RBX1202", is_fixable=True)
+WRONG_OPERATION = kind("RBX1203")
+ENVIRONMENT = kind("RBX1204")
+NOT_RUNNING = kind("RBX1205", is_fixable=True)
 
-Between `${` and `}` there must be a name or an expression. `$(arg speed)` is the syntax of ROS launch files.
-
-Bad:
-```yaml
-speed: ${args.speed * }
-```
-Good:
-```yaml
-speed: ${args.speed * 2}
-```
-""",
-    is_fixable=True,
-)
-UNKNOWN_NAME = kind(
-    "RBX1202",
-    """Unknown name in `${...}`
-
-You can fill in `args.NAME`, `robot.name`, `sim`, `env.NAME`. What is known only while the robot runs, such as
-`$battery`, has no braces and belongs in missions.
-
-Bad:
-```yaml
-speed: ${args.sped}
-```
-Good:
-```yaml
-speed: ${args.speed}
-```
-""",
-    is_fixable=True,
-)
-WRONG_OPERATION = kind(
-    "RBX1203",
-    """`${...}` that has no value
-
-The expression can be read but not computed: it adds a length to a time, or divides by zero.
-
-Bad:
-```yaml
-speed: ${args.speed + 1 s}
-```
-Good:
-```yaml
-speed: ${args.speed + 0.1 m/s}
-```
-""",
-)
-ENVIRONMENT = kind(
-    "RBX1204",
-    """An environment variable is not set
-
-`${env.NAME}` needs the variable; `${env.NAME:-default}` does without; `${env.NAME:?why}` says why it is needed.
-
-Bad:
-```yaml
-port: ${env.SERVO_PORT}
-```
-Good:
-```yaml
-port: ${env.SERVO_PORT:-/dev/ttyUSB0}
-```
-""",
-)
-NOT_RUNNING = kind(
-    "RBX1205",
-    """`$name` where `${...}` belongs
-
-A robot's file is composed before the robot runs: values to fill in have braces. `$name` is looked up while the robot
-runs and belongs in missions. Write a dollar as `$$`.
-
-Bad:
-```yaml
-speed: $speed
-```
-Good:
-```yaml
-speed: ${args.speed}
-```
-""",
-    is_fixable=True,
-)
-
-SECRET = kind(
-    "RBX1207",
-    """A secret that is not available
-
-`${secret.NAME}` is the text in the file `secrets/NAME` of the project, which only its owner may read (mode 0600), or in
-the environment variable `RBX_SECRET_NAME`.
-
-Bad: `${secret.token}` without the file `secrets/token`.
-Good: `mkdir -p secrets; cat > secrets/token; chmod 600 secrets/token`
-""",
-)
-SHOWN_SECRET = kind(
-    "RBX1208",
-    """A secret in a place that is shown
-
-A secret must be the whole value of a component's setting that takes one. Names, texts and missions are shown and
-logged, so they cannot contain it.
-
-Bad:
-```yaml
-about: Speaks with ${secret.token}
-```
-Good:
-```yaml
-about: Speaks with the cloud
-```
-""",
-)
+SECRET = kind("RBX1207")
+SHOWN_SECRET = kind("RBX1208")
 
 _PIECE = re.compile(
     r"\$\$|\$\{(?P<body>[^}]*)(?P<end>\}?)|\$(?P<name>[A-Za-z][A-Za-z0-9_.]*)"

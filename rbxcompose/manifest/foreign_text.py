@@ -7,21 +7,7 @@ from collections.abc import Mapping
 
 from rbxcompose.findings import Finding, Span, kind
 
-XML = kind(
-    "RBX1320",
-    """XML instead of a manifest
-
-A manifest is YAML. A robot names its URDF or xacro file, in the section `body`; launch files and behaviour trees of
-other programs have to be written anew.
-
-Bad: a robot's file that begins with `<robot name="helper">`.
-Good:
-```yaml
-body:
-  urdf: helper.urdf
-```
-""",
-)
+XML = kind("RBX1320")
 
 _ABOVE = re.compile(r"\s*+(?:<\?.*?\?>\s*+|<!--.*?-->\s*+|<!DOCTYPE[^>]*+>\s*+)*+", re.DOTALL)
 _ROOT = re.compile(r"<([A-Za-z_][\w.:-]*+)")

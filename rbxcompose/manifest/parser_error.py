@@ -9,42 +9,8 @@ import yaml
 
 from rbxcompose.findings import Fix, Span, kind, replacement
 
-QUOTES_NEEDED = kind(
-    "RBX1101",
-    """Text that needs quotes
-
-Some characters have a meaning in YAML: a colon followed by a space, ` #`, and a quote, `>`, `|`, `@`, `%`, `*`, `&`
-or `!` at the beginning; inside `{}` and `[]` also commas and brackets. Text with one of them needs quotes.
-
-Bad:
-```yaml
-about: Note: drives slowly
-```
-Good:
-```yaml
-about: "Note: drives slowly"
-```
-""",
-    is_fixable=True,
-)
-NOT_YAML = kind(
-    "RBX1102",
-    """Not valid YAML
-
-The file cannot be read beyond the marked place. Usually a bracket, a quote, a colon or the indentation is wrong there
-or just above.
-
-Bad:
-```yaml
-match: [battery, charger
-```
-Good:
-```yaml
-match: [battery, charger]
-```
-""",
-    is_fixable=True,
-)
+QUOTES_NEEDED = kind("RBX1101", is_fixable=True)
+NOT_YAML = kind("RBX1102", is_fixable=True)
 QUOTE_HELP = "put quotes around this"
 
 _BEHIND_KEY = re.compile(r"\s*+(- +)*+[^\s:][^:]*+: +")

@@ -9,24 +9,7 @@ from rbxcompose.findings import Finding, Severity, kind
 from rbxcompose.manifest.scalar_parts import part_span
 from rbxcompose.manifest.tree import ScalarNode, TreeNode, children
 
-PASSWORD = kind(
-    "RBX1321",
-    """A password in a manifest
-
-An address such as `rtsp://user:password@host` contains a password. Manifests are shared, shown and logged. Where a
-setting takes a secret, give it the whole address as one; elsewhere use an address without a password.
-
-Bad:
-```yaml
-about: Its camera is rtsp://admin:hunter2@192.168.0.7/live
-```
-Good:
-```yaml
-about: Its camera is rtsp://192.168.0.7/live
-```
-""",
-    Severity.WARNING,
-)
+PASSWORD = kind("RBX1321", Severity.WARNING)
 
 _WITH_PASSWORD = re.compile(r"[A-Za-z][A-Za-z0-9+.-]{0,20}://[^\s/:@]{0,60}:(?P<password>[^\s/@]{1,200})@")
 _HIDDEN = re.compile(r"\*+|\$.*|<.*>")  # what stands for a password is none

@@ -19,35 +19,8 @@ from rbxcompose.manifest.yaml_nodes import TOO_LARGE, compose
 from rbxcompose.printable import FORBIDDEN, code_point
 from rbxcompose.regular_files import NotRegularError, open_regular
 
-NOT_UTF8 = kind(
-    "RBX1111",
-    """The file is not UTF-8 text
-
-Manifests are text in UTF-8. Save the file in this encoding; every editor can.
-
-Bad: a file saved as UTF-16 or Latin-1.
-Good: the same file saved as UTF-8.
-""",
-)
-UNREADABLE = kind(
-    "RBX1301",
-    """A file cannot be read
-
-The file does not exist, cannot be read, or is not a regular file. Paths are relative to the file that writes them.
-
-Bad:
-```yaml
-missions:
-  patrol: ../missions/patrol.yml
-```
-Good:
-```yaml
-missions:
-  patrol: ../missions/patrol.yaml
-```
-""",
-    is_fixable=True,
-)
+NOT_UTF8 = kind("RBX1111")
+UNREADABLE = kind("RBX1301", is_fixable=True)
 
 _ODD_INDENT = re.compile(
     r"^ *([\u00a0\u2000-\u200a\u202f\u205f\u3000])[ \u00a0\u2000-\u200a\u202f\u205f\u3000]*", re.MULTILINE

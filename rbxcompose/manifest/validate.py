@@ -37,122 +37,12 @@ from rbxcompose.manifest.tree import (
 from rbxcompose.printable import plain
 from rbxcompose.units import Quantity, UnitError, format_quantity
 
-UNKNOWN_KEY = kind(
-    "RBX1001",
-    """Unknown key
-
-Every map has a fixed set of keys; this one is not among them, so it would have no effect. Usually it is misspelt.
-
-Bad:
-```yaml
-base:
-  type: diff_drive_sim
-  max_sped: 0.5 m/s
-```
-Good:
-```yaml
-base:
-  type: diff_drive_sim
-  max_speed: 0.5 m/s
-```
-""",
-    is_fixable=True,
-)
-MISSING_KEY = kind(
-    "RBX1002",
-    """Missing key
-
-This map lacks a key that has no default.
-
-Bad:
-```yaml
-teleop:
-  timeout: 0.5 s
-```
-Good:
-```yaml
-teleop:
-  priority: 100
-  timeout: 0.5 s
-```
-""",
-    is_fixable=True,
-)
-WRONG_TYPE = kind(
-    "RBX1003",
-    """Wrong type or unit
-
-The value is not what this key takes: text instead of a number, a time instead of a speed, an angle without its unit.
-
-Bad:
-```yaml
-max_speed: fast
-```
-Good:
-```yaml
-max_speed: 0.3 m/s
-```
-""",
-    is_fixable=True,
-)
-NOT_A_CHOICE = kind(
-    "RBX1004",
-    """Not one of the choices
-
-This key takes one of a few words, or the name of something that exists.
-
-Bad:
-```yaml
-bus:
-  wire: jazy
-```
-Good:
-```yaml
-bus:
-  wire: jazzy
-```
-""",
-    is_fixable=True,
-)
-OUT_OF_RANGE = kind(
-    "RBX1005",
-    """Out of range
-
-The value has the right type but is too small or too large, or a list has too few or too many items.
-
-Bad:
-```yaml
-bus:
-  domain: -1
-```
-Good:
-```yaml
-bus:
-  domain: 0
-```
-""",
-)
-BAD_NAME = kind(
-    "RBX1006",
-    """A name of the wrong form
-
-Names start with a lower-case letter and continue with lower-case letters, digits and underscores, at most 60 in all:
-they are used in topics, paths and expressions.
-
-Bad:
-```yaml
-components:
-  Front-Camera:
-    type: camera
-```
-Good:
-```yaml
-components:
-  front_camera:
-    type: camera
-```
-""",
-)
+UNKNOWN_KEY = kind("RBX1001", is_fixable=True)
+MISSING_KEY = kind("RBX1002", is_fixable=True)
+WRONG_TYPE = kind("RBX1003", is_fixable=True)
+NOT_A_CHOICE = kind("RBX1004", is_fixable=True)
+OUT_OF_RANGE = kind("RBX1005")
+BAD_NAME = kind("RBX1006")
 
 T = TypeVar("T")
 KEYS = "keys that it takes"

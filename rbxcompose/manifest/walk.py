@@ -22,127 +22,13 @@ from rbxcompose.manifest.tree import BROKEN, Entry, MappingNode, ScalarNode, Seq
 from rbxcompose.manifest.yaml_nodes import TOO_LARGE
 from rbxcompose.printable import FORBIDDEN, code_point, plain
 
-TWICE = kind(
-    "RBX1104",
-    """A key is written twice
-
-A map names each thing once; of two equal keys, YAML silently keeps the last.
-
-Bad:
-```yaml
-runtime: 45 s
-warn: 50 %
-runtime: 30 s
-```
-Good:
-```yaml
-runtime: 30 s
-warn: 50 %
-```
-""",
-)
-NOT_A_KEY = kind(
-    "RBX1105",
-    """A key that is not a plain word, or has no value
-
-Keys are words. Inside `{}`, each key needs a value, and text with a comma needs quotes.
-
-Bad:
-```yaml
-home: {check: f($a, $b) < 1}
-```
-Good:
-```yaml
-home:
-  check: f($a, $b) < 1
-```
-""",
-)
-CHARACTER = kind(
-    "RBX1106",
-    """A character that a manifest may not contain
-
-Control characters and characters that change the direction of writing make a text look different from what it is. Tabs
-have no fixed width, so YAML does not allow them for indentation; write spaces.
-
-Bad:
-```yaml
-about: "red \\e[31m text"
-```
-Good:
-```yaml
-about: red text
-```
-""",
-    is_fixable=True,
-)
-TAG = kind(
-    "RBX1107",
-    """A tag that manifests do not have
-
-The only tags are `!remove` and `!replace`, in profiles and overlays. Text that starts with `!` needs quotes.
-
-Bad:
-```yaml
-about: !important drives slowly
-```
-Good:
-```yaml
-about: "!important drives slowly"
-```
-""",
-)
-ALIAS = kind(
-    "RBX1108",
-    """An alias that contains itself or multiplies
-
-`*name` repeats what `&name` marks. It may not be inside what it repeats, and all aliases of a file may repeat at most
-10,000 values.
-
-Bad:
-```yaml
-corners: &corners [*corners]
-```
-Good:
-```yaml
-corners: [corner_1, corner_2]
-```
-""",
-)
-NUMBER = kind(
-    "RBX1109",
-    """An invalid number
-
-A number must be finite and have at most 40 characters.
-
-Bad:
-```yaml
-speed: .inf
-```
-Good:
-```yaml
-speed: 0.5 m/s
-```
-""",
-)
-HASH = kind(
-    "RBX1110",
-    """Text after `#` is a comment
-
-A ` #` starts a comment, and what follows is not part of the value. Put quotes around the text if it is, and a space
-after the `#` if it is not.
-
-Bad:
-```yaml
-about: Room #3
-```
-Good:
-```yaml
-about: "Room #3"
-```
-""",
-    Severity.WARNING,
-)
+TWICE = kind("RBX1104")
+NOT_A_KEY = kind("RBX1105")
+CHARACTER = kind("RBX1106", is_fixable=True)
+TAG = kind("RBX1107")
+ALIAS = kind("RBX1108")
+NUMBER = kind("RBX1109")
+HASH = kind("RBX1110", Severity.WARNING)
 
 REMOVE, REPLACE = "!remove", "!replace"
 _UNKNOWN = "!"  # what a tag that was reported is taken for

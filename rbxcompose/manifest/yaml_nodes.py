@@ -10,28 +10,7 @@ from rbxcompose.findings import Finding, Span, kind
 from rbxcompose.manifest.limits import DEPTH, NODES
 from rbxcompose.manifest.yaml_errors import explain
 
-TOO_LARGE = kind(
-    "RBX1103",
-    """A manifest is too large
-
-Manifests have limits, so that no file can use up time or memory: 2 MB, 40,000 values with their keys, 64 levels, 1,000
-keys in one map, 64 kB for one text, 200 characters for a key, 40 for a number, 10,000 values reached through aliases,
-10,000 values in one datum of a mission. All files of a robot have at most 8 MB and 20,000 values together; a part or a
-mission counts each time it is used, and a text with `${...}` counts for each 8 characters. What `${...}` fills in has
-at most 8 MB.
-
-A URDF file has at most 4 MB, 200,000 elements and 64 levels.
-
-Bad:
-```yaml
-serial: 10000000000000000000000000000000000000000000
-```
-Good:
-```yaml
-serial: "10000000000000000000000000000000000000000000"
-```
-""",
-)
+TOO_LARGE = kind("RBX1103")
 
 
 class _LimitError(Exception):

@@ -9,17 +9,7 @@ from rbxcompose.findings import Finding, Related, Span, kind
 from rbxcompose.manifest.registry import sections
 from rbxcompose.model.robot import Robot
 
-STILL_USED = kind(
-    "RBX1310",
-    """A profile removes what others use
-
-With this profile, something is gone that the rest of the robot still names: a component whose output a mux takes, a
-place that a mission drives to. Keep it, or remove or change what uses it in the same profile.
-
-Bad: a profile with `components: {battery: !remove}`, in a robot whose charger needs the battery.
-Good: a profile with `components: {battery: !remove, charger: !remove}`.
-""",
-)
+STILL_USED = kind("RBX1310")
 _QUOTED = re.compile(r"'([^']*)'")
 _MOST_SHOWN = 8
 

@@ -19,17 +19,7 @@ from rbxcompose.motion.scene import MOST_SHAPES, Colour, PlacedObject, ScenePiec
 from rbxcompose.motion.scene_shapes import MESH, MOST_POINTS, OCTREE, SIZES, mistake_in_shape
 from rbxcompose.printable import plain
 
-NO_SCENE = kind(
-    "RBX2351",
-    """A scene file cannot be read
-
-A file `.scene` is a text that MoveIt writes: a name, objects with their shapes, poses and colours, and a point at the
-end. A number is missing, is none, or does not fit its shape.
-
-Bad: `box` with the next line `0.6 0.4`
-Good: `box` with the next line `0.6 0.4 0.02`
-""",
-)
+NO_SCENE = kind("RBX2351")
 LARGEST = 20_000_000  # [bytes] of a file
 _OLD_NAME = "(noname)"
 _WORD = re.compile(r"\S+")

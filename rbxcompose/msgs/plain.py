@@ -19,27 +19,8 @@ M = TypeVar("M", bound=Message)
 Key = str | int
 KeyPath = tuple[Key, ...]  # from the message: ("pose", "position", "x") or ("transforms", 0)
 
-NO_FIELD = kind(
-    "RBX9023",
-    """A field that the message does not have
-
-The text of a message uses the field names of its type. `rbxcompose msg show TYPE` prints the type.
-
-Bad: `rbxcompose topic pub /cmd_vel geometry_msgs/Twist '{linaer: {x: 0.1}}'`
-Good: `rbxcompose topic pub /cmd_vel geometry_msgs/Twist '{linear: {x: 0.1}}'`
-""",
-)
-WRONG_VALUE = kind(
-    "RBX9024",
-    """A value that does not fit the field of a message
-
-Each field has a type and a range: numbers, flags, texts, lists with a given length, other messages. Numbers in messages
-have no units: they are in the units of ROS 2, mostly SI.
-
-Bad: `rbxcompose topic pub /answer std_msgs/Int32 '{data: many}'`
-Good: `rbxcompose topic pub /answer std_msgs/Int32 '{data: 42}'`
-""",
-)
+NO_FIELD = kind("RBX9023")
+WRONG_VALUE = kind("RBX9024")
 
 _RANGES = {
     "byte": (0, 255),

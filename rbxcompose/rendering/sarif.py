@@ -9,6 +9,7 @@ from urllib.parse import quote
 
 import rbxcompose
 from rbxcompose.edits import COMMAND_LINE, exact
+from rbxcompose.finding_pages import page_of
 from rbxcompose.findings import KINDS, Finding, Fix, Related, Report, Sources, Span
 from rbxcompose.formats import output_format
 
@@ -39,13 +40,13 @@ def _rule(code: str) -> Data:
     kind = KINDS.get(code)
     if kind is None:
         return {"id": code}
-    title, _, body = kind.doc.strip().partition("\n")
-    summary = body.strip().partition("\n\n")[0] or title
+    title, body = page_of(kind)
+    summary = body.partition("\n\n")[0] or title
     return {
         "id": code,
         "shortDescription": _message(title),
         "fullDescription": _message(summary.replace("\n", " ")),
-        "help": {**_message(f"{title}\n\n{body.strip()}"), "markdown": f"# {title}\n\n{body.strip()}"},
+        "help": {**_message(f"{title}\n\n{body}"), "markdown": f"# {title}\n\n{body}"},
         "defaultConfiguration": {"level": kind.severity.value},
     }
 

@@ -14,21 +14,8 @@ LONGEST_NAME = 60  # characters
 LONGEST_TEXT = 200
 FARTHEST = 100.0  # [m] from the origin of `map`; a person should plan a longer tour
 
-NAME = kind(
-    "RBX9102",
-    """A name that cannot be used
-
-`new` uses the name for files, keys and components. It begins with a lower-case letter, continues with lower-case
-letters, digits and underscores, and has at most 60 characters. Reserved words are refused.
-""",
-)
-ANSWER = kind(
-    "RBX9103",
-    """An answer that cannot be used
-
-`new` cannot use the answer to one of its questions, or the value of one of its options. The message says why.
-""",
-)
+NAME = kind("RBX9102")
+ANSWER = kind("RBX9103")
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
 _YAML_WORDS = frozenset({"true", "false", "null"})  # as YAML values these are not texts

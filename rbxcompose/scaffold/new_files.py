@@ -11,22 +11,8 @@ from rbxcompose.findings import Finding, kind
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.printable import plain
 
-EXISTS = kind(
-    "RBX9101",
-    """A file already exists
-
-`new` and `import` never overwrite anything. Choose another name, move the file away, or use another folder with
-`--into` or `--out`.
-""",
-)
-NOT_WRITTEN = kind(
-    "RBX9104",
-    """A file cannot be written
-
-The system refuses: the folder is not writable, the disk is full, or a file is where a folder should be. `new`
-leaves nothing behind.
-""",
-)
+EXISTS = kind("RBX9101")
+NOT_WRITTEN = kind("RBX9104")
 
 
 def taken(folder: Path, names: Iterable[str]) -> Finding | None:

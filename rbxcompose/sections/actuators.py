@@ -16,75 +16,8 @@ from rbxcompose.manifest.section import Contents, Reading
 from rbxcompose.manifest.tree import ScalarNode, at, key_span, value_span
 from rbxcompose.references import ACTUATOR, SERVO_BUS, Refers
 
-NO_MODEL = kind(
-    "RBX2213",
-    """A servo of an unknown model
-
-The model decides the control table, the protocol and what a tick is.
-
-Bad:
-```yaml
-buses:
-  servos:
-    type: dynamixel
-actuators:
-  pan:
-    bus: servos
-    model: AX-21
-    id: 1
-```
-Good:
-```yaml
-buses:
-  servos:
-    type: dynamixel
-actuators:
-  pan:
-    bus: servos
-    model: AX-12
-    id: 1
-```
-""",
-    is_fixable=True,
-)
-ONE_ID = kind(
-    "RBX2214",
-    """Two servos of one bus have the same id
-
-Both would answer at once, and none could be understood. `rbxcompose servo set-id` changes the id of a servo.
-
-Bad:
-```yaml
-buses:
-  servos:
-    type: dynamixel
-actuators:
-  pan:
-    bus: servos
-    model: AX-12
-    id: 1
-  tilt:
-    bus: servos
-    model: AX-12
-    id: 1
-```
-Good:
-```yaml
-buses:
-  servos:
-    type: dynamixel
-actuators:
-  pan:
-    bus: servos
-    model: AX-12
-    id: 1
-  tilt:
-    bus: servos
-    model: AX-12
-    id: 2
-```
-""",
-)
+NO_MODEL = kind("RBX2213", is_fixable=True)
+ONE_ID = kind("RBX2214")
 
 
 class ActuatorModel(Config):

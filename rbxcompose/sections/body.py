@@ -29,19 +29,7 @@ from rbxcompose.printable import plain
 from rbxcompose.references import JOINT, LINK
 from rbxcompose.units import Quantity, UnitError, parse_quantity
 
-STALE = kind(
-    "RBX2307",
-    """The pairs of links that arms need not watch are not those of this body
-
-The file under `collisions` is missing, or its `body` is the digest of another one: joints, shapes or what `cover` says
-have changed since it was written. Without it, arms watch all pairs of links but those that a joint connects and those
-that always collide, which is safe and may be slower. A profile that changes the body has a file of its own.
-
-Bad: `body: {urdf: robot.urdf, collisions: robot.collisions.yaml}`, after a link got another shape.
-Good: the same, after `rbxcompose arm setup`
-""",
-    Severity.WARNING,
-)
+STALE = kind("RBX2307", Severity.WARNING)
 
 DESCRIPTION = "robot_description"
 """The component that a robot with a body runs."""

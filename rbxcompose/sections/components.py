@@ -26,27 +26,7 @@ from rbxcompose.sdk import registry
 from rbxcompose.sdk.component import Component
 from rbxcompose.sdk.ports import Port
 
-UNKNOWN_TYPE = kind(
-    "RBX3004",
-    """Unknown type of component
-
-Neither the project nor an installed package has a component type with this name.
-
-Bad:
-```yaml
-components:
-  base:
-    type: diff_drive_simm
-```
-Good:
-```yaml
-components:
-  base:
-    type: diff_drive_sim
-```
-""",
-    is_fixable=True,
-)
+UNKNOWN_TYPE = kind("RBX3004", is_fixable=True)
 
 
 @dataclass(frozen=True, slots=True)

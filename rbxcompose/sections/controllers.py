@@ -22,94 +22,14 @@ from rbxcompose.sections.actuators import actuators, model_of
 from rbxcompose.sections.body import body
 from rbxcompose.sections.joints import held_limits, joints, may_be_driven
 
-NOT_DRIVEN = kind(
-    "RBX2215",
-    """A controller leads a joint that it cannot drive
-
-Each joint of a controller has a servo of the right mode, and the servos of one controller are on one bus. A joint that
-mimics another one in the URDF follows that one, and nothing else.
-
-Bad: a controller with the joint `tilt_joint`, which `joints:` does not have.
-Good: `tilt_joint: {actuator: tilt_servo}` under `joints:`.
-""",
-)
-CLAIMED_TWICE = kind(
-    "RBX2220",
-    """Two controllers lead the same joint from the start
-
-Both would move it at once. One of them can wait with `start: inactive` until `rbxcompose controller switch NAME --off
-OTHER` makes it active.
-
-Bad: `head` and `gaze`, both with `joints: [pan_joint]`.
-Good: `gaze: {type: joint_command, joints: [pan_joint], start: inactive}`
-""",
-)
-NAME_OF_JOINT = kind(
-    "RBX2221",
-    """A controller has the name of a joint
-
-Both have topics and services below their name, such as `NAME/command`, and nobody could tell them apart.
-
-Bad: a controller `lift_joint`, which leads the joint `lift_joint`.
-Good: a controller `lift`.
-""",
-)
-CANNOT_WORK = kind(
-    "RBX2222",
-    """A controller cannot work with its settings
-
-Each value is permitted, but together they describe nothing that can be: fingers that open farther than they reach, a
-base without an extent.
-
-Bad: `hand: {type: gripper, ..., finger_length: 2 cm, pad_width: 1 cm, opening: [0 cm, 9 cm]}`
-Good: `hand: {type: gripper, ..., finger_length: 6 cm, pad_width: 1 cm, opening: [0 cm, 9 cm]}`
-""",
-)
-NO_WHOLE_TURN = kind(
-    "RBX2280",
-    """A servo that does not see a whole turn is to be a wheel or a spindle
-
-Servos of the families AX, RX, EX and the XL-320 turn without an end, but they do not tell where they are in a part of
-each turn. So nobody knows the way of a wheel, or the height of a lift.
-
-Bad: `left_servo: {bus: servos, model: AX-12, id: 1, mode: velocity}` for a wheel of a `diff_drive`.
-Good: `left_servo: {bus: servos, model: XL430-W250, id: 1, mode: velocity}`
-""",
-)
-WRONG_KIND = kind(
-    "RBX2285",
-    """A controller leads a joint of another kind than it can
-
-A wheel turns without an end: in the URDF its joint is `continuous`. What a `linear` controller drives up and down
-slides: its joint is `prismatic`.
-
-Bad: `wheels: {type: diff_drive, left: left_wheel, ...}`, where `left_wheel` has `type="revolute"`.
-Good: the same, where the URDF has `<joint name="left_wheel" type="continuous">`.
-""",
-)
-BEYOND_LIMITS = kind(
-    "RBX2290",
-    """A controller asks for positions that its joint does not reach
-
-The joint would stop at its limit, and what the controller wants would never be done. The limits are those of the body,
-and those under `joints:`, which can only be tighter. Angles of a gripper follow from its `opening` and its fingers.
-
-Bad: `hand: {type: gripper, ..., opening: [0 cm, 9 cm]}`, for which the finger would turn farther than its `upper`.
-Good: `hand: {type: gripper, ..., opening: [0 cm, 5 cm]}`
-""",
-)
-NO_ITEM = kind(
-    "RBX2291",
-    """A servo has no such item
-
-The model of a servo decides which items its memory has: a light, and ports for sensors in some models. Only what moves
-nothing can be switched by a controller; everything can be read.
-
-Bad: `lamp: {type: gpio, actuator: pan_servo, item: lde, direction: out}`
-Good: `lamp: {type: gpio, actuator: pan_servo, item: led, direction: out}`
-""",
-    is_fixable=True,
-)
+NOT_DRIVEN = kind("RBX2215")
+CLAIMED_TWICE = kind("RBX2220")
+NAME_OF_JOINT = kind("RBX2221")
+CANNOT_WORK = kind("RBX2222")
+NO_WHOLE_TURN = kind("RBX2280")
+WRONG_KIND = kind("RBX2285")
+BEYOND_LIMITS = kind("RBX2290")
+NO_ITEM = kind("RBX2291", is_fixable=True)
 
 
 def _models(node: TreeNode) -> Iterator[type[Config]]:

@@ -16,49 +16,10 @@ from rbxcompose.manifest.section import Contents, Reading
 from rbxcompose.manifest.tree import key_span
 from rbxcompose.references import DEVICE, DEVICE_PORT, PREFIXED
 
-NOT_DESCRIBED = kind(
-    "RBX2260",
-    """Nothing tells which device is meant
-
-A device is found by its vendor and product together, by the USB port where it is plugged in, or by all of them.
-`rbxcompose udev scan` shows them for everything that is plugged in, and writes the entry.
-
-Bad: `devices: {servos: {serial: A700eUxA}}`
-Good: `devices: {servos: {vendor: 0403, product: 6001, serial: A700eUxA}}`
-""",
-)
-SAME_DEVICE = kind(
-    "RBX2261",
-    """Two devices are one
-
-Both entries say the same, so both names would always be the same adapter.
-
-Bad: `devices: {left: {vendor: 0403, product: 6014}, right: {vendor: 0403, product: 6014}}`
-Good: the same with the `serial` of each, or with the `usb_port` where each is plugged in.
-""",
-)
-INCLUDED_DEVICE = kind(
-    "RBX2262",
-    """A device is also what another entry describes
-
-One entry leaves open what the other one tells, so the adapter of the second is one of the first, too. While both are
-plugged in, the first is not clear.
-
-Bad: `devices: {any: {vendor: 0403, product: 6014}, arm: {vendor: 0403, product: 6014, serial: FT4THV5C}}`
-Good: the `serial` of both.
-""",
-    Severity.WARNING,
-)
-KERNEL_NAME = kind(
-    "RBX2263",
-    """The kernel has a device of this name
-
-A udev rule makes a link `/dev/NAME` for each device, which cannot have the name of a file that is there already.
-
-Bad: `devices: {ttyusb0: {vendor: 0403, product: 6014}}`, or `video0`, `console`, `null`.
-Good: `devices: {arm: {vendor: 0403, product: 6014}}`
-""",
-)
+NOT_DESCRIBED = kind("RBX2260")
+SAME_DEVICE = kind("RBX2261")
+INCLUDED_DEVICE = kind("RBX2262", Severity.WARNING)
+KERNEL_NAME = kind("RBX2263")
 
 _DIGITS = re.compile(r"[0-9a-f]{4}")
 _USB_PORT = re.compile(USB_PORT)

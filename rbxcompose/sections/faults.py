@@ -17,37 +17,9 @@ from rbxcompose.sections.actuators import actuators
 from rbxcompose.sections.joints import joints, may_be_driven, unread_joints
 from rbxcompose.twins.servo_faults import UNPLUG, FaultName
 
-NO_SERVO = kind(
-    "RBX2270",
-    """A fault of a joint or a bus without a servo
-
-Only servos can fail: a joint that `joints:` does not have is not driven, and a bus without driven joints does not run.
-
-Bad: a fault of `tilt_joint`, which `joints:` does not have.
-Good: `tilt_joint: {actuator: tilt_servo}` under `joints:`.
-""",
-)
-OF_WHAT = kind(
-    "RBX2271",
-    """A fault that is not of one joint or one bus
-
-A fault has either `joint` or `bus`; then all servos of the bus have it. Only a bus can be unplugged.
-
-Bad: `{at: 3 s, fault: unplug, joint: pan_joint}`
-Good: `{at: 3 s, fault: unplug, bus: servos}`
-""",
-)
-REAL = kind(
-    "RBX2272",
-    """Faults do nothing to real servos
-
-They are made in simulation. With `--real`, the robot runs without them.
-
-Bad: `rbxcompose up --real` of a robot with `faults:`.
-Good: the faults in a profile of their own, which is not chosen with `--real`.
-""",
-    Severity.WARNING,
-)
+NO_SERVO = kind("RBX2270")
+OF_WHAT = kind("RBX2271")
+REAL = kind("RBX2272", Severity.WARNING)
 
 
 class FaultModel(Config):

@@ -21,17 +21,7 @@ from rbxcompose.sections.led_joints import follow_topic, joint_limits, stream_to
 from rbxcompose.sections.scene import scene
 
 HEAD = "head"
-NOT_TURNED = kind(
-    "RBX2355",
-    """The controller of a head does not turn its camera
-
-A head looks at something by joints between the root of the body and its camera. Its controller follows trajectories, as
-those of the type `joint_trajectory` do, and leads at least one of these joints.
-
-Bad: `heads: {head: {camera: base_link, controller: head_controller}}`, where nothing moves `base_link`.
-Good: `heads: {head: {camera: camera_depth_frame, controller: head_controller}}`
-""",
-)
+NOT_TURNED = kind("RBX2355")
 
 
 class HeadModel(Config):

@@ -52,39 +52,9 @@ from rbxcompose.units import (
     parse_quantity,
 )
 
-NOT_TOGETHER = kind(
-    "RBX2216",
-    """Servos and their joint do not fit together
-
-A joint that slides needs to know how far it goes for each turn of its servo: `travel`, or a `calibration`. Servos that
-drive one joint together are on one bus and have one mode, and no servo drives two joints. A joint that mimics another
-one in the URDF follows it by positions, on the same bus.
-
-Bad: `lift_joint: {actuator: lift_servo}`, where `lift_joint` slides.
-Good: `lift_joint: {actuator: lift_servo, travel: 8 mm}`
-""",
-)
-DOES_NOT_MOVE = kind(
-    "RBX2217",
-    """A servo is to move a joint that does not move
-
-In the URDF the joint is fixed, or floats. Either another joint is meant, or the URDF has the wrong type.
-
-Bad: `camera_joint: {actuator: pan_servo}`, where the URDF has `<joint name="camera_joint" type="fixed">`.
-Good: `pan_joint: {actuator: pan_servo}`, where the URDF has `<joint name="pan_joint" type="revolute">`.
-""",
-)
-NOWHERE_TO_GO = kind(
-    "RBX2224",
-    """Limits that leave a joint no motion
-
-Its least position is above its greatest one, no position is within its limits and within those of the body, or its
-speed, acceleration or jerk is not above 0.
-
-Bad: `limits: {position: [120 deg, 150 deg]}`, where the URDF has `<limit lower="-1.5" upper="1.5" .../>`.
-Good: `limits: {position: [-60 deg, 60 deg]}`
-""",
-)
+NOT_TOGETHER = kind("RBX2216")
+DOES_NOT_MOVE = kind("RBX2217")
+NOWHERE_TO_GO = kind("RBX2224")
 
 
 def _either(turning: Dimension, sliding: Dimension) -> PlainValidator:

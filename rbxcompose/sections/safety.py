@@ -16,41 +16,8 @@ from rbxcompose.manifest.wanted_components import WantedComponent, Wiring
 from rbxcompose.sections.faults import buses_of_joints
 from rbxcompose.sections.joints import JointPosition
 
-THERMAL_ORDER = kind(
-    "RBX2218",
-    """Temperatures in the wrong order
-
-A joint above `limit` rests until it is at `resume` or below, so `resume` is below `limit`; `warn` is not above it.
-
-Bad:
-```yaml
-safety:
-  thermal: {limit: 60 degC, resume: 65 degC}
-```
-Good:
-```yaml
-safety:
-  thermal: {limit: 60 degC, resume: 45 degC}
-```
-""",
-)
-NOTHING_TO_PARK = kind(
-    "RBX2219",
-    """Joints are to be parked, but nothing says where
-
-Bad:
-```yaml
-safety:
-  on_shutdown: park
-```
-Good:
-```yaml
-safety:
-  on_shutdown: park
-  park: {arm_lift_joint: -60 deg}
-```
-""",
-)
+THERMAL_ORDER = kind("RBX2218")
+NOTHING_TO_PARK = kind("RBX2219")
 
 
 class ThermalModel(Config):

@@ -35,28 +35,8 @@ SCENE = "scene"
 """The component that a robot with arms runs."""
 CLOUD_MAPPER = "cloud_mapper"
 """The type of what each entry of `clouds` runs."""
-NO_OBJECT = kind(
-    "RBX2306",
-    """An object of the scene cannot be
-
-Its lengths are from 0.1 mm to 100 m, and it does not have the name of a link of the body: findings about collisions
-name both.
-
-Bad: `table: {box: [60 cm, 40 cm, 0 cm]}`
-Good: `table: {box: [60 cm, 40 cm, 2 cm]}`
-""",
-)
-NO_MESH = kind(
-    "RBX2350",
-    """The mesh of an object cannot be read
-
-An object of the scene is a mesh in a file beside the manifest. The file is too large, cut short, or not of the format
-that its name says.
-
-Bad: `cup: {mesh: {file: cup.stl}}`, where `cup.stl` is a page that says that the file was not found.
-Good: `cup: {mesh: {file: cup.stl, scale: 0.001}}`, where `cup.stl` is a mesh in millimetres.
-""",
-)
+NO_OBJECT = kind("RBX2306")
+NO_MESH = kind("RBX2350")
 COLOURS = {
     "black": (0.1, 0.1, 0.1),
     "white": (1.0, 1.0, 1.0),

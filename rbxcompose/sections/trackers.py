@@ -26,17 +26,7 @@ from rbxcompose.sections.heads import HEAD
 from rbxcompose.sections.led_joints import stream_topic
 
 TRACKER = "tracker"
-NO_REST = kind(
-    "RBX2356",
-    """A tracker cannot lead its arm
-
-An arm that follows a point is led by a stream of trajectories, which controllers of the type `joint_trajectory` take.
-When the point is too far away, the arm goes to one of its poses.
-
-Bad: `chase: {arm: right_arm, frame: camera_link, rest: restng}`
-Good: `chase: {arm: right_arm, frame: camera_link, rest: resting}`, where `resting` is a pose of `right_arm`.
-""",
-)
+NO_REST = kind("RBX2356")
 
 
 class TrackerModel(Config):

@@ -24,21 +24,7 @@ CYCLES = 2
 SLOWEST = 50.0  # [Hz] of a base that does not tell its rate
 SHORTEST_LEASE = 0.4  # [s]; links that pause for less are common
 
-LATE_STOP = kind(
-    "RBX6140",
-    """A base stops too late after a cut link
-
-Commands of this base come from another host. After the link is cut, it moves on until it misses them, and then brakes:
-`command_timeout`, two cycles, and the time to brake from its largest speed or turn rate. That is longer than
-`stop_within` of the robot in the system, or a setting that decides it is not known.
-
-Where only goals come from another host or robot, they are cancelled first, which takes 0.4 s at least.
-
-Bad: `stop_within: 0.6 s` for a base with `command_timeout: 0.5 s`, `max_speed: 0.5 m/s` and `acceleration: 1 m/s^2`,
-which stands still after 1.04 s.
-Good: `command_timeout: 0.25 s` and `max_speed: 0.3 m/s` in a profile for this system; or both on one host.
-""",
-)
+LATE_STOP = kind("RBX6140")
 
 
 @dataclass(frozen=True, slots=True)

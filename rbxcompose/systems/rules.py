@@ -22,198 +22,21 @@ from rbxcompose.units import BIT_RATE, FREQUENCY, TIME, format_quantity
 FASTEST = 100.0  # [Hz] of commands across a link; wireless links pause for tens of milliseconds
 SHORTEST = 0.2  # [s] without a command, within which a base should not brake because of a link
 
-DEVICE_ELSEWHERE = kind(
-    "RBX6103",
-    """A component runs on another host than its device
-
-A component that opens a serial port has to run on the host that the device is connected to. `devices` of a host lists
-what is connected there.
-
-Bad:
-```yaml
-hosts:
-  robot: {address: 10.42.0.2, devices: [/dev/ttyUSB0]}
-  desk: {}
-robots:
-  arm:
-    robot: ../robots/arm/robot.yaml
-    on: desk
-    place: {servos: desk}
-```
-Good:
-```yaml
-    place: {servos: robot}
-```
-""",
-)
-NO_ADDRESS = kind(
-    "RBX6104",
-    """Two hosts cannot find each other
-
-The hosts of a robot are linked router to router. Of two hosts, one dials the other, which needs an `address`.
-
-Bad:
-```yaml
-hosts:
-  robot: {}
-  desk: {}
-```
-Good:
-```yaml
-hosts:
-  robot: {address: 10.42.0.2}
-  desk: {}
-```
-""",
-)
-FAST_LOOP = kind(
-    "RBX6105",
-    """Fast commands cross between hosts
-
-A link between hosts pauses at times: Wi-Fi for tens of milliseconds, sometimes more. Commands that must come often and
-in time belong on the host of what they move. A base whose `command_timeout` is short brakes at each pause.
-
-Bad: a base with `command_timeout: 0.1 s` on the robot, and what drives it on a desk.
-Good: both on the robot, or `command_timeout: 0.5 s`.
-""",
-    Severity.WARNING,
-)
-BULK = kind(
-    "RBX6106",
-    """Large messages cross between hosts
-
-Topics of the class `bulk`, such as images, go through shared memory within a host. Between hosts each message is sent
-in full over the link.
-
-Bad: a camera on the robot, and what finds faces in its images on a desk with Wi-Fi.
-Good: both on the robot; what was found crosses.
-""",
-    Severity.WARNING,
-)
-SAME_ENDPOINT = kind(
-    "RBX6107",
-    """Two routers listen at one port
-
-Each robot has a router of its own on each host. Two of them cannot listen at one port.
-
-Bad: two robots of a system whose bases are on one host, both with `link_port: 7447`.
-Good: leave `link_port` out; each robot gets a port of its own.
-""",
-)
-NOT_OURS = kind(
-    "RBX6108",
-    """A robot on several hosts uses a router of others, or keeps strangers out by sockets
-
-On several hosts, a robot needs routers of its own, which are linked. With `bus.router`, it uses one that exists. With
-`bus.access: user`, other users of the host are kept out, but without `security: mtls` the link would let every machine
-of the network in.
-
-Bad: a robot with `bus: {router: tcp/192.168.0.2:7447}` whose components are placed on two hosts.
-Good: the same robot without `bus.router`.
-""",
-)
+DEVICE_ELSEWHERE = kind("RBX6103")
+NO_ADDRESS = kind("RBX6104")
+FAST_LOOP = kind("RBX6105", Severity.WARNING)
+BULK = kind("RBX6106", Severity.WARNING)
+SAME_ENDPOINT = kind("RBX6107")
+NOT_OURS = kind("RBX6108")
 
 
-IDLE_LINK = kind(
-    "RBX6118",
-    """The topic does not cross this link
+IDLE_LINK = kind("RBX6118", Severity.WARNING, is_fixable=True)
+FEWER_COMMANDS = kind("RBX6119")
+PLAIN_QUIC = kind("RBX6141")
+TOO_MUCH = kind("RBX6120", Severity.WARNING)
 
-`downsample` and `priorities` of a link are for topics with a publisher on one of its hosts and a subscriber on the
-other. This one stays within a host, goes another way, or does not exist.
-
-Bad:
-```yaml
-links:
-  wifi: {between: [robot, desk], downsample: {batery_level: 2 Hz}}
-```
-Good:
-```yaml
-links:
-  wifi: {between: [robot, desk], downsample: {battery_level: 2 Hz}}
-```
-""",
-    Severity.WARNING,
-    is_fixable=True,
-)
-FEWER_COMMANDS = kind(
-    "RBX6119",
-    """Commands would be left out, or wait
-
-A base brakes when no command has come for a while, and what steers it relies on each. Messages of the class `command`
-are not downsampled, and go before all others.
-
-Bad:
-```yaml
-links:
-  wifi: {between: [robot, desk], downsample: {cmd_vel: 1 Hz}}
-```
-Good: run what commands on the host of what moves.
-""",
-)
-PLAIN_QUIC = kind(
-    "RBX6141",
-    """QUIC needs certificates
-
-QUIC is always encrypted, so its routers need the certificates that `security init` makes.
-
-Bad: `wifi: {between: [robot, desk], protocol: quic}` in a system without `security`.
-Good: the same with `security: mtls`.
-""",
-)
-TOO_MUCH = kind(
-    "RBX6120",
-    """More crosses than the link carries
-
-The topics whose rates are known need more than `limit`, by the least size of their messages.
-
-Bad: a lidar with 40 Hz across `wifi: {between: [robot, desk], limit: 100 kbit/s}`.
-Good: `downsample: {scan: 2 Hz}` on this link.
-""",
-    Severity.WARNING,
-)
-
-OPTIONAL_BASE = kind(
-    "RBX6145",
-    """What drives the robot runs on a host that it can do without
-
-The other hosts do not wait for a host that is `optional`: the robot starts, and its missions run, without its base.
-
-Bad:
-```yaml
-hosts:
-  robot: {address: 10.42.0.2, optional: true}
-robots:
-  turtlebot:
-    place: {base: robot}
-```
-Good:
-```yaml
-hosts:
-  robot: {address: 10.42.0.2}
-```
-""",
-    Severity.WARNING,
-)
-SAME_ADDRESS = kind(
-    "RBX6146",
-    """Two hosts have one address
-
-An address leads to one machine, so one of the hosts is never reached.
-
-Bad:
-```yaml
-hosts:
-  robot: {address: 10.42.0.2}
-  desk: {address: 10.42.0.2}
-```
-Good:
-```yaml
-hosts:
-  robot: {address: 10.42.0.2}
-  desk: {address: 10.42.0.1}
-```
-""",
-)
+OPTIONAL_BASE = kind("RBX6145", Severity.WARNING)
+SAME_ADDRESS = kind("RBX6146")
 
 
 def system_findings(system: System) -> Iterator[Finding]:

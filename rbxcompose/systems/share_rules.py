@@ -19,121 +19,14 @@ from rbxcompose.systems.exchange import (
 from rbxcompose.systems.model import PlacedRobot, System
 from rbxcompose.systems.traffic import TopicEnd
 
-NOT_PUBLISHED = kind(
-    "RBX6123",
-    """Nothing gives what the robot shares
-
-`share` lists topics that a component of the robot publishes, and services and actions that one serves.
-
-Bad:
-```yaml
-    share: [odm]
-```
-Good:
-```yaml
-    share: [odom]
-```
-""",
-    is_fixable=True,
-)
-NOT_SHARED = kind(
-    "RBX6124",
-    """A robot listens to a topic that another one does not share
-
-Robots of a system see of each other only what `share` lists, below the name of the robot: `map` of `scout` is
-`/scout/map` for all others.
-
-Bad: a component of `cleaner` subscribes to `/scout/map`, and `scout` has `share: [odom]`.
-Good: `share: [odom, map]`.
-""",
-    Severity.WARNING,
-)
-TAKEN_NAME = kind(
-    "RBX6125",
-    """A robot publishes under the name of a topic that another one shares
-
-What `scout` shares as `map` is `/scout/map` on the bus of each robot that subscribes to it. If that robot publishes
-there, too, its components cannot tell which message is whose.
-
-Bad: `share: [map]` of `scout`, and a component of `cleaner` with `connect: {map: /scout/map}` that publishes it.
-Good: the component of `cleaner` publishes on another topic.
-""",
-)
-OTHER_TYPE = kind(
-    "RBX6126",
-    """A robot takes what is shared for something else
-
-A subscriber receives messages of its own type only, and a service or an action answers requests of its own type only.
-Others are dropped by the bus without a word.
-
-Bad: `scout` shares `odom` of the type `nav_msgs/Odometry`, and a component of `cleaner` takes it for a
-`geometry_msgs/PoseStamped`.
-Good: both have the same type.
-""",
-)
-UNREACHED_SHARE = kind(
-    "RBX6127",
-    """What is shared cannot be fetched
-
-A robot fetches what another one shares from the host of the publisher, which needs an `address` if it is another host.
-A robot that uses a router of others with `bus.router` cannot take part.
-
-Bad:
-```yaml
-hosts:
-  hall: {}
-  desk: {address: 10.42.0.1}
-robots:
-  scout: {robot: ../robots/scout/robot.yaml, on: hall, share: [map]}
-  cleaner: {robot: ../robots/cleaner/robot.yaml, on: desk}
-```
-Good:
-```yaml
-hosts:
-  hall: {address: 10.42.0.2}
-```
-""",
-)
-NO_CALLER = kind(
-    "RBX6150",
-    """Nobody may call what the robot shares
-
-A service or an action in `share` can be called by the robots in `callers` only. Whoever calls a robot may move it, so
-this is said by the robot that is called, and for nobody by default.
-
-Bad:
-```yaml
-    share: [odom, go_to]
-```
-Good:
-```yaml
-    share: [odom, go_to]
-    callers: [dispatcher]
-```
-""",
-)
-UNKNOWN_CALLER = kind(
-    "RBX6151",
-    """Unknown caller
-
-`callers` takes names of robots of the system, names that instances have in common, and `labels` of robots.
-
-Bad: `callers: [dispacher]`, in a system with a robot `dispatcher`.
-Good: `callers: [dispatcher]`
-""",
-    is_fixable=True,
-)
-NOT_A_CALLER = kind(
-    "RBX6152",
-    """A robot calls what it may not
-
-A robot may call the services in `share` of another one, and send goals to the actions in it, if that one has it among
-its `callers`. Otherwise its requests stay where they are.
-
-Bad: a mission of `cleaner` with `scout/go_to: dock`, and `callers: [dispatcher]` of `scout`.
-Good: `callers: [dispatcher, cleaner]`.
-""",
-)
+NOT_PUBLISHED = kind("RBX6123", is_fixable=True)
+NOT_SHARED = kind("RBX6124", Severity.WARNING)
+TAKEN_NAME = kind("RBX6125")
+OTHER_TYPE = kind("RBX6126")
+UNREACHED_SHARE = kind("RBX6127")
+NO_CALLER = kind("RBX6150")
+UNKNOWN_CALLER = kind("RBX6151", is_fixable=True)
+NOT_A_CALLER = kind("RBX6152")
 _WORDS = {"msg": "topic", "srv": "service", "action": "action"}
 
 

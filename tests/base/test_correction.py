@@ -66,9 +66,9 @@ def test_a_part_of_a_text_is_corrected_within_it() -> None:
 
 
 def test_a_misspelt_name_brings_help_and_fix() -> None:
-    finding = FindingKind("RBX0009", "Title").misspelt(PLACE, "unknown", "dok", ["dock"])
+    finding = FindingKind("RBX0009").misspelt(PLACE, "unknown", "dok", ["dock"])
     assert finding.help == "did you mean 'dock'?"
     assert finding.fix
     assert finding.fix.is_safe
-    far = FindingKind("RBX0009", "Title").misspelt(PLACE, "unknown", "x", ["dock", "corner"], "places")
+    far = FindingKind("RBX0009").misspelt(PLACE, "unknown", "x", ["dock", "corner"], "places")
     assert (far.help, far.fix) == ("places: dock, corner", None)

@@ -9,6 +9,7 @@ import pytest
 
 from rbxcompose.body.xml_reader import read_urdf
 from rbxcompose.composition.dump import dump_robot
+from rbxcompose.finding_pages import body_of
 from rbxcompose.findings import KINDS, Finding
 from rbxcompose.manifest.limits import DEPTH, URDF_BYTES, URDF_ELEMENTS
 from rbxcompose.plan.diff import difference
@@ -98,7 +99,7 @@ def test_each_mistake_in_the_section_is_told_at_its_place(
 @pytest.mark.parametrize("number", range(1, 8))
 def test_the_page_of_a_kind_shows_the_mistake_and_its_cure(number: int, tmp_path: Path) -> None:
     code = f"RBX200{number}"
-    shown = dict(EXAMPLES.findall(KINDS[code].doc))
+    shown = dict(EXAMPLES.findall(body_of(KINDS[code])))
     robot = ROBOT.replace("urdf: cart.urdf", "xacro: cart.urdf") if code == "RBX2007" else ROBOT
     assert check(tmp_path, robot, cart_urdf=whole(shown["Bad"])).codes == [code]
     assert check(tmp_path, robot, cart_urdf=whole(shown["Good"])).codes == []

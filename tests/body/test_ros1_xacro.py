@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from rbxcompose.body.xacro import Expanded, expand
 from rbxcompose.cli.project.fixes import fix
 from rbxcompose.edits import apply
+from rbxcompose.finding_pages import body_of
 from rbxcompose.findings import KINDS, Finding, Span
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.manifest.library import library_root
@@ -154,7 +155,7 @@ def test_files_of_the_library_are_read_like_that_but_not_fixed(tmp_path: Path, m
 
 
 def test_the_page_shows_the_mistake_and_its_cure(tmp_path: Path) -> None:
-    examples = dict(re.findall(r"^(Bad|Good):\n```xml\n(.*?)^```", KINDS["RBX2014"].doc, re.MULTILINE | re.DOTALL))
+    examples = dict(re.findall(r"^(Bad|Good):\n```xml\n(.*?)^```", body_of(KINDS["RBX2014"]), re.MULTILINE | re.DOTALL))
     bad = check(tmp_path, cart=examples["Bad"])
     good = check(tmp_path, cart=examples["Good"])
     assert (bad.codes, good.codes) == (["RBX2014"], [])

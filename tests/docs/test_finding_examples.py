@@ -12,6 +12,7 @@ import pytest
 
 import rbxcompose
 from rbxcompose.edits import safe_fixes
+from rbxcompose.finding_pages import body_of
 from rbxcompose.findings import KINDS, FindingKind
 from rbxcompose.testing.manifests import Checked
 from tests.docs.examples import HEADER, ROBOT, check_mission, check_robot, profiles_of, with_sections
@@ -74,7 +75,7 @@ OF_MISSIONS = ("RBX41", "RBX7010", "RBX7011")  # whose examples are missions
 
 
 def examples(kind: FindingKind) -> dict[str, str]:
-    return dict(_EXAMPLE.findall(kind.doc))
+    return dict(_EXAMPLE.findall(body_of(kind)))
 
 
 def codes_of(kind: FindingKind, text: str, folder: Path) -> set[str]:

@@ -11,7 +11,7 @@ import pytest
 from rbxcompose.findings import KINDS, Edit, Finding, FindingKind, Fix, Related, Report, Severity, Span, replacement
 from rbxcompose.formats import PLUGINS, format_names, renderer
 
-KIND = FindingKind("RBX0001", "A title of {braces}.\n\nThe first part.\n\nBad: this\n", Severity.WARNING)
+KIND = FindingKind("RBX0001", Severity.WARNING, doc="A title of {braces}.\n\nThe first part.\n\nBad: this\n")
 SOURCES = {"robots/a b/robot.yaml": 'name: "on"\n', "--set": "a.b=1"}
 FILE = "robots/a b/robot.yaml"
 

@@ -6,6 +6,7 @@ import re
 
 import pytest
 
+from rbxcompose.finding_pages import body_of
 from rbxcompose.findings import FindingKind
 from rbxcompose.mission_tests import codes
 from rbxcompose.testing.golden import Golden
@@ -171,7 +172,7 @@ def test_a_robot_or_mission_that_is_not_there_is_told(trying: Trying) -> None:
     "kind", [codes.UNKNOWN, codes.WRONG_VALUE, codes.NEVER, codes.NO_STEP], ids=lambda kind: kind.code
 )
 def test_the_example_on_its_page_is_wrong_and_right(trying: Trying, kind: FindingKind) -> None:
-    bad, good = re.findall(r"```yaml\n(.*?)```", kind.doc, re.DOTALL)
+    bad, good = re.findall(r"```yaml\n(.*?)```", body_of(kind), re.DOTALL)
     rest = "" if "expect:" in bad else "expect:\n  for: 100 s\n"
     assert kind.code in trying.read(bad + rest)[1]
     assert kind.code not in trying.read(good + rest)[1]

@@ -6,6 +6,7 @@ import re
 
 import pytest
 
+from rbxcompose.finding_pages import body_of
 from rbxcompose.findings import KINDS, Finding, FindingKind, Report
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import MappingNode
@@ -242,7 +243,7 @@ MISSION_KINDS = sorted(
 
 @pytest.mark.parametrize("code", MISSION_KINDS)
 def test_each_docs_page_shows_what_is_found_and_how_it_is_right(code: str) -> None:
-    bad, good = re.findall(r"```yaml\n(.*?)```", KINDS[code].doc, re.DOTALL)
+    bad, good = re.findall(r"```yaml\n(.*?)```", body_of(KINDS[code]), re.DOTALL)
     if code == codes.WRONG_INPUT.code or code == codes.TOO_DEEP.code:
         return  # they need another file, or a page of their own
     for text, is_found in ((bad, True), (good, False)):

@@ -105,7 +105,7 @@ ABOVE = {
     "params": "",
     "plan": "composition missions model sdk",
     "recording": "bus.attachment bus.classes bus.names bus.tokens bus.transport bus.witness",
-    "rendering": "",
+    "rendering": "finding_pages",
     "replay": "bus plan.model recording runtime.process_group runtime.records sdk",
     "runtime": "body.transform_errors body.transforms bus diagnostics.updater missions.program.sources params plan "
     "process_end recording sdk",

@@ -1,17 +1,22 @@
-"""The generated pages are those of the code as it stands."""
+"""The pages of findings and the generated ones are those of the code as it stands."""
 
 from __future__ import annotations
 
 import subprocess
 import sys
 
+import pytest
+
 from docs import generate
 from docs.generating.families import declared, next_code
-from rbxcompose.check_runner import OWN
+from rbxcompose.check_runner import all_checks
 from rbxcompose.expressions.types import TYPES
-from rbxcompose.finding_pages import FAMILIES, all_kinds, family_of
+from rbxcompose.finding_pages import FAMILIES, all_kinds, family_of, page_folder
+from rbxcompose.findings import KINDS, kind
 from rbxcompose.manifest.registry import sections
 from rbxcompose.manifest.section import ROBOT
+from rbxcompose.missions.analysis.check_runner import mission_checks
+from rbxcompose.rules import OUR_CODES
 
 
 def test_every_page_is_there_and_none_is_out_of_date() -> None:
@@ -36,8 +41,27 @@ def test_every_code_belongs_to_a_family() -> None:
     assert [code for code, kind in all_kinds().items() if family_of(kind) == "other"] == []
 
 
+def test_the_page_of_every_kind_is_a_file_and_no_declaration_has_prose() -> None:
+    kinds = {code: one for code, one in all_kinds().items() if code.startswith(OUR_CODES)}
+    assert {page.stem for page in page_folder().glob("RBX*.md")} == kinds.keys()
+    assert [code for code, one in kinds.items() if one.doc] == []
+    docstrings = {one.code: one.find.__doc__ for one in all_checks()}
+    docstrings |= {one.code: one.find.__doc__ for one in mission_checks()}
+    assert [code for code in docstrings.keys() & kinds if len((docstrings[code] or "").splitlines()) != 1] == []
+
+
+def test_a_code_is_declared_once_by_a_module_that_may_be_imported_again() -> None:
+    codes = [code for _, code in declared()]
+    assert sorted(codes) == sorted(set(codes))
+    with pytest.raises(ValueError, match="two kinds of finding have the code RBX1001"):
+        kind("RBX1001")
+    for _ in range(2):
+        exec("kind('TOY01', doc='A toy')", {"kind": kind, "__name__": "toy"})
+    del KINDS["TOY01"]
+
+
 def test_the_table_of_families_counts_every_kind_and_the_next_code_is_free() -> None:
-    assert {code for _, code in declared()} == {code for code in all_kinds() if code.startswith(OWN)}
+    assert {code for _, code in declared()} == {code for code in all_kinds() if code.startswith(OUR_CODES)}
     assert {next_code(family) for family in FAMILIES}.isdisjoint(all_kinds())
 
 

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from rbxcompose.check_runner import OWN
 from rbxcompose.findings import KINDS
+from rbxcompose.rules import OUR_CODES
 
 collect_ignore = ["rbx_lamp"]
 
@@ -18,5 +18,5 @@ def known_kinds() -> Iterator[None]:
     before = set(KINDS)
     yield
     for code in KINDS.keys() - before:
-        if not code.startswith(OWN):
+        if not code.startswith(OUR_CODES):
             del KINDS[code]

@@ -17,29 +17,8 @@ from rbxcompose.model.robot import Robot
 from rbxcompose.motion.collisions import MeshChecker, adjacent_pairs
 from rbxcompose.sections.arms import arms
 
-COLLIDES = kind(
-    "RBX9423",
-    """A pose of an arm is in collision
-
-Two links are within each other there, or a link and an object of the scene, so no motion ends or begins there. Joints
-that the pose does not name, and those of the rest of the body, count as at rest.
-
-Bad: `poses: {down: {lift_joint: 0 deg}}`, where the gripper is in the pedestal.
-Good: `poses: {down: {lift_joint: -20 deg}}`
-""",
-)
-UNWATCHED = kind(
-    "RBX9424",
-    """Links collide in a pose, and their pair is in the file of those that need not be watched
-
-The pair is there because no position that was tried had them collide: try more, with `arm setup --samples`. Or a person
-wrote `user`, and arms let them pass through each other.
-
-Bad: `- [gripper_link, pedestal_link, never]`, which collide in the pose `down`.
-Good: the file that `rbxcompose arm setup --samples 1000000` writes.
-""",
-    Severity.WARNING,
-)
+COLLIDES = kind("RBX9423")
+UNWATCHED = kind("RBX9424", Severity.WARNING)
 
 
 def run_check(robot: Robot, compilation: Compilation, *, is_json: bool) -> int:

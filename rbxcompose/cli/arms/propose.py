@@ -14,17 +14,7 @@ from rbxcompose.manifest.files import shown_name
 from rbxcompose.scaffold.answers import name_like
 from rbxcompose.scaffold.new_files import write_new
 
-NO_ARM = kind(
-    "RBX9422",
-    """No arm can be proposed
-
-An arm is a row of at least two joints, from where the body branches to fingers or to an end. `arm setup --propose`
-takes a URDF file, and makes a new robot of it.
-
-Bad: `rbxcompose arm setup robots/rover/rover.urdf --propose`, a body with wheels alone.
-Good: `rbxcompose arm setup arm.urdf --propose --out robot.yaml`
-""",
-)
+NO_ARM = kind("RBX9422")
 
 
 def run_proposal(arguments: argparse.Namespace, description: Description, file: Path) -> int:

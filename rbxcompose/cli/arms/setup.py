@@ -28,29 +28,8 @@ from rbxcompose.model.robot import Robot
 from rbxcompose.printable import plain
 from rbxcompose.sections.arms import arms
 
-NO_SETUP = kind(
-    "RBX9420",
-    """An arm cannot be set up
-
-`arm setup` needs a body whose shapes can be read, the extra `arm`, and a folder that it may write to.
-
-Bad: `rbxcompose arm setup robots/turtlebot`, without `pip install 'rbxcompose[arm]'`.
-Good: `rbxcompose arm setup robots/pi_robot`
-""",
-)
-TOUCH_AT_REST = kind(
-    "RBX9421",
-    """Links collide at rest
-
-With all joints at 0, or at the nearest position within their limits, two links are within each other, and elsewhere
-they are not. Arms go on watching such a pair: either a shape is too large, or the arm must not go there. If they may
-touch, change the reason of the pair to `user` in the file.
-
-Bad: `- [pedestal_link, gripper_link, default]`, where the arm is as long as the pedestal is high.
-Good: `- [tilt_link, bracket_link, user]`, where the shape of a bracket is a plain box.
-""",
-    Severity.WARNING,
-)
+NO_SETUP = kind("RBX9420")
+TOUCH_AT_REST = kind("RBX9421", Severity.WARNING)
 SAMPLES, LEAST = 50_000, 100
 _BAR = 30
 

@@ -10,17 +10,7 @@ from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.manifest.validate import validate
 
-NO_MOTION = kind(
-    "RBX2310",
-    """An arm does not get to where a command wants it
-
-The text begins with the reason: [the page on arms](../arms.md#when-it-does-not-move) lists all of them.
-
-Bad: `rbxcompose arm plan '{right_arm_shoulder_pan_joint: -115 deg, right_arm_shoulder_lift_joint: 69 deg}'
-robots/pi_robot`, which is in the torso.
-Good: `rbxcompose arm plan straight_forward robots/pi_robot`
-""",
-)
+NO_MOTION = kind("RBX2310")
 _SHOWN = "GOAL"  # name of a text on the command line in findings
 T = TypeVar("T")
 

@@ -15,31 +15,8 @@ from rbxcompose.cli.output.console import FINDINGS, misused, refuse, tell, tell_
 from rbxcompose.cli.project.robot_choice import robot_path
 from rbxcompose.findings import Finding, kind
 
-NO_BODY = kind(
-    "RBX2008",
-    """The robot has no body
-
-`body` commands show what the section `body` of a robot names, or a URDF or xacro file.
-
-Bad: `rbxcompose body show robots/turtlebot`, whose file has no `body`.
-Good:
-```yaml
-body:
-  urdf: robot.urdf
-```
-""",
-)
-UNKNOWN = kind(
-    "RBX2018",
-    """The body has nothing of this name
-
-`body show` lists the joints that move; a joint that mimics another one has no position of its own. `body simplify`
-knows meshes by the name in the URDF, or by its last part.
-
-Bad: `rbxcompose body pose --joint head_pan=0.5`
-Good: `rbxcompose body pose --joint head_pan_joint=0.5`
-""",
-)
+NO_BODY = kind("RBX2008")
+UNKNOWN = kind("RBX2018")
 Use = Callable[[argparse.Namespace, Description], int]
 Read = Callable[[argparse.Namespace, DescribedBody], int]
 Actions: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"

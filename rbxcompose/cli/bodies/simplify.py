@@ -20,17 +20,7 @@ from rbxcompose.findings import Finding, kind
 from rbxcompose.manifest.files import find, shown_name
 from rbxcompose.printable import plain
 
-WOULD_REPLACE = kind(
-    "RBX2017",
-    """A file would be replaced
-
-`body simplify` writes no mesh over a file that exists: the original is often the only copy. Choose another folder, or
-say `--force`.
-
-Bad: `rbxcompose body simplify arm.stl --out .`
-Good: `rbxcompose body simplify arm.stl --out simple`
-""",
-)
+WOULD_REPLACE = kind("RBX2017")
 _HEAD = ("mesh", "triangles", "bytes", "largest error", "mean error", "file")
 _ABOUT = "write meshes with fewer triangles, as binary STL files, and tell how far they are from the originals"
 _MORE = """The error is the distance from points of the original surface to the nearest point of the simplified one:

@@ -20,37 +20,9 @@ from rbxcompose.units import FREQUENCY, TIME, Dimension, UnitError, to_si
 
 Do = Callable[[Guest, argparse.Namespace], int]
 
-NO_NAME = kind(
-    "RBX9022",
-    """Nothing on the bus has this name
-
-Topics, services and actions exist while something publishes, subscribes, serves or calls. `rbxcompose topic ls`,
-`service ls` and `action ls` list those that exist.
-
-Bad: `rbxcompose topic echo /odometry`
-Good: `rbxcompose topic echo /odom`
-""",
-)
-NOBODY = kind(
-    "RBX9025",
-    """No answer in time
-
-Nothing subscribes to the topic with this type, or the server did not answer within the timeout.
-
-Bad: `rbxcompose topic pub /nobody_listens std_msgs/Empty --timeout 1s`
-Good: `rbxcompose topic pub /cmd_vel/teleop geometry_msgs/Twist '{angular: {z: 0.5}}'`
-""",
-)
-SAID_NO = kind(
-    "RBX9026",
-    """The server refuses
-
-The request or goal reached its server, which did not carry it out; the message says why.
-
-Bad: a goal outside the map.
-Good: a goal that the robot can reach.
-""",
-)
+NO_NAME = kind("RBX9022")
+NOBODY = kind("RBX9025")
+SAID_NO = kind("RBX9026")
 
 
 def visit(arguments: argparse.Namespace, do: Callable[[Guest], int]) -> int:

@@ -41,17 +41,7 @@ _EACH = zenoh.ConsolidationMode.NONE
 _PAUSE = 0.01  # [s] between two looks for the router
 NO_HASHES = "TypeHashNotSupported"  # ROS 2 Humble writes this in place of a hash
 
-NO_ROUTER = kind(
-    "RBX9020",
-    """No router answers
-
-The command reaches a robot's bus through its Zenoh router, at the endpoint that `rbxcompose ps` shows, or at the one
-that `--router` names. Nothing answers there.
-
-Bad: `rbxcompose topic ls --router tcp/127.0.0.1:1`
-Good: `rbxcompose topic ls --router tcp/127.0.0.1:7447`
-""",
-)
+NO_ROUTER = kind("RBX9020")
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,17 +22,7 @@ from rbxcompose.msgs.plain import KeyPath, from_plain
 from rbxcompose.msgs.types import Interface, Message
 from rbxcompose.printable import FORBIDDEN
 
-NO_TYPE = kind(
-    "RBX9021",
-    """Unknown message type
-
-rbxcompose reads and writes the messages, services and actions whose definitions it has, and those of packages that are
-installed. Other types, or other definitions of the same type, can be listed and measured, but not read.
-
-Bad: `rbxcompose topic pub /word std_msgs/Strin 'data: hello'`
-Good: `rbxcompose topic pub /word std_msgs/String 'data: hello'`
-""",
-)
+NO_TYPE = kind("RBX9021")
 
 MOST_SHOWN = 128  # values of a list that text shows; JSON shows all
 _SHOWN = "MESSAGE"  # name of the message text in findings

@@ -25,17 +25,7 @@ from rbxcompose.units import ANGLE, LENGTH
 _TOPIC = "/tf_static"
 _LONGEST = 1000  # characters of a note
 
-NO_PLACE = kind(
-    "RBX9043",
-    """A frame cannot be placed there
-
-A frame has one parent and one pose in it, and frames form a tree: a frame is not below itself, and what one program
-places, no other one places elsewhere. `rbxcompose tf tree` shows where all frames are.
-
-Bad: `rbxcompose tf static base_link base_link`
-Good: `rbxcompose tf static base_link laser --z 20cm`
-""",
-)
+NO_PLACE = kind("RBX9043")
 
 
 def add_static_arguments(parser: argparse.ArgumentParser) -> None:

@@ -16,28 +16,8 @@ from rbxcompose.cli.project.questions import Asker, CancelledError
 from rbxcompose.devices.rules import RELOAD
 from rbxcompose.findings import kind
 
-NOT_INSTALLED = kind(
-    "RBX9418",
-    """The rules of udev cannot be written
-
-Only root may write into `/etc/udev/rules.d`. Nothing was changed. The robot itself needs no rules: it finds devices
-by what the kernel tells of them.
-
-Bad: `rbxcompose udev install robots/arm`
-Good: `sudo rbxcompose udev install robots/arm`, or
-`rbxcompose udev generate robots/arm | sudo tee /etc/udev/rules.d/99-rbxcompose-arm.rules`
-""",
-)
-NO_DEVICES = kind(
-    "RBX9419",
-    """The robot has no devices
-
-There is nothing to write rules for.
-
-Bad: a robot without `devices:`
-Good: `devices: {arm: {vendor: 0403, product: 6014}}`; `rbxcompose udev scan` writes such entries.
-""",
-)
+NOT_INSTALLED = kind("RBX9418")
+NO_DEVICES = kind("RBX9419")
 _MODE = 0o644
 _YES = ("y", "yes")
 

@@ -35,16 +35,7 @@ FORMATS = {"text": mission_text, "mermaid": mission_mermaid, "dot": mission_dot,
 USAGE = 2
 _SAMPLES: Mapping[str, str] = {"TEXT": "hello", "FLAG": "true", "COUNT": "2", "PLACE": "dock", "POSE": "dock"}
 
-NO_MISSION = kind(
-    "RBX9040",
-    """The robot has no mission of this name
-
-Missions have the names that the robot's section `missions` gives them. `rbxcompose mission ls` lists them.
-
-Bad: `rbxcompose mission show patrl robots/turtlebot`
-Good: `rbxcompose mission show patrol robots/turtlebot`
-""",
-)
+NO_MISSION = kind("RBX9040")
 
 
 def robot_of(path: str | None) -> Robot | None:

@@ -25,19 +25,7 @@ _MOST_RUNS = 10_000
 _DEEPEST = 200  # levels of lists and maps in a record, which are twice those of the values in it
 _OWN = ("mission", "run")  # keys of a record that identify its run
 
-NO_LOG = kind(
-    "RBX9041",
-    """The file is not the log of a mission
-
-`rbxcompose mission replay` reads the output of `rbxcompose mission log --all`: one JSON record per line, each run from
-its start. Without `--all` the inputs are missing, and nothing can be run again. The message names the first record that
-is not as `mission log` writes it. A log has at most 16 MB and 10,000 runs, and takes a limited amount of work to run
-again: replay a part of a longer one.
-
-Bad: `rbxcompose mission log > patrol.log; rbxcompose mission replay patrol.log robots/turtlebot`
-Good: `rbxcompose mission log --all > patrol.log; rbxcompose mission replay patrol.log robots/turtlebot`
-""",
-)
+NO_LOG = kind("RBX9041")
 
 
 @dataclass(slots=True)

@@ -10,17 +10,7 @@ from typing import TextIO
 
 from rbxcompose.findings import kind
 
-NO_TERMINAL = kind(
-    "RBX9027",
-    """There is no terminal to read keys from
-
-`rbxcompose drive` and `rbxcompose body pose` read keys from a terminal. Without one, use `rbxcompose topic pub` to send
-velocities, and `body pose --joint NAME=POSITION` to move joints.
-
-Bad: `rbxcompose drive < keys.txt`
-Good: `rbxcompose drive`
-""",
-)
+NO_TERMINAL = kind("RBX9027")
 _ENTER, _LEAVE = "\x1b[?1049h\x1b[?25l", "\x1b[?25h\x1b[?1049l"  # alternate screen without a cursor, and back
 _HOME, _END_OF_LINE, _END_OF_SCREEN = "\x1b[H", "\x1b[K", "\x1b[J"
 

@@ -20,29 +20,8 @@ from rbxcompose.msgs.rcl_interfaces import (
     SetParametersAtomically,
 )
 
-HALF_DONE = kind(
-    "RBX9047",
-    """Parameters of several components were not set, and not all went back
-
-All values are set, or none. If a component refuses at the last moment, the others get their old values back. Here one
-of them did not take its own back: it has refused, or it has failed. `rbxcompose param history` tells who did what.
-
-Bad: a component that fails while it takes a value.
-Good: `rbxcompose param diff` shows what is set now; `param set` and `param undo` change it.
-""",
-)
-BREAKS_RULE = kind(
-    "RBX9030",
-    """A live value would break a rule of the robot
-
-Values that anybody sets while the robot runs are checked as `check` does it, together with all values that components
-have now: what is refused in the manifest is refused then. Warnings count as well, since a robot that moves gives no
-time to read them. So it is for `param set`, for missions and for tools of ROS 2.
-
-Bad: `rbxcompose param set go_to speed "0.8 m/s"`, for a base that can do 0.5 m/s.
-Good: `rbxcompose param set go_to speed "0.4 m/s"`
-""",
-)
+HALF_DONE = kind("RBX9047")
+BREAKS_RULE = kind("RBX9030")
 CHANGE = "change_parameters"
 Wanted = Mapping[str, Sequence[Parameter]]  # by node
 

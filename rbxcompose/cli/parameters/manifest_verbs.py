@@ -24,17 +24,7 @@ from rbxcompose.inspection.origin import origin_of
 from rbxcompose.manifest.tree import at
 from rbxcompose.runtime.folder import RobotFolder, RobotState
 
-NO_FILES = kind(
-    "RBX9046",
-    """The files of the robot are not known, or have errors
-
-What compares live values with the manifest needs the robot's files: those of a robot that this user has brought up on
-this machine. `rbxcompose check` tells what is wrong with them.
-
-Bad: `rbxcompose param save --router tcp/192.168.1.7:7447`
-Good: `rbxcompose param save`, on the robot itself.
-""",
-)
+NO_FILES = kind("RBX9046")
 
 
 def manifest_of(nodes: ParameterNodes, arguments: argparse.Namespace) -> tuple[LiveSettings, RobotFolder, RobotState]:

@@ -25,29 +25,8 @@ from rbxcompose.regular_files import read_regular
 from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.runtime.plan_requests import ComparePlan
 
-NOT_SAVED = kind(
-    "RBX9044",
-    """A live value cannot be saved
-
-`param save` writes each changed value where the manifest says it, and nothing else may change by that. A value cannot
-be saved if it was given by `--set`, is computed, is written in a file of the library, or comes from an argument that
-also sets something else. No file is changed then.
-
-Bad: `rbxcompose param save`, after setting `arm_base.max_speed` of a part `rbx:parts/base.yaml` that fixes it.
-Good: write it over the part, in the robot's file: `components: {arm_base: {max_speed: 0.4 m/s}}`
-""",
-)
-CHANGED_SINCE = kind(
-    "RBX9045",
-    """A file has another value than the robot came up with
-
-Somebody has edited the file while the robot ran. `param save` does not write over that: take over the file with
-`rbxcompose apply` or `rbxcompose param reset`, or write the value by hand.
-
-Bad: an editor changes `runtime:` of the battery, then `rbxcompose param set battery runtime "30 s"` and `param save`.
-Good: one of the two.
-""",
-)
+NOT_SAVED = kind("RBX9044")
+CHANGED_SINCE = kind("RBX9045")
 Compiled = Callable[[Mapping[Path, str]], Compilation]
 _COMPARE = 10.0  # [s] for the supervisor to read a plan
 

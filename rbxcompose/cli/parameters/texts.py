@@ -16,24 +16,7 @@ from rbxcompose.params.core import SEPARATOR
 from rbxcompose.params.values import to_message
 from rbxcompose.units import Dimension
 
-NO_VALUES = kind(
-    "RBX9048",
-    """A file of parameters that cannot be read
-
-It has the components by name, each with its parameters and their values, as `param dump` writes it. A file of
-`ros2 param dump` will do, too.
-
-Bad:
-```yaml
-battery: 30 s
-```
-Good:
-```yaml
-battery:
-  runtime: 30 s
-```
-""",
-)
+NO_VALUES = kind("RBX9048")
 PIPED = "-"
 _ROS = "ros__parameters"
 

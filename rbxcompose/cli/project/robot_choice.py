@@ -11,17 +11,7 @@ from rbxcompose.cli.robots.lookup import NotDoneError, find_robot, known_state, 
 from rbxcompose.findings import kind
 from rbxcompose.manifest.files import ROBOT_FILE
 
-UNNAMED = kind(
-    "RBX9031",
-    """No robot is named
-
-Without a path, a verb takes the `robot.yaml` of the current folder, else the only robot of the project there, else the
-only robot that is up. `up` starts one, so it takes only those of the folder.
-
-Bad: `rbxcompose up`, in a folder with two robots.
-Good: `rbxcompose up robots/turtlebot`
-""",
-)
+UNNAMED = kind("RBX9031")
 _MOST = 5  # robots that are listed
 _ABOUT = "the robot's file, its folder, or rbx:robots/NAME of the library; without it, the only one"
 

@@ -13,18 +13,7 @@ from rbxcompose.manifest.files import ROBOT_FILE, find, project_of, shown_name
 from rbxcompose.manifest.library import PREFIX
 from rbxcompose.manifest.section import SYSTEM, TEST
 
-UNUSED = kind(
-    "RBX9007",
-    """No robot uses the file
-
-A mission or a part is checked together with the robots that use it. No robot of the project does, so there is
-nothing to check it against. An overlay does not say which robots it is for: `check ROBOT -f FILE` checks it on one.
-
-Bad: `rbxcompose check missions/draft.yaml`, which no robot has in its `missions:`.
-Good: name the mission in a robot, or leave it out of the command.
-""",
-    Severity.WARNING,
-)
+UNUSED = kind("RBX9007", Severity.WARNING)
 
 _USE = "name it in a robot ('missions:', 'include:')"
 _MANIFESTS = ("*.yaml", "*.yml")

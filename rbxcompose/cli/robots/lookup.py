@@ -16,48 +16,12 @@ from rbxcompose.runtime.requests import RobotStatus
 
 A = TypeVar("A")
 
-ALREADY_UP = kind(
-    "RBX9001",
-    """The robot is already up
-
-A robot runs once per user. `rbxcompose ps` shows it; `rbxcompose down` ends it.
-""",
-)
-NOT_UP = kind(
-    "RBX9002",
-    """No such robot is up
-
-The command needs a running robot. `rbxcompose up PATH` starts one.
-""",
-)
-WHICH = kind(
-    "RBX9003",
-    """Several robots are up
-
-The command is for one robot: name it with `--robot NAME`.
-""",
-)
-REFUSED = kind(
-    "RBX9004",
-    """The robot refuses
-
-The command reached the robot, which cannot carry it out now; the message says why.
-""",
-)
-NO_ANSWER = kind(
-    "RBX9005",
-    """The robot does not answer
-
-Its supervisor is dead or stopped. `rbxcompose down` ends what is left of it.
-""",
-)
-UNSAFE = kind(
-    "RBX9006",
-    """The robot's folder is not safe
-
-Lock, state and control socket of a robot are in a folder that nobody else may open.
-""",
-)
+ALREADY_UP = kind("RBX9001")
+NOT_UP = kind("RBX9002")
+WHICH = kind("RBX9003")
+REFUSED = kind("RBX9004")
+NO_ANSWER = kind("RBX9005")
+UNSAFE = kind("RBX9006")
 
 
 class NotDoneError(Exception):

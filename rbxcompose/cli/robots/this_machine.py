@@ -12,17 +12,7 @@ from rbxcompose.findings import Finding, Report, kind
 from rbxcompose.model.robot import Robot
 from rbxcompose.sdk.capabilities import NeedsExtra
 
-NO_EXTRA = kind(
-    "RBX2253",
-    """A component needs a package that is not installed
-
-Some drivers need packages that robots without them do without. They come with an extra of rbxcompose; simulated
-devices often need none. `rbxcompose needs` lists the extras of a robot, and `make up` installs them.
-
-Bad: `pip install rbxcompose`, then `rbxcompose up --real` of a robot with servos.
-Good: `pip install 'rbxcompose[servos]'`
-""",
-)
+NO_EXTRA = kind("RBX2253")
 
 
 def is_fit(robot: Robot, sources: Mapping[str, str]) -> bool:

@@ -20,17 +20,7 @@ from rbxcompose.runtime.supervision.changes import Fate
 from rbxcompose.systems.bundle import bundle_of
 from rbxcompose.systems.model import System
 
-REFUSED_THERE = kind(
-    "RBX6128",
-    """A host refuses the change
-
-`apply` asks all hosts of a system first. If one refuses or cannot be reached, nothing is changed; with `--partial` the
-others are. If one fails while it changes, those before it are taken back, unless `--partial` is given.
-
-Bad: `rbxcompose apply systems/two_hosts.yaml`, while a mission runs whose component would restart.
-Good: `rbxcompose mission pause --robot systems/two_hosts.yaml`, then the same.
-""",
-)
+REFUSED_THERE = kind("RBX6128")
 Key = tuple[str, str]  # host and robot
 
 

@@ -19,17 +19,7 @@ from rbxcompose.executive.requests import MISSION
 from rbxcompose.findings import kind
 from rbxcompose.systems.model import PlacedRobot
 
-NO_LABEL = kind(
-    "RBX6130",
-    """No robot has these labels
-
-`fleet` chooses robots by `labels` in the file of a system, by their names, and by the name that instances have in
-common. Of several labels, a robot must have all.
-
-Bad: `rbxcompose fleet ls systems/fleet.yaml --label indor`
-Good: `rbxcompose fleet ls systems/fleet.yaml --label indoor`
-""",
-)
+NO_LABEL = kind("RBX6130")
 _COLUMNS = ("robot", "host", "state", "mission", "battery")
 ShareFacts = tuple[str, str, dict[str, Any]]  # robot, host, and what `top` tells of the share, or its `state` alone
 

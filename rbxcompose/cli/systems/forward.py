@@ -21,27 +21,8 @@ from rbxcompose.sdk.registry import component_type
 from rbxcompose.systems.model import PlacedRobot, System
 from rbxcompose.systems.share import hosts_of
 
-WHICH = kind(
-    "RBX6121",
-    """It is not clear which robot of the system is meant
-
-Verbs take a system in place of a robot: all of its robots are meant. What watches, commands, or works with files is for
-one of them, which is named behind a colon.
-
-Bad: `rbxcompose mission watch --robot systems/fleet.yaml`, with several robots.
-Good: `rbxcompose mission watch --robot systems/fleet.yaml:cleaner`
-""",
-)
-NOBODY_THERE = kind(
-    "RBX6122",
-    """No host of the system can answer
-
-The verb is for a component that the robot does not have.
-
-Bad: `rbxcompose mission ls --robot systems/two_hosts.yaml`, for a robot without missions.
-Good: `rbxcompose plan systems/two_hosts.yaml` shows which host runs what.
-""",
-)
+WHICH = kind("RBX6121")
+NOBODY_THERE = kind("RBX6122")
 SSH_FAILED = 255  # exit code of ssh, if it fails itself
 _OF_SYSTEM = ("--ssh-config", "--profile")
 _FOR_ONE = ("watch", "echo", "hz", "pub", "call", "send", "static")  # they last, or are meant for one

@@ -21,28 +21,8 @@ from rbxcompose.manifest.system_file import HostModel
 from rbxcompose.printable import plain
 from rbxcompose.systems.bundle import Bundle
 
-UNREACHED = kind(
-    "RBX6113",
-    """A host cannot be reached by ssh
-
-`ssh` of a host is what one types after `ssh`. It has to work without a question: with a key, and a host key that is
-known. The message ends with what ssh says.
-
-Bad: `rbxcompose up systems/two_hosts.yaml`, while `ssh pi@robot true` asks for a password.
-Good: `ssh-copy-id pi@robot`, then `ssh pi@robot true` once, to accept the key of the host.
-""",
-)
-OTHER_VERSION = kind(
-    "RBX6114",
-    """A host has another version of rbxcompose, or none
-
-All hosts of a system need the same version: what they send each other depends on it. If `rbxcompose` is not in the path
-of commands over ssh, `command` of the host tells where it is.
-
-Bad: a host with rbxcompose 0.1 and a desk with 0.2.
-Good: `pip install rbxcompose==0.2` on the host, or `command: /home/pi/venv/bin/rbxcompose`.
-""",
-)
+UNREACHED = kind("RBX6113")
+OTHER_VERSION = kind("RBX6114")
 AT_ONCE = 16  # commands whose answers are awaited, so that a fleet does not need a machine of its own
 CONNECT = 10  # [s] to reach a host
 _UNPACK = """set -e

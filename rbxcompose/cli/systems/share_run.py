@@ -25,38 +25,9 @@ from rbxcompose.systems.reader import compile_system
 from rbxcompose.systems.share import robots_on, share_of
 
 USAGE = 2
-WHICH_HOST = kind(
-    "RBX6110",
-    """It is not clear which host this is
-
-`up SYSTEM --host NAME` runs what the system places on the host of this name. Without `--host`, `up` starts all hosts by
-their `ssh`; a host without it is the machine of the command.
-
-Bad: `rbxcompose up systems/two_hosts.yaml --host rboot`
-Good: `rbxcompose up systems/two_hosts.yaml --host robot`
-""",
-)
-OTHER_MACHINE = kind(
-    "RBX6111",
-    """The host has another address
-
-The routers of the other hosts dial the `address` of a host, so its own router listens there. This machine does not have
-that address: it is another one, or its network is not up yet.
-
-Bad: `rbxcompose up systems/two_hosts.yaml --host robot`, on the desk.
-Good: `rbxcompose up systems/two_hosts.yaml --host desk`, on the desk.
-""",
-)
-WHICH_ROBOT = kind(
-    "RBX6112",
-    """The host runs several robots
-
-In the foreground, `up` shows one robot. With `-d` it starts all of the host; `--robot NAME` chooses one.
-
-Bad: `rbxcompose up systems/fleet.yaml --host hall`, which runs two robots.
-Good: `rbxcompose up systems/fleet.yaml --host hall -d`
-""",
-)
+WHICH_HOST = kind("RBX6110")
+OTHER_MACHINE = kind("RBX6111")
+WHICH_ROBOT = kind("RBX6112")
 
 
 def run_share(path: str, arguments: argparse.Namespace, options: RunOptions) -> int:

@@ -11,18 +11,7 @@ from rbxcompose.findings import Finding, Severity, kind
 from rbxcompose.printable import plain
 from rbxcompose.sections.devices import devices
 
-UNKNOWN = kind(
-    "RBX9412",
-    """An adapter is plugged in that the robot does not know
-
-The robot names its devices, but none of them is this adapter. It may be a replacement with another serial number, or
-nothing of the robot's.
-
-Bad: `devices: {arm: {vendor: 0403, product: 6014, serial: FT4THV5C}}`, after the adapter was replaced.
-Good: the serial number of the new one, as `rbxcompose udev scan` shows it.
-""",
-    Severity.WARNING,
-)
+UNKNOWN = kind("RBX9412", Severity.WARNING)
 
 
 @examination

@@ -9,17 +9,7 @@ from rbxcompose.doctor.registry import examination
 from rbxcompose.findings import Finding, kind
 from rbxcompose.printable import plain
 
-CLASH = kind(
-    "RBX9408",
-    """Two ends of one topic, service or action have different types
-
-They never find each other, and nothing reports it: the type and the hash of its definition are part of the name on the
-wire. Definitions of one type differ if packages of different versions are mixed.
-
-Bad: `/battery` as `std_msgs/Float32` at one end, and as `sensor_msgs/BatteryState` at the other.
-Good: one type, in one version, at all ends: `rbxcompose msg show TYPE` prints its hash.
-""",
-)
+CLASH = kind("RBX9408")
 
 
 @examination

@@ -11,42 +11,9 @@ from rbxcompose.findings import Finding, Severity, kind
 MOST_STEP = 0.05  # [s] by which the wall clock may move against the monotonic one while we look
 MOST_AHEAD, MOST_BEHIND = 0.05, 1.0  # [s] of a sender's stamps; those behind also include the transport time
 
-WRONG_CLOCK = kind(
-    "RBX9404",
-    """The clock of this machine is wrong
-
-Robots move by the monotonic clock, which is never set. But stamps of messages, recordings and ROS 2 use the wall clock.
-
-Bad: a computer without a battery for its clock, and without a time server.
-Good: `timedatectl set-ntp true`
-""",
-    Severity.WARNING,
-)
-OTHER_CLOCK = kind(
-    "RBX9405",
-    """A node on the bus has another time
-
-The stamps of its messages are in the future, or long ago. Whatever compares stamps from several publishers, such as
-transforms and recordings, is then wrong. A robot that runs with `--rate` counts its own time from zero, and so do its
-stamps.
-
-Bad: two computers of which one has no time server.
-Good: `timedatectl set-ntp true` on both
-""",
-    Severity.WARNING,
-)
-HOSTS_DIFFER = kind(
-    "RBX6129",
-    """The clocks of two hosts of a robot differ
-
-The hosts of a robot tell each other the time with their reports. Whatever compares stamps of both, such as transforms
-and recordings, is wrong by the difference. Deadlines are not: they count from the arrival of a message.
-
-Bad: a desk and a robot that is 0.3 s ahead of it.
-Good: `timedatectl set-ntp true` on both, or one that follows the other by NTP.
-""",
-    Severity.WARNING,
-)
+WRONG_CLOCK = kind("RBX9404", Severity.WARNING)
+OTHER_CLOCK = kind("RBX9405", Severity.WARNING)
+HOSTS_DIFFER = kind("RBX6129", Severity.WARNING)
 _HELP = "let a time server set it: timedatectl set-ntp true"
 
 

@@ -19,17 +19,7 @@ from rbxcompose.printable import plain
 
 _PREFIXES = "/dev/", "usb:", "usb@", "dev:"
 
-NO_DEVICE = kind(
-    "RBX9411",
-    """A device that the robot names cannot be used
-
-It is not plugged in, has another name, or this user may not open it. Serial devices usually belong to the group
-`dialout`; after you join it, log in again.
-
-Bad: `port: /dev/ttyUSB0`, which is `/dev/ttyUSB1` after the next start.
-Good: `port: /dev/serial/by-id/...`, and `sudo usermod -aG dialout $USER`
-""",
-)
+NO_DEVICE = kind("RBX9411")
 
 
 @examination

@@ -10,18 +10,7 @@ from rbxcompose.doctor.registry import examination
 from rbxcompose.findings import Finding, Severity, kind
 from rbxcompose.printable import plain
 
-LEFT = kind(
-    "RBX9409",
-    """A robot has left something behind
-
-Its supervisor is dead, so nothing restarts its processes and you must clean up with `down`. Or its state cannot be
-read, or some of its processes run without a supervisor.
-
-Bad: `kill -9` of the supervisor.
-Good: `rbxcompose down`
-""",
-    Severity.WARNING,
-)
+LEFT = kind("RBX9409", Severity.WARNING)
 _TITLE = re.compile(r"rbxcompose (?P<robot>[^:]+): (?P<process>.+)")
 _SUPERVISOR = "supervisor"
 

@@ -11,18 +11,7 @@ from rbxcompose.findings import Finding, Severity, kind
 FEWEST_FILES = 1024
 SMALLEST_SHARED = 16_000_000  # [B]
 
-LOW_LIMIT = kind(
-    "RBX9406",
-    """A limit of this machine is low
-
-Each link of a process takes an open file, and large messages may go through shared memory. Nothing that rbxcompose
-ships needs real-time priority or locked memory; third-party drivers may.
-
-Bad: a container with 1 MB at `/dev/shm`, or `ulimit -n 64`.
-Good: `docker run --shm-size=256m`, `ulimit -n 4096`
-""",
-    Severity.WARNING,
-)
+LOW_LIMIT = kind("RBX9406", Severity.WARNING)
 
 
 @examination

@@ -14,17 +14,7 @@ from rbxcompose.manifest.files import project_of, shown_name
 from rbxcompose.manifest.secrets import FOLDER
 from rbxcompose.printable import plain
 
-OPEN_TO_OTHERS = kind(
-    "RBX9410",
-    """Others may open what is private
-
-The folder of a robot contains the socket that commands it. A secret is read only if nobody else may read it. `up`
-refuses both.
-
-Bad: `chmod 755 /run/user/1000/rbxcompose`, `chmod 644 secrets/token`
-Good: `chmod 700 /run/user/1000/rbxcompose`, `chmod 600 secrets/token`
-""",
-)
+OPEN_TO_OTHERS = kind("RBX9410")
 
 
 @examination

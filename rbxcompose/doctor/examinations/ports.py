@@ -11,29 +11,8 @@ from rbxcompose.findings import Finding, Severity, kind
 from rbxcompose.printable import plain
 from rbxcompose.sections.bus import BusModel
 
-PORT_TAKEN = kind(
-    "RBX9402",
-    """The port of the bus is taken
-
-A robot that starts uses the next free port instead; `rbxcompose ps` shows which. A program that looks for the robot
-at its usual port then finds something else.
-
-Bad: a router of ROS 2 at 7447, and a robot with `bus: {port: 7447}` beside it.
-Good: `bus: {port: 7460}`, or `bus: {router: tcp/127.0.0.1:7447}` to use that router.
-""",
-    Severity.WARNING,
-)
-NO_LISTENER = kind(
-    "RBX9403",
-    """Nothing listens at the port of a running robot's router
-
-Its processes still talk to each other, but new ones cannot find them. The supervisor restarts a router that has ended;
-if it cannot, another program may have taken the port.
-
-Bad: the router was killed together with the supervisor.
-Good: `rbxcompose down`, then `rbxcompose up`
-""",
-)
+PORT_TAKEN = kind("RBX9402", Severity.WARNING)
+NO_LISTENER = kind("RBX9403")
 
 
 @examination

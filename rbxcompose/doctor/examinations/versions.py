@@ -8,18 +8,7 @@ from rbxcompose.doctor.facts import HostFacts, Version
 from rbxcompose.doctor.registry import examination
 from rbxcompose.findings import Finding, Severity, kind
 
-OTHER_VERSION = kind(
-    "RBX9401",
-    """A package is missing, or has another version than the one that is locked
-
-`requirements.lock` lists the versions with which rbxcompose is tested. Others mostly work, too. When something odd
-happens, check this first.
-
-Bad: `pip install rbxcompose` into an environment that is years old.
-Good: `pip install -r requirements.lock`
-""",
-    Severity.WARNING,
-)
+OTHER_VERSION = kind("RBX9401", Severity.WARNING)
 
 
 @examination

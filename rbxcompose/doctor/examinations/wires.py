@@ -11,18 +11,7 @@ from rbxcompose.findings import Finding, Severity, kind
 from rbxcompose.printable import plain
 from rbxcompose.sdk.ports import In
 
-NOBODY_PUBLISHES = kind(
-    "RBX9407",
-    """A topic has subscribers but no publisher
-
-The subscriber waits for ever. Inputs that the robot leaves open to the outside, such as `teleop` of a mux, are not
-reported.
-
-Bad: a node of ROS 2 that subscribes to `/odometry`, beside a robot that publishes `/odom`.
-Good: the same name at both ends: `ros2 run ... --ros-args -r odometry:=odom`
-""",
-    Severity.WARNING,
-)
+NOBODY_PUBLISHES = kind("RBX9407", Severity.WARNING)
 _MOST = 8  # names
 
 

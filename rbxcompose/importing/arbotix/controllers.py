@@ -11,19 +11,7 @@ from rbxcompose.importing.foreign_files import ForeignMap, Given
 from rbxcompose.importing.importer import NOT_CARRIED_OVER
 from rbxcompose.importing.manifest_text import number
 
-SIMULATED_BASE = kind(
-    "RBX2236",
-    """A base of ArbotiX is imported as a simulated one
-
-The ArbotiX board drives the motors of the base by its own firmware, which is not spoken to here. The manifest gets a
-base that is simulated within the same limits, so that missions and navigation can be tried; the figures of the real one
-are kept in a comment.
-
-Bad: a real robot whose `base` is of type `diff_drive_sim`: it does not move.
-Good: a component for the real base in its place; `rbxcompose new component NAME` writes one.
-""",
-    Severity.WARNING,
-)
+SIMULATED_BASE = kind("RBX2236", Severity.WARNING)
 
 FOLLOW, DIFF = "follow_controller", "diff_controller"
 ACTION = "follow_joint_trajectory"

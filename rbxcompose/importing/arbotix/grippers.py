@@ -12,19 +12,7 @@ from rbxcompose.importing.foreign_files import ForeignMap, Given
 from rbxcompose.importing.manifest_text import angle, flag, flow_list, length, number, place, word
 from rbxcompose.manifest.validate import OUT_OF_RANGE
 
-NO_OPENING = kind(
-    "RBX2237",
-    """Openings that a gripper cannot have
-
-`min_opening` and `max_opening` are distances between the pads, in metres. Often they hold angles of the joint in
-radians by mistake; the driver then refuses what fits and lets pass what does not. They are left out: measure how far
-the gripper opens, and write it.
-
-Bad: `{model: singlesided, min_opening: -0.8, max_opening: 0.5}`
-Good: `{model: singlesided, min_opening: 0.0, max_opening: 0.09}`
-""",
-    Severity.WARNING,
-)
+NO_OPENING = kind("RBX2237", Severity.WARNING)
 
 MODELS = {"singlesided": "one_sided", "dualservo": "dual", "parallel": "parallel"}
 PAD_WIDTH, FINGER_LENGTH, MIN_OPENING, MAX_OPENING = 0.01, 0.02, 0.0, 0.09  # defaults of the controller [m]

@@ -18,18 +18,7 @@ from rbxcompose.printable import plain
 from rbxcompose.sections.actuators import ONE_ID
 from rbxcompose.sections.controllers import NOT_DRIVEN
 
-NO_URDF = kind(
-    "RBX2239",
-    """The joints that were imported need a body
-
-Files of ArbotiX name joints but do not describe them; ROS has their URDF elsewhere. A manifest names it in `body`.
-Until it does, `check` tells that there are no such joints.
-
-Bad: a manifest with `joints:` as it was imported.
-Good: the same manifest with `body: {urdf: robot.urdf}`.
-""",
-    Severity.WARNING,
-)
+NO_URDF = kind("RBX2239", Severity.WARNING)
 
 USUAL_PORT = "/dev/ttyUSB0"
 

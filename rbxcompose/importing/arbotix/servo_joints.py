@@ -15,41 +15,9 @@ from rbxcompose.importing.importer import NOT_CARRIED_OVER
 from rbxcompose.importing.manifest_text import degrees_shown, number
 from rbxcompose.manifest.validate import OUT_OF_RANGE
 
-NO_SUCH_SERVO = kind(
-    "RBX2233",
-    """No known servo has these ticks over this range
-
-A file of ArbotiX says how many ticks a servo has and how many degrees they are. The angle of a tick follows from the
-model in a manifest, so a joint whose servo is of no known model is left out.
-
-Bad: `{id: 1, ticks: 1024, range: 180}`
-Good: `{id: 1, ticks: 1024, range: 300}`, an AX-12.
-""",
-)
-GUESSED = kind(
-    "RBX2234",
-    """The model of servos is a guess
-
-Files of ArbotiX do not name the models of servos. They are guessed: 1024 ticks are those of an AX-12, 4096 ticks over
-360 degrees those of an MX-28, 4096 ticks over 251 degrees those of an EX-106. The model decides the control table, and
-other models have the same ticks: look at the labels, or ask the servos with `rbxcompose servo scan`.
-
-Bad: `model: AX-12` for a servo on whose label is AX-18.
-Good: `model: AX-18`
-""",
-    Severity.WARNING,
-)
-UNREACHABLE = kind(
-    "RBX2235",
-    """A limit that the servo cannot reach
-
-With this neutral tick, the servo ends before the limit does. The limit is written as it was, but nothing moves there.
-
-Bad: `{id: 8, ticks: 4096, neutral: 1024, max_angle: 180, invert: true}`: at tick 0 the joint is at 90 degrees.
-Good: `{id: 8, ticks: 4096, neutral: 1024, max_angle: 90, invert: true}`
-""",
-    Severity.WARNING,
-)
+NO_SUCH_SERVO = kind("RBX2233")
+GUESSED = kind("RBX2234", Severity.WARNING)
+UNREACHABLE = kind("RBX2235", Severity.WARNING)
 
 DYNAMIXEL = "dynamixel"
 OTHER_TYPES = {

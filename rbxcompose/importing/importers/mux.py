@@ -14,30 +14,8 @@ from rbxcompose.importing.names import FreeNames
 from rbxcompose.mux.words import OWN_NAMES
 from rbxcompose.printable import plain
 
-RENAMED_TOPIC = kind(
-    "RBX2294",
-    """An imported topic gets another name
-
-Names of topics have lower-case letters, digits and underscores here, and the output of a mux has no slashes. Whoever
-sends or receives there must use the new name.
-
-Bad: `topic: Joy-Vel`
-Good: `topic: joy_vel`
-""",
-    Severity.WARNING,
-)
-GUESSED_OUTPUT = kind(
-    "RBX2295",
-    """The output of a mux is a guess
-
-Files of twist_mux do not say where it publishes; its launch file does, by a remapping of `cmd_vel_out`. The output is
-taken for `cmd_vel`, as nearly everywhere, unless an input is called so.
-
-Bad: a robot whose base listens to `/base/cmd_vel`, with a mux `cmd_vel`.
-Good: the name of the mux changed to the topic of the base.
-""",
-    Severity.WARNING,
-)
+RENAMED_TOPIC = kind("RBX2294", Severity.WARNING)
+GUESSED_OUTPUT = kind("RBX2295", Severity.WARNING)
 
 _TOPIC = re.compile(r"/?[a-z][a-z0-9_]*(/[a-z][a-z0-9_]*)*")
 _USUAL, _OTHERWISE = "cmd_vel", "cmd_vel_out"

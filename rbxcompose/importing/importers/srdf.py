@@ -22,42 +22,9 @@ from rbxcompose.importing.virtual_joints import virtual_joint
 from rbxcompose.motion.groups import carrying, chain
 from rbxcompose.printable import plain
 
-NO_SUCH = kind(
-    "RBX2311",
-    """An SRDF names what its URDF does not have
-
-A link, a joint or a group of the SRDF is not in the URDF that was given with it. Either it is that of another robot, or
-one of the two was changed. What names it is left out.
-
-Bad: `<chain base_link="torso" tip_link="grasp"/>`, where the URDF has `torso_link`.
-Good: `<chain base_link="torso_link" tip_link="grasp"/>`
-""",
-    Severity.WARNING,
-)
-RENAMED = kind(
-    "RBX2313",
-    """A group or a pose of an SRDF gets another name
-
-Names in manifests have lower-case letters, digits and underscores. Missions use the new name.
-
-Bad: `<group_state name="Ready-Pose" group="arm">`
-Good: `<group_state name="ready_pose" group="arm">`
-""",
-    Severity.WARNING,
-)
-WATCHED = kind(
-    "RBX2312",
-    """Pairs of links that MoveIt ignores since they collide at rest are watched
-
-In an SRDF they have the reason `Default`. MoveIt then lets them pass through each other everywhere; here, arms watch
-them, because a pair that collides at rest alone is a mistake in a shape, or a real collision. Write `user` in place of
-`default` in the file of pairs if they may touch.
-
-Bad: `<disable_collisions link1="gripper" link2="pedestal" reason="Default"/>`
-Good: `<disable_collisions link1="gripper" link2="wrist" reason="Adjacent"/>`
-""",
-    Severity.WARNING,
-)
+NO_SUCH = kind("RBX2311", Severity.WARNING)
+RENAMED = kind("RBX2313", Severity.WARNING)
+WATCHED = kind("RBX2312", Severity.WARNING)
 
 
 @importer("srdf", "an SRDF of MoveIt and the URDF that it is about, as two files")

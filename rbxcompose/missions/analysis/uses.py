@@ -9,40 +9,8 @@ from rbxcompose.findings import Finding, Related, Span, kind
 from rbxcompose.missions.program.linker import DEEPEST, MOST_NODES
 from rbxcompose.missions.program.program import Program
 
-CIRCLE = kind(
-    "RBX4146",
-    """Missions use each other in a circle
-
-A mission runs as one with all that it uses. One that uses itself, directly or through others, would never end.
-To do something again, write `repeat` or a machine.
-
-Bad: `patrol` has `use: rest`, and `rest` has `use: patrol`.
-
-Good: a third mission that does both in turn.
-
-```yaml
-do:
-  repeat: forever
-  do:
-    - use: patrol
-    - use: rest
-```
-""",
-)
-TOO_MUCH = kind(
-    "RBX4147",
-    """A mission is too large with all that it uses
-
-Each `use` has its own nodes. Twenty thousand nodes, and missions within sixteen others, are enough for every robot;
-more is usually a mistake, such as missions that use two others each, which use two others each.
-
-Each `run` has its own copy of all nodes in the data that it may get. With every copy counted, the missions of a robot
-may have 5,000 values and operators in such nodes. All their texts together may have 30,000 names and operators, such
-as `$battery` and `<`.
-
-Use a mission in a loop instead of many times.
-""",
-)
+CIRCLE = kind("RBX4146")
+TOO_MUCH = kind("RBX4147")
 
 
 def used_by(program: Program) -> dict[str, Span]:

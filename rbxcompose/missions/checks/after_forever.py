@@ -17,28 +17,7 @@ from rbxcompose.rules import OWN
 
 @mission_check("RBX4125", Severity.WARNING, closed=(OWN,))
 def after_forever(mission: Examined) -> Iterator[Finding]:
-    """A step is never reached
-
-    A sequence continues after a step that succeeds, a fallback after one that fails. A step that repeats for ever never
-    succeeds, and a step that cannot fail never leads to a second choice.
-
-    Bad:
-    ```yaml
-    do:
-      - repeat: forever
-        do:
-          go_to: corner_1
-      - go_to: dock
-    ```
-    Good:
-    ```yaml
-    do:
-      - repeat: 3
-        do:
-          go_to: corner_1
-      - go_to: dock
-    ```
-    """
+    """A step is never reached."""
     for node in mission.program.nodes:
         if found := _barrier(mission.program, node, mission.ending):
             barrier, following, why, cure = found

@@ -19,26 +19,7 @@ _ASKED_FIRST = ("only_if", "as_long_as")
 
 @mission_check("RBX4169", Severity.WARNING)
 def contrary_conditions(mission: Examined) -> Iterator[Finding]:
-    """A step has two conditions that never hold together
-
-    A step with `only_if` and `skip_if` runs only if the first holds and the second does not. The first step of a
-    reaction begins when its interrupt's `when` holds. If that contradicts the condition of the step, the step never
-    does anything.
-
-    Bad:
-    ```yaml
-    do:
-      - go_to: dock
-        only_if: $battery < 50 %
-        skip_if: $battery < 50 %
-    ```
-    Good:
-    ```yaml
-    do:
-      - go_to: dock
-        only_if: $battery < 50 %
-    ```
-    """
+    """A step has two conditions that never hold together."""
     program = mission.program
     for node in program.nodes:
         only, skip = _condition(node, "only_if"), _condition(node, "skip_if")

@@ -16,40 +16,7 @@ from rbxcompose.rules import OWN
 
 @mission_check("RBX4138", Severity.WARNING, closed=(OWN,))
 def endless_branch(mission: Examined) -> Iterator[Finding]:
-    """A parallel waits for a branch that never succeeds
-
-    A parallel is done when all of its branches have succeeded. A branch that repeats for ever never does, so the
-    mission never continues. Say which branch decides (`ends_with`), or that one success is enough. A branch with an
-    `end` is not waited for: it ends the mission.
-
-    Bad:
-    ```yaml
-    do:
-      - parallel:
-          drive:
-            go_to: corner_1
-          talk:
-            repeat: forever
-            every: 5 s
-            do:
-              log: On my way
-      - go_to: dock
-    ```
-    Good:
-    ```yaml
-    do:
-      - parallel:
-          drive:
-            go_to: corner_1
-          talk:
-            repeat: forever
-            every: 5 s
-            do:
-              log: On my way
-        ends_with: drive
-      - go_to: dock
-    ```
-    """
+    """A parallel waits for a branch that never succeeds."""
     program, ending = mission.program, mission.ending
     for node in program.nodes:
         branches = node.step.branches

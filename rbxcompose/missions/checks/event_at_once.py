@@ -12,28 +12,7 @@ from rbxcompose.missions.analysis.examined import Examined
 
 @mission_check("RBX4180")
 def event_at_once(mission: Examined) -> Iterator[Finding]:
-    """A condition on an event is evaluated only once
-
-    An event counts for a condition only if it has come since the node of this condition began. `check`, `if`, `only_if`
-    and `skip_if` evaluate their condition at the moment when their node begins, and nothing can have come since.
-    `wait_for`, `as_long_as`, `until` and interrupts evaluate theirs again and again.
-
-    Bad, if `confirmed` has `event: true`:
-
-    ```yaml
-    do:
-      - wait: 10 s
-      - check: $confirmed
-    ```
-
-    Good:
-
-    ```yaml
-    do:
-      wait_for: $confirmed
-      timeout: 10 s
-    ```
-    """
+    """A condition on an event is evaluated only once."""
     program = mission.program
     events = mission.robot.events - {*program.data, *program.inputs}
     for node in program.nodes if events else ():

@@ -13,33 +13,7 @@ from rbxcompose.missions.analysis.examined import Examined
 
 @mission_check("RBX4170", Severity.WARNING, closed=())
 def frozen_condition(mission: Examined) -> Iterator[Finding]:
-    """A condition is waited for that nothing changes
-
-    `until` and `wait_for` ask again and again. A condition that reads only data which no step sets has one answer for
-    ever.
-
-    Bad:
-    ```yaml
-    data:
-      visited: 0
-    do:
-      repeat: forever
-      until: $visited >= 4
-      do:
-        go_to: corner_1
-    ```
-    Good:
-    ```yaml
-    data:
-      visited: 0
-    do:
-      repeat: forever
-      until: $visited >= 4
-      do:
-        - go_to: corner_1
-        - set: {visited: $visited + 1}
-    ```
-    """
+    """A condition is waited for that nothing changes."""
     program = mission.program
     fixed = program.data.keys() - written(program)
     for node in program.nodes if fixed else ():

@@ -17,27 +17,7 @@ from rbxcompose.units import TIME, format_quantity
 
 @mission_check("RBX4127", Severity.WARNING, closed=(OWN,))
 def idle_modifier(mission: Examined) -> Iterator[Finding]:
-    """A modifier changes nothing
-
-    `optional` and `attempts` are for steps that can fail. On a step that cannot, they probably belong to another step.
-    `once` and `cooldown` are for steps that run repeatedly, in a loop or a machine. An `attempt_timeout` that is not
-    shorter than the `timeout` never passes. An `optional` condition of `check` guards nothing.
-
-    Bad:
-    ```yaml
-    do:
-      - go_to: corner_1
-      - wait: 2 s
-        optional: true
-    ```
-    Good:
-    ```yaml
-    do:
-      - go_to: corner_1
-        optional: true
-      - wait: 2 s
-    ```
-    """
+    """A modifier changes nothing."""
     known = constants_of(mission.program, {})
     for node in mission.program.nodes:
         yield from _attempt(node, known)

@@ -16,52 +16,7 @@ from rbxcompose.rules import OWN
 
 @mission_check("RBX4135", Severity.WARNING, closed=(OWN,))
 def impossible_result(mission: Examined) -> Iterator[Finding]:
-    """A branch is compared with a result that it cannot have
-
-    The conditions of `outcomes` test how each branch has ended. A branch that only waits cannot fail, and one that
-    repeats for ever cannot succeed. Such a branch never decides a condition on that result.
-
-    Bad:
-    ```yaml
-    machine:
-      start: watch
-      states:
-        watch:
-          do:
-            parallel:
-              work:
-                go_to: corner_1
-              monitor:
-                wait_for: $battery < 50 %
-            succeed_when: any
-            outcomes:
-              low: $monitor == failure
-              complete: otherwise
-          next:
-            low: failed
-            complete: finished
-    ```
-    Good:
-    ```yaml
-    machine:
-      start: watch
-      states:
-        watch:
-          do:
-            parallel:
-              work:
-                go_to: corner_1
-              monitor:
-                wait_for: $battery < 50 %
-            succeed_when: any
-            outcomes:
-              low: $monitor == success
-              complete: otherwise
-          next:
-            low: failed
-            complete: finished
-    ```
-    """
+    """A branch is compared with a result that it cannot have."""
     for node in mission.program.nodes:
         ends = mission.ending.of_branches(node)
         for outcome in node.step.branches.outcomes if node.step.branches else ():

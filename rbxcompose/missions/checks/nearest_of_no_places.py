@@ -21,30 +21,7 @@ _MAY_BE = (TypeKind.PLACE, TypeKind.POSE, TypeKind.TEXT, TypeKind.UNKNOWN)  # a 
 
 @mission_check("RBX4182")
 def nearest_of_no_places(mission: Examined) -> Iterator[Finding]:
-    """A loop takes the nearest item first, and an item is no place
-
-    `order: nearest` compares how far the items are from the robot, so each must be a place or a pose. The loop would
-    fail as soon as it looks at that item.
-
-    Bad:
-    ```yaml
-    do:
-      for: word
-      in: ["hello", "world"]
-      order: nearest
-      do:
-        log: $word
-    ```
-    Good:
-    ```yaml
-    do:
-      for: corner
-      in: [corner_1, corner_2]
-      order: nearest
-      do:
-        go_to: $corner
-    ```
-    """
+    """A loop takes the nearest item first, and an item is no place."""
     for view in mission.views:
         items = view.node.step.items
         if items is None or POSE not in view.node.step.reads:

@@ -12,30 +12,7 @@ from rbxcompose.rules import OWN
 
 @mission_check("RBX4107", Severity.WARNING, closed=(OWN,))
 def never_waits(mission: Examined) -> Iterator[Finding]:
-    """An endless loop never waits
-
-    Nothing in the body takes time, so the loop would run as fast as it can. The engine slows it down to the mission's
-    rate.
-
-    Bad:
-
-    ```yaml
-    do:
-      repeat: forever
-      do:
-        check: $battery < 30 %
-    ```
-
-    Good:
-
-    ```yaml
-    do:
-      repeat: forever
-      every: 1 s
-      do:
-        check: $battery < 30 %
-    ```
-    """
+    """An endless loop never waits."""
     for view in mission.views:
         node = view.node
         if view.waits:

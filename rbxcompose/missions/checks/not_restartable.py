@@ -13,30 +13,7 @@ from rbxcompose.rules import OWN
 
 @mission_check("RBX4116", Severity.WARNING, closed=(OWN,))
 def not_restartable(mission: Examined) -> Iterator[Finding]:
-    """An interrupt may restart a skill that cannot be restarted
-
-    `afterwards: continue` restarts the step that was cut short. The skill declares that it must not be restarted.
-
-    Bad:
-
-    ```yaml
-    interrupts:
-      battery_low:
-        when: $battery < 20 %
-        do: recharge
-        afterwards: continue
-    do: pour                # a skill that cannot be restarted
-    ```
-
-    Good:
-
-    ```yaml
-    do:
-      - if: $battery < 20 %
-        then: recharge
-      - pour
-    ```
-    """
+    """An interrupt may restart a skill that cannot be restarted."""
     cutting = [one for one in mission.program.interrupts if one.afterwards != END]
     for node in mission.program.below(mission.program.main) if cutting else ():
         skill = mission.robot.skills.get(node.skill)

@@ -14,32 +14,7 @@ from rbxcompose.missions.analysis.examined import Examined
 
 @mission_check("RBX4183", Severity.WARNING, closed=())
 def nothing_to_go_over(mission: Examined) -> Iterator[Finding]:
-    """A loop goes over a list that is always empty
-
-    The list is empty at the start, and no step of the mission puts anything into it. So nothing in the loop is ever
-    done.
-
-    Bad:
-    ```yaml
-    data:
-      route: []
-    do:
-      for: place
-      in: $route
-      do:
-        go_to: $place
-    ```
-    Good:
-    ```yaml
-    data:
-      route: [corner_1, corner_2]
-    do:
-      for: place
-      in: $route
-      do:
-        go_to: $place
-    ```
-    """
+    """A loop goes over a list that is always empty."""
     program, changed = mission.program, replaced(mission.program)
     for node in program.nodes:
         items = node.step.items

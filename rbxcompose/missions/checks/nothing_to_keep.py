@@ -11,23 +11,7 @@ from rbxcompose.missions.analysis.examined import Examined
 
 @mission_check("RBX4136")
 def nothing_to_keep(mission: Examined) -> Iterator[Finding]:
-    """A node has no result to keep
-
-    Skills, `call`, `use` and `for` have a result that `save` keeps in the data. Other nodes only succeed or fail.
-
-    Bad:
-    ```yaml
-    do:
-      wait: 2 s
-      save: waited
-    ```
-    Good:
-    ```yaml
-    do:
-      go_to: corner_1
-      save: way
-    ```
-    """
+    """A node has no result to keep."""
     for node in mission.program.nodes:
         if node.saved and not node.step.has_result:
             message = f"'{node.step.word}' has no result to keep"

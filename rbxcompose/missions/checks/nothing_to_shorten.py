@@ -11,32 +11,7 @@ from rbxcompose.missions.analysis.examined import Examined
 
 @mission_check("RBX4137")
 def nothing_to_shorten(mission: Examined) -> Iterator[Finding]:
-    """`remove_done` without a list in the data
-
-    An item that is done is removed from the data that `in` names, so that the next run of the loop does only the rest.
-    A list written directly in `in`, or one from elsewhere, stays as it is.
-
-    Bad:
-    ```yaml
-    do:
-      for: corner
-      in: [corner_1, corner_2]
-      remove_done: true
-      do:
-        go_to: $corner
-    ```
-    Good:
-    ```yaml
-    data:
-      corners: [corner_1, corner_2]
-    do:
-      for: corner
-      in: $corners
-      remove_done: true
-      do:
-        go_to: $corner
-    ```
-    """
+    """`remove_done` without a list in the data."""
     for node in mission.program.nodes:
         shortened = node.step.effects.shortened
         items = node.step.items

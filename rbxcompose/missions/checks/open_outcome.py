@@ -18,38 +18,7 @@ ONE_WORD = "write 'next' as a map with 'success' and 'failure'"
 
 @mission_check("RBX4141")
 def open_outcome(mission: Examined) -> Iterator[Finding]:
-    """An outcome of a state leads nowhere
-
-    Every way in which the body of a state can end needs a transition. An outcome without its own transition takes that
-    of the result it counts as, `success` or `failure`. One word after `next` is enough if the body cannot fail.
-
-    Bad:
-
-    ```yaml
-    machine:
-      start: away
-      states:
-        away:
-          do:
-            go_to: corner_1
-          next:
-            success: finished
-    ```
-
-    Good:
-
-    ```yaml
-    machine:
-      start: away
-      states:
-        away:
-          do:
-            go_to: corner_1
-          next:
-            success: finished
-            failure: failed
-    ```
-    """
+    """An outcome of a state leads nowhere."""
     for node in mission.program.nodes:
         if node.step.look.form is Form.STATE:
             yield from _open(node, node.step.leads_to, mission.ending.of(node.number))

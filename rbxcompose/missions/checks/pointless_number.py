@@ -13,23 +13,7 @@ from rbxcompose.missions.analysis.facts import place_in_text
 
 @mission_check("RBX4128", Severity.WARNING, closed=())
 def pointless_number(mission: Examined) -> Iterator[Finding]:
-    """A number of rounds or attempts, or a duration, leaves nothing to be done
-
-    `repeat: 0` does nothing, a timeout of zero fails immediately, and durations are never negative.
-
-    Bad:
-    ```yaml
-    do:
-      repeat: 0
-      do: recharge
-    ```
-    Good:
-    ```yaml
-    do:
-      repeat: 2
-      do: recharge
-    ```
-    """
+    """A number of rounds or attempts, or a duration, leaves nothing to be done."""
     for node in mission.program.nodes:
         modifiers = (one for modifier in node.modifiers.values() for one in modifier.numbers)
         for what, expression, least in (*node.step.numbers, *modifiers):

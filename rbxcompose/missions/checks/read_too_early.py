@@ -14,32 +14,7 @@ from rbxcompose.rules import OWN
 
 @mission_check("RBX4164", Severity.WARNING, closed=(OWN,))
 def read_too_early(mission: Examined) -> Iterator[Finding]:
-    """A result is read before it is saved
-
-    `save` keeps the result of a step when this step has ended. An earlier step has nothing to read: its condition does
-    not hold, and a text or an argument that needs the result fails.
-
-    Bad:
-    ```yaml
-    do:
-      - log: $tour.failed could not be reached
-      - for: corner
-        in: [corner_1, corner_2]
-        do:
-          go_to: $corner
-        save: tour
-    ```
-    Good:
-    ```yaml
-    do:
-      - for: corner
-        in: [corner_1, corner_2]
-        do:
-          go_to: $corner
-        save: tour
-      - log: $tour.failed could not be reached
-    ```
-    """
+    """A result is read before it is saved."""
     program = mission.program
     if any(one.afterwards != CONTINUE for one in program.interrupts):
         return  # what is restarted may read what an earlier run of it saved

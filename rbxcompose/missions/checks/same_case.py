@@ -18,39 +18,7 @@ NUMBERS = (TypeKind.QUANTITY, TypeKind.COUNT)
 
 @mission_check("RBX4154", Severity.WARNING, closed=())
 def same_case(mission: Examined) -> Iterator[Finding]:
-    """A case that is never taken
-
-    The first case that equals the value is taken. A second equal case, or one with a value that the choice cannot have,
-    is never taken.
-
-    Bad:
-
-    ```yaml
-    data:
-      rounds: 1
-    do:
-      choose: $rounds
-      cases:
-        1:
-          log: one
-        1.0:
-          log: one again
-    ```
-
-    Good:
-
-    ```yaml
-    data:
-      rounds: 1
-    do:
-      choose: $rounds
-      cases:
-        1:
-          log: one
-        2:
-          log: two
-    ```
-    """
+    """A case that is never taken."""
     for view in mission.views:
         choice = view.node.step.choice
         if choice is None:

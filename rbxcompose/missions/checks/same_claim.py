@@ -13,28 +13,7 @@ from rbxcompose.missions.analysis.examined import Examined
 
 @mission_check("RBX4152", Severity.WARNING, closed=())
 def same_claim(mission: Examined) -> Iterator[Finding]:
-    """Two branches of a parallel need the same part of the robot
-
-    A skill claims what it needs for itself, such as the base. Two skills that claim the same thing at the same time
-    work against each other: the robot would drive to two places at once.
-
-    Bad:
-
-    ```yaml
-    do:
-      parallel:
-        - go_to: corner_1
-        - go_to: corner_2
-    ```
-
-    Good:
-
-    ```yaml
-    do:
-      - go_to: corner_1
-      - go_to: corner_2
-    ```
-    """
+    """Two branches of a parallel need the same part of the robot."""
     program, robot = mission.program, mission.robot
     for node in program.nodes:
         if node.step.branches is None:

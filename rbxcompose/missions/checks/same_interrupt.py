@@ -11,35 +11,7 @@ from rbxcompose.missions.analysis.examined import Examined
 
 @mission_check("RBX4171", Severity.WARNING, closed=())
 def same_interrupt(mission: Examined) -> Iterator[Finding]:
-    """Two interrupts have the same condition
-
-    Both become due at the same moment, and the first one acts first. One of them was probably copied and not changed.
-
-    Bad:
-    ```yaml
-    interrupts:
-      battery_low:
-        when: $battery < 30 %
-        do: [{go_to: dock}, recharge]
-      battery_empty:
-        when: $battery < 30 %
-        do: {end: failure}
-    do:
-      go_to: corner_1
-    ```
-    Good:
-    ```yaml
-    interrupts:
-      battery_empty:
-        when: $battery < 10 %
-        do: {end: failure}
-      battery_low:
-        when: $battery < 30 %
-        do: [{go_to: dock}, recharge]
-    do:
-      go_to: corner_1
-    ```
-    """
+    """Two interrupts have the same condition."""
     first: dict[str, int] = {}
     interrupts = mission.program.interrupts
     for index, one in enumerate(interrupts):

@@ -12,28 +12,7 @@ from rbxcompose.missions.analysis.examined import Examined
 
 @mission_check("RBX4162")
 def saved_over_datum(mission: Examined) -> Iterator[Finding]:
-    """A result is kept in a datum of another type
-
-    `save` keeps a map: the fields of a result, the outputs of a mission, or `done` and `failed` of a `for`. A datum
-    that holds anything else would change its type.
-
-    Bad:
-    ```yaml
-    data:
-      way: 0
-    do:
-      go_to: corner_1
-      save: way
-    ```
-    Good:
-    ```yaml
-    data:
-      way: {}
-    do:
-      go_to: corner_1
-      save: way
-    ```
-    """
+    """A result is kept in a datum of another type."""
     data = mission.program.data
     for node in mission.program.nodes:
         datum = data.get(node.saved.text) if node.saved and node.step.has_result else None

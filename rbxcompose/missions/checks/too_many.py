@@ -12,30 +12,7 @@ from rbxcompose.missions.analysis.examined import Examined
 
 @mission_check("RBX4153")
 def too_many(mission: Examined) -> Iterator[Finding]:
-    """A parallel counts more branches than it has
-
-    `succeed_when: 3` can never be met by two branches.
-
-    Bad:
-
-    ```yaml
-    do:
-      parallel:
-        - wait: 1 s
-        - wait: 2 s
-      succeed_when: 3
-    ```
-
-    Good:
-
-    ```yaml
-    do:
-      parallel:
-        - wait: 1 s
-        - wait: 2 s
-      succeed_when: 2
-    ```
-    """
+    """A parallel counts more branches than it has."""
     for node in mission.program.nodes:
         branches = node.step.branches
         if branches is None:

@@ -14,44 +14,7 @@ from rbxcompose.rules import OWN
 
 @mission_check("RBX4133", Severity.WARNING, closed=(OWN,))
 def trapped_state(mission: Examined) -> Iterator[Finding]:
-    """A state from which no path leads to an end
-
-    The machine has an end that can be reached, but from this state it runs in circles for ever. A state whose body
-    never ends by itself is taken as intended and not reported.
-
-    Bad:
-    ```yaml
-    machine:
-      start: look
-      states:
-        look:
-          do:
-            check: $battery > 20 %
-          next:
-            success: finished
-            failure: rest
-        rest:
-          do:
-            wait: 10 s
-          next: rest
-    ```
-    Good:
-    ```yaml
-    machine:
-      start: look
-      states:
-        look:
-          do:
-            check: $battery > 20 %
-          next:
-            success: finished
-            failure: rest
-        rest:
-          do:
-            wait: 10 s
-          next: look
-    ```
-    """
+    """A state from which no path leads to an end."""
     for machine, states, leads in transitions(mission.program):
         used = reached(machine.start, leads)
         goals = {*machine.ends, *(state.name for state in states if _is_endless(state))}

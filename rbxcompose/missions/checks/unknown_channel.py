@@ -14,24 +14,7 @@ from rbxcompose.rules import NAMES, WIRING
 
 @mission_check("RBX4150", is_fixable=True, closed=(WIRING, NAMES))
 def unknown_channel(mission: Examined) -> Iterator[Finding]:
-    """A mission uses a topic or a service that the robot does not have
-
-    `publish` takes a topic of the robot, `call` one of its services, both under the name that the components use.
-
-    Bad:
-
-    ```yaml
-    do:
-      publish: cmd_vel/telop
-    ```
-
-    Good:
-
-    ```yaml
-    do:
-      publish: cmd_vel/teleop
-    ```
-    """
+    """A mission uses a topic or a service that the robot does not have."""
     for node in mission.program.nodes:
         for message in published(node):
             yield from _nowhere(message, "topic", mission.robot.topics)

@@ -14,24 +14,7 @@ from rbxcompose.references import MISSION
 
 @mission_check("RBX4144", is_fixable=True)
 def unknown_mission(mission: Examined) -> Iterator[Finding]:
-    """A mission uses another one that the robot does not have
-
-    `use` takes a name under the robot's `missions:`.
-
-    Bad:
-
-    ```yaml
-    do:
-      use: patrl
-    ```
-
-    Good:
-
-    ```yaml
-    do:
-      use: patrol
-    ```
-    """
+    """A mission uses another one that the robot does not have."""
     missions = mission.robot.missions
     for node in mission.program.nodes:
         used = node.step.uses

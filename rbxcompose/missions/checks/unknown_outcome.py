@@ -12,35 +12,7 @@ from rbxcompose.missions.language.foreign_steps import OUTCOMES
 
 @mission_check("RBX4142", is_fixable=True)
 def unknown_outcome(mission: Examined) -> Iterator[Finding]:
-    """A transition for an outcome that cannot occur
-
-    The body of the state never ends in that way. The outcome may be misspelt, or left over from an earlier version.
-
-    Bad:
-
-    ```yaml
-    machine:
-      start: talk
-      states:
-        talk:
-          do:
-            log: hello
-          next:
-            succes: finished
-    ```
-
-    Good:
-
-    ```yaml
-    machine:
-      start: talk
-      states:
-        talk:
-          do:
-            log: hello
-          next: finished
-    ```
-    """
+    """A transition for an outcome that cannot occur."""
     for node in mission.program.nodes:
         leads_to = node.step.leads_to
         below = mission.program.below(node.number)

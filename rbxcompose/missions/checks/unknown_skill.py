@@ -24,24 +24,7 @@ def _called(node: MissionNode) -> str:
 
 @mission_check("RBX4102", is_fixable=True)
 def unknown_skill(mission: Examined) -> Iterator[Finding]:
-    """A mission uses a skill that the robot does not have
-
-    Skills are the actions that the robot's components serve. No component of this robot serves an action of this name.
-
-    Bad:
-
-    ```yaml
-    do:
-      goto: dock
-    ```
-
-    Good:
-
-    ```yaml
-    do:
-      go_to: dock
-    ```
-    """
+    """A mission uses a skill that the robot does not have."""
     skills = mission.robot.skills
     for node in mission.program.nodes:
         if node.skill and node.skill not in skills:

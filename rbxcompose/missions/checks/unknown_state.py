@@ -13,38 +13,7 @@ from rbxcompose.missions.program.program import MissionNode
 
 @mission_check("RBX4140", is_fixable=True)
 def unknown_state(mission: Examined) -> Iterator[Finding]:
-    """A transition leads to a state that does not exist
-
-    Declare states under `states:` and ends under `ends:`. The ends `finished` and `failed` always exist.
-
-    Bad:
-
-    ```yaml
-    machine:
-      start: away
-      states:
-        away:
-          do:
-            go_to: corner_1
-          next:
-            success: finishd
-            failure: failed
-    ```
-
-    Good:
-
-    ```yaml
-    machine:
-      start: away
-      states:
-        away:
-          do:
-            go_to: corner_1
-          next:
-            success: finished
-            failure: failed
-    ```
-    """
+    """A transition leads to a state that does not exist."""
     for node in mission.program.nodes:
         if node.step.states:
             yield from _start(node.step.states)

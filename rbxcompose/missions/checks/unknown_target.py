@@ -11,42 +11,7 @@ from rbxcompose.missions.analysis.examined import Examined
 
 @mission_check("RBX4145", is_fixable=True)
 def unknown_target(mission: Examined) -> Iterator[Finding]:
-    """An interrupt restarts something that does not exist
-
-    `afterwards: {restart: NAME}` takes the `name` of a node, a state, or the item of a loop.
-
-    Bad:
-
-    ```yaml
-    interrupts:
-      battery_low:
-        when: $battery < 20 %
-        do: recharge
-        afterwards:
-          restart: rooom
-    do:
-      for: room
-      in: [corner_1, corner_2]
-      do:
-        go_to: $room
-    ```
-
-    Good:
-
-    ```yaml
-    interrupts:
-      battery_low:
-        when: $battery < 20 %
-        do: recharge
-        afterwards:
-          restart: room
-    do:
-      for: room
-      in: [corner_1, corner_2]
-      do:
-        go_to: $room
-    ```
-    """
+    """An interrupt restarts something that does not exist."""
     known = {name for node in mission.program.nodes for name in (node.name, node.item) if name}
     for interrupt in mission.program.interrupts:
         named = interrupt.restarts

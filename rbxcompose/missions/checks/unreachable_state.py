@@ -13,46 +13,7 @@ from rbxcompose.rules import OWN
 
 @mission_check("RBX4143", Severity.WARNING, closed=(OWN,))
 def unreachable_state(mission: Examined) -> Iterator[Finding]:
-    """A state that cannot be reached
-
-    The machine begins in `start` and follows `next`; nothing leads to this state.
-
-    Bad:
-
-    ```yaml
-    machine:
-      start: talk
-      states:
-        talk:
-          do:
-            log: hello
-          next: finished
-        drive:
-          do:
-            go_to: dock
-          next:
-            success: finished
-            failure: failed
-    ```
-
-    Good:
-
-    ```yaml
-    machine:
-      start: talk
-      states:
-        talk:
-          do:
-            log: hello
-          next: drive
-        drive:
-          do:
-            go_to: dock
-          next:
-            success: finished
-            failure: failed
-    ```
-    """
+    """A state that cannot be reached."""
     for machine, states, leads in transitions(mission.program):
         used = reached(machine.start, leads)
         for state in states if machine.start in leads else ():

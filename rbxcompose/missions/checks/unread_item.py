@@ -16,28 +16,7 @@ from rbxcompose.rules import OWN
 
 @mission_check("RBX4187", Severity.WARNING, closed=(OWN,))
 def unread_item(mission: Examined) -> Iterator[Finding]:
-    """A loop never reads its item
-
-    Each round does the same with one of its items, which is written in the body. A loop that only counts its rounds is
-    not reported.
-
-    Bad:
-    ```yaml
-    do:
-      for: corner
-      in: [corner_1, corner_2]
-      do:
-        go_to: corner_1
-    ```
-    Good:
-    ```yaml
-    do:
-      for: corner
-      in: [corner_1, corner_2]
-      do:
-        go_to: $corner
-    ```
-    """
+    """A loop never reads its item."""
     program = mission.program
     known = constants_of(program, {})
     for node in program.nodes:

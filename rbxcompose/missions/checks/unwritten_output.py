@@ -13,32 +13,7 @@ from rbxcompose.rules import OWN
 
 @mission_check("RBX4134", Severity.WARNING, closed=(OWN,))
 def unwritten_output(mission: Examined) -> Iterator[Finding]:
-    """An output that nothing writes
-
-    An output is read from the mission's data, and nothing in the mission changes this datum: the output always has the
-    value under `data`.
-
-    Bad:
-    ```yaml
-    data:
-      found: 0
-    outputs:
-      people: $found
-    do:
-      go_to: dock
-    ```
-    Good:
-    ```yaml
-    data:
-      found: 0
-    outputs:
-      people: $found
-    do:
-      - go_to: dock
-      - set:
-          found: $found + 1
-    ```
-    """
+    """An output that nothing writes."""
     program = mission.program
     constant = program.data.keys() - written(program)
     for name, asked in program.outputs.items():

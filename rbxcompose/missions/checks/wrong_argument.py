@@ -26,27 +26,7 @@ STRUCTURED = (TypeKind.LIST, TypeKind.MAP)
 
 @mission_check("RBX4105", is_fixable=True)
 def wrong_argument(mission: Examined) -> Iterator[Finding]:
-    """Wrong, missing or unknown argument of a skill
-
-    A skill takes the fields of its action's goal as arguments; a single value is the main one. That of a controller
-    takes its joints by name, at least one of them.
-
-    Bad:
-
-    ```yaml
-    do:
-      go_to:
-        plce: dock
-    ```
-
-    Good:
-
-    ```yaml
-    do:
-      go_to:
-        pose: dock
-    ```
-    """
+    """Wrong, missing or unknown argument of a skill."""
     for view in mission.views:
         skill = mission.robot.skills.get(view.node.skill)
         if skill:

@@ -29,31 +29,7 @@ NUMBERS = (TypeKind.QUANTITY, TypeKind.COUNT)
 
 @mission_check("RBX4151", is_fixable=True)
 def wrong_field(mission: Examined) -> Iterator[Finding]:
-    """A message of a mission does not fit its type
-
-    The fields of a message are those of its ROS type, and each field has its own type. `rbxcompose msg show TYPE` lists
-    them. What some fields measure is known: those of a Twist are speeds, so a length does not fit there.
-
-    Bad:
-
-    ```yaml
-    do:
-      publish: cmd_vel/teleop
-      message:
-        liner:
-          x: 0.1
-    ```
-
-    Good:
-
-    ```yaml
-    do:
-      publish: cmd_vel/teleop
-      message:
-        linear:
-          x: 0.1
-    ```
-    """
+    """A message of a mission does not fit its type."""
     topics, services = mission.robot.topics, mission.robot.services
     for view in mission.views:
         for message in published(view.node):

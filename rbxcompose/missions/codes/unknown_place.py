@@ -4,28 +4,7 @@ from __future__ import annotations
 
 from rbxcompose.findings import Finding, Related, Span, kind
 
-UNKNOWN_PLACE = kind(
-    "RBX4103",
-    """A mission names a place that the robot does not know
-
-Places are declared in the robot's `places:`.
-
-Bad:
-
-```yaml
-do:
-  go_to: dok
-```
-
-Good:
-
-```yaml
-do:
-  go_to: dock
-```
-""",
-    is_fixable=True,
-)
+UNKNOWN_PLACE = kind("RBX4103", is_fixable=True)
 
 
 def removed_place(span: Span, name: str, remover: Span) -> Finding:

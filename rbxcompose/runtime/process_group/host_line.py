@@ -22,19 +22,7 @@ from rbxcompose.runtime.clock_offset import Echo, OffsetFilter
 from rbxcompose.runtime.host_report import HostReport
 from rbxcompose.typed_json import UnreadableError, from_data, to_data
 
-LETS_THROUGH = kind(
-    "RBX6142",
-    """Access control lets through what it denies
-
-With `security: mtls`, each host tries the router of every other host with a message that this must not let through. It
-came through, so the router does not enforce what the plan computed, and other hosts could command what moves here. The
-robot goes down before anything moves. Nothing in a manifest causes this: the certificates do not belong to these hosts,
-or another version of Zenoh reads its access control differently.
-
-Bad: a router that runs without the access control of the plan.
-Good: `rbxcompose security init systems/two_hosts.yaml`, and the same version of rbxcompose on all hosts.
-""",
-)
+LETS_THROUGH = kind("RBX6142")
 
 
 def host_key(robot: str, host: str) -> str:
