@@ -10,9 +10,8 @@ from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.missions.analysis.check_runner import check_program
 from rbxcompose.missions.language.reader import read_program
-from rbxcompose.missions.slips.count_in_words import ENDLESS
-from rbxcompose.missions.slips.foreign_flag import FLAGS
-from rbxcompose.missions.slips.unknown_settings import FOREIGN, STEPS
+from rbxcompose.missions.slips.settings import FOREIGN, STEPS
+from rbxcompose.missions.slips.values import ENDLESS, FLAGS
 from rbxcompose.rendering.text import render_text
 from rbxcompose.testing.golden import Golden
 from tests.missions.simulated import ROBOT

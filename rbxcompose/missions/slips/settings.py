@@ -1,12 +1,13 @@
-"""Keys beside a step that are none of its settings: words of other languages, and settings of other steps."""
+"""Settings of steps: unknown ones, those of other languages, and those that stand at the wrong place."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 
-from rbxcompose.findings import DID_YOU_MEAN, Finding, nearest
+from rbxcompose.findings import DID_YOU_MEAN, Edit, Finding, Fix, nearest, replacement
 from rbxcompose.manifest.scalars import plain_value
-from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode
 from rbxcompose.missions import codes
 from rbxcompose.missions.language.grammar import GrammarPlace, Takes, Words, without_word
 from rbxcompose.missions.slips import slip
@@ -116,3 +117,103 @@ def is_setting(node: TreeNode) -> bool:
     except UnitError:
         return False
     return True
+
+
+_OURS: Mapping[Takes, Mapping[str, str]] = {
+    Takes.MISSION: {
+        "do": "steps plan tree body",
+        "data": "variables vars blackboard",
+        "inputs": "parameters params args arguments",
+        "interrupts": "events handlers",
+        "about": "description",
+    },
+    Takes.INTERRUPT: {"when": "if condition on trigger", "do": "then action reaction"},
+    Takes.STATE: {"next": "transitions", "do": "action", "on_enter": "on_entry entry", "on_exit": "exit"},
+    Takes.STEP: {},  # see `_OF_STEPS`
+}
+_OF_STEPS: Mapping[str, Mapping[str, str]] = {
+    "if": {"then": "do steps"},
+    "repeat": {"do": "steps body then actions tasks"},
+    "for": {"do": "steps body then actions tasks", "in": "of over items"},
+}
+_WHAT: Mapping[Takes, str] = {
+    Takes.MISSION: "in a mission",
+    Takes.INTERRUPT: "in an interrupt",
+    Takes.STATE: "in a state",
+}
+
+
+@slip(*_OURS, before=(unknown_settings,))
+def foreign_keys(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
+    """Recognise keys for which ours are known and not written."""
+    if not isinstance(node, MappingNode):
+        return None
+    kind = place.words.kind_of(node) if place.takes is Takes.STEP else ""
+    words = _OF_STEPS.get(kind, {}) if kind else _OURS[place.takes]
+    meant = {theirs: ours for ours, names in words.items() if (theirs := _written(node, ours, names))}
+    if not meant:
+        return None
+    entries = {meant.get(name, name): _named(one, meant.get(name, name)) for name, one in node.entries.items()}
+    what = f"beside '{kind}'" if kind else _WHAT.get(place.takes, "")
+    findings = tuple(_told(node.entries[theirs], ours, what) for theirs, ours in meant.items())
+    return Repair(MappingNode(entries, node.span), findings)
+
+
+def _written(node: MappingNode, ours: str, names: str) -> str:
+    """Return which of the names of others is written for ours, nothing if ours is, too."""
+    if ours in node or (ours == "do" and "machine" in node):
+        return ""
+    return next((name for name in names.split() if name in node), "")
+
+
+def _named(entry: Entry, name: str) -> Entry:
+    return entry if entry.key.text == name else Entry(replace(entry.key, text=name), entry.value)
+
+
+def _told(entry: Entry, ours: str, what: str) -> Finding:
+    theirs = entry.key.text
+    fix = replacement(entry.key.span, theirs, ours, is_safe=False)  # its value may have another form
+    help_text = f"{DID_YOU_MEAN} '{ours}'?"
+    return codes.UNKNOWN_KEY.at(entry.key.span, f"unknown key '{theirs}' {what}", help=help_text, fix=fix)
+
+
+@slip(Takes.STEP, after=(unknown_settings,))
+def settings_among_branches(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
+    """Recognise branches that are named like settings and look like them."""
+    kind = place.words.kind_of(node) if isinstance(node, MappingNode) else ""
+    if not kind or not isinstance(node, MappingNode):
+        return None
+    slots, own = place.words.kinds[kind], node.entries[kind]
+    if slots[kind].takes is not Takes.BRANCHES or not isinstance(own.value, MappingNode):
+        return None
+    branches = own.value
+    found = {
+        key: entry
+        for key, entry in branches.entries.items()
+        if (key in slots and key != kind and isinstance(entry.value, ScalarNode))
+        or (key in place.words.modifiers and key != "name" and is_setting(entry.value))
+    }
+    if not found:
+        return None
+    last = next(reversed(branches.entries))
+    findings = tuple(_among(own.key, entry, is_last=key == last) for key, entry in found.items())
+    left = {key: entry for key, entry in branches.entries.items() if key not in found}
+    right = Entry(own.key, MappingNode(left, branches.span))
+    return Repair(MappingNode({**found, **node.entries, kind: right}, node.span), findings)
+
+
+def _among(parallel: ScalarNode, setting: Entry, *, is_last: bool) -> Finding:
+    message = f"'{setting.key.text}' is among the branches"
+    help_text = f"move it left, into the column of '{parallel.text}'"
+    fix = _moved_left(setting, parallel) if is_last else None
+    return codes.WRONG_SHAPE.at(setting.key.span, message, help=help_text, fix=fix)
+
+
+def _moved_left(entry: Entry, parallel: ScalarNode) -> Fix | None:
+    """Return the fix that moves a key on a line of its own into the column of `parallel`."""
+    span, column = entry.key.span, parallel.span.column
+    if entry.value.span.end_line != span.line or column >= span.column:
+        return None
+    before = span._replace(column=1, end_line=span.line, end_column=span.column)
+    edit = Edit(before, " " * (span.column - 1), " " * (column - 1))
+    return Fix((edit,), True, f"'{entry.key.text}' into the column of '{parallel.text}'")
