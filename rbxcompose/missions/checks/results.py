@@ -1,15 +1,26 @@
-"""Results that are read before anything can have saved them."""
+"""Saved results and outputs."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
+from rbxcompose.expressions.types import UNKNOWN, accepts, map_of
 from rbxcompose.findings import Finding, Related, Severity
 from rbxcompose.missions.analysis.check_runner import mission_check
+from rbxcompose.missions.analysis.effects import written
 from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.missions.program.answers import NodeFlow
 from rbxcompose.missions.program.program import CONTINUE, MissionNode, Program
 from rbxcompose.rules import OWN
+
+
+@mission_check("RBX4136")
+def nothing_to_keep(mission: Examined) -> Iterator[Finding]:
+    """A node has no result to keep."""
+    for node in mission.program.nodes:
+        if node.saved and not node.step.has_result:
+            message = f"'{node.step.word}' has no result to keep"
+            yield nothing_to_keep.at(node.saved.span, message, help="skills, 'call', 'use' and 'for' have one")
 
 
 @mission_check("RBX4164", Severity.WARNING, closed=(OWN,))
@@ -59,3 +70,37 @@ def _above(program: Program, node: MissionNode) -> list[int]:
 
 def _comes_again(node: MissionNode) -> bool:
     return node.step.comes_again or any(one.repeats for one in node.modifiers.values())
+
+
+@mission_check("RBX4162")
+def saved_over_datum(mission: Examined) -> Iterator[Finding]:
+    """A result is kept in a datum of another type."""
+    data = mission.program.data
+    for node in mission.program.nodes:
+        datum = data.get(node.saved.text) if node.saved and node.step.has_result else None
+        if node.saved and datum and not accepts(datum.type, map_of(UNKNOWN)):
+            name = node.saved.text
+            yield saved_over_datum.at(
+                node.saved.span,
+                f"'{name}' is {datum.type.phrase}, but the result of '{node.step.word}' is a map",
+                help=f"write '{name}: {{}}' under 'data', and read an entry of it as '${name}.NAME'; or save it under "
+                "another name",
+                related=[Related(datum.span, "the datum")],
+            )
+
+
+@mission_check("RBX4134", Severity.WARNING, closed=(OWN,))
+def unwritten_output(mission: Examined) -> Iterator[Finding]:
+    """An output that nothing writes."""
+    program = mission.program
+    constant = program.data.keys() - written(program)
+    for name, asked in program.outputs.items():
+        read = {one.name for one in asked.expression.names}
+        if read and read <= constant:
+            first = sorted(read)[0]
+            yield unwritten_output.at(
+                asked.scalar.span,
+                f"the output '{name}' is always the same: nothing sets '{first}'",
+                help=f"set '{first}' where its value is known, or keep a result with 'save: {first}'",
+                related=[Related(program.data[first].span, "its only value")],
+            )
