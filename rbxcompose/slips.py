@@ -1,9 +1,8 @@
 """Slips: beginners' mistakes that are recognised, reported with their correction, and read as they were meant.
 
-Compiler writers call them error productions: each is one file, beside the grammar instead of in it. A slip in a tree
+Compiler writers call them error productions: each is a function, beside the grammar instead of in it. A slip in a tree
 looks at a node at one place of its grammar and returns a `Repair`: the findings, and the node to continue with. So the
-reader that follows sees no slips, only the grammar. A family of slips is a package of files with one `Slips` as
-decorator.
+reader that follows sees no slips, only the grammar. A family of slips is a package with one `Slips` as decorator.
 """
 
 from __future__ import annotations

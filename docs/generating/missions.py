@@ -2,26 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
 from docs.generating.components import ports_of
 from docs.generating.markdown import about, code, example, example_of, lowered, page, table
 from docs.generating.shapes import keys_table
-from rbxcompose.expressions.text import Template
-from rbxcompose.expressions.tree import Expression
-from rbxcompose.expressions.types import UNKNOWN, Type
 from rbxcompose.manifest.arguments import ArgumentModel
-from rbxcompose.manifest.tree import ScalarNode
-from rbxcompose.missions.language.asked import Asked, Assignment
+from rbxcompose.missions.language.fields import Field, first_line
 from rbxcompose.missions.language.grammar import Takes
 from rbxcompose.missions.language.reader import INTERRUPT_KEYS
 from rbxcompose.missions.modifiers.registry import modifiers
 from rbxcompose.missions.program.goals import skill_of, topic_skill
-from rbxcompose.missions.program.messages import MessageTemplate
-from rbxcompose.missions.program.moments import Moments
 from rbxcompose.missions.program.registry import StepType, kinds
 from rbxcompose.schema.mission import mission_schema
-from rbxcompose.schema.node_schema import Asking, first_line
 from rbxcompose.schema.scalars import SHARED, Schema
 from rbxcompose.schema.settle import referred
 from rbxcompose.sdk.ports import ServesAction, ServesTopic
@@ -38,105 +31,6 @@ skills of the shipped types; a single value is the first argument.
 """
 ORDER = "## Modifiers\nAny node may have modifiers. They apply from the outside in, in this order:"
 _HEAD = ("key", "takes", "what it is")
-
-
-class Told(Asking):
-    """A reader that has every key, and keeps for each in words what it takes."""
-
-    def __init__(self, key: str) -> None:
-        super().__init__(key)
-        self.words: dict[str, str] = {}
-
-    def scalar(self, key: str, what: str, takes: Takes = Takes.OTHER) -> ScalarNode | None:
-        """Note a word."""
-        self.words[key] = what
-        return super().scalar(key, what)
-
-    def expression(self, key: str, wanted: Type, what: str) -> Expression:
-        """Note what is asked for."""
-        self.words[key] = "a value" if wanted == UNKNOWN else what
-        return super().expression(key, wanted, what)
-
-    def count_or(self, key: str, words: tuple[str, ...]) -> Expression | str:
-        """Note a number or words."""
-        self.words[key] = " or ".join(["a whole number", *map(code, words)])
-        return super().count_or(key, words)
-
-    def map_of(self, key: str, what: str, takes: Takes = Takes.OTHER) -> None:
-        """Note a map."""
-        self.words[key] = what
-        super().map_of(key, what)
-
-    def branch(self, key: str, branches: tuple[str, ...]) -> str:
-        """Note a name."""
-        self.words[key] = "the name of a branch"
-        return super().branch(key, branches)
-
-    def name(self, key: str, what: str) -> ScalarNode:
-        """Note a name."""
-        self.words[key] = what
-        return super().name(key, what)
-
-    def branches(self) -> tuple[str, ...]:
-        """Note nodes."""
-        self.words[self.key] = "a list of nodes, or a map from names to nodes"
-        return super().branches()
-
-    def cases(self, key: str) -> tuple[Asked, ...]:
-        """Note a map."""
-        self.words[key] = "a map from values to nodes"
-        return super().cases(key)
-
-    def message(self, target: str, body: str) -> MessageTemplate:
-        """Note a name and what is sent."""
-        self.words[target], self.words[body] = "its name", "a map of fields, or the value of the only one"
-        return super().message(target, body)
-
-    def moments(self, keys: Iterable[str]) -> Moments:
-        """Note hooks."""
-        told = list(keys)
-        self.words.update(dict.fromkeys(told, "`set`, `log` or `publish`"))
-        return super().moments(told)
-
-    def flag(self, key: str) -> bool:
-        """Note a flag."""
-        self.words[key] = "`true` or `false`"
-        return super().flag(key)
-
-    def choice(self, key: str, choices: tuple[str, ...]) -> str:
-        """Note the words, the default first."""
-        self.words[key] = " or ".join(map(code, choices)) + (" (the first one)" if len(choices) > 1 else "")
-        return super().choice(key, choices)
-
-    def template(self, key: str) -> Template:
-        """Note a text."""
-        self.words[key] = "a text"
-        return super().template(key)
-
-    def child(self, key: str) -> None:
-        """Note a node."""
-        self.words[key] = "a node"
-        super().child(key)
-
-    def steps(self) -> None:
-        """Note a list."""
-        self.words[self.key] = "a list of nodes"
-        super().steps()
-
-    def item_name(self) -> None:
-        """Note a name."""
-        self.words[self.key] = "a name for the item"
-        super().item_name()
-
-    def items(self, key: str) -> Expression | tuple[Expression, ...]:
-        """Note a list of values."""
-        self.words[key] = "a list, or an expression"
-        return super().items(key)
-
-    def assignments(self, key: str) -> tuple[Assignment, ...]:
-        """Note a map."""
-        self.words[key] = "a map from data to values"
-        return super().assignments(key)
 
 
 def whole_page() -> str:
@@ -166,8 +60,9 @@ def described(properties: Mapping[str, Schema], required: list[str]) -> str:
 
 def of_kind(kind: StepType) -> str:
     """Return what is known of a kind: what it does, its keys, an example."""
-    told = told_by(kind)
-    rows = [(code(key), takes(told, key), kind.options.get(key, "")) for key in told.words]
+    absent = {True: "", False: "; optional"}
+    others = [(code(one.key), takes(one) + absent[one.is_required], one.help) for one in kind.options()]
+    rows = [(code(kind.name), takes(kind.fields[kind.name]), ""), *others]
     return "\n".join(
         [
             f"### {code(kind.name)}\n{about(kind)}\n",
@@ -177,24 +72,19 @@ def of_kind(kind: StepType) -> str:
     )
 
 
-def told_by(kind: StepType) -> Told:
-    """Return what each key of a kind takes."""
-    told = Told(kind.name)
-    kind.read(told)
-    return told
-
-
-def takes(told: Told, key: str) -> str:
-    """Return what a key takes, and whether it may be missing."""
-    return told.words[key] + ("; optional" if key in told.optional and key != told.key else "")
+def takes(field: Field) -> str:
+    """Return what a key takes."""
+    words = " or ".join(map(code, field.choices))
+    if field.takes is Takes.CHOICE:
+        return f"{words} (the first one)"
+    return f"{field.words} or {words}" if words else field.words
 
 
 def of_modifier(name: str) -> str:
     """Return what is known of a modifier."""
-    told, cls = Told(name), modifiers()[name]
-    cls.read(told, name)
-    words = f"### {code(name)}\n{about(cls)} It takes {told.words[name]}.\n"
-    others = [(code(key), told.words[key], meaning) for key, meaning in cls.keys.items()]
+    cls = modifiers()[name]
+    words = f"### {code(name)}\n{about(cls)} It takes {takes(cls.fields[name])}.\n"
+    others = [(code(one.key), takes(one), one.help) for one in cls.options()]
     return "\n".join([words, *([table(_HEAD, others)] if others else []), example(example_of(cls), "yaml mission")])
 
 

@@ -11,7 +11,7 @@ from typing import Any
 from docs.generating.commands import parsers, written
 from docs.generating.families import families
 from docs.generating.markdown import about, code, lowered, table
-from docs.generating.missions import told_by
+from docs.generating.missions import takes
 from docs.generating.robot import models_below
 from docs.generating.shapes import with_default
 from rbxcompose.manifest.registry import sections as registered
@@ -86,9 +86,8 @@ def nodes() -> str:
 
 def of_node(kind: StepType) -> tuple[str, str, str, str]:
     """Return the row of a kind."""
-    told = told_by(kind)
-    options = [f"{code(key)}: {words}" for key, words in told.words.items() if key != kind.name]
-    return linked(kind), told.words.get(kind.name, ""), "; ".join(options), about(kind).partition("\n\n")[0]
+    options = [f"{code(one.key)}: {takes(one)}" for one in kind.options()]
+    return linked(kind), takes(kind.fields[kind.name]), "; ".join(options), about(kind).partition("\n\n")[0]
 
 
 def steps() -> str:

@@ -319,6 +319,6 @@ def words(text: str) -> tuple[Reference, ...]:
 @cache
 def _step_words() -> frozenset[str]:
     """Return the words of the language in steps: all other keys are names of skills."""
-    options = (key for kind in kinds().values() for key in kind.options)
+    options = (key for kind in kinds().values() for key in kind.fields)
     own = (*STATE_KEYS, *MACHINE_KEYS, *INTERRUPT_KEYS, *DEEDS, "level", "restart", "name")
-    return frozenset((*kinds(), *options, *modifier_keys(), *own))
+    return frozenset((*options, *modifier_keys(), *own))

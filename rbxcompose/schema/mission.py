@@ -8,36 +8,60 @@ from types import MappingProxyType
 from typing import Any
 
 from rbxcompose.config import Name
-from rbxcompose.expressions.types import FLAG, TYPES
+from rbxcompose.expressions.types import COUNT, FLAG, TYPES, Type, TypeKind, quantity_of
 from rbxcompose.manifest.arguments import ArgumentModel
 from rbxcompose.manifest.header import ManifestHeader
 from rbxcompose.missions.engine.resume_points import HISTORIES
+from rbxcompose.missions.language.fields import HISTORY, Declared, Field, first_line
+from rbxcompose.missions.language.grammar import Takes
 from rbxcompose.missions.language.machine_reader import RESULTS
 from rbxcompose.missions.language.reader import INTERRUPT_KEYS, KEYS
 from rbxcompose.missions.modifiers.registry import modifiers
 from rbxcompose.missions.modifiers.state_hooks import ON_ENTER
 from rbxcompose.missions.program.goals import skill_of, topic_skill
-from rbxcompose.missions.program.history import HISTORY
 from rbxcompose.missions.program.machines import MACHINE_KEYS
 from rbxcompose.missions.program.moments import DEEDS
 from rbxcompose.missions.program.program import AFTERWARDS, RESTART, Skill
 from rbxcompose.missions.program.registry import kinds
-from rbxcompose.schema.node_schema import (
-    EXPRESSION,
-    ITEM_NAME,
-    MACHINE,
-    NODE,
-    argument_schema,
-    first_line,
-    kind_schema,
-    modifier_schema,
-    modifier_schemas,
-)
 from rbxcompose.schema.robot import document
 from rbxcompose.schema.scalars import DEFINITIONS, Schema, computed
 from rbxcompose.schema.settle import schemas_of
 from rbxcompose.sdk.ports import ServesAction, ServesTopic
 from rbxcompose.sdk.registry import component_type
+from rbxcompose.units import TIME
+
+NODE: Schema = {"$ref": f"{DEFINITIONS}node"}
+MACHINE: Schema = {"$ref": f"{DEFINITIONS}machine"}
+EXPRESSION: Schema = {"type": ["string", "number", "boolean"]}
+ANYTHING: Schema = {"type": ["string", "number", "boolean", "object", "array"]}
+ITEM_NAME: Schema = {"type": "string", "pattern": "^[a-z][a-z0-9_]*$", "maxLength": 60}
+WORD: Schema = {"type": "string", "minLength": 1}
+_MAP: Schema = {"type": "object", "minProperties": 1}
+_SEVERAL = {"minItems": 1, "items": NODE, "minProperties": 1, "additionalProperties": NODE}
+_NAMED: Schema = {**_MAP, "propertyNames": ITEM_NAME, "additionalProperties": EXPRESSION}
+_TAKEN: Mapping[Takes, Schema] = {
+    Takes.CONDITION: computed(FLAG),
+    Takes.WATCHED: WORD,
+    Takes.DURATION: computed(quantity_of(TIME)),
+    Takes.VALUE: EXPRESSION,
+    Takes.FLAG: {"type": ["boolean", "string"], "pattern": r"\$\{", "examples": [True]},
+    Takes.TEXT: EXPRESSION,
+    Takes.WORD: WORD,
+    Takes.NAME: ITEM_NAME,
+    Takes.BRANCH: ITEM_NAME,
+    Takes.ITEM_NAME: ITEM_NAME,
+    Takes.ITEMS: {"anyOf": [{"type": "array", "items": {**EXPRESSION, "x-names": "place"}}, {"type": "string"}]},
+    Takes.STEP: NODE,
+    Takes.STEPS: {"$ref": f"{DEFINITIONS}steps"},
+    Takes.BRANCHES: {"type": ["object", "array"], "propertyNames": ITEM_NAME, **_SEVERAL},
+    Takes.CASES: {**_MAP, "additionalProperties": NODE},
+    Takes.ASSIGNMENTS: _NAMED,
+    Takes.OUTCOMES: _NAMED,
+    Takes.INPUTS: {**_NAMED, "additionalProperties": ANYTHING},
+    Takes.CONTENTS: ANYTHING,
+    Takes.HOOK: {"$ref": f"{DEFINITIONS}deeds"},
+    Takes.MACHINE: MACHINE,
+}
 
 KIND = "kind_"  # prefix of the definition of a kind of node
 ANY_NODE = "What is done: a skill, a kind of node with its settings, or a list of nodes, which is a sequence."
@@ -124,12 +148,13 @@ def _nodes(types: Iterable[str], skills: Mapping[str, Skill]) -> dict[str, Schem
     """Return the definitions of a node and of a list of nodes."""
     told = skills_of(types)
     told |= {name: (skill, told[name][1] if name in told else "Skill of this robot.") for name, skill in skills.items()}
-    anywhere = {"name": NODE_NAME, **modifier_schemas()}
+    of_nodes = (schemas_of_keys(one) for one in modifiers().values() if not one.only_states)
+    anywhere = {"name": NODE_NAME, **{key: schema for one in of_nodes for key, schema in one.items()}}
     known = {name: _skill(skill, about) for name, (skill, about) in told.items()}
     closed: dict[str, Schema] = {}
     for name, kind in kinds().items():
-        keys, needed = kind_schema(kind)
-        allowed = {**keys, **dict.fromkeys(anywhere, True)}
+        allowed = {**schemas_of_keys(kind), **dict.fromkeys(anywhere, True)}
+        needed = sorted(key for key, one in kind.fields.items() if one.is_required)
         closed[name] = {"properties": allowed, "required": needed, "additionalProperties": False}
     words = {name: _key_of(f"{KIND}{name}", name) for name in closed}
     chosen: list[Schema] = [
@@ -148,6 +173,34 @@ def _nodes(types: Iterable[str], skills: Mapping[str, Skill]) -> dict[str, Schem
     return {**shared, **{f"{KIND}{name}": one for name, one in closed.items()}}
 
 
+def schemas_of_keys(cls: type[Declared]) -> dict[str, Schema]:
+    """Return the described schemas of the keys of a kind or a modifier."""
+    return {key: {**_of_field(one), "description": one.help} for key, one in cls.fields.items()}
+
+
+def _of_field(field: Field) -> Schema:
+    match field:
+        case Field(takes=Takes.CHOICE, choices=choices):
+            return {"enum": list(choices), "default": choices[0]}
+        case Field(takes=Takes.COUNT, choices=()):
+            return computed(COUNT)
+        case Field(takes=Takes.COUNT, choices=words):
+            count = computed(COUNT, f"a number or {' or '.join(map(repr, words))}")
+            pattern = "|".join([*(f"^{word}$" for word in words), str(count["pattern"])])
+            return {**count, "pattern": pattern, "examples": [3, *words]}
+        case Field(takes=Takes.RECORD, keys=keys):
+            inner = {key: {**_of_field(one), "description": one.help} for key, one in keys.items()}
+            return {"type": "object", "required": list(keys), "properties": inner, "additionalProperties": False}
+    return _TAKEN[field.takes]
+
+
+def _argument(wanted: Type) -> Schema:
+    """Return the schema of an argument of a skill."""
+    if wanted.kind in (TypeKind.PLACE, TypeKind.POSE):
+        return {**WORD, "type": ["string", "object"], "x-names": "place"}
+    return computed(FLAG) if wanted.kind is TypeKind.FLAG else EXPRESSION
+
+
 def _key_of(definition: str, key: str) -> Schema:
     """Return a reference to the schema of a key in a definition."""
     return {"$ref": f"{DEFINITIONS}{definition}/properties/{key}"}
@@ -155,7 +208,7 @@ def _key_of(definition: str, key: str) -> Schema:
 
 def _deeds() -> Schema:
     """Return the schema of the actions of a hook."""
-    keys = {key: _key_of(f"{KIND}{word}", key) for word in DEEDS for key in kind_schema(kinds()[word])[0]}
+    keys = {key: _key_of(f"{KIND}{word}", key) for word in DEEDS for key in kinds()[word].fields}
     return {"type": "object", "minProperties": 1, "properties": keys, "additionalProperties": False}
 
 
@@ -183,7 +236,7 @@ def _state(anywhere: dict[str, Schema]) -> Schema:
     to = {"type": ["string", "object"], "minLength": 1, "minProperties": 1, "additionalProperties": ITEM_NAME}
     own: dict[str, Schema] = {"do": NODE, "machine": MACHINE, "next": to}
     described = {key: {**schema, "description": _STATE[key]} for key, schema in own.items()}
-    hooks = modifier_schema(ON_ENTER, modifiers()[ON_ENTER])
+    hooks = schemas_of_keys(modifiers()[ON_ENTER])
     inside = {key: _key_of("node", key) for key in anywhere if key != "name"}
     return {"type": "object", "properties": {**described, **hooks, **inside}, "additionalProperties": False}
 
@@ -191,10 +244,10 @@ def _state(anywhere: dict[str, Schema]) -> Schema:
 def _skill(skill: Skill, about: str) -> Schema:
     """Return the schema of the value of a skill: its main argument, or a map of several."""
     arguments = {
-        name: {**argument_schema(wanted), "description": f"Argument of `{skill.name}`: {wanted.phrase}."}
+        name: {**_argument(wanted), "description": f"Argument of `{skill.name}`: {wanted.phrase}."}
         for name, wanted in skill.arguments.items()
     }
-    single = argument_schema(skill.arguments[skill.main]) if skill.main else {}
+    single = _argument(skill.arguments[skill.main]) if skill.main else {}
     several = {"type": "object", "properties": arguments, "additionalProperties": False}
     notes = {key: single[key] for key in ("x-names",) if key in single}
     empty = [] if skill.required or skill.entries else [{"type": "null"}]

@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from rbxcompose.missions.slips.count_in_words import NUMBERS
+from rbxcompose.missions.slips.values import NUMBERS
 from rbxcompose.rendering.text import render_text
 from rbxcompose.testing.golden import Golden
 from tests.missions.test_slips import FILE, cured, report_of

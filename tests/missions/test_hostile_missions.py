@@ -13,7 +13,7 @@ from rbxcompose.missions.program.registry import kinds
 from tests.missions.simulated import ROBOT
 
 HERE = Span("mission.yaml", 1, 1, 1, 2)
-OPTIONS = sorted({option for kind in kinds().values() for option in kind.options})
+OPTIONS = sorted({option for kind in kinds().values() for option in kind.fields if option != kind.name})
 WORDS = st.sampled_from(
     ["", "a", "go_to", "dock", "forever", "$x", "$item", "5 s", "30 %", "2", "true", "a b", "${x}", "$battery < 1", "'"]
 )

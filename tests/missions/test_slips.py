@@ -10,10 +10,8 @@ from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.missions.analysis.check_runner import check_program
 from rbxcompose.missions.language.reader import read_program
-from rbxcompose.missions.program.registry import kinds
-from rbxcompose.missions.slips.count_in_words import ENDLESS
-from rbxcompose.missions.slips.foreign_flag import FLAGS
-from rbxcompose.missions.slips.unknown_settings import FOREIGN, STEPS
+from rbxcompose.missions.slips.settings import FOREIGN, STEPS
+from rbxcompose.missions.slips.values import ENDLESS, FLAGS
 from rbxcompose.rendering.text import render_text
 from rbxcompose.testing.golden import Golden
 from tests.missions.simulated import ROBOT
@@ -111,7 +109,7 @@ def test_a_skill_of_the_robot_is_a_step_whatever_its_value_looks_like() -> None:
 
 
 def test_words_of_others_are_none_of_ours_and_stand_for_one_of_ours() -> None:
-    settings = {*kinds()["if"].options, *ROBOT.skills, *STEPS}
+    settings = {"then", "else", *ROBOT.skills, *STEPS}
     for word, ours in FOREIGN.items():
         text = f"do:\n  - if: $door\n    then: a\n    {word}: $door\n"
         helps = [one.help for one in report_of(text) if one.code == "RBX4101"]

@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Self
 
 import pytest
 
-from rbxcompose.expressions.tree import Expression
-from rbxcompose.expressions.types import COUNT
 from rbxcompose.findings import Report
 from rbxcompose.inspection.mission_html import mission_html
 from rbxcompose.inspection.mission_text import mission_text
@@ -17,22 +13,39 @@ from rbxcompose.mission_tests.coverage import Coverage, SeenWays
 from rbxcompose.mission_tests.explorer import ExplorationLimits, explore
 from rbxcompose.missions.analysis.check_runner import check_program
 from rbxcompose.missions.engine.snapshot import restore, save
-from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.engine.world import Settings
-from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.language.reader import read_program
 from rbxcompose.missions.program import registry
-from rbxcompose.missions.program.answers import Advice, Counted, NodeFlow
-from rbxcompose.missions.program.families import Deed, Loop
 from rbxcompose.missions.program.linker import link
-from rbxcompose.missions.program.look import NodeLook
-from rbxcompose.missions.program.outcomes import ANY, SUCCEEDS, Outcomes
-from rbxcompose.missions.program.possible import Possibility, started
-from rbxcompose.missions.program.program import Endings, MissionNode, RobotNames
-from rbxcompose.missions.program.registry import kind, kinds
-from rbxcompose.missions.program.statuses import FAILURE, RUNNING, SUCCESS
+from rbxcompose.missions.program.outcomes import SUCCEEDS
+from rbxcompose.missions.program.registry import kinds
+from rbxcompose.missions.sdk import (
+    ANY,
+    FAILURE,
+    RUNNING,
+    SUCCESS,
+    Advice,
+    Deed,
+    Endings,
+    Expression,
+    Loop,
+    MissionNode,
+    NodeFlow,
+    NodeLook,
+    Outcomes,
+    Possibility,
+    RobotNames,
+    Site,
+    Task,
+    child,
+    count,
+    dataclass,
+    duration,
+    kind,
+    started,
+)
 from rbxcompose.missions.view.picture import picture_of
-from rbxcompose.schema.node_schema import kind_schema
+from rbxcompose.schema.mission import schemas_of_keys
 from tests.missions.simulated import ROBOT, Simulated, program_of, tree
 
 TEXT = "do: {persist: 2, gap: 1 s, do: {go_to: dock}, timeout: 1 min}"
@@ -72,18 +85,13 @@ class PersistTask(Task):
 class Persist(Loop):
     """Do the body until it has succeeded once."""
 
-    most: Expression
-    gap: Expression
+    most: Expression = count(least=1)
+    do = child("What is done.")
+    gap: Expression = duration("Time between two tries.", least=0)
 
     waits = True
     flow = NodeFlow.ONE_OF
     look = NodeLook("∞")
-
-    @classmethod
-    def read(cls, reader: NodeReader) -> Self:
-        most = reader.expression(reader.key, COUNT, "a number")
-        reader.child("do")
-        return cls(most, reader.duration("gap"))
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         return endings.of(node.children[0]) if node.children else ANY
@@ -96,13 +104,9 @@ class Persist(Loop):
     ) -> Iterator[Possibility]:
         yield Possibility(node.span, f"{node.path}: body", started(node.children[0]))
 
-    @property
-    def numbers(self) -> tuple[Counted, ...]:
-        return Counted("'persist'", self.most, 1), Counted("'gap'", self.gap, 0)
-
 
 def declare() -> None:
-    kind("persist", PersistTask, {"do": "What is done.", "gap": "Time between two tries."})(Persist)
+    kind("persist", PersistTask)(Persist)
 
 
 @pytest.fixture(autouse=True)
@@ -177,10 +181,14 @@ def test_it_is_explored() -> None:
 
 
 def test_it_has_a_schema() -> None:
-    made, needed = kind_schema(kinds()["persist"])
-    assert needed == ["do", "gap", "persist"]
+    made = schemas_of_keys(kinds()["persist"])
     assert made["persist"]["description"] == "Do the body until it has succeeded once."
     assert made["gap"]["description"] == "Time between two tries."
+
+
+def test_its_keys_are_data() -> None:
+    told = [(key, one.takes, one.is_required, one.least) for key, one in kinds()["persist"].fields.items()]
+    assert told == [("persist", "count", True, 1), ("do", "step", True, None), ("gap", "duration", True, 0)]
 
 
 class SilentTask(Task):
@@ -200,7 +208,7 @@ class Silent(Deed):
 
 
 def test_a_kind_that_leaves_something_unanswered_is_refused_and_a_type_error() -> None:
-    with pytest.raises(TypeError, match="the kind 'silent' does not answer effects, may_end, read"):
+    with pytest.raises(TypeError, match="the kind 'silent' does not answer may_end"):
         kind("silent", SilentTask)(Silent)  # type: ignore[type-abstract]
     with pytest.raises(TypeError, match="abstract"):
         Silent()  # type: ignore[abstract]

@@ -1,4 +1,4 @@
-"""Checks of a mission on a robot before it runs: rules, one file each in `missions/checks`."""
+"""Checks of a mission on a robot before it runs: rules in the modules of `missions/checks`."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Rules about missions: one file each, with its docs page."""
+"""Rules about missions: a module for each subject."""

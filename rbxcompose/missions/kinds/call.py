@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Self
-
 from rbxcompose.dataclass import dataclass
 from rbxcompose.missions.engine.instant_actions import fields_of
 from rbxcompose.missions.engine.leaf import Leaf
 from rbxcompose.missions.engine.task import Site
-from rbxcompose.missions.language.node_reader import NodeReader
-from rbxcompose.missions.program.families import LeafStep
+from rbxcompose.missions.language.fields import contents, message
+from rbxcompose.missions.program.families import LeafStep, ends
 from rbxcompose.missions.program.messages import MessageTemplate
 from rbxcompose.missions.program.moments import NodeEffects
-from rbxcompose.missions.program.outcomes import ANY, Outcomes
-from rbxcompose.missions.program.program import Endings, MissionNode
+from rbxcompose.missions.program.outcomes import ANY
+from rbxcompose.missions.program.program import MissionNode
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.statuses import RUNNING
 from rbxcompose.msgs import registry
@@ -46,7 +44,7 @@ class CallTask(Leaf):
         return RUNNING
 
 
-@kind("call", CallTask, {"request": "The fields of the request; a single value stands for the only field."})
+@kind("call", CallTask)
 @dataclass(frozen=True, slots=True)
 class CallStep(LeafStep):
     """Call a service of the robot; a response with `success: false` is a failure.
@@ -58,21 +56,15 @@ class CallStep(LeafStep):
           timeout: 2 s
     """
 
-    message: MessageTemplate
+    message: MessageTemplate = message("request")
+    request = contents("The fields of the request; a single value stands for the only field.")
 
     waits = True
     has_result = True
     lasts = None
     only_asks = False
 
-    @classmethod
-    def read(cls, reader: NodeReader) -> Self:
-        """Read the service and `request`."""
-        return cls(reader.message(reader.key, "request"))
-
-    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
-        """Return that it may fail: the service may refuse."""
-        return ANY
+    may_end = ends(ANY)
 
     def text(self, node: MissionNode) -> str:
         """Return the service."""

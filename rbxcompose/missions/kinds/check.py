@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Self
-
 from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.evaluate import holds
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.missions.engine.task import Site, Task
-from rbxcompose.missions.language.node_reader import NodeReader
-from rbxcompose.missions.program.families import LeafStep
-from rbxcompose.missions.program.moments import NO_EFFECTS
-from rbxcompose.missions.program.outcomes import ANY, Outcomes
-from rbxcompose.missions.program.program import Endings, MissionNode
+from rbxcompose.missions.language.fields import condition
+from rbxcompose.missions.program.families import LeafStep, ends
+from rbxcompose.missions.program.outcomes import ANY
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.statuses import FAILURE, SUCCESS
 
@@ -42,19 +38,11 @@ class CheckStep(LeafStep):
           - go_to: corner_1
     """
 
-    condition: Expression
+    condition: Expression = condition()
 
     waits = False
     has_result = False
     lasts = None
     only_asks = True
-    effects = NO_EFFECTS
 
-    @classmethod
-    def read(cls, reader: NodeReader) -> Self:
-        """Read the condition."""
-        return cls(reader.condition(reader.key))
-
-    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
-        """Return that it may succeed or fail."""
-        return ANY
+    may_end = ends(ANY)

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import field
-from typing import Self
-
 from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.evaluate import evaluate
-from rbxcompose.expressions.types import UNKNOWN
+from rbxcompose.expressions.tree import Expression
 from rbxcompose.expressions.values import is_same
 from rbxcompose.missions.engine.task import Site, Task
-from rbxcompose.missions.language.node_reader import NodeReader
+from rbxcompose.missions.language.asked import Asked
+from rbxcompose.missions.language.fields import cases, child, value
 from rbxcompose.missions.program.branches import BranchChoice
 from rbxcompose.missions.program.families import Choosing
 from rbxcompose.missions.program.outcomes import ALWAYS_FAILS, ALWAYS_SUCCEEDS, Outcomes, either
@@ -50,7 +48,7 @@ class ChooseTask(Task):
         return len(cases) if len(cases) < len(self.chosen) else -1
 
 
-@kind("choose", ChooseTask, {"cases": "What is done for which value.", "else": "What is done for all other values."})
+@kind("choose", ChooseTask)
 @dataclass(frozen=True, slots=True)
 class ChooseStep(Choosing):
     """Do the case that matches a value, which is read once; skipped without a match.
@@ -69,21 +67,19 @@ class ChooseStep(Choosing):
             log: Nothing to do in $room
     """
 
-    choice: BranchChoice = field()  # `else` is the child after those of the cases
+    value: Expression = value("a value, such as '$room'")
+    cases: tuple[Asked, ...] = cases("What is done for which value.")
+    otherwise = child("What is done for all other values.", "else", optional=True)  # the child after those of the cases
 
-    @classmethod
-    def read(cls, reader: NodeReader) -> Self:
-        """Read the value, `cases` and `else`."""
-        asked = reader.expression(reader.key, UNKNOWN, "a value, such as '$room'")
-        cases = reader.cases("cases")
-        if reader.has("else"):
-            reader.child("else")
-        return cls(BranchChoice(asked, cases))
+    @property
+    def choice(self) -> BranchChoice:
+        """Return the value and the cases."""
+        return BranchChoice(self.value, self.cases)
 
     @property
     def ways(self) -> tuple[str, ...]:
         """Return the cases, and `else` for all other values."""
-        return (*(f"case {case.expression.text}" for case in self.choice.cases), "else")
+        return (*(f"case {case.expression.text}" for case in self.cases), "else")
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return the outcomes of all cases; a missing value is a failure."""

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Self
-
 from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.text import Template
 from rbxcompose.missions.engine.task import Site, Task
-from rbxcompose.missions.language.node_reader import NodeReader
-from rbxcompose.missions.program.families import Deed
-from rbxcompose.missions.program.moments import NO_EFFECTS
-from rbxcompose.missions.program.outcomes import FAILS, NEVER, SUCCEEDS, Outcomes
-from rbxcompose.missions.program.program import Endings, MissionNode
+from rbxcompose.missions.language.fields import choice, text
+from rbxcompose.missions.program.families import Deed, ends
+from rbxcompose.missions.program.outcomes import FAILS, NEVER, SUCCEEDS
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.statuses import FAILURE, RUNNING, SUCCESS
 
@@ -36,7 +32,7 @@ class EndTask(Task):
         return RUNNING
 
 
-@kind("end", EndTask, {"message": "A message for the log."})
+@kind("end", EndTask)
 @dataclass(frozen=True, slots=True)
 class EndStep(Deed):
     """End the mission that contains this node, in `success` or `failure`; what runs is halted.
@@ -53,20 +49,10 @@ class EndStep(Deed):
             go_to: corner_1
     """
 
-    result: str
-    message: Template | None
+    result: str = choice(SUCCEEDS, FAILS)
+    message: Template | None = text("A message for the log.", optional=True)
 
-    effects = NO_EFFECTS
-
-    @classmethod
-    def read(cls, reader: NodeReader) -> Self:
-        """Read the result and `message`."""
-        result = reader.choice(reader.key, (SUCCEEDS, FAILS))
-        return cls(result, reader.template("message") if reader.has("message") else None)
-
-    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
-        """Return no outcomes: the node never ends, the mission does."""
-        return NEVER
+    may_end = ends(NEVER)
 
     @property
     def ends_mission(self) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from rbxcompose.missions.program.answers import NodeFlow
-from rbxcompose.missions.program.in_turn import OPTIONS, RANDOM, InTurn, InTurnTask
+from rbxcompose.missions.program.in_turn import RANDOM, InTurn, InTurnTask
 from rbxcompose.missions.program.look import NodeLook
 from rbxcompose.missions.program.outcomes import FAILS, SUCCEEDS
 from rbxcompose.missions.program.possible import Possibility, started
@@ -21,7 +21,7 @@ class FallbackTask(InTurnTask):
     decides = SUCCESS
 
 
-@kind("fallback", FallbackTask, OPTIONS)
+@kind("fallback", FallbackTask)
 class FallbackStep(InTurn):
     """Try the nodes of a list in order, until one succeeds; skipped ones are passed over.
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import field
-from typing import Self
 
 from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.check import StaticScope, check
@@ -17,7 +15,7 @@ from rbxcompose.missions.engine.condition_watches import POSE
 from rbxcompose.missions.engine.data_edits import without
 from rbxcompose.missions.engine.scopes import ItemScope
 from rbxcompose.missions.engine.task import Site, Task
-from rbxcompose.missions.language.node_reader import NodeReader
+from rbxcompose.missions.language.fields import child, choice, flag, item_name, items
 from rbxcompose.missions.program.answers import NodeFlow
 from rbxcompose.missions.program.families import Loop
 from rbxcompose.missions.program.look import NodeLook
@@ -104,14 +102,14 @@ class ForTask(Task):
         if status == FAILURE:
             self.failed.append(self.taken)
             self.did = FAILURE
-            return not self.step.goes_on and not self.step.ends_at_success
+            return self.step.if_one_fails == STOP and self.step.succeed_when == ALL
         if status == SUCCESS:
             self.done.append(self.taken)
             if self.did == SKIPPED:
                 self.did = SUCCESS
-            if self.step.removes_done and isinstance(self.step.items, Expression):
+            if self.step.remove_done and isinstance(self.step.items, Expression):
                 without(self.step.items.tree, self.taken, self.run.data, self.scope)
-            return self.step.ends_at_success
+            return self.step.succeed_when == ANY
         return False
 
     def _take(self) -> None:
@@ -146,18 +144,7 @@ class ForTask(Task):
         return list(value)
 
 
-@kind(
-    "for",
-    ForTask,
-    {
-        "in": "A list, or a map, whose keys it takes; it is read once, at the start.",
-        "do": "What is done for each item.",
-        "order": "The order: as `written`, `random` (a new draw at each start), or the `nearest` place first.",
-        "if_one_fails": "`stop` fails at once; `next` does the other items and fails at the end.",
-        "succeed_when": "`all` must succeed, or `any`: it continues after a failure and ends at the first success.",
-        "remove_done": "Whether an item that succeeded is removed from the data that `in` names.",
-    },
-)
+@kind("for", ForTask)
 @dataclass(frozen=True, slots=True)
 class ForStep(Loop):
     """Do the body for each item of a list; the body reads the item by its `$name`.
@@ -171,30 +158,27 @@ class ForStep(Loop):
             go_to: $corner
     """
 
-    items: Expression | tuple[Expression, ...] = field()
-    goes_on: bool
-    order: str
-    ends_at_success: bool
-    removes_done: bool
+    item: str = item_name()
+    items: Expression | tuple[Expression, ...] = items(
+        "A list, or a map, whose keys it takes; it is read once, at the start.", "in"
+    )
+    do = child("What is done for each item.")
+    if_one_fails: str = choice(
+        STOP, NEXT, help="`stop` fails at once; `next` does the other items and fails at the end."
+    )
+    order: str = choice(
+        *(WRITTEN, RANDOM, NEAREST),
+        help="The order: as `written`, `random` (a new draw at each start), or the `nearest` place first.",
+    )
+    succeed_when: str = choice(
+        *(ALL, ANY), help="`all` must succeed, or `any`: it continues after a failure and ends at the first success."
+    )
+    remove_done: bool = flag("Whether an item that succeeded is removed from the data that `in` names.")
 
     has_result = True
     result_names = (DONE, FAILED)
     flow = NodeFlow.PER_ITEM
     look = NodeLook("↻")
-
-    @classmethod
-    def read(cls, reader: NodeReader) -> Self:
-        """Read the item's name, `in`, `do` and the options."""
-        reader.item_name()
-        items = reader.items("in")
-        reader.child("do")
-        return cls(
-            items,
-            reader.choice("if_one_fails", (STOP, NEXT)) == NEXT,
-            reader.choice("order", (WRITTEN, RANDOM, NEAREST)),
-            reader.choice("succeed_when", (ALL, ANY)) == ANY,
-            reader.flag("remove_done") if reader.has("remove_done") else False,
-        )
 
     def shows(self, node: MissionNode, scope: StaticScope) -> Mapping[str, Type]:
         """Return the item's name, with the type that all items have."""
@@ -208,7 +192,7 @@ class ForStep(Loop):
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return that it fails if its body fails or its list cannot be read."""
-        if self.order == NEAREST or self.removes_done or not node.children or not self._is_read(endings):
+        if self.order == NEAREST or self.remove_done or not node.children or not self._is_read(endings):
             return ANYHOW
         return Outcomes(fails=endings.of(node.children[0]).plain.fails)
 
@@ -235,7 +219,7 @@ class ForStep(Loop):
     @property
     def effects(self) -> NodeEffects:
         """Return the data that holds its items, if it removes those that are done."""
-        if not self.removes_done:
+        if not self.remove_done:
             return NO_EFFECTS
         tree = None if isinstance(self.items, tuple) else self.items.tree
         while isinstance(tree, FieldAccess | Index):

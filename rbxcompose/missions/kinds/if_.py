@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Self
-
 from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.evaluate import holds
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.missions.analysis.facts import is_simple
 from rbxcompose.missions.engine.task import Site, Task
-from rbxcompose.missions.language.node_reader import NodeReader
+from rbxcompose.missions.language.fields import child, condition
 from rbxcompose.missions.program.families import Choosing
 from rbxcompose.missions.program.outcomes import ALWAYS_FAILS, ALWAYS_SUCCEEDS, Outcomes, either
 from rbxcompose.missions.program.program import Endings, MissionNode
@@ -40,7 +38,7 @@ class IfTask(Task):
         return self.advance(self.branches[self.index])
 
 
-@kind("if", IfTask, {"then": "What is done if the condition holds.", "else": "What is done if it does not."})
+@kind("if", IfTask)
 @dataclass(frozen=True, slots=True)
 class IfStep(Choosing):
     """Evaluate a condition once, then do `then` or `else`; skipped without a match.
@@ -55,18 +53,11 @@ class IfStep(Choosing):
             log: The battery has $battery
     """
 
-    condition: Expression
+    condition: Expression = condition()
+    then = child("What is done if the condition holds.")
+    otherwise = child("What is done if it does not.", "else", optional=True)
 
     ways = ("then", "else")
-
-    @classmethod
-    def read(cls, reader: NodeReader) -> Self:
-        """Read the condition, `then` and `else`."""
-        condition = reader.condition(reader.key)
-        reader.child("then")
-        if reader.has("else"):
-            reader.child("else")
-        return cls(condition)
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return the outcomes of both branches; a condition that cannot be evaluated is a failure."""

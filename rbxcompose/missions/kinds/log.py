@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Self
-
 from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.text import Template
 from rbxcompose.missions.analysis.facts import is_sure
 from rbxcompose.missions.engine.events import Logged
 from rbxcompose.missions.engine.task import Site, Task
-from rbxcompose.missions.language.node_reader import NodeReader
+from rbxcompose.missions.language.fields import choice, text
 from rbxcompose.missions.program.families import Deed
-from rbxcompose.missions.program.moments import LEVELS, NO_EFFECTS
+from rbxcompose.missions.program.moments import LEVELS
 from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, ANY, Outcomes
 from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.registry import kind
@@ -33,7 +31,7 @@ class LogTask(Task):
         return SUCCESS
 
 
-@kind("log", LogTask, {"level": "Its severity."})
+@kind("log", LogTask)
 @dataclass(frozen=True, slots=True)
 class LogStep(Deed):
     """Write one line; `$name` in it is filled in.
@@ -44,15 +42,8 @@ class LogStep(Deed):
           level: warn
     """
 
-    template: Template
-    level: str
-
-    effects = NO_EFFECTS
-
-    @classmethod
-    def read(cls, reader: NodeReader) -> Self:
-        """Read the text and `level`."""
-        return cls(reader.template(reader.key), reader.choice("level", LEVELS))
+    template: Template = text()
+    level: str = choice(*LEVELS, help="Its severity.")
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return that it fails only if it cannot read a value."""

@@ -10,6 +10,8 @@ from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.values import Value
 from rbxcompose.missions.engine.events import Transition
 from rbxcompose.missions.engine.task import Site, Task
+from rbxcompose.missions.language.fields import kept
+from rbxcompose.missions.language.grammar import Takes
 from rbxcompose.missions.language.machine_reader import read_machine, read_state
 from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.program.answers import Advice, NodeFlow, Skipped
@@ -110,16 +112,15 @@ class MachineStep(Loop):
                 failure: failed
     """
 
-    states: MachineStates = field()
-    history: str = field()
+    states: MachineStates = kept(Takes.MACHINE, read_machine, "'start' and 'states' below it")
 
     flow = NodeFlow.OPEN
     look = NodeLook("◉", Form.MACHINE)
 
-    @classmethod
-    def read(cls, reader: NodeReader) -> Self:
-        """Read the states and the keys beside them."""
-        return cls(*read_machine(reader))
+    @property
+    def history(self) -> str:
+        """Return the history."""
+        return self.states.history
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return the ends that its states lead to."""

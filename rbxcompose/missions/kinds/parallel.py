@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import field
-from typing import Self
-
 from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.evaluate import holds
 from rbxcompose.expressions.tree import Expression
+from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.engine.task import Site, Task
-from rbxcompose.missions.language.node_reader import NodeReader
+from rbxcompose.missions.language.fields import branch, branches, count, flag, kept
+from rbxcompose.missions.language.grammar import Takes
 from rbxcompose.missions.program.answers import NodeFlow, Skipped
-from rbxcompose.missions.program.branches import ALL, ANY, Branches, BranchResult, BranchScope, read_outcomes
+from rbxcompose.missions.program.branches import (
+    ALL,
+    ANY,
+    Branches,
+    BranchResult,
+    BranchScope,
+    OutcomeRule,
+    read_outcomes,
+)
 from rbxcompose.missions.program.families import Straight
 from rbxcompose.missions.program.look import Form, NodeLook
 from rbxcompose.missions.program.outcomes import FAILS, SUCCEEDS, Outcomes, either
@@ -33,7 +40,7 @@ class ParallelTask(Task):
         super().__init__(site)
         self.children = site.children
         self.branches = step.branches
-        self.waits_for_all = step.waits_for_all
+        self.waits_for_all = step.wait_for_all
         self.results = [IDLE] * len(self.children)
         self.names = [""] * len(self.children)  # outcomes of their own
         self.runs = [False] * len(self.children)
@@ -139,17 +146,7 @@ class ParallelTask(Task):
         return number
 
 
-@kind(
-    "parallel",
-    ParallelTask,
-    {
-        "succeed_when": "How many branches must succeed: `all`, `any` or a number.",
-        "fail_when": "How many branches must fail for the whole to fail: `any`, `all` or a number.",
-        "ends_with": "The branch whose result is the result; failures of others do not count.",
-        "wait_for_all": "Whether it waits for all branches to end, even when the result is decided.",
-        "outcomes": "Of a state's body: outcome by condition over the results of the branches; the first one wins.",
-    },
-)
+@kind("parallel", ParallelTask)
 @dataclass(frozen=True, slots=True)
 class ParallelStep(Straight):
     """Do several nodes at the same time. Each tick ticks those that have not ended, then decides the result.
@@ -163,30 +160,43 @@ class ParallelStep(Straight):
               log: On my way
     """
 
-    branches: Branches = field()
-    waits_for_all: bool
+    names: tuple[str, ...] = branches()
+    ends_with: ScalarNode | None = branch("The branch whose result is the result; failures of others do not count.")
+    succeed_when: Expression | str = count(
+        *(ALL, ANY), help="How many branches must succeed: `all`, `any` or a number.", optional=True, default=ALL
+    )
+    fail_when: Expression | str = count(
+        *(ANY, ALL),
+        help="How many branches must fail for the whole to fail: `any`, `all` or a number.",
+        optional=True,
+        default=ANY,
+    )
+    wait_for_all: bool = flag("Whether it waits for all branches to end, even when the result is decided.")
+    outcomes: tuple[OutcomeRule, ...] = kept(
+        Takes.OUTCOMES,
+        read_outcomes,
+        "a map from outcomes to conditions",
+        "Of a state's body: outcome by condition over the results of the branches; the first one wins.",
+        is_required=False,
+        default=(),
+    )
 
     skipped = Skipped.WITH_ALL_INSIDE
     flow = NodeFlow.OPEN
     look = NodeLook("⇉", Form.BESIDE, has_roles=True)
 
-    @classmethod
-    def read(cls, reader: NodeReader) -> Self:
-        """Read the branches, and the options that decide the result."""
-        names = reader.branches()
-        ends_with = reader.branch("ends_with", names) if reader.has("ends_with") else None
-        succeed_when = reader.count_or("succeed_when", (ALL, ANY)) if reader.has("succeed_when") else ALL
-        fail_when = reader.count_or("fail_when", (ANY, ALL)) if reader.has("fail_when") else ANY
-        waits_for_all = reader.flag("wait_for_all") if reader.has("wait_for_all") else False
-        outcomes = read_outcomes(reader, names)
-        name, place = (ends_with.text, ends_with.span) if ends_with else ("", None)
-        return cls(Branches(names, succeed_when, fail_when, name, place, outcomes), waits_for_all)
+    @property
+    def branches(self) -> Branches:
+        """Return what decides how the branches end."""
+        at = self.ends_with
+        name, place = (at.text, at.span) if at else ("", None)
+        return Branches(self.names, self.succeed_when, self.fail_when, name, place, self.outcomes)
 
     @property
     def reads(self) -> frozenset[str]:
         """Return all `$names` that its outcomes read beside its branches."""
-        conditions = (one.condition for one in self.branches.outcomes if one.condition)
-        return frozenset(name.name for one in conditions for name in one.names).difference(self.branches.names)
+        conditions = (one.condition for one in self.outcomes if one.condition)
+        return frozenset(name.name for one in conditions for name in one.names).difference(self.names)
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return the outcomes by conditions, else those of the `ends_with` branch, else the plain ones."""

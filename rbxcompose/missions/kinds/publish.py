@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Self
-
 from rbxcompose.dataclass import dataclass
 from rbxcompose.missions.engine.instant_actions import publish
 from rbxcompose.missions.engine.task import Site, Task
-from rbxcompose.missions.language.node_reader import NodeReader
-from rbxcompose.missions.program.families import Deed
+from rbxcompose.missions.language.fields import contents, message
+from rbxcompose.missions.program.families import Deed, ends
 from rbxcompose.missions.program.messages import MessageTemplate
 from rbxcompose.missions.program.moments import NodeEffects
-from rbxcompose.missions.program.outcomes import ANY, Outcomes
-from rbxcompose.missions.program.program import Endings, MissionNode
+from rbxcompose.missions.program.outcomes import ANY
+from rbxcompose.missions.program.program import MissionNode
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.statuses import SUCCESS
 
@@ -32,7 +30,7 @@ class PublishTask(Task):
         return SUCCESS
 
 
-@kind("publish", PublishTask, {"message": "The fields of the message; a single value stands for the only field."})
+@kind("publish", PublishTask)
 @dataclass(frozen=True, slots=True)
 class PublishStep(Deed):
     """Publish a message on a topic of the robot; missing fields are zero or empty.
@@ -45,16 +43,10 @@ class PublishStep(Deed):
               x: 0.1
     """
 
-    message: MessageTemplate
+    message: MessageTemplate = message("message")
+    body = contents("The fields of the message; a single value stands for the only field.", "message")
 
-    @classmethod
-    def read(cls, reader: NodeReader) -> Self:
-        """Read the topic and `message`."""
-        return cls(reader.message(reader.key, "message"))
-
-    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
-        """Return that it may fail: a value may be missing or not fit."""
-        return ANY
+    may_end = ends(ANY)
 
     def text(self, node: MissionNode) -> str:
         """Return the topic."""

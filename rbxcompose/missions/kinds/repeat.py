@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import Self
 
 from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.evaluate import holds
 from rbxcompose.expressions.tree import Expression, Number
 from rbxcompose.missions.analysis.facts import is_simple, takes_time
 from rbxcompose.missions.engine.task import Site, Task
-from rbxcompose.missions.language.node_reader import NodeReader
-from rbxcompose.missions.program.answers import Advice, Counted, NodeFlow
+from rbxcompose.missions.language.fields import child, count_or_forever, duration, watched
+from rbxcompose.missions.program.answers import Advice, NodeFlow
 from rbxcompose.missions.program.families import Loop
 from rbxcompose.missions.program.look import NodeLook
 from rbxcompose.missions.program.outcomes import ANY, Outcomes
@@ -79,15 +78,7 @@ class RepeatTask(Task):
         return RUNNING
 
 
-@kind(
-    "repeat",
-    RepeatTask,
-    {
-        "do": "What is done in each round.",
-        "until": "A condition that ends the loop; it is evaluated after each round and never cuts one short.",
-        "every": "Time from the start of one round to the start of the next.",
-    },
-)
+@kind("repeat", RepeatTask)
 @dataclass(frozen=True, slots=True)
 class RepeatStep(Loop):
     """Do the body repeatedly. It fails with the first round that fails, and succeeds after the last.
@@ -101,20 +92,17 @@ class RepeatStep(Loop):
             go_to: corner_1
     """
 
-    rounds: Expression | None  # None: for ever
-    until: Expression | None
-    every: Expression | None  # from start to start
+    rounds: Expression | None = count_or_forever(least=1)
+    do = child("What is done in each round.")
+    until: Expression | None = watched(
+        "A condition that ends the loop; it is evaluated after each round and never cuts one short.", optional=True
+    )
+    every: Expression | None = duration(
+        "Time from the start of one round to the start of the next.", optional=True, least=0
+    )
 
     flow = NodeFlow.IN_TURN
     look = NodeLook("↻")
-
-    @classmethod
-    def read(cls, reader: NodeReader) -> Self:
-        """Read the number of rounds, `do`, `until` and `every`."""
-        rounds = reader.count_or_forever(reader.key)
-        reader.child("do")
-        until = reader.watched("until") if reader.has("until") else None
-        return cls(rounds, until, reader.duration("every") if reader.has("every") else None)
 
     @property
     def lasts(self) -> Expression | None:
@@ -143,8 +131,3 @@ class RepeatStep(Loop):
     def waits(self) -> bool:
         """Return whether it waits between its rounds, which takes a period."""
         return takes_time(self.every)
-
-    @property
-    def numbers(self) -> tuple[Counted, ...]:
-        """Return the number of rounds and their period."""
-        return Counted("'repeat'", self.rounds, 1), Counted("'every'", self.every, 0)

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Self
-
 from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.evaluate import evaluate
 from rbxcompose.expressions.tree import Expression
-from rbxcompose.expressions.types import UNKNOWN
 from rbxcompose.missions.analysis.held_nodes import HeldNode
 from rbxcompose.missions.engine.task import Site, Task
-from rbxcompose.missions.language.node_reader import NodeReader
+from rbxcompose.missions.language.fields import value
 from rbxcompose.missions.program.answers import NodeFlow, Skipped
 from rbxcompose.missions.program.families import Straight
 from rbxcompose.missions.program.look import PLAIN
@@ -65,18 +62,11 @@ class RunStep(Straight):
             run: $step
     """
 
-    expression: Expression
+    expression: Expression = value("data that hold a node, such as '$chore'", holds_nodes=True)
 
     skipped = Skipped.PERHAPS
     flow = NodeFlow.OPEN
     look = PLAIN
-
-    @classmethod
-    def read(cls, reader: NodeReader) -> Self:
-        """Read the expression, and the nodes in the data that it may yield."""
-        expression = reader.expression(reader.key, UNKNOWN, "data that hold a node, such as '$chore'")
-        reader.held(expression)
-        return cls(expression)
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return the outcomes of all these nodes; it fails if the data have no node there."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rbxcompose.missions.program.answers import NodeFlow
-from rbxcompose.missions.program.in_turn import OPTIONS, RANDOM, InTurn, InTurnTask
+from rbxcompose.missions.program.in_turn import RANDOM, InTurn, InTurnTask
 from rbxcompose.missions.program.look import NodeLook
 from rbxcompose.missions.program.outcomes import FAILS, SUCCEEDS
 from rbxcompose.missions.program.registry import kind
@@ -18,7 +18,7 @@ class SequenceTask(InTurnTask):
     is_kept_after_failure = True
 
 
-@kind("sequence", SequenceTask, OPTIONS)
+@kind("sequence", SequenceTask)
 class SequenceStep(InTurn):
     """Do the nodes of a list in order, until one fails.
 

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Self
-
 from rbxcompose.dataclass import dataclass
 from rbxcompose.missions.analysis.facts import is_sure
 from rbxcompose.missions.engine.instant_actions import assign
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.asked import Assignment
-from rbxcompose.missions.language.node_reader import NodeReader
+from rbxcompose.missions.language.fields import assignments
 from rbxcompose.missions.program.families import Deed
 from rbxcompose.missions.program.moments import NodeEffects
 from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, ANY, Outcomes
@@ -48,12 +46,7 @@ class SetStep(Deed):
           - log: $visited visited
     """
 
-    assignments: tuple[Assignment, ...]
-
-    @classmethod
-    def read(cls, reader: NodeReader) -> Self:
-        """Read the map from names to expressions."""
-        return cls(reader.assignments(reader.key))
+    assignments: tuple[Assignment, ...] = assignments()
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return that it fails only if it cannot read a value."""

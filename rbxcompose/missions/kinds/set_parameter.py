@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import field
-from typing import Self
-
 from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.types import Type, TypeKind
 from rbxcompose.expressions.values import Value
-from rbxcompose.manifest.tree import MappingNode, ScalarNode
+from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.engine.leaf import Leaf
 from rbxcompose.missions.engine.task import Site
 from rbxcompose.missions.language.asked import WrittenArgument
-from rbxcompose.missions.language.node_reader import NodeReader
+from rbxcompose.missions.language.fields import new_name, record, value, word
 from rbxcompose.missions.language.written import getter
-from rbxcompose.missions.program.families import LeafStep
+from rbxcompose.missions.program.families import LeafStep, ends
 from rbxcompose.missions.program.moments import NodeEffects, WrittenSetting
-from rbxcompose.missions.program.outcomes import ANY, Outcomes
-from rbxcompose.missions.program.program import Endings, MissionNode
+from rbxcompose.missions.program.outcomes import ANY
+from rbxcompose.missions.program.program import MissionNode
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.statuses import RUNNING
 
-COMPONENT, PARAMETER, VALUE = KEYS = ("component", "parameter", "value")
 _ENCODED = {  # the number of `rcl_interfaces/ParameterType` and the field of the value, by the type of a setting
     TypeKind.FLAG: (1, "bool_value"),
     TypeKind.COUNT: (2, "integer_value"),
@@ -73,36 +69,33 @@ class SetParameterStep(LeafStep):
           set_parameter: {component: battery, parameter: runtime, value: 30 s}
     """
 
-    setting: WrittenSetting = field()
-    arguments: tuple[WrittenArgument, ...] = field()
+    given: tuple[ScalarNode, ...] = record(
+        "a map with 'component', 'parameter' and 'value'",
+        component=new_name("the name of a component", "The component."),
+        parameter=word("the name of a setting", "One of its settings that may change while it runs."),
+        value=value("a value", "The new value, of the type of the setting."),
+    )
 
     waits = True
     has_result = False
     lasts = None
     only_asks = False
 
-    @classmethod
-    def read(cls, reader: NodeReader) -> Self:
-        """Read the component, the parameter and the value."""
-        shape = "a map with 'component', 'parameter' and 'value'"
-        mapping = reader.map_of(reader.key, shape)
-        inner = reader.inside(mapping or MappingNode(), KEYS, f"'{reader.key}'")
-        empty = ScalarNode("", reader.key_span(reader.key))
-        given = [empty] * len(KEYS)
-        if mapping is not None:
-            words = ("the name of a component", "the name of a setting", "a value")
-            given = [inner.scalar(key, what) or empty for key, what in zip(KEYS, words, strict=True)]
-        component, parameter, value = given
-        return cls(WrittenSetting(component, parameter), (WrittenArgument(VALUE, value, value.span),))
+    @property
+    def setting(self) -> WrittenSetting:
+        """Return the setting."""
+        return WrittenSetting(*self.given[:2])
 
-    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
-        """Return that it may fail: the component may refuse."""
-        return ANY
+    @property
+    def arguments(self) -> tuple[WrittenArgument, ...]:
+        """Return the value."""
+        return (WrittenArgument("value", self.given[2], self.given[2].span),)
+
+    may_end = ends(ANY)
 
     def text(self, node: MissionNode) -> str:
         """Return the setting and its value."""
-        value = self.arguments[0].value
-        return f"{self.setting.path} {value.text if isinstance(value, ScalarNode) else ''}".strip()
+        return f"{self.setting.path} {self.given[2].text}".strip()
 
     @property
     def effects(self) -> NodeEffects:

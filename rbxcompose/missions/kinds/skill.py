@@ -16,7 +16,6 @@ from rbxcompose.missions.language.asked import WrittenArgument
 from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.language.written import Getter, getter
 from rbxcompose.missions.program.families import LeafStep
-from rbxcompose.missions.program.moments import NO_EFFECTS
 from rbxcompose.missions.program.outcomes import ANY, FAILS, SUCCEEDS, Outcomes
 from rbxcompose.missions.program.possible import Possibility, ended
 from rbxcompose.missions.program.program import Endings, MissionNode, RobotNames
@@ -113,7 +112,6 @@ class SkillStep(LeafStep):
     has_result = True
     lasts = None
     only_asks = False
-    effects = NO_EFFECTS
 
     @classmethod
     def read(cls, reader: NodeReader) -> Self:

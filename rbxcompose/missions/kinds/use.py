@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import field
-from typing import Self
-
 from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.evaluate import evaluate
 from rbxcompose.expressions.values import NotArrivedError, Value
@@ -12,11 +9,11 @@ from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.engine.resume_points import LAST
 from rbxcompose.missions.engine.task import Site
 from rbxcompose.missions.language.asked import WrittenArgument
-from rbxcompose.missions.language.node_reader import NodeReader
+from rbxcompose.missions.language.fields import history, inputs, word
 from rbxcompose.missions.language.written import PLACED, getter, place
 from rbxcompose.missions.program.answers import NodeFlow, Skipped
 from rbxcompose.missions.program.families import Straight
-from rbxcompose.missions.program.history import HISTORY, WithHistory, read_history
+from rbxcompose.missions.program.history import WithHistory
 from rbxcompose.missions.program.look import NodeLook
 from rbxcompose.missions.program.outcomes import Outcomes
 from rbxcompose.missions.program.program import Endings, MissionNode, Target
@@ -105,7 +102,7 @@ class UseTask(WithHistory):
         return found
 
 
-@kind("use", UseTask, {"with": "Values for the inputs of the mission.", "history": HISTORY})
+@kind("use", UseTask)
 @dataclass(frozen=True, slots=True)
 class UseStep(Straight):
     """Run another mission of the robot; its outputs can be kept with `save`.
@@ -120,26 +117,14 @@ class UseStep(Straight):
               rounds: 1
     """
 
-    uses: ScalarNode = field()
-    arguments: tuple[WrittenArgument, ...] = field()
-    history: str = field()
+    uses: ScalarNode = word("the name of a mission")
+    arguments: tuple[WrittenArgument, ...] = inputs("Values for the inputs of the mission.")
+    history: str = history()
 
     skipped = Skipped.PERHAPS
     has_result = True
     flow = NodeFlow.OPEN
     look = NodeLook("↗")
-
-    @classmethod
-    def read(cls, reader: NodeReader) -> Self:
-        """Read the name of the mission, `with` and `history`."""
-        name = reader.scalar(reader.key, "the name of a mission") or ScalarNode("", reader.span)
-        given = reader.map_of("with", "a map from inputs to values") if reader.has("with") else None
-        entries = given.entries.items() if given else ()
-        arguments = tuple(WrittenArgument(key, entry.value, entry.key.span) for key, entry in entries)
-        if given is None and reader.has("with"):
-            span = reader.key_span("with")
-            arguments = (WrittenArgument("", ScalarNode("", span), span),)  # what is given could not be read
-        return cls(name, arguments, read_history(reader))
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return the outcomes of the mission."""

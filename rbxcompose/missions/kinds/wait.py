@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import field
-from typing import Self
-
 from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.tree import Expression, Number
 from rbxcompose.missions.engine.task import Site, Task
-from rbxcompose.missions.language.node_reader import NodeReader
-from rbxcompose.missions.program.answers import Counted
+from rbxcompose.missions.language.fields import duration
 from rbxcompose.missions.program.families import LeafStep
-from rbxcompose.missions.program.moments import NO_EFFECTS
 from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, ANY, Outcomes
 from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.registry import kind
@@ -50,23 +45,12 @@ class WaitStep(LeafStep):
           - go_to: corner_1
     """
 
-    lasts: Expression = field()
+    lasts: Expression = duration(least=0, counted="a wait")
 
     waits = True
     has_result = False
     only_asks = False
-    effects = NO_EFFECTS
-
-    @classmethod
-    def read(cls, reader: NodeReader) -> Self:
-        """Read the duration."""
-        return cls(reader.duration(reader.key))
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return that it always succeeds if the duration is a literal."""
         return ALWAYS_SUCCEEDS if isinstance(self.lasts.tree, Number) else ANY
-
-    @property
-    def numbers(self) -> tuple[Counted, ...]:
-        """Return the duration."""
-        return (Counted("a wait", self.lasts, 0),)

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Self
-
 from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.evaluate import holds
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.missions.analysis.facts import is_simple
 from rbxcompose.missions.engine.condition_watches import Watched
 from rbxcompose.missions.engine.task import Site, Task
-from rbxcompose.missions.language.node_reader import NodeReader
+from rbxcompose.missions.language.fields import watched
 from rbxcompose.missions.program.families import LeafStep
-from rbxcompose.missions.program.moments import NO_EFFECTS
 from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, ANY, Outcomes
 from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.registry import kind
@@ -57,18 +54,12 @@ class WaitForStep(LeafStep):
           timeout: 1 min
     """
 
-    condition: Expression
+    condition: Expression = watched()
 
     waits = True
     has_result = False
     lasts = None
     only_asks = True
-    effects = NO_EFFECTS
-
-    @classmethod
-    def read(cls, reader: NodeReader) -> Self:
-        """Read the condition."""
-        return cls(reader.watched(reader.key))
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return that it succeeds; only a condition that cannot be evaluated is a failure."""

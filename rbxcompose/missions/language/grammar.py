@@ -36,7 +36,19 @@ class Takes(StrEnum):
     ITEM_NAME = "item name"
     COUNT = "count"
     FLAG = "flag"
-    OTHER = "other"
+    CONDITION = "condition"
+    WATCHED = "watched condition"
+    DURATION = "duration"
+    VALUE = "value"
+    CHOICE = "choice"
+    TEXT = "text"
+    WORD = "word"
+    NAME = "name"
+    BRANCH = "branch"
+    RECORD = "record"
+    INPUTS = "inputs"
+    OUTCOMES = "outcomes"
+    CONTENTS = "contents"
 
 
 class KeySlot(NamedTuple):

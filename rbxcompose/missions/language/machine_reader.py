@@ -7,11 +7,10 @@ from collections.abc import Mapping
 from rbxcompose.findings import Span
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.engine.resume_points import NO_HISTORY
-from rbxcompose.missions.language.grammar import Takes, is_told
+from rbxcompose.missions.engine.resume_points import HISTORIES
+from rbxcompose.missions.language.grammar import is_told
 from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.language.value_reader import WORDS
-from rbxcompose.missions.program.history import read_history
 from rbxcompose.missions.program.machines import ENDS, MACHINE_KEYS, MachineStates, Next
 from rbxcompose.missions.program.statuses import FAILURE, NAMES, SUCCESS
 
@@ -20,11 +19,11 @@ STATE_KEYS = (*BODIES, "on_enter", "on_exit", "next")
 RESULTS = (NAMES[SUCCESS], NAMES[FAILURE])
 
 
-def read_machine(reader: NodeReader) -> tuple[MachineStates, str]:
+def read_machine(reader: NodeReader, key: str) -> MachineStates:
     """Read the map below `machine`: the start state, the states and ends, and the history."""
-    value = reader.map_of(reader.key, "'start' and 'states' below it", Takes.MACHINE)
+    value = reader.map_of(key, "'start' and 'states' below it")
     if value is None:
-        return MachineStates(), NO_HISTORY
+        return MachineStates()
     inner = reader.inside(value, MACHINE_KEYS, "a machine")
     states = value.get("states")
     names: tuple[str, ...] = ()
@@ -46,8 +45,8 @@ def read_machine(reader: NodeReader) -> tuple[MachineStates, str]:
     start = inner.scalar("start", "the name of a state") if "start" in value else None
     if "start" not in value:
         reader.add(codes.MISSING.at(reader.span, "a machine needs 'start': the state in which it starts"))
-    history = read_history(inner)
-    return MachineStates(start.text if start else "", names, ends, start.span if start else None), history
+    history = inner.choice("history", HISTORIES)
+    return MachineStates(start.text if start else "", names, ends, start.span if start else None, history)
 
 
 def _ends(inner: NodeReader, states: tuple[str, ...]) -> Mapping[str, str]:
@@ -89,7 +88,7 @@ def read_state(reader: NodeReader) -> Next | None:
 
 
 def _next(reader: NodeReader) -> Next | None:
-    value = reader.take("next", Takes.NEXT)
+    value = reader.mapping.get("next")
     if value is None:
         return None
     if is_told(value):

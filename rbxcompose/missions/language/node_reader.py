@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 
 from rbxcompose.expressions.text import Template, parse_template
@@ -12,7 +12,7 @@ from rbxcompose.findings import Span
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions import codes
 from rbxcompose.missions.language.asked import Asked, Assignment, WrittenArgument
-from rbxcompose.missions.language.grammar import Takes, is_told
+from rbxcompose.missions.language.grammar import is_told
 from rbxcompose.missions.language.spans import expression_of
 from rbxcompose.missions.language.value_reader import Nodes, ValueReader, read_expression
 from rbxcompose.missions.program.messages import MessageTemplate, TemplateShape, WrittenValue
@@ -28,9 +28,9 @@ class NodeReader(ValueReader):
         self.children: list[int] = []
         self.item = ""
 
-    def map_of(self, key: str, what: str, takes: Takes = Takes.OTHER) -> MappingNode | None:
+    def map_of(self, key: str, what: str) -> MappingNode | None:
         """Return an option that must be a map with entries; None, with a finding, if it is not."""
-        value = self.take(key, takes)
+        value = self.mapping.get(key)
         if isinstance(value, MappingNode) and value.entries:
             return value
         if not is_told(value):
@@ -58,9 +58,9 @@ class NodeReader(ValueReader):
         """Read the nodes in the data that an expression may yield."""
         self.children.extend(self.nodes.held(expression, self.number, self.span))
 
-    def branches(self) -> tuple[str, ...]:
+    def branches(self, key: str) -> tuple[str, ...]:
         """Read the branches of a parallel, a list or a map, and return the names in a map."""
-        value = self.take(self.key, Takes.BRANCHES)
+        value = self.mapping.get(key)
         if not isinstance(value, MappingNode):
             self._list(value)
             return ()
@@ -69,11 +69,12 @@ class NodeReader(ValueReader):
         for name, entry in value.entries.items():
             self.check_name(entry.key)
             self.child_node(entry.value, name)
-        return tuple(value.entries)
+        self.names = tuple(value.entries)
+        return self.names
 
     def cases(self, key: str) -> tuple[Asked, ...]:
         """Read a map from values to nodes, and return the values in the order of the children."""
-        value = self.map_of(key, "values below it, each with what is done then", Takes.CASES)
+        value = self.map_of(key, "values below it, each with what is done then")
         if value is None:
             return ()
         read = []
@@ -105,7 +106,7 @@ class NodeReader(ValueReader):
 
     def _deeds(self, key: str) -> Deeds:
         what = "an action: 'set', 'log' or 'publish' below it, without a dash"
-        value = self.map_of(key, what, Takes.HOOK)
+        value = self.map_of(key, what)
         if value is None:
             return Deeds()
         inner = self.inside(value, (*DEEDS, *OPTIONS), f"'{key}'")
@@ -142,16 +143,16 @@ class NodeReader(ValueReader):
 
     def child(self, key: str) -> None:
         """Read the node under a key, which is required."""
-        value = self.take(key, Takes.STEP)
+        value = self.mapping.get(key)
         if value is None or (isinstance(value, ScalarNode) and value.plain and not value.text):
             span = self.key_span(key) if value else self.span
             self.nodes.add(codes.MISSING.at(span, f"'{self.key}' needs '{key}': what to do"))
             return
         self.children.append(self.nodes.child(value, key, self.number))
 
-    def steps(self) -> None:
-        """Read the list that is the kind's value."""
-        self._list(self.take(self.key, Takes.STEPS))
+    def steps(self, key: str) -> None:
+        """Read a list of nodes."""
+        self._list(self.mapping.get(key))
 
     def _list(self, value: TreeNode | None) -> None:
         items = value.items if isinstance(value, SequenceNode) else ()
@@ -160,15 +161,16 @@ class NodeReader(ValueReader):
         if value and not items and not is_told(value):
             self.add(codes.MISSING.at(value.span, f"'{self.key}' needs at least one step"))
 
-    def item_name(self) -> None:
+    def item_name(self, key: str) -> str:
         """Read the name under which the nodes below see a loop's item."""
-        scalar = self.scalar(self.key, "a name for the item", Takes.ITEM_NAME)
+        scalar = self.scalar(key, "a name for the item")
         if scalar and self.check_name(scalar):
             self.item = scalar.text
+        return self.item
 
     def items(self, key: str) -> Expression | tuple[Expression, ...]:
         """Read a literal list, or an expression that yields one (for a map: its keys)."""
-        value = self.take(key, Takes.ITEMS)
+        value = self.mapping.get(key)
         if not isinstance(value, SequenceNode):
             expression = self.expression(key, UNKNOWN, "a list")
             self.nodes.loop(self.item, expression)
@@ -183,7 +185,7 @@ class NodeReader(ValueReader):
 
     def assignments(self, key: str) -> tuple[Assignment, ...]:
         """Read a map from names of data to expressions."""
-        value = self.take(key, Takes.ASSIGNMENTS)
+        value = self.mapping.get(key)
         if is_told(value):
             return ()
         if not isinstance(value, MappingNode) or not value.entries:
@@ -198,6 +200,22 @@ class NodeReader(ValueReader):
             read.extend(Assignment(name, entry.key.span, asked) for asked in inner.asked[len(read) :])
         self.asked.extend(replace(asked, is_assigned=True) for asked in inner.asked)
         return tuple(read)
+
+    def inputs(self, key: str) -> tuple[WrittenArgument, ...]:
+        """Read the values for the inputs of another mission."""
+        given = self.map_of(key, "a map from inputs to values")
+        if given is None:
+            span = self.key_span(key)
+            return (WrittenArgument("", ScalarNode("", span), span),)  # what is given could not be read
+        return tuple(WrittenArgument(name, entry.value, entry.key.span) for name, entry in given.entries.items())
+
+    def record(self, key: str, what: str, keys: Mapping[str, str]) -> tuple[ScalarNode, ...]:
+        """Read a map with these keys, each with what it needs; a scalar that is not there has no text."""
+        mapping, empty = self.map_of(key, what), ScalarNode("", self.key_span(key))
+        if mapping is None:
+            return (empty,) * len(keys)
+        inner = self.inside(mapping, keys, f"'{key}'")
+        return tuple(inner.scalar(name, needs) or empty for name, needs in keys.items())
 
     def arguments(self) -> tuple[WrittenArgument, ...]:
         """Read the arguments of a skill: one value, or a map of several."""

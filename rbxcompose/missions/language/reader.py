@@ -15,7 +15,7 @@ from rbxcompose.missions.analysis.held_nodes import ITEM, PathPattern, matching,
 from rbxcompose.missions.analysis.uses import TOO_MUCH
 from rbxcompose.missions.language.asked import Asked
 from rbxcompose.missions.language.budget import MOST_HELD, MOST_WRITTEN, Budget
-from rbxcompose.missions.language.grammar import LEVELS, Takes, long_form
+from rbxcompose.missions.language.grammar import LEVELS, long_form
 from rbxcompose.missions.language.header import read_data, read_inputs, read_rate
 from rbxcompose.missions.language.keys import find_key
 from rbxcompose.missions.language.machine_reader import STATE_KEYS, as_state
@@ -237,8 +237,8 @@ class _Reader:
         is_state = kind is not None and kind.is_inner
         written = reader.mapping.entries.keys()
         for key, cls in modifiers().items():
-            if not written.isdisjoint((key, *cls.keys)) and (is_state or not cls.only_states):
-                read[key] = cls.read(reader, key)
+            if not written.isdisjoint(cls.fields) and (is_state or not cls.only_states):
+                read[key] = cls.read(reader)
         return program.MissionNode(
             number=reader.number,
             step=step,
@@ -320,7 +320,7 @@ class _Reader:
 
     def afterwards(self, reader: NodeReader) -> tuple[str, ScalarNode | None]:
         """Read what follows a reaction: a word, or `restart` with the name of what starts again."""
-        value = reader.take("afterwards", Takes.AFTERWARDS)
+        value = reader.mapping.get("afterwards")
         if not isinstance(value, MappingNode):
             return reader.choice("afterwards", AFTERWARDS), None
         inner = reader.inside(value, (RESTART,), "'afterwards'")

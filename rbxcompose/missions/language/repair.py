@@ -7,6 +7,7 @@ from collections.abc import Collection, Mapping
 from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Report
 from rbxcompose.manifest.tree import Key, MappingNode, ScalarNode, TreeNode, with_children
+from rbxcompose.missions.language.fields import Declared
 from rbxcompose.missions.language.grammar import (
     BELOW,
     EACH,
@@ -18,7 +19,9 @@ from rbxcompose.missions.language.grammar import (
     is_empty,
     long_form,
 )
-from rbxcompose.missions.language.layout import state_slots, step_slots, words
+from rbxcompose.missions.modifiers.registry import modifiers
+from rbxcompose.missions.modifiers.state_hooks import ON_ENTER
+from rbxcompose.missions.program.registry import kinds
 from rbxcompose.missions.slips import slip
 from rbxcompose.slips import repaired
 
@@ -33,7 +36,11 @@ class Repairs:
     @classmethod
     def of(cls, report: Report, skills: Collection[str]) -> Repairs:
         """Return the repairs for a mission of a robot with these skills, as far as they are known."""
-        return cls(report, words(frozenset(skills)))
+        of_kinds = {name: _slots(kind) for name, kind in kinds().items()}
+        found: dict[str, KeySlot] = {"name": KeySlot(Takes.NAME)}
+        for one in modifiers().values():
+            found |= {} if one.only_states else _slots(one)
+        return cls(report, Words(of_kinds, found, frozenset(skills)))
 
     def mission(self, root: MappingNode) -> MappingNode:
         """Return the tree of a mission with its slips repaired."""
@@ -55,7 +62,7 @@ class Repairs:
 
         def below(name: Key, child: TreeNode) -> TreeNode:
             inner = slots.get(str(name)) or slots.get(EACH)
-            if inner is None or inner.takes is Takes.OTHER:
+            if inner is None:
                 return child
             behind = node.entries[str(name)].key if isinstance(node, MappingNode) else key
             return self._node(inner, behind, child, inside)
@@ -65,7 +72,11 @@ class Repairs:
     def _below(self, takes: Takes, node: TreeNode) -> Mapping[str, KeySlot]:
         """Return what a node takes below it, by key."""
         if takes is Takes.STATE:
-            return state_slots()
+            return {**self.words.modifiers, **_slots(modifiers()[ON_ENTER]), **BELOW[Takes.STATE]}
         if takes is Takes.STEP and isinstance(node, MappingNode):
-            return step_slots(self.words.kind_of(node))
+            return {**self.words.modifiers, **self.words.kinds.get(self.words.kind_of(node), {})}
         return BELOW.get(takes, {})
+
+
+def _slots(cls: type[Declared]) -> dict[str, KeySlot]:
+    return {key: one.slot for key, one in cls.fields.items()}

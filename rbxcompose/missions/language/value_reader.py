@@ -15,7 +15,7 @@ from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions import codes
 from rbxcompose.missions.language.asked import Asked
-from rbxcompose.missions.language.grammar import Takes, is_told
+from rbxcompose.missions.language.grammar import is_told
 from rbxcompose.missions.language.names import NAME, no_name
 from rbxcompose.missions.language.spans import expression_of, inner_span
 from rbxcompose.units import NUMBER, TIME
@@ -72,6 +72,7 @@ class ValueReader:
         self.key = key
         self.nodes = nodes
         self.asked: list[Asked] = []
+        self.names: tuple[str, ...] = ()  # of the branches
 
     @property
     def span(self) -> Span:
@@ -87,13 +88,9 @@ class ValueReader:
         entry = self.mapping.entries.get(key)
         return entry.key.span if entry else self.mapping.span
 
-    def take(self, key: str, takes: Takes = Takes.OTHER, choices: tuple[str, ...] = ()) -> TreeNode | None:
-        """Return the value of a key; `takes` and `choices` are what the grammar allows there."""
-        return self.mapping.get(key)
-
-    def scalar(self, key: str, what: str, takes: Takes = Takes.OTHER) -> ScalarNode | None:
+    def scalar(self, key: str, what: str) -> ScalarNode | None:
         """Return an option that must be one word, number or text; None, with a finding, if it is not."""
-        value = self.take(key, takes)
+        value = self.mapping.get(key)
         if is_told(value):
             return None
         if isinstance(value, ScalarNode) and (value.text or not value.plain):
@@ -131,14 +128,14 @@ class ValueReader:
 
     def count_or(self, key: str, words: tuple[str, ...]) -> Expression | str:
         """Read a whole number or one of the words."""
-        value = self.take(key, Takes.COUNT, words)
+        value = self.mapping.get(key)
         if isinstance(value, ScalarNode) and value.text in words:
             return value.text
         return self.expression(key, COUNT, f"a number or {' or '.join(repr(word) for word in words)}")
 
     def flag(self, key: str) -> bool:
         """Read `true` or `false`."""
-        scalar = self.scalar(key, "'true' or 'false'", Takes.FLAG)
+        scalar = self.scalar(key, "'true' or 'false'")
         value = scalar and (plain_value(scalar) if scalar.filled is None else scalar.filled)
         if scalar and not isinstance(value, bool):
             self.add(codes.NOT_A_CHOICE.at(scalar.span, f"'{key}' must be true or false"))
@@ -198,8 +195,9 @@ class ValueReader:
         self.asked.append(Asked(expression, wanted, scalar, is_watched=is_watched))
         return expression
 
-    def branch(self, key: str, branches: tuple[str, ...]) -> ScalarNode | None:
+    def branch(self, key: str) -> ScalarNode | None:
         """Read the name of one of the branches."""
+        branches = self.names
         scalar = self.scalar(key, "the name of a branch")
         if scalar and scalar.text not in branches:
             message = f"there is no branch '{scalar.text}'"

@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import field
+from typing import Self
+
+from rbxcompose.dataclass import dataclass
+from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.program.answers import ModifierScope
 from rbxcompose.missions.program.modifier import Modifier
+from rbxcompose.missions.program.moments import Moments
 from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, Outcomes
 
 
@@ -17,6 +23,20 @@ class Plain(Modifier):
     def changed(self, inner: Outcomes) -> Outcomes:
         """Return the outcomes of the node inside."""
         return inner
+
+
+@dataclass(frozen=True, slots=True)
+class Acting(Plain):
+    """A modifier whose keys are hooks."""
+
+    moments: Moments = field()
+
+    value = None
+
+    @classmethod
+    def read(cls, reader: NodeReader) -> Self:
+        """Read the hooks that are present."""
+        return cls(reader.moments(cls.fields))
 
 
 class Skipping(Modifier):

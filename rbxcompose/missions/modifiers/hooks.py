@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field
-from typing import Self
 
-from rbxcompose.dataclass import dataclass
 from rbxcompose.missions.engine.instant_actions import act, act_safely
 from rbxcompose.missions.engine.task import Site, Task
-from rbxcompose.missions.language.node_reader import NodeReader
-from rbxcompose.missions.modifiers.families import Plain
+from rbxcompose.missions.language.fields import hook
+from rbxcompose.missions.modifiers.families import Acting
 from rbxcompose.missions.modifiers.registry import Decorator, modifier
-from rbxcompose.missions.program.moments import Moments
 from rbxcompose.missions.program.statuses import FAILURE, SUCCESS
 
 ON_START, ON_SUCCESS, ON_FAILURE, ON_HALT = "on_start", "on_success", "on_failure", "on_halt"
@@ -53,17 +49,8 @@ class HooksTask(Decorator):
         return starts_over
 
 
-@modifier(
-    ON_START,
-    HooksTask,
-    {
-        ON_SUCCESS: "What is set, logged or published when the node succeeds.",
-        ON_FAILURE: "What is set, logged or published when the node fails.",
-        ON_HALT: "What is set, logged or published when the node is halted.",
-    },
-)
-@dataclass(frozen=True, slots=True)
-class Hooks(Plain):
+@modifier(ON_START, HooksTask)
+class Hooks(Acting):
     """Act when the node starts or ends: `set`, `log` or `publish`.
 
     They run once per node, not per attempt, and see its result before `optional` and `invert`.
@@ -80,11 +67,7 @@ class Hooks(Plain):
               missed: $missed + 1
     """
 
-    moments: Moments = field()
-
-    value = None
-
-    @classmethod
-    def read(cls, reader: NodeReader, key: str) -> Self:
-        """Read the hooks that are present."""
-        return cls(reader.moments((key, *cls.keys)))
+    on_start = hook()
+    on_success = hook("What is set, logged or published when the node succeeds.")
+    on_failure = hook("What is set, logged or published when the node fails.")
+    on_halt = hook("What is set, logged or published when the node is halted.")

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Self
-
 from rbxcompose.dataclass import dataclass
 from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.engine.task import Site, Task
-from rbxcompose.missions.language.node_reader import NodeReader
+from rbxcompose.missions.language.fields import new_name
 from rbxcompose.missions.modifiers.families import Plain
 from rbxcompose.missions.modifiers.registry import Decorator, modifier
 from rbxcompose.missions.program.statuses import RUNNING
@@ -53,14 +51,9 @@ class Save(Plain):
           - log: $tour.failed could not be reached
     """
 
-    kept_as: ScalarNode
+    kept_as: ScalarNode = new_name("a name for the result")
 
     value = None
-
-    @classmethod
-    def read(cls, reader: NodeReader, key: str) -> Self:
-        """Read the name."""
-        return cls(reader.name(key, "a name for the result"))
 
     @property
     def saved(self) -> ScalarNode | None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import field
 from typing import Self
 
 from rbxcompose.dataclass import dataclass
@@ -13,9 +12,10 @@ from rbxcompose.missions import codes
 from rbxcompose.missions.analysis.facts import takes_time
 from rbxcompose.missions.engine.condition_watches import Watched
 from rbxcompose.missions.engine.task import Site, Task
+from rbxcompose.missions.language.fields import count_or_forever, duration, watched
 from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.modifiers.registry import Decorator, modifier
-from rbxcompose.missions.program.answers import Advice, Counted, ModifierScope
+from rbxcompose.missions.program.answers import Advice, ModifierScope
 from rbxcompose.missions.program.modifier import Modifier
 from rbxcompose.missions.program.outcomes import ALWAYS_FAILS, SUCCEEDS, Outcomes
 from rbxcompose.missions.program.statuses import FAILURE, RUNNING
@@ -71,12 +71,7 @@ class AsLongAs(Cutting):
           as_long_as: $battery > 20 %
     """
 
-    value: Expression = field()
-
-    @classmethod
-    def read(cls, reader: NodeReader, key: str) -> Self:
-        """Read a condition."""
-        return cls(reader.watched(key))
+    value: Expression = watched()
 
 
 class TimeoutTask(Decorator):
@@ -118,22 +113,12 @@ class Timeout(Cutting):
           timeout: 30 s
     """
 
-    value: Expression = field()
-
-    @classmethod
-    def read(cls, reader: NodeReader, key: str) -> Self:
-        """Read a duration."""
-        return cls(reader.duration(key))
+    value: Expression = duration(least=SHORTEST, counted="a timeout")
 
     @property
     def limit(self) -> Expression | None:
         """Return the duration."""
         return self.value
-
-    @property
-    def numbers(self) -> tuple[Counted, ...]:
-        """Return the duration."""
-        return (Counted("a timeout", self.value, SHORTEST),)
 
 
 class AttemptsTask(Decorator):
@@ -185,14 +170,7 @@ class AttemptsTask(Decorator):
         return 0.0 if expression is None else self.number_of(expression, what)
 
 
-@modifier(
-    "attempts",
-    AttemptsTask,
-    {
-        "attempt_timeout": "How long each attempt may take.",
-        "attempt_pause": "The time between an attempt that failed and the next one.",
-    },
-)
+@modifier("attempts", AttemptsTask)
 @dataclass(frozen=True, slots=True)
 class Attempts(Modifier):
     """Retry after a failure, at the next tick or after a pause.
@@ -205,24 +183,23 @@ class Attempts(Modifier):
           attempt_pause: 2 s
     """
 
-    value: Expression | None = field()  # the maximum number; None: for ever
-    timeout: Expression | None = None  # of each attempt
-    pause: Expression | None = None  # between two attempts
+    value: Expression | None = count_or_forever(is_required=False, least=1)
+    timeout: Expression | None = duration("How long each attempt may take.", key="attempt_timeout", optional=True)
+    pause: Expression | None = duration(
+        "The time between an attempt that failed and the next one.", key="attempt_pause", optional=True
+    )
 
     may_skip = False
     repeats = True
 
     @classmethod
-    def read(cls, reader: NodeReader, key: str) -> Self:
-        """Read a count or `forever`, and the other settings of attempts."""
-        timeout, pause = (
-            reader.duration(one) if reader.has(one) else None for one in ("attempt_timeout", "attempt_pause")
-        )
-        if not reader.has(key):
-            one = "attempt_timeout" if timeout else "attempt_pause"
-            reader.add(codes.MISSING.at(reader.key_span(one), f"'{one}' needs 'attempts': how often it is tried"))
-            return cls(None, timeout, pause)
-        return cls(reader.count_or_forever(key), timeout, pause)
+    def read(cls, reader: NodeReader) -> Self:
+        """Read its settings; there must be a number of attempts."""
+        read = cls(**cls.values(reader))
+        if not reader.has(cls.name):
+            key = "attempt_timeout" if read.timeout else "attempt_pause"
+            reader.add(codes.MISSING.at(reader.key_span(key), f"'{key}' needs 'attempts': how often it is tried"))
+        return read
 
     def changed(self, inner: Outcomes) -> Outcomes:
         """Return that endless attempts end in success, unless each has a timeout."""
@@ -248,8 +225,3 @@ class Attempts(Modifier):
     def attempt_limit(self) -> Expression | None:
         """Return the time limit of each attempt."""
         return self.timeout
-
-    @property
-    def numbers(self) -> tuple[Counted, ...]:
-        """Return the number of attempts."""
-        return (Counted("'attempts'", self.value, 1),)

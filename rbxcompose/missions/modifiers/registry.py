@@ -6,7 +6,6 @@ import importlib
 import inspect
 from collections.abc import Callable, Mapping
 from functools import cache
-from types import MappingProxyType
 from typing import TypeVar
 
 from rbxcompose.missions.engine.task import Site, Task
@@ -45,13 +44,10 @@ _DECORATORS: dict[type[Modifier], Callable[[Modifier, Site, Task], Task]] = {}
 def modifier(
     name: str,
     task: Callable[[Site, M, Task], Task],
-    keys: Mapping[str, str] = MappingProxyType({}),
     *,
     only_states: bool = False,
 ) -> Callable[[type[M]], type[M]]:
     """Register a modifier under its key, inside those that its module registered before.
-
-    `keys` are those that it reads besides its own, each with its description.
 
     Raises:
         TypeError: if the modifier does not implement all abstract members.
@@ -66,7 +62,8 @@ def modifier(
                 raise TypeError(f"'{site.node.path}' has no '{name}'")
             return task(site, options, inner)
 
-        cls.name, cls.keys, cls.only_states = name, keys, only_states
+        cls.bind(name)
+        cls.only_states = only_states
         MODIFIERS[name], _DECORATORS[cls] = cls, make
         return cls
 
@@ -91,5 +88,5 @@ def modifiers() -> Mapping[str, type[Modifier]]:
 @cache
 def modifier_keys() -> Mapping[str, type[Modifier]]:
     """Return every key that modifiers of nodes read, with its modifier."""
-    found = ((key, cls) for name, cls in modifiers().items() for key in (name, *cls.keys) if not cls.only_states)
+    found = ((key, cls) for cls in modifiers().values() for key in cls.fields if not cls.only_states)
     return dict(found)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Self
+from typing import ClassVar
 
 from rbxcompose.dataclass import dataclass
 from rbxcompose.missions.engine.task import Site, Task
-from rbxcompose.missions.language.node_reader import NodeReader
+from rbxcompose.missions.language.fields import flag
 from rbxcompose.missions.modifiers.registry import Decorator, modifier
 from rbxcompose.missions.program.answers import ModifierScope
 from rbxcompose.missions.program.modifier import Modifier
@@ -40,16 +40,11 @@ class TurningTask(Decorator):
 class Turning(Modifier):
     """A modifier that replaces results; it may be switched off."""
 
-    is_on: bool
+    is_on: bool = flag()
 
     may_skip = False
     value = None
     turns: ClassVar[dict[int, int]]  # replacements by result
-
-    @classmethod
-    def read(cls, reader: NodeReader, key: str) -> Self:
-        """Read `true` or `false`."""
-        return cls(reader.flag(key))
 
 
 class OptionalTask(TurningTask):

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import field
-from typing import ClassVar, Self
+from typing import ClassVar
 
 from rbxcompose.dataclass import dataclass
 from rbxcompose.expressions.evaluate import holds
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.missions.engine.task import Site, Task
-from rbxcompose.missions.language.node_reader import NodeReader
+from rbxcompose.missions.language.fields import condition, duration, flag
 from rbxcompose.missions.modifiers.families import Skipping
 from rbxcompose.missions.modifiers.registry import Decorator, modifier
 from rbxcompose.missions.program.answers import ModifierScope
@@ -49,14 +48,9 @@ class SkipIfTask(ConditionalTask):
 class Conditional(Skipping):
     """A modifier with a condition."""
 
-    value: Expression = field()
+    value: Expression = condition()
 
     serves = ModifierScope.ALL
-
-    @classmethod
-    def read(cls, reader: NodeReader, key: str) -> Self:
-        """Read a condition."""
-        return cls(reader.condition(key))
 
 
 @modifier("only_if", OnlyIfTask)
@@ -138,14 +132,9 @@ class Once(Skipping):
             - go_to: corner_1
     """
 
-    is_on: bool
+    is_on: bool = flag()
 
     value = None
-
-    @classmethod
-    def read(cls, reader: NodeReader, key: str) -> Self:
-        """Read `true` or `false`."""
-        return cls(reader.flag(key))
 
     @property
     def serves(self) -> ModifierScope:
@@ -185,11 +174,6 @@ class Cooldown(Skipping):
             - go_to: corner_1
     """
 
-    value: Expression = field()
+    value: Expression = duration()
 
     serves = ModifierScope.REPEATED
-
-    @classmethod
-    def read(cls, reader: NodeReader, key: str) -> Self:
-        """Read a duration."""
-        return cls(reader.duration(key))

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import field
-from typing import Self
-
-from rbxcompose.dataclass import dataclass
 from rbxcompose.missions.engine.instant_actions import act, act_safely
 from rbxcompose.missions.engine.task import Site, Task
-from rbxcompose.missions.language.node_reader import NodeReader
-from rbxcompose.missions.modifiers.families import Plain
+from rbxcompose.missions.language.fields import hook
+from rbxcompose.missions.modifiers.families import Acting
 from rbxcompose.missions.modifiers.registry import Decorator, modifier
-from rbxcompose.missions.program.moments import Moments
 from rbxcompose.missions.program.statuses import RUNNING
 
 ON_ENTER, ON_EXIT = "on_enter", "on_exit"
@@ -51,11 +46,8 @@ class EnteringTask(Decorator):
             act_safely(self.moments, ON_EXIT, self)
 
 
-@modifier(
-    ON_ENTER, EnteringTask, {ON_EXIT: "What is set, logged or published when the state is left."}, only_states=True
-)
-@dataclass(frozen=True, slots=True)
-class Entering(Plain):
+@modifier(ON_ENTER, EnteringTask, only_states=True)
+class Entering(Acting):
     """Act when a state is entered and left: `set`, `log` or `publish`.
 
     A state is also left when something inside the mission halts it, and also entered when its history brings the
@@ -77,11 +69,5 @@ class Entering(Plain):
                 failure: failed
     """
 
-    moments: Moments = field()
-
-    value = None
-
-    @classmethod
-    def read(cls, reader: NodeReader, key: str) -> Self:
-        """Read those of the two that are present."""
-        return cls(reader.moments((key, *cls.keys)))
+    on_enter = hook()
+    on_exit = hook("What is set, logged or published when the state is left.")

@@ -101,16 +101,14 @@ class BranchScope(Inner):
         return self._ended[name] if name in self._ended else self.outer.variable(name)
 
 
-def read_outcomes(reader: NodeReader, branches: tuple[str, ...]) -> tuple[OutcomeRule, ...]:
-    """Read the outcomes of a parallel with these branches; `otherwise` comes last and must be there."""
-    if not reader.has("outcomes"):
-        return ()
-    value = reader.map_of("outcomes", "a map from outcomes to conditions")
+def read_outcomes(reader: NodeReader, key: str) -> tuple[OutcomeRule, ...]:
+    """Read the outcomes of a parallel; `otherwise` comes last and must be there."""
+    value = reader.map_of(key, "a map from outcomes to conditions")
     if value is None:
         return ()
-    if not branches:
+    if not reader.names:
         message = "'outcomes' needs branches with names"
-        reader.add(codes.WRONG_SHAPE.at(reader.key_span("outcomes"), message, help="write the branches as a map"))
+        reader.add(codes.WRONG_SHAPE.at(reader.key_span(key), message, help="write the branches as a map"))
     read = []
     for index, (name, entry) in enumerate(value.entries.items()):
         is_last = index + 1 == len(value.entries)

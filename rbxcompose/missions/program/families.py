@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 from rbxcompose.expressions.check import StaticScope
 from rbxcompose.expressions.tree import Expression
@@ -13,7 +14,16 @@ from rbxcompose.missions.program.look import PLAIN, Form, NodeLook
 from rbxcompose.missions.program.moments import NO_EFFECTS, NodeEffects
 from rbxcompose.missions.program.outcomes import Outcomes
 from rbxcompose.missions.program.possible import Possibility, skipped, started
-from rbxcompose.missions.program.program import MissionNode, RobotNames, Step
+from rbxcompose.missions.program.program import Endings, MissionNode, RobotNames, Step
+
+
+def ends(outcomes: Outcomes) -> Any:
+    """Return the `may_end` of a kind that may end in these ways wherever it is written."""
+
+    def may_end(step: Step, node: MissionNode, endings: Endings) -> Outcomes:
+        return outcomes
+
+    return may_end
 
 
 class LeafStep(Step):
@@ -37,6 +47,11 @@ class LeafStep(Step):
     def shows(self, node: MissionNode, scope: StaticScope) -> Mapping[str, Type]:
         """Return nothing: it has no children."""
         return {}
+
+    @property
+    def effects(self) -> NodeEffects:
+        """Return no effects."""
+        return NO_EFFECTS
 
     @property
     @abstractmethod

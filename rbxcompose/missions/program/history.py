@@ -4,16 +4,8 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from rbxcompose.missions.engine.resume_points import DEEP, HISTORIES, NO_HISTORY
+from rbxcompose.missions.engine.resume_points import DEEP, NO_HISTORY
 from rbxcompose.missions.engine.task import Task
-from rbxcompose.missions.language.node_reader import NodeReader
-
-HISTORY = "Where it restarts after it was halted: `last` at the child it was in, `deep` also inside that child."
-
-
-def read_history(reader: NodeReader) -> str:
-    """Read the option; `none` if it is absent."""
-    return reader.choice("history", HISTORIES)
 
 
 class WithHistory(Task):

@@ -2,47 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import field
-from typing import ClassVar, Self
+from typing import ClassVar
 
 from rbxcompose.dataclass import dataclass
 from rbxcompose.missions.engine.condition_watches import Watched
 from rbxcompose.missions.engine.task import Site
-from rbxcompose.missions.language.node_reader import NodeReader
+from rbxcompose.missions.language.fields import children, choice, flag, history
 from rbxcompose.missions.program.answers import Skipped
 from rbxcompose.missions.program.families import Straight
-from rbxcompose.missions.program.history import HISTORY, WithHistory, read_history
+from rbxcompose.missions.program.history import WithHistory
 from rbxcompose.missions.program.outcomes import ALWAYS_FAILS, ALWAYS_SUCCEEDS, FAILS, NEVER, Outcomes
 from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.statuses import FAILURE, IDLE, RUNNING, SKIPPED
 
 WRITTEN, RANDOM = "written", "random"
-OPTIONS: Mapping[str, str] = {
-    "reactive": "Whether earlier conditions (`check`, `wait_for`, lists of only those) are evaluated at each tick.",
-    "history": HISTORY,
-    "order": "The order of the nodes: as `written`, or `random` (a new draw at each start).",
-}
 
 
 @dataclass(frozen=True, slots=True)
 class InTurn(Straight):
     """A list of nodes: the first that ends with the result `decides` ends the list with it."""
 
-    reactive: bool
-    history: str = field()
-    order: str = field()
+    nodes = children()
+    reactive: bool = flag(
+        "Whether earlier conditions (`check`, `wait_for`, lists of only those) are evaluated at each tick."
+    )
+    history: str = history()
+    order: str = choice(
+        WRITTEN, RANDOM, help="The order of the nodes: as `written`, or `random` (a new draw at each start)."
+    )
 
     only_asks = True
     skipped = Skipped.WITH_ALL_INSIDE
     decides: ClassVar[str]
-
-    @classmethod
-    def read(cls, reader: NodeReader) -> Self:
-        """Read the list and its options."""
-        reader.steps()
-        reactive = reader.flag("reactive") if reader.has("reactive") else False
-        return cls(reactive, read_history(reader), reader.choice("order", (WRITTEN, RANDOM)))
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return the deciding outcomes of every child, and all outcomes of the last one that is reached."""

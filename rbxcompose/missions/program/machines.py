@@ -7,6 +7,7 @@ from dataclasses import field
 
 from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Span
+from rbxcompose.missions.engine.resume_points import NO_HISTORY
 from rbxcompose.missions.program.statuses import FAILURE, NAMES, SUCCESS
 
 FINISHED, FAILED = "finished", "failed"
@@ -32,3 +33,4 @@ class MachineStates:
     names: tuple[str, ...] = ()
     ends: Mapping[str, str] = field(default_factory=dict)
     start_span: Span | None = None
+    history: str = NO_HISTORY

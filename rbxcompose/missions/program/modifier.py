@@ -3,29 +3,21 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from typing import ClassVar, Self
+from typing import ClassVar
 
 from rbxcompose.expressions.tree import Expression
 from rbxcompose.manifest.tree import ScalarNode
-from rbxcompose.missions.language.node_reader import NodeReader
-from rbxcompose.missions.program.answers import Advice, Counted, ModifierScope
+from rbxcompose.missions.language.fields import Declared
+from rbxcompose.missions.program.answers import Advice, ModifierScope
 from rbxcompose.missions.program.moments import Moments
 from rbxcompose.missions.program.outcomes import Outcomes
 
 
-class Modifier(ABC):
+class Modifier(Declared, ABC):
     """A setting of a node, with its options; only some modifiers override what is not abstract."""
 
     __slots__ = ()
-    name: ClassVar[str]
-    keys: ClassVar[Mapping[str, str]]  # keys besides its own, each with its purpose
     only_states: ClassVar[bool]  # it is for states of machines only
-
-    @classmethod
-    @abstractmethod
-    def read(cls, reader: NodeReader, key: str) -> Self:
-        """Read the modifier's value."""
 
     @abstractmethod
     def changed(self, inner: Outcomes) -> Outcomes:
@@ -60,11 +52,6 @@ class Modifier(ABC):
     def endless(self) -> Advice | None:
         """Return the advice to give if the node inside takes no time."""
         return None
-
-    @property
-    def numbers(self) -> tuple[Counted, ...]:
-        """Return its numbers, each with the least value that makes sense."""
-        return ()
 
     @property
     def limit(self) -> Expression | None:

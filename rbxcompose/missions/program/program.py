@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import field
 from functools import cached_property
-from typing import ClassVar, Protocol, Self
+from typing import ClassVar, Protocol
 
 from rbxcompose.config import Place
 from rbxcompose.dataclass import dataclass
@@ -19,8 +19,8 @@ from rbxcompose.findings import Span
 from rbxcompose.manifest.tree import MappingNode, ScalarNode
 from rbxcompose.missions.engine.resume_points import NO_HISTORY
 from rbxcompose.missions.language.asked import Asked, WrittenArgument
-from rbxcompose.missions.language.node_reader import NodeReader
-from rbxcompose.missions.program.answers import Advice, Counted, NodeFlow, Skipped
+from rbxcompose.missions.language.fields import Declared
+from rbxcompose.missions.program.answers import Advice, NodeFlow, Skipped
 from rbxcompose.missions.program.branches import BranchChoice, Branches
 from rbxcompose.missions.program.data import Datum, Input
 from rbxcompose.missions.program.look import NodeLook
@@ -105,7 +105,7 @@ class Endings(Protocol):
         ...
 
 
-class Step(ABC):
+class Step(Declared, ABC):
     """What a node does: a kind of the language with its options, which are the fields of the subclass.
 
     Every kind answers what is abstract, itself or through its family (`families.py`). The rest are capabilities: a
@@ -113,15 +113,8 @@ class Step(ABC):
     """
 
     __slots__ = ()
-    name: ClassVar[str]  # the word of the language
-    options: ClassVar[Mapping[str, str]]  # the keys that belong to it, each with its purpose
     is_inner: ClassVar[bool]  # it occurs only inside another one, like a state in a machine: it has no word
     result_names: ClassVar[tuple[str, ...]] = ()  # entries of its result, if these are always the same
-
-    @classmethod
-    @abstractmethod
-    def read(cls, reader: NodeReader) -> Self:
-        """Read the kind's value and options."""
 
     @abstractmethod
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
@@ -219,11 +212,6 @@ class Step(ABC):
     def lasts(self) -> Expression | None:
         """Return the time that it takes; of a loop, that from the start of one round to the start of the next."""
         return None
-
-    @property
-    def numbers(self) -> tuple[Counted, ...]:
-        """Return its numbers, each with the least value that makes sense."""
-        return ()
 
     @property
     def history(self) -> str:

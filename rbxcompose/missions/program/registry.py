@@ -5,9 +5,8 @@ from __future__ import annotations
 import importlib
 import inspect
 import pkgutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import cache
-from types import MappingProxyType
 from typing import TypeAlias, TypeVar
 
 from rbxcompose.missions import kinds as package
@@ -24,13 +23,12 @@ _TASKS: dict[StepType, Callable[[Site], Task]] = {}
 def kind(
     name: str,
     task: Callable[[Site, S], Task],
-    options: Mapping[str, str] = MappingProxyType({}),
     *,
     is_inner: bool = False,
 ) -> Callable[[type[S]], type[S]]:
     """Register a kind under its word, with the task that runs it.
 
-    `options` has a sentence on each of its keys. A kind that `is_inner` has no word in the language.
+    A kind that `is_inner` has no word in the language.
 
     Raises:
         TypeError: if the kind does not answer everything that every kind must.
@@ -45,7 +43,8 @@ def kind(
                 raise TypeError(f"'{site.node.path}' is no '{name}'")
             return task(site, site.node.step)
 
-        cls.name, cls.options, cls.is_inner = name, options, is_inner
+        cls.bind(name)
+        cls.is_inner = is_inner
         KINDS[name], _TASKS[cls] = cls, make
         _look_again()
         return cls

@@ -52,8 +52,3 @@ def test_what_is_said_of_a_mistake_is_its_golden_text(
 def test_every_golden_mission_belongs_to_a_kind_and_every_rule_has_one() -> None:
     assert {path.stem for path in (HERE / "golden").glob("*.*")} == set(CODES)
     assert {rule.code for rule in mission_checks()} <= set(CODES)
-
-
-def test_a_rule_is_named_like_its_file() -> None:
-    for rule in mission_checks():
-        assert rule.find.__module__ == f"rbxcompose.missions.checks.{rule.find.__name__}"

@@ -1,0 +1,166 @@
+"""Loops: their lists, their items, and whether they take time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from rbxcompose.expressions.check import check
+from rbxcompose.expressions.tree import Expression, ExpressionNode, FieldAccess, Text, Variable, Word
+from rbxcompose.expressions.types import Type, TypeKind
+from rbxcompose.expressions.values import Value
+from rbxcompose.findings import Finding, Related, Severity, suggest
+from rbxcompose.manifest.tree import ScalarNode
+from rbxcompose.missions.analysis.check_runner import mission_check
+from rbxcompose.missions.analysis.effects import replaced
+from rbxcompose.missions.analysis.examined import Examined
+from rbxcompose.missions.analysis.facts import Constants, constants_of
+from rbxcompose.missions.analysis.scope_types import View
+from rbxcompose.missions.engine.condition_watches import POSE
+from rbxcompose.missions.program.program import MissionNode, Program
+from rbxcompose.references import PLACE
+from rbxcompose.rules import OWN
+
+_MAY_BE = (TypeKind.PLACE, TypeKind.POSE, TypeKind.TEXT, TypeKind.UNKNOWN)  # a text may name a place
+
+
+@mission_check("RBX4182")
+def nearest_of_no_places(mission: Examined) -> Iterator[Finding]:
+    """A loop takes the nearest item first, and an item is no place."""
+    for view in mission.views:
+        items = view.node.step.items
+        if items is None or POSE not in view.node.step.reads:
+            continue
+        listed = (items,) if isinstance(items, Expression) else items
+        for item, asked in zip(listed, view.node.asked, strict=False):
+            found, _ = check(item, view.scope)
+            if isinstance(items, Expression):
+                yield from _in_list(view, items, found)
+            elif found.kind not in _MAY_BE:
+                yield nearest_of_no_places.at(asked.scalar.span, f"{_ASKED}, and this is {found.phrase}", help=_HELP)
+            elif isinstance(item.tree, Text) and not _is_place(view, item.tree.value):
+                message, help_text = _told(view, item.tree.value)
+                yield nearest_of_no_places.at(asked.scalar.span, message, help=help_text)
+
+
+_ASKED = "'order: nearest' needs places"
+_HELP = "write 'order: written', or a list of places"
+
+
+def _in_list(view: View, items: Expression, found: Type) -> Iterator[Finding]:
+    """Yield the finding on a list that an expression gives: by its type, or by what is known of it."""
+    span, data = view.node.asked[0].scalar.span, view.program.data
+    if found.kind is TypeKind.LIST and found.entry.kind not in _MAY_BE:
+        yield nearest_of_no_places.at(span, f"{_ASKED}, and each item is {found.entry.phrase}", help=_HELP)
+    elif isinstance(items.tree, Variable) and (name := items.tree.name) in data.keys() - replaced(view.program):
+        value: Value = data[name].value
+        words = [one for one in value if isinstance(one, str)] if isinstance(value, list | tuple | Mapping) else []
+        for word in words:
+            if not _is_place(view, word):
+                message, help_text = _told(view, word)
+                related = [Related(data[name].span, "its items")]
+                yield nearest_of_no_places.at(span, message, help=help_text, related=related)
+                return
+
+
+def _is_place(view: View, word: str) -> bool:
+    return word in view.robot.places or view.robot.may_have(PLACE, word)
+
+
+def _told(view: View, word: str) -> tuple[str, str]:
+    help_text = suggest(word, view.robot.places, "places")
+    return f"{_ASKED}, and '{word}' is none", f"{_HELP}; {help_text}".removesuffix("; ")
+
+
+@mission_check("RBX4107", Severity.WARNING, closed=(OWN,))
+def never_waits(mission: Examined) -> Iterator[Finding]:
+    """An endless loop never waits."""
+    for view in mission.views:
+        node = view.node
+        if view.waits:
+            continue
+        ends = mission.ending.of(node.number)
+        for advice in (node.step.endless(ends), *(one.endless for one in node.modifiers.values())):
+            if advice:
+                yield never_waits.at(node.span, advice.message, help=advice.help)
+
+
+@mission_check("RBX4183", Severity.WARNING, closed=())
+def nothing_to_go_over(mission: Examined) -> Iterator[Finding]:
+    """A loop goes over a list that is always empty."""
+    program, changed = mission.program, replaced(mission.program)
+    for node in program.nodes:
+        items = node.step.items
+        if isinstance(items, tuple) and not items and not node.asked:
+            yield nothing_to_go_over.at(node.span, "its list is empty: nothing in it is ever done", help=_LIST_HELP)
+        if items is None or isinstance(items, tuple):
+            continue
+        name, value = _start(items.tree, {key: one.value for key, one in program.data.items() if key not in changed})
+        if isinstance(value, list | tuple | Mapping) and not value:
+            yield nothing_to_go_over.at(
+                node.asked[0].scalar.span,
+                f"'{items.text}' is empty, and no step of this mission fills it: nothing in this loop is ever done",
+                help=f"write its items under 'data', or 'set: {{{name}: ...}}' in a step before it",
+                related=[Related(program.data[name].span, "its only value")],
+            )
+
+
+_LIST_HELP = "write its items after 'in', such as 'in: [corner_1, corner_2]'"
+
+
+def _start(tree: ExpressionNode, data: Mapping[str, Value]) -> tuple[str, Value]:
+    """Return the datum that an expression reads and what the part of it is at the start; None if it is not known."""
+    match tree:
+        case Variable(name=name):
+            return name, data.get(name)
+        case FieldAccess(of=of, name=entry):
+            name, whole = _start(of, data)
+            return name, whole.get(entry) if isinstance(whole, Mapping) else None
+    return "", None
+
+
+@mission_check("RBX4137")
+def nothing_to_shorten(mission: Examined) -> Iterator[Finding]:
+    """`remove_done` without a list in the data."""
+    for node in mission.program.nodes:
+        shortened = node.step.effects.shortened
+        items = node.step.items
+        is_read = isinstance(items, tuple) or (items is not None and items.text)
+        if shortened is not None and shortened not in mission.program.data and is_read and not mission.program.is_open:
+            help_text = "write the list under 'data', and its name after 'in'"
+            span = node.asked[0].scalar.span if node.asked else node.span
+            yield nothing_to_shorten.at(span, "'remove_done' needs an 'in' that names data", help=help_text)
+
+
+@mission_check("RBX4187", Severity.WARNING, closed=(OWN,))
+def unread_item(mission: Examined) -> Iterator[Finding]:
+    """A loop never reads its item."""
+    program = mission.program
+    known = constants_of(program, {})
+    for node in program.nodes:
+        if node.step.items is None or node.item in program.reads:
+            continue
+        items = _words(node, known)
+        for scalar in _written(program, node):
+            if scalar.text in items:
+                yield unread_item.at(
+                    scalar.span,
+                    f"each round takes '{scalar.text}': nothing in this loop reads '${node.item}'",
+                    help=f"write '${node.item}'",
+                    related=[Related(node.span, "the loop")],
+                )
+                break
+
+
+def _words(node: MissionNode, known: Constants) -> set[str]:
+    """Return the items of a loop that are words, as far as the text shows them."""
+    items = node.step.items
+    if isinstance(items, Expression):
+        listed = known.get(items.tree.name) if isinstance(items.tree, Variable) else None
+        return {one for one in listed if isinstance(one, str)} if isinstance(listed, list | tuple) else set()
+    return {one.tree.name for one in items or () if isinstance(one.tree, Word)}
+
+
+def _written(program: Program, loop: MissionNode) -> Iterator[ScalarNode]:
+    """Yield the values that steps inside of a loop give to skills and missions."""
+    for node in program.nodes[loop.number + 1 : loop.end]:
+        yield from (one.value for one in node.step.arguments if isinstance(one.value, ScalarNode))
