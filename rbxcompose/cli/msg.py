@@ -15,8 +15,7 @@ from rbxcompose.cli.output.console import refuse, tell
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.msgs.definitions import Structures
 from rbxcompose.msgs.hashes import type_hash
-from rbxcompose.msgs.joined import short
-from rbxcompose.msgs.packages import OWN, all_names, package_files, parts_of, whole_text
+from rbxcompose.msgs.packages import OWN, all_names, package_files, parts_of, short, whole_text
 from rbxcompose.scaffold.new_files import write_new
 
 LICENCE = "Apache-2.0"

@@ -1,15 +1,16 @@
-"""Interface texts for export: one with all messages inside it, or a package for a ROS 2 workspace."""
+"""Interface texts for export: one with all messages inside it, as in MCAP, or a package for a ROS 2 workspace."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
-from rbxcompose.msgs.definitions import INTERFACES, KINDS, interface_names, read
-from rbxcompose.msgs.joined import joined, parts
+from rbxcompose.msgs.definitions import INTERFACES, KINDS, FieldType, interface_names, read
 
 OWN = "rbxcompose_msgs"
 """The package that no ROS 2 installation has."""
 
+_SEPARATOR = "=" * 80
 _XML = """<?xml version="1.0"?>
 <package format="3">
   <name>{package}</name>
@@ -72,6 +73,33 @@ def package_files(package: str, version: str, licence: str) -> dict[str, str]:
         "package.xml": _XML.format(package=package, version=version, licence=licence, depends=tags),
         "CMakeLists.txt": _CMAKE.format(package=package, finds=finds, files="".join(lines)),
     }
+
+
+def parts(name: str, types_of: Callable[[str], Iterable[FieldType]]) -> list[str]:
+    """Return the names of all messages inside an interface, each once, containers first.
+
+    `types_of` maps the name of an interface to the types of its fields.
+    """
+    found: dict[str, None] = {}
+    left = [name]
+    while left:
+        fresh = dict.fromkeys(type_.base for type_ in types_of(left.pop(0)) if type_.is_message)
+        new = [one for one in fresh if one not in found]
+        found.update(dict.fromkeys(new))
+        left += new
+    return list(found)
+
+
+def joined(name: str, made_of: Iterable[str], text_of: Callable[[str], str]) -> str:
+    """Return the text of an interface and those of all messages inside it, each below a line of `=`."""
+    texts = [f"{_SEPARATOR}\nMSG: {short(one)}\n{text_of(one)}" for one in made_of]
+    return "".join([text_of(name), *texts])
+
+
+def short(name: str) -> str:
+    """Return `geometry_msgs/Twist` for `geometry_msgs/msg/Twist`."""
+    package, _, bare = name.split("/")
+    return f"{package}/{bare}"
 
 
 def _path(root: Path, name: str) -> Path:

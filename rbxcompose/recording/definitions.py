@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.definitions import INTERFACES, FieldType, parse_type
-from rbxcompose.msgs.joined import joined, parts, short
+from rbxcompose.msgs.packages import joined, parts, short
 
 
 def definition_of(name: str) -> str:
