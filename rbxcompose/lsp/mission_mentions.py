@@ -18,6 +18,8 @@ from rbxcompose.lsp.project_files import NO_MEANING, Meanings, ProjectFiles
 from rbxcompose.lsp.symbols import BRANCH, INTERRUPT, ITEM, NODE, STATE, VARIABLE, Mention, Symbol
 from rbxcompose.manifest.tree import KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode, at
 from rbxcompose.missions.language.asked import Asked, WrittenArgument
+from rbxcompose.missions.language.grammar import Takes
+from rbxcompose.missions.language.keys import keys_taking
 from rbxcompose.missions.language.machine_reader import STATE_KEYS
 from rbxcompose.missions.language.reader import BODIES, INTERRUPT_KEYS, read_program
 from rbxcompose.missions.modifiers.registry import modifier_keys
@@ -28,7 +30,7 @@ from rbxcompose.missions.program.registry import kinds
 from rbxcompose.references import CONTROLLER, JOINT, MISSION, PLACE, VALUE
 
 Skills = Mapping[str, Skill]
-_NAMED = ("parallel", "cases", "states", "interrupts")  # keys whose keys are names chosen by people
+_NAMED = (Takes.BRANCHES, Takes.CASES, Takes.STATES, Takes.INTERRUPTS)  # maps whose keys people choose
 _PLAIN = ("message", "set", "with", "publish", "call", "inputs")  # keys whose values are no steps
 _WORDS = (TypeKind.CHOICE, TypeKind.TEXT)  # types whose bare words are no places
 
@@ -113,7 +115,7 @@ class MissionMentions:
                 yield self._mention(value, Symbol(self.path, ITEM, value.text, around.path), is_definition=True)
             elif key == "machine":
                 yield from self._machine(value, inner)
-            elif key in _NAMED and isinstance(value, MappingNode):
+            elif key in keys_taking(*_NAMED) and isinstance(value, MappingNode):
                 yield from self._keys(value, BRANCH, around.path) if key == "parallel" else ()
                 yield from self._walk_named(value, inner)
             elif key in _step_words() or key in _PLAIN:

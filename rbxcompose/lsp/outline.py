@@ -10,14 +10,14 @@ from rbxcompose.lsp.project import MISSION, kind_of
 from rbxcompose.lsp.quick import quick_tree
 from rbxcompose.manifest.header import ManifestHeader
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
+from rbxcompose.missions.language.grammar import Takes
+from rbxcompose.missions.language.keys import keys_taking
 from rbxcompose.missions.modifiers.registry import modifier_keys
 from rbxcompose.missions.program.registry import kinds
 
 DEEPEST = 12  # levels of steps that an editor shows
 _DETAIL = 60  # characters of a value
 _BODIES = ("do", "machine", "interrupts")
-_HOLDING = ("do", "then", "else")  # keys with a step
-_LISTS = ("sequence", "fallback", "parallel")  # keys with a list of steps
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,19 +59,19 @@ def _of_body(key: str, node: TreeNode, level: int) -> Iterator[OutlineEntry]:
     """Yield what stands below a key of a mission: steps, or names with steps."""
     if level > DEEPEST:
         return
-    if isinstance(node, SequenceNode) and key in (*_HOLDING, *_LISTS):
+    if isinstance(node, SequenceNode) and key in keys_taking(Takes.STEP, Takes.STEPS, Takes.BRANCHES):
         for item in node.items:
             yield from _step(item, level)
-    elif isinstance(node, MappingNode) and key in ("states", "interrupts"):
+    elif isinstance(node, MappingNode) and key in keys_taking(Takes.STATES, Takes.INTERRUPTS):
         for entry in node.entries.values():
             yield _made(entry, "state", tuple(_inside(entry.value, level)))
-    elif isinstance(node, MappingNode) and key in ("parallel", "cases"):
+    elif isinstance(node, MappingNode) and key in keys_taking(Takes.BRANCHES, Takes.CASES):
         for entry in node.entries.values():
             yield _made(entry, "state", tuple(_step(entry.value, level + 1)))
     elif isinstance(node, MappingNode) and key == "machine":
         for name, entry in node.entries.items():
             yield from _of_body(name, entry.value, level)
-    elif key in _HOLDING:
+    elif key in keys_taking(Takes.STEP):
         yield from _step(node, level)
 
 

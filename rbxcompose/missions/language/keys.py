@@ -6,7 +6,7 @@ from functools import cache
 
 from rbxcompose.manifest.tree import MappingNode, ScalarNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.grammar import is_told
+from rbxcompose.missions.language.grammar import BELOW, Takes, is_told
 from rbxcompose.missions.language.value_reader import Nodes
 from rbxcompose.missions.modifiers.registry import modifier_keys
 from rbxcompose.missions.program.registry import StepType, kinds
@@ -16,6 +16,14 @@ from rbxcompose.missions.program.registry import StepType, kinds
 def anywhere() -> tuple[str, ...]:
     """Return the keys that any node may have."""
     return ("name", *modifier_keys())
+
+
+@cache
+def keys_taking(*taken: Takes) -> frozenset[str]:
+    """Return the keys of steps, states, machines and interrupts that take one of these."""
+    of_kinds = (field for kind in kinds().values() for field in kind.fields.values())
+    below = ((key, slot.takes) for slots in BELOW.values() for key, slot in slots.items())
+    return frozenset(key for key, takes in (*below, *((one.key, one.takes) for one in of_kinds)) if takes in taken)
 
 
 def _cure(step: MappingNode) -> str:

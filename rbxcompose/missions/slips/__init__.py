@@ -1,4 +1,4 @@
-"""The slips of missions, by what they repair: what is written at a place of the grammar, what to say, and how to read it."""
+"""The slips of missions, a module for each subject: what is written, what to say, and what to read instead.
 
 Each is a function of a `GrammarPlace` and the node there, under `@slip(PLACES)`; it returns None if there is no slip.
 """
