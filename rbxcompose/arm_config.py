@@ -13,8 +13,7 @@ from pydantic import Field
 
 from rbxcompose.body.description import Description
 from rbxcompose.body.link_pairs import LinkPair
-from rbxcompose.body.urdf import read_body
-from rbxcompose.body.xml_reader import XmlElement, read_urdf
+from rbxcompose.body.urdf import body_of
 from rbxcompose.config import Config
 from rbxcompose.control.limits import MotionLimits
 from rbxcompose.geometry import Vector3
@@ -159,10 +158,7 @@ def space_of(config: ArmConfig) -> JointSpace:
 
 def description_of(config: ArmConfig) -> Description:
     """Return the body that an arm is part of; the plan has only what could be read."""
-    root = read_urdf(config.urdf, "urdf")
-    if not isinstance(root, XmlElement):
-        raise ValueError(root.message)
-    return Description(config.urdf, read_body(root)[0], {name: Path(path) for name, path in config.meshes.items()})
+    return Description(config.urdf, body_of(config.urdf), {name: Path(path) for name, path in config.meshes.items()})
 
 
 def mesh_bytes(config: ArmConfig) -> int:

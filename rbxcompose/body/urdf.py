@@ -9,12 +9,12 @@ import math
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import field
-from functools import partial
+from functools import lru_cache, partial
 from typing import TypeVar
 
 from rbxcompose.body.model import KINDS, Body, BodyJoint, BodyLink, Geometry, Inertial, JointLimits, Mimic, Shape
 from rbxcompose.body.tree_rules import tree_mistakes
-from rbxcompose.body.xml_reader import XmlElement
+from rbxcompose.body.xml_reader import XmlElement, read_urdf
 from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Related, kind
 from rbxcompose.geometry import Transform3, quaternion_from_rpy
@@ -37,6 +37,19 @@ def read_body(root: XmlElement) -> tuple[Body, list[Finding]]:
     reader = _BodyReader()
     body = reader.body(root)
     return body, reader.findings or list(tree_mistakes(body, root.span))
+
+
+@lru_cache(maxsize=4)  # components are asked for their ports many times, which follow from the body
+def body_of(urdf: str) -> Body:
+    """Return the body that a URDF of a plan describes.
+
+    Raises:
+        ValueError: if it is not XML.
+    """
+    root = read_urdf(urdf, "urdf")
+    if not isinstance(root, XmlElement):
+        raise ValueError(root.message)
+    return read_body(root)[0]
 
 
 class _MistakeError(Exception):

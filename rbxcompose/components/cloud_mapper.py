@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from rbxcompose.body.model import Geometry
-from rbxcompose.body.urdf import read_body
-from rbxcompose.body.xml_reader import XmlElement, read_urdf
+from rbxcompose.body.urdf import body_of
 from rbxcompose.diagnostics.updater import TaskStatus
 from rbxcompose.geometry import Transform3, rotate
 from rbxcompose.motion.cloud_points import CloudError, points_of
@@ -98,7 +97,7 @@ class CloudMapper(Component[CloudMapperConfig]):
     @classmethod
     def ports(cls, config: CloudMapperConfig) -> dict[str, Port[Any]]:
         """Return the ports: clouds, the octree, and a look at each frame outside of the body."""
-        root = read_body(_urdf(config.urdf))[0].root
+        root = body_of(config.urdf).root
         clouds = In(
             PointCloud2, config.topic, qos="bulk", is_open=True, max_rate=max(1.0, 2 * config.rate), max_size=LARGEST
         )
@@ -115,7 +114,7 @@ class CloudMapper(Component[CloudMapperConfig]):
     def configure(self) -> None:
         """Measure the body."""
         config = self.config
-        self.body = read_body(_urdf(config.urdf))[0]
+        self.body = body_of(config.urdf)
         self.filter = SpaceFilter(self.body, {name: Path(path) for name, path in config.meshes.items()})
         self.seen = SeenCells(config.cell, config.forget)
         self.joints: deque[tuple[int, dict[str, float]]] = deque(maxlen=KNOWN)  # with stamps [ns]
@@ -228,15 +227,8 @@ class CloudMapper(Component[CloudMapperConfig]):
         self.bound["cells"](SceneObjects(objects=(one,)))
 
 
-def _urdf(text: str) -> XmlElement:
-    root = read_urdf(text, "urdf")
-    if not isinstance(root, XmlElement):
-        raise ValueError(root.message)
-    return root
-
-
 def _outside(config: CloudMapperConfig) -> tuple[str, ...]:
-    links = read_body(_urdf(config.urdf))[0].links
+    links = body_of(config.urdf).links
     return tuple(one for one in dict.fromkeys((*config.frames, config.frame)) if one and one not in links)
 
 

@@ -10,9 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from rbxcompose.arm_config import ArmJointConfig
-from rbxcompose.body.model import Body
-from rbxcompose.body.urdf import read_body
-from rbxcompose.body.xml_reader import XmlElement, read_urdf
+from rbxcompose.body.urdf import body_of
 from rbxcompose.config import Config
 from rbxcompose.control.limits import MotionLimits
 from rbxcompose.dataclass import dataclass
@@ -126,13 +124,13 @@ class Head(Component[HeadConfig]):
             topic = f"{config.name}/target"
             found[TARGET] = In(PointStamped, topic, qos="command", is_open=True, may_be_silent=True).named(TARGET)
             found[STREAM] = Out(JointTrajectory, config.stream).named(STREAM)
-        root = _body_of(config).root
+        root = body_of(config.urdf).root
         looks = {_look(frame): Looks(source=frame, target=root).named(_look(frame)) for frame in config.frames}
         return super().ports(config) | found | looks
 
     def configure(self) -> None:
         """Read the body."""
-        self.body = _body_of(self.config)
+        self.body = body_of(self.config.urdf)
         limits = {name: MotionLimits(one.lower, one.upper) for name, one in self.config.joints.items()}
         self.gaze = Gaze(self.body, self.config.camera, limits)
         self.positions: dict[str, float] = {}
@@ -286,13 +284,6 @@ def trajectory(aim: Aiming, duration: float) -> JointTrajectory:
     positions = np.array([*aim.positions.values()])
     point = JointTrajectoryPoint(positions=positions, time_from_start=to_duration(duration))
     return JointTrajectory(joint_names=tuple(aim.positions), points=(point,))
-
-
-def _body_of(config: HeadConfig) -> Body:
-    root = read_urdf(config.urdf, "urdf")
-    if not isinstance(root, XmlElement):
-        raise ValueError(root.message)
-    return read_body(root)[0]
 
 
 def _look(frame: str) -> str:

@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from rbxcompose.body.model import Body, Geometry
-from rbxcompose.body.urdf import read_body
-from rbxcompose.body.xml_reader import XmlElement, read_urdf
+from rbxcompose.body.model import Geometry
+from rbxcompose.body.urdf import body_of
 from rbxcompose.findings import Finding
 from rbxcompose.geometry import Quaternion, Transform3, Vector3
 from rbxcompose.key_feed import KeyFeed, whole
@@ -133,7 +132,7 @@ class Scene(Component[SceneConfig]):
     @classmethod
     def ports(cls, config: SceneConfig) -> dict[str, Port[Any]]:
         """Return the ports: its own, what sensors see, and a look at each frame outside of the body."""
-        root = _body(config).root
+        root = body_of(config.urdf).root
         seen = {one: In(SceneObjects, f"scene/{one}", qos="latched").named(f"cloud_{one}") for one in config.clouds}
         clouds = {port.name: port for port in seen.values()}
         looks = {_look(frame): Looks(source=frame, target=root).named(_look(frame)) for frame in config.frames}
@@ -148,7 +147,7 @@ class Scene(Component[SceneConfig]):
         self.positions: dict[str, float] = {}
         self.outside: dict[str, Transform3] = {}  # frames outside of the body in that of its root, as they were told
         objects = (_placed(name, one) for name, one in self.config.objects.items())
-        self.things = PlanningScene(_body(self.config), objects, self.config.frames)
+        self.things = PlanningScene(body_of(self.config.urdf), objects, self.config.frames)
         self.moveit = MoveItScene(self.things, dict(self.config.paddings))
 
     def activate(self) -> None:
@@ -349,13 +348,6 @@ class Scene(Component[SceneConfig]):
                 paddings=np.array([*self.moveit.paddings.values()], dtype=np.float64),
             )
         )
-
-
-def _body(config: SceneConfig) -> Body:
-    root = read_urdf(config.urdf, "urdf")
-    if not isinstance(root, XmlElement):
-        raise ValueError(root.message)
-    return read_body(root)[0]
 
 
 def _without_points(one: PlacedObject) -> PlacedObject:

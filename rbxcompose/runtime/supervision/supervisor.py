@@ -11,7 +11,9 @@ import selectors
 import signal
 import socket
 from collections.abc import Callable
+from functools import cached_property
 from types import FrameType
+from typing import Any
 
 from rbxcompose.clock import MonotonicClock
 from rbxcompose.dataclass import dataclass
@@ -57,6 +59,23 @@ class _Child:
     wanted_end: signal.Signals | None = None  # to be sent as soon as it is forked
 
 
+@dataclass(frozen=True)
+class _Lasting:
+    """What of the state does not change while a plan runs: it takes long to find out, and is written often."""
+
+    plan: Plan
+
+    @cached_property
+    def state(self) -> dict[str, Any]:
+        """Return it, as arguments of `RobotState`."""
+        return {
+            "batteries": gauges_of(self.plan),
+            "executive": _executive(self.plan),
+            "teleoperated": teleoperated(self.plan),
+            "rest_time": rest_time(self.plan),
+        }
+
+
 class Supervisor:
     """Runs one robot to its end; `run` returns the exit code."""
 
@@ -71,6 +90,7 @@ class Supervisor:
         self._interrupts = 0
         self._manager = of_this_process()
         self._is_state_old = False  # the state file is out of date
+        self._lasting = _Lasting(launch.plan)
         self._complained = ""
         router = None if launch.plan.bus.router else ROUTER
         self.conductor = Conductor(launch.plan, launch.options, self._scheduler, self, router=router)
@@ -353,6 +373,8 @@ class Supervisor:
         """Return the state for the state file and `ps`."""
         running = {name: child.process for name, child in self._children.items() if child.process is not None}
         plan = self.conductor.plan
+        if self._lasting.plan is not plan:
+            self._lasting = _Lasting(plan)
         components = tuple(self._component(one.name, one.type, one.process) for one in plan.instances)
         return RobotState(
             robot=self._launch.plan.robot,
@@ -363,13 +385,10 @@ class Supervisor:
             router=self.conductor.endpoint,
             boot=boot_id(),
             domain=self._launch.plan.bus.domain,
-            batteries=gauges_of(plan),
-            executive=_executive(plan),
-            teleoperated=teleoperated(plan),
             layers=self.conductor.layers,
             stop=self.conductor.latch.state,
-            rest_time=rest_time(plan),
             clocks=self.conductor.hosts.clocks,
+            **self._lasting.state,
         )
 
     def _component(self, name: str, type_name: str, process: str) -> ComponentState:
