@@ -75,7 +75,7 @@ def tried() -> list[Case]:
 
 @pytest.mark.timeout(200)
 def test_a_strangers_robot_gets_the_findings_of_ours(tmp_path: Path) -> None:
-    other = {}
+    other: dict[str, object] = {}
     for case in tried():
         theirs = replace(case, files={name: strange(text) for name, text in case.files.items()})
         found, ours = (run(robot, tmp_path / who / case.name).found for who, robot in (("a", theirs), ("b", case)))

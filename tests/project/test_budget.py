@@ -16,8 +16,11 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
+import pytest
+
 from tests.project.package import PACKAGE, ROOT, files, text_of
 
+pytestmark = pytest.mark.timeout(100)
 WITH_ROOMS = ("domains",)
 SLACK = 0.02  # by which a figure may lie below its limit before the limit has to follow
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from graphlib import CycleError, TopologicalSorter
 
+import pytest
+
 from tests.project.package import files, imported, imported_by, module_of
 
 Imports = Mapping[str, set[str]]
@@ -33,6 +35,7 @@ def all_imports() -> dict[str, set[str]]:
     )
 
 
+@pytest.mark.timeout(100)
 def test_there_is_no_circle() -> None:
     assert circle(all_imports()) == []
 

@@ -7,6 +7,8 @@ from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 
+import pytest
+
 from tests.project.package import PACKAGE, files, text_of
 
 TWO_SIDES = {  # what a component sees, as a protocol of the SDK, and the bus's implementation of just that
@@ -39,6 +41,7 @@ def defined(path: Path) -> Iterator[tuple[str, bool]]:
                     yield name, False
 
 
+@pytest.mark.timeout(100)
 def test_each_public_name_of_a_class_stands_for_nothing_else() -> None:
     places: dict[str, list[str]] = defaultdict(list)
     classes: set[str] = set()
