@@ -5,6 +5,9 @@ BIN := $(VENV)/bin
 ROBOT ?= robots/turtlebot/robot.yaml
 PYTEST ?= -n auto
 
+# Each command that a test starts would compile the package again.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: up test lint types unit soak bench docs messages lock clean
 
 # What the robot needs beside rbxcompose, such as the planning libraries of an arm, in the versions of the lock file.

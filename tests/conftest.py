@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import settings
 from xdist.scheduler import LoadScopeScheduling
 
 from rbxcompose.testing.golden import Golden
@@ -24,8 +25,12 @@ ROOT = Path(__file__).parents[1]
 CACHES = "RBXCOMPOSE_TEST_CACHES"
 
 
-def pytest_configure() -> None:
-    """Give all workers of this run a folder of caches that goes with it."""
+def pytest_configure(config: pytest.Config) -> None:
+    """Give all workers a folder of caches that goes with the run; say how many examples to try; keep bytecode."""
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+    sys.dont_write_bytecode = False
+    settings.register_profile("rbxcompose", max_examples=300 if config.getoption("--soak") else 30)
+    settings.load_profile("rbxcompose")
     os.environ.setdefault("NUMBA_CACHE_DIR", str(ROOT / ".numba_cache"))  # compiling takes longer than most tests may
     if CACHES not in os.environ:
         os.environ[CACHES] = os.environ["XDG_CACHE_HOME"] = tempfile.mkdtemp()

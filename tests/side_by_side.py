@@ -30,4 +30,5 @@ REAL_TIME = (
 def scope_of(nodeid: str) -> str:
     """Return what one worker runs together: tests of one file share what is costly to make."""
     file = nodeid.partition("::")[0]
-    return "real time" if file.startswith(REAL_TIME) else file
+    together = "tests/project/"  # they read all files of the package, once
+    return "real time" if file.startswith(REAL_TIME) else together if file.startswith(together) else file

@@ -174,7 +174,7 @@ ODD = [
 ]
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(changes=st.lists(st.tuples(st.integers(0, len(WORDS) - 1), st.sampled_from([*ODD, *WORDS])), max_size=4))
 def test_a_damaged_urdf_is_a_body_of_finite_numbers_or_a_finding_with_its_place(changes: list[tuple[int, str]]) -> None:
     words = list(WORDS)

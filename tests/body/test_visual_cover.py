@@ -36,7 +36,7 @@ include: {{arm: {{part: rbx:parts/servo_arm.yaml, with: {{bus: servos}}}}}}
 """
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(st.lists(ELEMENTS, min_size=1, max_size=3))
 def test_collision_shapes_are_all_shapes_that_there_are_each_once(links: list[list[tuple[str, str, str]]]) -> None:
     text = "".join(_link(number, elements) for number, elements in enumerate(links))

@@ -67,14 +67,24 @@ def concerned() -> list[Case]:
     return [case for case in there if not case.kind or CODES & {code for _, _, code in case.expected}]
 
 
-@pytest.mark.parametrize("case", concerned(), ids=lambda case: case.name)
-def test_a_strangers_robot_gets_the_findings_of_ours(case: Case, tmp_path: Path) -> None:
-    theirs = replace(case, files={name: strange(text) for name, text in case.files.items()})
-    assert run(theirs, tmp_path / "theirs").found == run(case, tmp_path / "ours").found
+def tried() -> list[Case]:
+    """Return the first of the cases of each kind for each code, which is enough to try each rule."""
+    found = {(case.kind, tuple(sorted({code for _, _, code in case.expected}))): case for case in concerned()[::-1]}
+    return list(found.values())
+
+
+@pytest.mark.timeout(200)
+def test_a_strangers_robot_gets_the_findings_of_ours(tmp_path: Path) -> None:
+    other: dict[str, object] = {}
+    for case in tried():
+        theirs = replace(case, files={name: strange(text) for name, text in case.files.items()})
+        found, ours = (run(robot, tmp_path / who / case.name).found for who, robot in (("a", theirs), ("b", case)))
+        other |= {case.name: (found, ours)} if found != ours else {}
+    assert other == {}
 
 
 def test_each_rule_is_tried_on_a_strangers_robot() -> None:
-    changed = [case for case in concerned() if any("toy_" in strange(text) for text in case.files.values())]
+    changed = [case for case in tried() if any("toy_" in strange(text) for text in case.files.values())]
     assert {code for case in changed for _, _, code in case.expected} >= CODES
 
 

@@ -189,7 +189,7 @@ def at_the_dock() -> Bench:
     drain=st.floats(0.1, 20.0),
     tells_at_once=st.booleans(),
 )
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=20, deadline=None)
 def test_whenever_the_battery_steps_the_end_of_a_charge_is_seen(
     phase: float, delay: float, starts: float, drain: float, tells_at_once: bool
 ) -> None:

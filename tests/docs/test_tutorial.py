@@ -46,7 +46,7 @@ class Reader:
         if "pip install" in block.text:
             return  # it is installed
         path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-        environment = {**os.environ, "PATH": path, "XDG_RUNTIME_DIR": str(self.folder), "PYTHONDONTWRITEBYTECODE": "1"}
+        environment = {**os.environ, "PATH": path, "XDG_RUNTIME_DIR": str(self.folder)}
         done = subprocess.run(
             ["bash", "-c", block.text], cwd=self.folder, env=environment, capture_output=True, text=True, check=False
         )

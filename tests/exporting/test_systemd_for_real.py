@@ -26,7 +26,7 @@ name: alone
 hosts: {{here: {{}}}}
 robots: {{patroller: {{robot: {tree}/robots/turtlebot/robot.yaml}}}}
 """
-PROGRAM = f'#!/bin/sh\nPYTHONPATH={TREE} PYTHONDONTWRITEBYTECODE=1 exec {sys.executable} -m rbxcompose "$@"\n'
+PROGRAM = f'#!/bin/sh\nPYTHONPATH={TREE} exec {sys.executable} -m rbxcompose "$@"\n'
 LONGEST = 40.0  # [s] for a loaded machine to start the robot
 
 

@@ -71,7 +71,7 @@ def test_a_first_key_of_an_item_may_become_a_word() -> None:
 
 
 @given(st.sampled_from(list(TEXTS)), st.data())
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_no_position_in_no_beginning_of_a_text_makes_trouble(path: object, data: st.DataObject) -> None:
     text = TEXTS[path]  # type: ignore[index]
     cut = data.draw(st.integers(0, len(text)))

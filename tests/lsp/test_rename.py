@@ -249,11 +249,13 @@ def check_renaming(names: Names, symbol: Symbol) -> None:
 
 
 @pytest.mark.timeout(200)
+@pytest.mark.timeout(120)  # a name that all robots have in common compiles all of them
 def test_after_any_rename_a_robot_is_the_same_but_for_the_name(shipped: Names, soak: Soak) -> None:
     symbols = sorted(shipped.index.symbols, key=str)
 
     @settings(
-        max_examples=400 if soak.is_on else 6,
+        max_examples=400 if soak.is_on else 4,
+        derandomize=not soak.is_on,  # some names take a hundred times as long as others
         deadline=None,
         suppress_health_check=[HealthCheck.function_scoped_fixture],
     )

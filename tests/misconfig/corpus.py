@@ -88,11 +88,12 @@ class Outcome:
         return self.found - self.case.expected
 
 
-def cases() -> list[Case]:
+@cache
+def cases() -> tuple[Case, ...]:
     """Return all cases, the wrong ones first."""
     wrong = (_case(path, kind.name) for kind in sorted((HERE / "wrong").iterdir()) for path in sorted(kind.iterdir()))
     right = (_case(path, "") for path in sorted((HERE / "right").iterdir()))
-    return [*wrong, *right]
+    return (*wrong, *right)
 
 
 def described() -> dict[str, str]:

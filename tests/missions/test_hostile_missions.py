@@ -36,7 +36,7 @@ NODES: st.SearchStrategy[TreeNode] = st.recursive(
 )
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(st.dictionaries(NAMES, NODES, max_size=5), NODES)
 def test_random_trees_never_raise(entries: dict[str, TreeNode], task: TreeNode) -> None:
     report = Report()

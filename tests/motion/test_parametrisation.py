@@ -27,7 +27,7 @@ def test_a_straight_motion_is_examined_at_no_more_positions_than_needed() -> Non
     assert len(made.dense(0.01)) == 101
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(SEEDS, st.integers(2, 7))
 def test_a_trajectory_stays_on_the_curve_that_was_looked_at_before(seed: int, count: int) -> None:
     way = np.random.default_rng(seed).uniform(-2.0, 2.0, (count, 3))

@@ -22,7 +22,7 @@ ALLOWED = adjacent_pairs(DESCRIPTION.body)
 PLANNER = planner()
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(st.integers(0, 2**31))
 def test_what_is_free_is_what_a_formula_says(seed: int) -> None:
     checker = SecondChecker(DESCRIPTION, JOINTS, ALLOWED)

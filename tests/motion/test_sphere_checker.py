@@ -42,7 +42,7 @@ def both(mesh: MeshChecker, points: Array) -> tuple[int | None, int | None]:
     return SphereChecker(mesh, TREES).first_bad(points), first_bad(mesh, points)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(THINGS, st.lists(st.tuples(solids, poses), max_size=1), st.floats(0.0, 0.2), SEEDS)
 def test_the_first_bad_position_of_many_is_that_of_coal(
     things: list[PlacedObject], held: list[tuple[Geometry, Transform3]], padding: float, seed: int
@@ -69,7 +69,7 @@ def test_the_answers_follow_what_moves_beside_the_arm() -> None:
     assert len(verdicts) > 1
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(SEEDS)
 def test_a_fast_plan_is_free_and_within_all_limits_by_other_code(seed: int) -> None:
     used = fast_planner()

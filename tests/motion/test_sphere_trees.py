@@ -71,7 +71,7 @@ def test_spheres_cover_a_cylinder_within_and_on_its_surface(radius: float, lengt
     assert len(tree.leaves[0]) <= LEAVES
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(st.integers(1, 40), SEEDS)
 def test_spheres_cover_every_triangle_of_a_mesh(count: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -79,7 +79,7 @@ def test_spheres_cover_every_triangle_of_a_mesh(count: int, seed: int) -> None:
     assert not len(uncovered(mesh_tree(triangles), on_surface(triangles, 500, rng)))
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(st.integers(1, 40), SEEDS)
 def test_the_hulls_of_a_mesh_cover_it_as_its_spheres_do(count: int, seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -55,7 +55,7 @@ arms: {{arm: {{planner: {{type: {planner}}}}}}}
 """
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(ELEMENTS, st.integers(0, 2**31))
 def test_each_point_of_what_is_seen_or_hit_is_in_a_sphere_of_its_link(
     tmp_path_factory: pytest.TempPathFactory, elements: list[tuple[str, str, str]], seed: int

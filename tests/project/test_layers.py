@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import ast
 import re
 from graphlib import TopologicalSorter
 from pathlib import Path
 
-import pytest
-
-PACKAGE = Path(__file__).parents[2] / "rbxcompose"
+from tests.project.package import PACKAGE, ROOT, files, imported_by, module_of, text_of
 
 # What everything else may import, each with what it imports itself.
 GROUND = {
@@ -137,22 +134,11 @@ TYPE_CHECKING_BLOCKS = 17
 
 
 def imports(path: Path) -> set[str]:
-    found: set[str] = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            found |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
-    ours = (name.removeprefix("rbxcompose.") for name in found if name.startswith("rbxcompose."))
+    """Return the modules of ours that a file imports, with the names that it takes from them."""
+    pairs = [(module, taken) for module, taken in imported_by(path) if f"{module}.".startswith("rbxcompose.")]
+    names = {module for module, _ in pairs} | {f"{module}.{taken}" for module, taken in pairs if taken}
+    ours = (name.removeprefix("rbxcompose.") for name in names if name != "rbxcompose")
     return {name for name in ours if not name.startswith("__")}
-
-
-def files() -> list[Path]:
-    return sorted(PACKAGE.rglob("*.py"))
-
-
-def module_of(path: Path) -> str:
-    return ".".join(path.relative_to(PACKAGE).with_suffix("").parts)
 
 
 def row_of(module: str) -> str | None:
@@ -166,15 +152,17 @@ def is_within(name: str, permitted: str) -> bool:
     return f"{name}.".startswith(f"{permitted}.") or permitted.startswith(f"{name}.")
 
 
-@pytest.mark.parametrize("path", files(), ids=lambda path: str(path.relative_to(PACKAGE)))
-def test_a_module_imports_only_from_the_layers_below_it(path: Path) -> None:
-    if path == PACKAGE / "__init__.py":
-        assert imports(path) == set()
-        return
+def wrong_imports(path: Path) -> set[str]:
     row = row_of(module_of(path))
-    assert row, "it has no row in the table above"
-    wrong = {name for name in imports(path) if not any(is_within(name, one) for one in (row, *TABLE[row]))}
-    assert wrong == set()
+    if row is None:
+        return {"it has no row in the table above"}
+    return {name for name in imports(path) if not any(is_within(name, permitted) for permitted in (row, *TABLE[row]))}
+
+
+def test_a_module_imports_only_from_the_layers_below_it() -> None:
+    assert imports(PACKAGE / "__init__.py") == set()
+    found = {str(path.relative_to(ROOT)): wrong_imports(path) for path in files() if path != PACKAGE / "__init__.py"}
+    assert {path: wrong for path, wrong in found.items() if wrong} == {}
 
 
 def test_no_row_is_left_of_what_is_gone() -> None:
@@ -189,11 +177,11 @@ def test_the_table_has_no_circle() -> None:
 
 
 def test_types_are_rarely_imported_for_the_type_checker_alone() -> None:
-    blocks = sum(path.read_text(encoding="utf-8").count("\nif TYPE_CHECKING:") for path in files())
+    blocks = sum(text_of(path).count("\nif TYPE_CHECKING:") for path in files())
     assert blocks <= TYPE_CHECKING_BLOCKS
 
 
 def test_the_page_for_contributors_tells_the_home_of_every_core() -> None:
-    page = (PACKAGE.parent / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    page = text_of(ROOT / "CONTRIBUTING.md")
     table = page.partition("| package | decides |")[2].partition("\n\n")[0]
     assert set(re.findall(r"^\| `(\w+)` \|", table, re.MULTILINE)) == CORES

@@ -8,7 +8,7 @@ import itertools
 import pkgutil
 import re
 from collections.abc import Callable, Iterator
-from pathlib import Path
+from functools import cache
 from re import _constants as codes  # type: ignore[attr-defined]
 from re import _parser as parser  # type: ignore[attr-defined]
 from time import perf_counter
@@ -16,12 +16,12 @@ from typing import Any
 
 import pytest
 
-import rbxcompose
+from tests.project.package import PACKAGE, files, text_of
 
-PACKAGE = Path(rbxcompose.__file__).parent
 N = 4_000  # characters of a near-miss
 SHORT = 0.004  # [s] in which a linear expression is through with any of them
 METHODS = ("match", "fullmatch", "search", "findall", "finditer", "sub", "split")
+CALL = re.compile(rf"\.({'|'.join(METHODS)})\b")
 SAMPLES = "\n\t -_.,:/#$'\"[]{}()!|>aAeisx01°"
 
 
@@ -31,41 +31,35 @@ def modules() -> Iterator[str]:
             yield module.name
 
 
-def uses_of(tree: ast.AST) -> dict[str, set[str]]:
-    """The methods by which names of patterns are used."""
-    found: dict[str, set[str]] = {}
-    for node in ast.walk(tree):
-        match node:
-            case ast.Attribute(value=ast.Name(id=name) | ast.Attribute(attr=name), attr=method) if method in METHODS:
-                found.setdefault(name, set()).add(method)
-    return found
+@cache
+def calls() -> tuple[dict[str, set[str]], tuple[tuple[str, str, ast.expr], ...]]:
+    """Return the methods by which names of patterns are used, by name, and patterns that stand where they are used."""
+    used: dict[str, set[str]] = {}
+    in_place = []
+    for path in files():
+        for node in ast.walk(ast.parse(text_of(path))) if CALL.search(text_of(path)) else ():
+            match node:
+                case ast.Attribute(value=ast.Name(id=name) | ast.Attribute(attr=name), attr=method):
+                    if method in METHODS:
+                        used.setdefault(name, set()).add(method)
+                case ast.Call(func=ast.Attribute(value=ast.Name("re"), attr=method), args=[written, *_]):
+                    if method in METHODS:
+                        in_place.append((f"{path.relative_to(PACKAGE)}:{node.lineno}", method, written))
+    return used, tuple(in_place)
 
 
 def patterns() -> dict[tuple[str, Any], set[str]]:
     """All patterns that are compiled in modules, with the methods by which anybody uses them."""
-    used: dict[str, set[str]] = {}
+    used, in_place = calls()
     found: dict[tuple[str, Any], set[str]] = {}
-    for path in PACKAGE.rglob("*.py"):
-        for name, methods in uses_of(ast.parse(path.read_text())).items():
-            used.setdefault(name, set()).update(methods)
     for name in modules():
         for word, value in vars(importlib.import_module(name)).items():
             if isinstance(value, re.Pattern):
                 found.setdefault((word, value), set()).update(used.get(word, ()))
-    for where, method, written in written_in_place():
+    for where, method, written in in_place:
         if isinstance(written, ast.Constant):
             found.setdefault((where, re.compile(written.value)), set()).add(method)
     return found
-
-
-def written_in_place() -> Iterator[tuple[str, str, ast.expr]]:
-    """Patterns that stand where they are used, with the method."""
-    for path in PACKAGE.rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text())):
-            match node:
-                case ast.Call(func=ast.Attribute(value=ast.Name("re"), attr=method), args=[written, *_]):
-                    if method in METHODS:
-                        yield f"{path.relative_to(PACKAGE)}:{node.lineno}", method, written
 
 
 def character(items: list[Any]) -> str:
@@ -174,14 +168,13 @@ def slow_texts(pattern: re.Pattern[Any], methods: set[str]) -> Iterator[str]:
                 yield f"{method}: {before!r} {pump!r} * n {end!r}"
 
 
-ALL = sorted(patterns().items(), key=lambda one: (one[0][0], str(one[0][1].pattern)))
-
-
-@pytest.mark.parametrize(("pattern", "methods"), [(key[1], uses) for key, uses in ALL], ids=[key[0] for key, _ in ALL])
-def test_a_pattern_is_linear(pattern: re.Pattern[Any], methods: set[str]) -> None:
-    assert methods, "nobody uses it, or by a method that this test does not know"
-    assert next(slow_texts(pattern, methods), None) is None
+@pytest.mark.timeout(200)
+def test_every_pattern_is_linear() -> None:
+    found = patterns()
+    assert {where for (where, _), methods in found.items() if not methods} == set(), "used by no method known here"
+    slow = {where: next(slow_texts(pattern, methods), None) for (where, pattern), methods in found.items()}
+    assert {where: text for where, text in slow.items() if text} == {}
 
 
 def test_no_pattern_is_put_together_where_this_test_cannot_see_it() -> None:
-    assert [where for where, _, written in written_in_place() if not isinstance(written, ast.Constant)] == []
+    assert [where for where, _, written in calls()[1] if not isinstance(written, ast.Constant)] == []

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from difflib import ndiff
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -25,14 +26,26 @@ from rbxcompose.sdk import Component, component
 from rbxcompose.sdk.registry import PLUGINS
 from tests.conftest import ROOT
 
-FILES_WRITTEN: dict[str, Any] = {name: json.loads(text) for name, text in files().items()}
-NEIGHBOURS = Registry().with_resources((name, Resource.from_contents(schema)) for name, schema in FILES_WRITTEN.items())
-SCHEMAS: dict[str, Any] = {
-    kind.lower(): json.loads(as_text(make(sorted(PLUGINS.shipped)))) for kind, make in MAKERS.items()
-}
-"""Each as it is printed: alone."""
+NAMES = [kind.lower() for kind in MAKERS]
 ROBOT = (ROOT / "robots/turtlebot/robot.yaml").read_text(encoding="utf-8")
 MISSION = "rbx: 1\nkind: Mission\nname: m\n"
+
+
+@cache
+def written() -> dict[str, Any]:
+    """Return the schemas as files, by the names of the files."""
+    return {name: json.loads(text) for name, text in files().items()}
+
+
+@cache
+def neighbours() -> Any:
+    return Registry().with_resources((name, Resource.from_contents(schema)) for name, schema in written().items())
+
+
+@cache
+def schemas() -> dict[str, Any]:
+    """Return each schema as it is printed: alone."""
+    return {kind.lower(): json.loads(as_text(make(sorted(PLUGINS.shipped)))) for kind, make in MAKERS.items()}
 
 
 def mistakes(text: str) -> list[str]:
@@ -41,8 +54,8 @@ def mistakes(text: str) -> list[str]:
     assert node is not None, findings
     data: Any = json.loads(json.dumps(to_plain(node)))
     kind = data["kind"].lower()
-    alone = Draft7Validator(SCHEMAS[kind])
-    beside = Draft7Validator(FILES_WRITTEN[f"{kind}.schema.json"], registry=NEIGHBOURS)
+    alone = Draft7Validator(schemas()[kind])
+    beside = Draft7Validator(written()[f"{kind}.schema.json"], registry=neighbours())
     found, again = (
         [".".join(map(str, one.absolute_path)) for one in made.iter_errors(data)] for made in (alone, beside)
     )
@@ -61,23 +74,23 @@ def test_the_manifests_of_the_project_are_right(path: Path) -> None:
 
 
 def test_the_schemas_in_the_repository_are_up_to_date() -> None:
-    written = {path.name: path.read_text(encoding="utf-8") for path in (ROOT / "schemas").iterdir()}
-    assert written == files(), "run `make docs`"
+    committed = {path.name: path.read_text(encoding="utf-8") for path in (ROOT / "schemas").iterdir()}
+    assert committed == files(), "run `make docs`"
 
 
 def test_the_files_are_small() -> None:
     assert sum(len(text.encode()) for text in files().values()) <= 300_000
 
 
-@pytest.mark.parametrize("name", SCHEMAS)
+@pytest.mark.parametrize("name", NAMES)
 def test_a_schema_and_its_definitions_are_of_draft_7(name: str) -> None:
-    for schema in [SCHEMAS[name], *SCHEMAS[name]["$defs"].values()]:
+    for schema in [schemas()[name], *schemas()[name]["$defs"].values()]:
         Draft7Validator.check_schema(schema)
 
 
-@pytest.mark.parametrize("name", SCHEMAS)
+@pytest.mark.parametrize("name", NAMES)
 def test_a_schema_that_is_printed_can_be_used_alone(name: str) -> None:
-    assert all(one["$ref"].startswith("#/") for one in references(SCHEMAS[name]))
+    assert all(one["$ref"].startswith("#/") for one in references(schemas()[name]))
 
 
 def maps(schema: object) -> Iterator[dict[str, Any]]:
@@ -93,9 +106,9 @@ def maps(schema: object) -> Iterator[dict[str, Any]]:
             yield from maps(value)
 
 
-@pytest.mark.parametrize("name", SCHEMAS)
+@pytest.mark.parametrize("name", NAMES)
 def test_every_property_has_a_description(name: str) -> None:
-    root = SCHEMAS[name]
+    root = schemas()[name]
     declared = [(key, schema) for keys in maps(root) for key, schema in keys.items()]
     told = {key for key, schema in declared if schema is not True and schema.get("description")}
     for key, schema in declared:  # what a whole map adds to the changes of it is described there
@@ -104,7 +117,7 @@ def test_every_property_has_a_description(name: str) -> None:
 
 def entries(kind: str) -> Iterator[dict[str, Any]]:
     """Yield each entry of `components`: that of a file alone, and that of a file that changes others."""
-    root = SCHEMAS[kind]
+    root = schemas()[kind]
     for keys in [root.get("else", root)["properties"], root.get("then", root)["properties"]]:
         entry = referred(keys["components"], root)["additionalProperties"]
         yield entry.get("anyOf", [entry])[0]
@@ -115,8 +128,8 @@ def test_what_every_component_may_have_is_described_at_the_entry(kind: str) -> N
     for entry in entries(kind):
         for chosen in entry["allOf"]:
             if "$ref" in chosen["then"]:
-                (changes,) = referred(chosen["then"], SCHEMAS[kind]).get("allOf", [chosen["then"]])
-                keys = referred(changes, SCHEMAS[kind])["properties"]
+                (changes,) = referred(chosen["then"], schemas()[kind]).get("allOf", [chosen["then"]])
+                keys = referred(changes, schemas()[kind])["properties"]
                 assert {key for key, schema in keys.items() if schema is True} == set(entry["properties"])
 
 
@@ -168,15 +181,15 @@ def references(schema: object) -> Iterator[dict[str, Any]]:
         yield schema
 
 
-@pytest.mark.parametrize("name", SCHEMAS)
+@pytest.mark.parametrize("name", NAMES)
 def test_beside_a_reference_stand_only_notes_because_nothing_else_there_counts(name: str) -> None:
     notes = {"$ref", "description", "default"}
-    assert [one for one in references(SCHEMAS[name]) if not one.keys() <= notes] == []
+    assert [one for one in references(schemas()[name]) if not one.keys() <= notes] == []
 
 
 @pytest.mark.parametrize(("name", "model"), [(kind.lower(), file_model(kind)) for kind in FILES])
 def test_every_section_has_a_schema(name: str, model: type[Config]) -> None:
-    assert set(SCHEMAS[name]["properties"]) == set(model.model_fields)
+    assert set(schemas()[name]["properties"]) == set(model.model_fields)
 
 
 def test_every_key_of_a_kind_or_modifier_is_described() -> None:
@@ -345,22 +358,23 @@ def test_a_mistake_in_a_mission_is_refused_at_its_place(text: str, place: str) -
     assert place in mistakes(f"{MISSION}{text}\n")
 
 
-@pytest.mark.parametrize("name", sorted(SCHEMAS["robot"]["$defs"]))
-def test_the_examples_of_a_definition_are_right(name: str) -> None:
-    shared = SCHEMAS["robot"]["$defs"]
-    for schema in entries("robot") if name.startswith("component_") else [shared.get(f"whole_{name}", shared[name])]:
-        validator = Draft7Validator({**schema, "$defs": shared})
-        for sample in shared[name].get("examples", []):
-            validator.validate(sample)
+def test_the_examples_of_definitions_are_right() -> None:
+    shared = schemas()["robot"]["$defs"]
+    for name, definition in shared.items():
+        wholes = entries("robot") if name.startswith("component_") else [shared.get(f"whole_{name}", definition)]
+        for schema in wholes:
+            validator = Draft7Validator({**schema, "$defs": shared})
+            for sample in definition.get("examples", []):
+                validator.validate(sample)
 
 
 def test_a_component_type_has_its_docstring_as_description_and_its_example() -> None:
-    battery = SCHEMAS["robot"]["$defs"]["component_battery_sim"]
+    battery = schemas()["robot"]["$defs"]["component_battery_sim"]
     assert battery["description"].startswith("A battery that drains evenly")
     assert battery["examples"] == [{"type": "battery_sim", "runtime": "45 s", "warn": "50 %", "error": "20 %"}]
     assert battery["properties"]["warn"]["default"] == "50 %"
-    warn, _ = referred(battery["properties"]["warn"], SCHEMAS["robot"])["anyOf"]
-    assert referred(warn, SCHEMAS["robot"])["x-dimension"] == "ratio"
+    warn, _ = referred(battery["properties"]["warn"], schemas()["robot"])["anyOf"]
+    assert referred(warn, schemas()["robot"])["x-dimension"] == "ratio"
 
 
 @pytest.mark.parametrize("kind", MAKERS)

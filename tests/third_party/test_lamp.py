@@ -44,7 +44,6 @@ class Installed:
             **os.environ,
             "PYTHONPATH": f"{self.site}{os.pathsep}{ROOT}",
             "XDG_RUNTIME_DIR": str(work),
-            "PYTHONDONTWRITEBYTECODE": "1",
             "NO_COLOR": "1",
         }
 

@@ -1,0 +1,40 @@
+"""The files of the package and what they import, read once for all tests of the project."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+PACKAGE = ROOT / "rbxcompose"
+
+
+@cache
+def files() -> tuple[Path, ...]:
+    return tuple(sorted(PACKAGE.rglob("*.py")))
+
+
+@cache
+def text_of(path: Path) -> str:
+    return path.read_text(encoding="utf-8")
+
+
+def module_of(path: Path) -> str:
+    """Return the name of a file's module below `rbxcompose`, that of a package with `__init__` behind it."""
+    return ".".join(path.relative_to(PACKAGE).with_suffix("").parts)
+
+
+@cache
+def imported_by(path: Path) -> tuple[tuple[str, str], ...]:
+    return tuple(imported(text_of(path)))
+
+
+def imported(text: str) -> Iterator[tuple[str, str]]:
+    """Yield the modules that a text imports anywhere, each with what is taken from it."""
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Import):
+            yield from ((alias.name, "") for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            yield from ((node.module, alias.name) for alias in node.names)
