@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import argparse
 
-from rbxcompose.cli.bus.entities import add_server_verbs, tell_list, visit
-from rbxcompose.cli.bus.guest import Guest
-from rbxcompose.cli.systems.options import BUS
+from rbxcompose.cli.bus.guest import Guest, add_server_verbs, tell_list, visit
+from rbxcompose.cli.output.options import BUS
 
 ON_SYSTEM = BUS
 _VERB = ("send", "send a goal, print feedback and result")
@@ -31,6 +30,6 @@ def _ls(guest: Guest, arguments: argparse.Namespace) -> int:
 
 
 def _send(guest: Guest, arguments: argparse.Namespace) -> int:
-    from rbxcompose.cli.bus.action_send import send  # the imports for messages would slow down the list
+    from rbxcompose.cli.bus.exchange import send  # the imports for messages would slow down the list
 
     return send(guest, arguments)

@@ -10,15 +10,11 @@ from __future__ import annotations
 import argparse
 import json
 
-from rbxcompose.cli.output.console import FINDINGS, refuse, tell, tell_report
-from rbxcompose.cli.project.kinds import is_system
-from rbxcompose.cli.project.robot_choice import add_path_argument, robot_path
-from rbxcompose.cli.project.robot_options import add_layer_options, chosen_layers, compiled
-from rbxcompose.cli.robots.change_outcome import carry_out, unsure
-from rbxcompose.cli.robots.commands import show_answer
-from rbxcompose.cli.robots.lookup import NotDoneError, answer_of, find_robot
-from rbxcompose.cli.robots.proposal import LONGEST_CHANGE, Proposal
-from rbxcompose.cli.systems.options import add_system_options
+from rbxcompose.cli.output.console import FINDINGS, NotDoneError, refuse, tell, tell_report
+from rbxcompose.cli.output.options import add_system_options, is_system
+from rbxcompose.cli.robots.changes import LONGEST_CHANGE, Proposal, carry_out, unsure
+from rbxcompose.cli.robots.lookup import answer_of, find_robot, show_answer
+from rbxcompose.cli.robots.targets import add_layer_options, add_path_argument, chosen_layers, compiled, robot_path
 from rbxcompose.runtime.plan_requests import RevertPlan
 
 _LAST = -1  # generation of the last change

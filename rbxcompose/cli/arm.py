@@ -11,37 +11,56 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Callable, Mapping
-from time import perf_counter
-from typing import TypeVar
+import math
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from functools import partial
+from pathlib import Path
+from time import perf_counter, process_time
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rbxcompose.arm_config import ArmWorks
 from rbxcompose.arm_goals import goal_of
-from rbxcompose.cli.arms.bench import add_bench_options, run_bench
-from rbxcompose.cli.arms.chosen import chosen_arm, chosen_robot, done, shown, values_of
-from rbxcompose.cli.arms.go import add_go_options
-from rbxcompose.cli.arms.inverse import add_inverse_options, run_inverse
-from rbxcompose.cli.arms.motion_picture import draw_motion
-from rbxcompose.cli.arms.reach_map import add_reach_options, run_reach
+from rbxcompose.body.attachment import FramePose
+from rbxcompose.cli.arms.goals import (
+    NO_MOTION,
+    KeepModel,
+    TraceModel,
+    chosen_arm,
+    chosen_robot,
+    done,
+    keys_of,
+    positions_in,
+    read_joints,
+    read_written,
+    shown,
+    values_of,
+)
+from rbxcompose.cli.arms.pictures import add_reach_options, draw_motion, run_reach
 from rbxcompose.cli.arms.setup import add_options, run_setup
-from rbxcompose.cli.arms.written import NO_MOTION, read_written
-from rbxcompose.cli.bodies.arm_models import KeepModel, TraceModel
-from rbxcompose.cli.bus.entities import table
-from rbxcompose.cli.output.console import refuse, tell
-from rbxcompose.cli.project.robot_choice import add_path_argument
-from rbxcompose.cli.project.robot_options import add_layer_options
-from rbxcompose.cli.robots.lookup import NotDoneError
+from rbxcompose.cli.bus.guest import Guest, visit, wanted
+from rbxcompose.cli.output.console import NotDoneError, misused, table, tell
+from rbxcompose.cli.output.options import Action, add_actions, add_json_option, add_timeout_option, argument, run_action
+from rbxcompose.cli.robots.lookup import add_bus_options
+from rbxcompose.cli.robots.targets import add_layer_options, add_path_argument
+from rbxcompose.findings import suggest
 from rbxcompose.geometry import Transform3
+from rbxcompose.motion.arm_figures import NO_TRIES, Tries, call_time, free_pairs, inverse_tries, motion_tries
+from rbxcompose.motion.inverse_kinematics import PoseSolutions, PoseTarget
 from rbxcompose.motion.kept import KeptTip
 from rbxcompose.motion.planner import MotionPlan, MotionRequest, Planning
+from rbxcompose.motion.pose_search import searched
+from rbxcompose.motion.posture import Posture
+from rbxcompose.motion.problem_sets import MotionProblem, ProblemError, problem_files, read_problem
 from rbxcompose.motion.reasons import MotionFailure
 from rbxcompose.motion.trace_planner import planned_trace
 from rbxcompose.msgs.plain import from_plain
 from rbxcompose.msgs.rbxcompose_msgs import MoveArm, TraceArm
 from rbxcompose.sections.arms import ArmOfRobot, arms
+from rbxcompose.units import ANGLE, LENGTH
 
 T = TypeVar("T")
 M = TypeVar("M", MoveArm.Goal, TraceArm.Goal)
@@ -49,57 +68,40 @@ M = TypeVar("M", MoveArm.Goal, TraceArm.Goal)
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    verbs = "ls|fk|ik|plan|trace|picture|bench|setup|go"
-    actions = parser.add_subparsers(dest="action", metavar=verbs, required=True)
-    ls = actions.add_parser("ls", help="list the arms of a robot with their joints and poses")
-    fk = actions.add_parser("fk", help="print where the tip is (forward kinematics)")
-    fk.add_argument("goal", metavar="GOAL", help="a pose by name, or '{JOINT: POSITION, ...}'")
-    ik = actions.add_parser("ik", help="print positions of joints that bring the tip to a pose (inverse kinematics)")
-    add_inverse_options(ik)
-    plan = actions.add_parser("plan", help="plan a motion and tell how long it takes, or why there is none")
-    plan.add_argument("goal", metavar="GOAL", help="a pose by name, or '{JOINT: POSITION, ...}'")
-    fk.add_argument("--picture", metavar="FILE", help="draw it among the things of the scene as PNG")
-    trace = actions.add_parser("trace", help="plan a way of the tip along lines and arcs, or tell how far it gets")
-    trace.add_argument("way", metavar="WAY", help="as in a mission: '{points: [{x: 5 cm}], relative: true}'")
-    for one in (plan, trace):
-        one.add_argument("--picture", metavar="FILE", help="draw start, goal (green) and the way of the tip as PNG")
-    for one in (ik, plan, trace):
-        one.add_argument("--from", dest="start", metavar="GOAL", default="", help="where it begins (default: at rest)")
-    picture = actions.add_parser("picture", help="draw where the tip gets, and how well, as PNG")
-    add_reach_options(picture)
-    bench = actions.add_parser("bench", help="measure kinematics, and motions, also those of published problems")
-    add_bench_options(bench)
-    setup = actions.add_parser("setup", help="find pairs of links that need not be watched, and write their file")
-    add_options(setup)
-    for one, do in (
-        (ls, _ls),
-        (fk, _fk),
-        (ik, run_inverse),
-        (plan, _plan),
-        (trace, _trace),
-        (picture, _picture),
-        (bench, _bench),
-        (setup, run_setup),
-    ):
-        add_path_argument(one)
-        if one not in (ls, setup):
-            one.add_argument("--arm", metavar="NAME", help="which one, if there are several")
-        add_layer_options(one)
-        one.add_argument("--json", action="store_true", help="answer in JSON")
-        one.set_defaults(do=do)
-    go = actions.add_parser("go", help="move an arm of a running robot, and print how that ends")
-    add_go_options(go)
-    for one in (plan, go):
-        one.add_argument("--keep", metavar="KEEP", default="", help="on the way: '{roll: 10 deg, pitch: 10 deg}'")
+    goal = argument("goal", metavar="GOAL", help="a pose by name, or '{JOINT: POSITION, ...}'")
+    fk_picture = argument("--picture", metavar="FILE", help="draw it among the things of the scene as PNG")
+    words = "draw start, goal (green) and the way of the tip as PNG"
+    picture = argument("--picture", metavar="FILE", help=words)
+    way = argument("way", metavar="WAY", help="as in a mission: '{points: [{x: 5 cm}], relative: true}'")
+    start = argument("--from", dest="start", metavar="GOAL", default="", help="where it begins (default: at rest)")
+    words = "on the way: '{roll: 10 deg, pitch: 10 deg}'"
+    keep = argument("--keep", metavar="KEEP", default="", help=words)
+    arm = argument("--arm", metavar="NAME", help="which one, if there are several")
+    json_ = argument("--json", action="store_true", help="answer in JSON")
+    shared = (add_path_argument, add_layer_options, json_)
+    of_arm = (add_path_argument, arm, add_layer_options, json_)
+    ik = "print positions of joints that bring the tip to a pose (inverse kinematics)"
+    trace = "plan a way of the tip along lines and arcs, or tell how far it gets"
+    setup = "find pairs of links that need not be watched, and write their file"
+    bench = "measure kinematics, and motions, also those of published problems"
+    plan = "plan a motion and tell how long it takes, or why there is none"
+    actions = (
+        Action("ls", "list the arms of a robot with their joints and poses", _ls, shared),
+        Action("fk", "print where the tip is (forward kinematics)", _fk, (goal, fk_picture, *of_arm)),
+        Action("ik", ik, run_inverse, (add_inverse_options, start, *of_arm)),
+        Action("plan", plan, _plan, (goal, picture, start, *of_arm, keep)),
+        Action("trace", trace, _trace, (way, picture, start, *of_arm)),
+        Action("picture", "draw where the tip gets, and how well, as PNG", _picture, (add_reach_options, *of_arm)),
+        Action("bench", bench, _bench, (add_bench_options, *of_arm)),
+        Action("setup", setup, run_setup, (add_options, *shared)),
+        Action("go", "move an arm of a running robot, and print how that ends", run_go, (add_go_options, keep)),
+    )
+    add_actions(parser, actions)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the chosen subcommand."""
-    do: Callable[[argparse.Namespace], int] = arguments.do
-    try:
-        return do(arguments)
-    except NotDoneError as error:
-        return refuse(error.finding)
+    return run_action(arguments)
 
 
 def _ls(arguments: argparse.Namespace) -> int:
@@ -232,3 +234,235 @@ def _tell_plan(
     for point in points:
         tell(f"  {shown(works, point)}")
     return 0
+
+
+def add_inverse_options(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of `arm ik`."""
+    words = "of the tip: '{x: 20 cm, y: -10 cm, z: 55 cm, yaw: 90 deg}'"
+    parser.add_argument("target", metavar="POSE", help=words)
+    parser.add_argument("--frame", metavar="LINK", default="", help="the link in whose frame it is (default: the root)")
+    counts = parser.add_mutually_exclusive_group()
+    counts.add_argument("--any-orientation", action="store_true", help="only the position counts")
+    counts.add_argument("--any-position", action="store_true", help="only the orientation counts")
+    words = "if it cannot be taken, print the nearest pose that can be, and how far that is from it"
+    parser.add_argument("--approximate", action="store_true", help=words)
+    words = "where joints should rather be, if several positions do (default: as 'kinematics' of the arm says)"
+    parser.add_argument("--prefer", metavar="GOAL", default="", help=words)
+
+
+def run_inverse(arguments: argparse.Namespace) -> int:
+    """Print solutions, the best first.
+
+    Raises:
+        NotDoneError: if there is none, or the arguments ask for nothing that there is.
+    """
+    made = chosen_arm(arguments)
+    if made is None:
+        return 1
+    one, works = made
+    target = _target(arguments, works, start := values_of(works, one, arguments.start))
+    found = _found(arguments, works, one, target, start)
+    each = [dict(zip(works.space.names, values.tolist(), strict=True)) for values in found.free]
+    missed = [target.error(works.kinematics.tip_pose(values)) for values in found.free]
+    if arguments.json:
+        data = {"solutions": each, "colliding": len(found.colliding), "attempts": found.attempts}
+        errors = [{"away": away, "angle": angle} for away, angle in missed]
+        tell(json.dumps(data | {"approximate": found.is_approximate, "errors": errors}))
+        return 0 if each else 1
+    for number, (solution, off) in enumerate(zip(each, missed, strict=True), 1):
+        words = f" (approximate, {_far(*off)} from it)" if found.is_approximate else ""
+        tell(f"solution {number}{words}: {shown(works, solution)}")
+    if each:
+        return 0
+    words = f"goal_out_of_reach: the tip got within {_far(*found.nearest)} of it"
+    if found.colliding:
+        words = f"goal_in_collision: all {len(found.colliding)} solutions collide"
+    raise NotDoneError(NO_MOTION.at(None, words))
+
+
+def _target(arguments: argparse.Namespace, works: ArmWorks, start: NDArray[Any]) -> PoseTarget:
+    """Return the pose that is asked for, in the frame of the root."""
+    links, pose = works.kinematics.poses(start), read_written(FramePose, arguments.target).to_transform()
+    if arguments.frame and arguments.frame not in links:
+        message = f"there is no link '{arguments.frame}'; {suggest(arguments.frame, links, 'links')}"
+        raise NotDoneError(NO_MOTION.at(None, message))
+    return PoseTarget(
+        links[arguments.frame].compose(pose) if arguments.frame else pose,
+        arguments.any_orientation,
+        works.solver.tolerance,
+        works.solver.angle_tolerance,
+        arguments.any_position,
+        arguments.approximate,
+    )
+
+
+def _found(
+    arguments: argparse.Namespace, works: ArmWorks, one: ArmOfRobot, target: PoseTarget, start: NDArray[Any]
+) -> PoseSolutions:
+    solver, began = works.solver, perf_counter()
+    prefer = arguments.prefer or solver.prefer
+    return done(
+        searched(
+            works.kinematics,
+            works.space,
+            target,
+            start,
+            works.planner.checker.is_free,
+            seed=works.planner.settings.seed,
+            posture=Posture.of(works.space.names, positions_in(works, one, prefer)) if prefer else None,
+            restarts=solver.restarts,
+            is_late=lambda: perf_counter() - began >= solver.time,
+        )
+    )
+
+
+def _far(away: float, angle: float) -> str:
+    return f"{away * 100:.1f} cm and {math.degrees(angle):.1f} deg"
+
+
+_WAY = "points"  # the key of a way; all others are joints
+
+
+def add_go_options(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of `arm go`."""
+    parser.add_argument("arm", metavar="ARM", help="the arm")
+    words = "a pose by name, '{JOINT: POSITION, ...}', or a way of the tip: '{points: [{x: 5 cm}]}'"
+    parser.add_argument("goal", metavar="GOAL", help=words)
+    add_timeout_option(parser, "5s")
+    add_json_option(parser)
+    add_bus_options(parser)
+
+
+def run_go(arguments: argparse.Namespace) -> int:
+    """Send the goal, and print how it ends."""
+    from rbxcompose.cli.bus.exchange import send  # the imports for messages would slow down the others
+
+    is_way = _WAY in keys_of(arguments.goal)
+    if is_way and arguments.keep:
+        return misused("arm go", "--keep is not for a way of the tip: 'keep_orientation' is a key of that")
+    way = read_written(TraceModel, arguments.goal).message() if is_way else None
+    arguments.name = f"{arguments.arm}/{'trace' if is_way else 'move'}"
+
+    def do(guest: Guest) -> int:
+        arguments.content = json.dumps(_move(guest, arguments) if way is None else way)
+        return send(guest, arguments)
+
+    return visit(arguments, do)
+
+
+def _move(guest: Guest, arguments: argparse.Namespace) -> dict[str, Any]:
+    """Return a goal of `MoveArm`.
+
+    Raises:
+        NotDoneError: if it is none, or nothing tells which joints turn and which slide.
+    """
+    keep = read_written(KeepModel, arguments.keep or "{}").message()
+    if not arguments.goal.startswith("{"):
+        return {"pose": arguments.goal, "keep": keep}
+    from rbxcompose.cli.bodies.heard import DESCRIPTION, described, described_body
+
+    action = wanted([one for one in guest.graph().actions if one.givers], arguments.name, "action")
+    namespace = action.name.removesuffix(f"/{arguments.name.lstrip('/')}")
+    body = described_body(guest, described(guest, f"{namespace}/{DESCRIPTION}"), arguments.timeout)
+    dimensions = {joint.name: LENGTH if joint.slides else ANGLE for joint in body.moving}
+    positions = read_joints(arguments.goal, dimensions)
+    return {"joints": list(positions), "positions": list(positions.values()), "keep": keep}
+
+
+COUNT, MOST, SEED, SHOWN = 100, 100_000, 3, 3
+HEAD = ("what", "solved", "median", "p95", "length", "collide")
+
+
+def add_bench_options(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `arm bench`."""
+    words = "poses, motions, and problems of each scenario (default: 100)"
+    parser.add_argument("--count", type=_count, default=COUNT, metavar="N", help=words)
+    words = "published problems: SCENARIO/scene0001.yaml with SCENARIO/request0001.yaml, as MotionBenchMaker has them"
+    parser.add_argument("--problems", type=Path, metavar="FOLDER", help=words)
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or not 0 < len(text) <= len(str(MOST)) or not 0 < int(text) <= MOST:
+        raise argparse.ArgumentTypeError(f"must be a whole number from 1 to {MOST}, not '{text}'")
+    return int(text)
+
+
+def run_bench(arguments: argparse.Namespace, works: ArmWorks) -> int:
+    """Measure, and print the figures; return 1 if a plan collides by the second examination."""
+    problems = list[MotionProblem]()
+    if arguments.problems is not None:
+        try:
+            files = problem_files(arguments.problems, arguments.count)
+            problems = [read_problem(*one, works.kinematics.body.root) for one in files]
+            for each in problems:
+                _prove_fit(works, each)
+        except ProblemError as error:
+            return misused("arm bench", str(error))
+    kinematics, clock = works.kinematics, process_time
+    samples = works.space.samples(arguments.count, SEED)
+    rest = np.array([kinematics.body.joints[name].rest for name in works.space.names])
+    calls = {
+        "forward kinematics": call_time(partial(kinematics.tip, with_jacobian=False), samples, clock),
+        "Jacobian": call_time(partial(kinematics.tip, with_jacobian=True), samples, clock),
+    }
+    tries = {
+        "inverse kinematics": inverse_tries(kinematics, works.space, works.solver, rest, samples, clock),
+        "random motions": _motions(works, arguments.count),
+    }
+    for scenario, found in _solved(works, problems):
+        tries[scenario] = tries.get(scenario, NO_TRIES).with_(found)
+    is_fast = kinematics.compiled is not None
+    if arguments.json:
+        data = {name: _data(one) for name, one in tries.items()}
+        tell(json.dumps({"compiled": is_fast, "calls": calls, "tries": data}))
+    else:
+        how = "compiled by numba" if is_fast else "not compiled: pip install 'rbxcompose[fast]' makes it faster"
+        tell(f"{len(works.space.joints)} joints, inverse kinematics {how}; times are those of the processor")
+        rows = [(name, "", f"{1e6 * took:.1f} us", "", "", "") for name, took in calls.items()]
+        tell(table([HEAD, *rows, *(_row(name, one) for name, one in tries.items())]))
+        for name, one in tries.items():
+            for reason, count in Counter(one.failures).most_common(SHOWN):
+                tell(
+                    f"not solved in {name}, {count} times: {reason}" if count > 1 else f"not solved in {name}: {reason}"
+                )
+    return 1 if any(one.colliding for one in tries.values()) else 0
+
+
+def _motions(works: ArmWorks, count: int) -> Tries:
+    second = works.second_checker(works.objects)
+    return motion_tries(works.planner, free_pairs(works.planner, count, SEED), second.is_free_along, process_time)
+
+
+def _solved(works: ArmWorks, problems: list[MotionProblem]) -> Iterator[tuple[str, Tries]]:
+    """Yield what became of each problem, with its scenario."""
+    names = works.space.names
+    for one in problems:
+        others = {name: at for name, at in one.start.items() if name not in names}
+        works.kinematics.place(others)
+        works.place_objects(one.objects)
+        second = works.second_checker(one.objects, others)
+        start, goal = (np.array([at[name] for name in names]) for at in (one.start, one.goal))
+        yield one.scenario, motion_tries(works.planner, [(start, goal)], second.is_free_along, process_time)
+
+
+def _prove_fit(works: ArmWorks, problem: MotionProblem) -> None:
+    """Raise if a problem is about another arm.
+
+    Raises:
+        ProblemError: with what it lacks.
+    """
+    for at, word in ((problem.start, "start"), (problem.goal, "goal")):
+        if lacking := [name for name in works.space.names if name not in at]:
+            raise ProblemError(f"{word} {problem.scenario}/{problem.name} does not say where '{lacking[0]}' is")
+
+
+def _row(name: str, one: Tries) -> tuple[str, ...]:
+    times = [f"{1e3 * took:.3g} ms" if one.times else "" for took in (one.median, one.p95)]
+    ways = (f"{one.length:.2f} rad", f"{one.colliding}") if one.lengths else ("", "")
+    return (name, f"{one.solved} of {one.count}", *times, *ways)
+
+
+def _data(one: Tries) -> dict[str, object]:
+    figures = {"median": one.median, "p95": one.p95, "length": one.length}
+    known = {name: value for name, value in figures.items() if math.isfinite(value)}
+    return {"count": one.count, "solved": one.solved, **known, "colliding": one.colliding}

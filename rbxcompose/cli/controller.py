@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
-from rbxcompose.cli.bus.entities import table
-from rbxcompose.cli.output.console import refuse, tell
-from rbxcompose.cli.robots.commands import add_asking_options, show_answer
-from rbxcompose.cli.robots.lookup import REFUSED, NotDoneError, answer_of, find_robot, known_state
+from rbxcompose.cli.output.console import NotDoneError, table, tell
+from rbxcompose.cli.output.options import Action, add_actions, argument, run_action
+from rbxcompose.cli.robots.lookup import REFUSED, add_asking_options, answer_of, find_robot, known_state, show_answer
 from rbxcompose.controller_requests import BUS, ControllerState, ListControllers, ScaleMotion, SwitchControllers
 from rbxcompose.findings import suggest
 from rbxcompose.runtime.folder import RobotFolder
@@ -21,37 +20,24 @@ ON_SYSTEM = BUS
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    actions = parser.add_subparsers(dest="action", metavar="ls|switch|speed", required=True)
-    ls = actions.add_parser("ls", help="list controllers, whether they are active, and their joints")
-    ls.set_defaults(do=_ls)
-    switch = actions.add_parser(
-        "switch",
-        help="switch controllers on and off, all at once or not at all",
-        description="No joint may be led by two controllers, so name those that give way with --off.",
+    apart = "No joint may be led by two controllers, so name those that give way with --off."
+    slowed = """The goal on its way stays on its path, and is slowed down, too. 0 % holds it where it is, 100 %
+lets it go on. Motions led by hand keep their speed."""
+    on = argument("on", metavar="NAME", nargs="*", help="a controller that becomes active")
+    off = argument("--off", metavar="NAME", action="append", default=[], help="one that becomes inactive")
+    name = argument("name", metavar="NAME", help="the controller")
+    share = argument("share", metavar="SHARE", help="from 0 %% to 100 %%")
+    actions = (
+        Action("ls", "list controllers, whether they are active, and their joints", _ls),
+        Action("switch", "switch controllers on and off, all at once or not at all", _switch, (on, off), apart),
+        Action("speed", "let a controller follow its goals at a share of their speed", _speed, (name, share), slowed),
     )
-    switch.add_argument("on", metavar="NAME", nargs="*", help="a controller that becomes active")
-    switch.add_argument("--off", metavar="NAME", action="append", default=[], help="one that becomes inactive")
-    switch.set_defaults(do=_switch)
-    speed = actions.add_parser(
-        "speed",
-        help="let a controller follow its goals at a share of their speed",
-        description="The goal on its way stays on its path, and is slowed down, too. 0 % holds it where it is, 100 % "
-        "lets it go on. Motions led by hand keep their speed.",
-    )
-    speed.add_argument("name", metavar="NAME", help="the controller")
-    speed.add_argument("share", metavar="SHARE", help="from 0 %% to 100 %%")
-    speed.set_defaults(do=_speed)
-    for one in (ls, switch, speed):
-        add_asking_options(one)
+    add_actions(parser, actions, add_asking_options)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the chosen subcommand."""
-    do: Callable[[argparse.Namespace], int] = arguments.do
-    try:
-        return do(arguments)
-    except NotDoneError as error:
-        return refuse(error.finding)
+    return run_action(arguments)
 
 
 def _listed(folder: RobotFolder) -> Iterator[tuple[str, ControllerState]]:

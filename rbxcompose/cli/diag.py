@@ -8,18 +8,16 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
-import select
-import shutil
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Sequence
+from functools import partial
+from typing import Any
 
-from rbxcompose.cli.output.console import has_colour, refuse, tell
-from rbxcompose.cli.output.terminal import full_screen, raw, show
-from rbxcompose.cli.robots.commands import add_asking_options, pass_on
-from rbxcompose.cli.robots.health import change_line, told_change, told_tree, tree_lines
-from rbxcompose.cli.robots.lookup import NotDoneError, answer_of, find_robot
+from rbxcompose.cli.output.console import has_colour, tell
+from rbxcompose.cli.output.options import Action, add_actions, argument, run_action
+from rbxcompose.cli.output.terminal import LiveScreen, is_terminal
+from rbxcompose.cli.robots.lookup import add_asking_options, answer_of, find_robot, pass_on
 from rbxcompose.diagnostics.requests import (
     TYPE,
     Acknowledge,
@@ -27,8 +25,12 @@ from rbxcompose.diagnostics.requests import (
     LevelChange,
     ListChanges,
     ShowDiagnostics,
+    TreeLine,
 )
+from rbxcompose.levels import Level
+from rbxcompose.printable import fitted, plain
 from rbxcompose.runtime.folder import RobotFolder
+from rbxcompose.typed_json import to_data
 
 ON_SYSTEM = TYPE
 _PERIOD = 0.2  # [s] between two requests to a robot that is followed
@@ -36,32 +38,23 @@ _PERIOD = 0.2  # [s] between two requests to a robot that is followed
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
-
-    def add(action: str, words: str, do: Callable[[argparse.Namespace], int]) -> argparse.ArgumentParser:
-        made = actions.add_parser(action, help=words, description=words)
-        made.set_defaults(do=do)
-        add_asking_options(made)
-        return made
-
-    tree = add("tree", "print groups and parts with their levels; the exit code is the level of the robot", _tree)
-    watch = add("watch", "show the tree live, until q or Ctrl-C", _watch)
-    for one in (tree, watch):
-        one.add_argument("-v", "--values", action="store_true", help="also the values that parts tell")
-    add("echo", "print each change of a level with its cause, until interrupted", _echo)
-    history = add("history", "print the last changes of levels, oldest first", _history)
-    history.add_argument("path", nargs="?", default="", metavar="PATH", help="only of this group and what is below it")
-    ack = add("ack", "let latched levels follow the present again", _acknowledge)
-    ack.add_argument("path", nargs="?", default="", metavar="PATH", help="the group, such as /power; without it, all")
+    values = argument("-v", "--values", action="store_true", help="also the values that parts tell")
+    below = argument("path", nargs="?", default="", metavar="PATH", help="only of this group and what is below it")
+    group = argument("path", nargs="?", default="", metavar="PATH", help="the group, such as /power; without it, all")
+    actions = (
+        ("tree", "print groups and parts with their levels; the exit code is the level of the robot", _tree, values),
+        ("watch", "show the tree live, until q or Ctrl-C", _watch, values),
+        ("echo", "print each change of a level with its cause, until interrupted", _echo),
+        ("history", "print the last changes of levels, oldest first", _history, below),
+        ("ack", "let latched levels follow the present again", _acknowledge, group),
+    )
+    described = (Action(name, words, do, (add_asking_options, *own), words) for name, words, do, *own in actions)
+    add_actions(parser, described, metavar="ACTION")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the chosen subcommand."""
-    do: Callable[[argparse.Namespace], int] = arguments.do
-    try:
-        return do(arguments)
-    except NotDoneError as error:
-        return refuse(error.finding)
+    return run_action(arguments)
 
 
 def _tree(arguments: argparse.Namespace) -> int:
@@ -84,7 +77,7 @@ def _watch(arguments: argparse.Namespace) -> int:
     try:
         if arguments.json:
             return _follow_tree(folder)
-        if not (sys.stdin.isatty() and sys.stdout.isatty()):
+        if not is_terminal():
             _tree(arguments)
             return 0
         return _show_live(folder, values=arguments.values)
@@ -104,15 +97,19 @@ def _follow_tree(folder: RobotFolder) -> int:
 
 
 def _show_live(folder: RobotFolder, *, values: bool) -> int:
-    keyboard, colour = sys.stdin.fileno(), has_colour(sys.stdout)
-    with raw(keyboard), full_screen(sys.stdout):
-        while True:
-            size = shutil.get_terminal_size()  # takes 80 x 24 for a terminal that reports 0 x 0
+    colour = has_colour(sys.stdout)
+    with LiveScreen() as screen:
+        while not screen.is_over:
             tree = answer_of(folder, ShowDiagnostics())
-            lines = tree_lines(folder.path.name, tree, values=values, colour=colour, width=size.columns)
-            show(sys.stdout, list(lines)[: size.lines])
-            if select.select([keyboard], [], [], _PERIOD)[0] and os.read(keyboard, 100).lower().count(b"q"):
-                return 0
+            screen.draw(partial(_tree_picture, folder.path.name, tree, values, colour))
+            screen.wait(_PERIOD)
+    return 0
+
+
+def _tree_picture(
+    robot: str, tree: DiagnosticsTree, values: bool, colour: bool, width: int, height: int
+) -> Sequence[str]:
+    return list(tree_lines(robot, tree, values=values, colour=colour, width=width))
 
 
 def _echo(arguments: argparse.Namespace) -> int:
@@ -151,3 +148,65 @@ def _history(arguments: argparse.Namespace) -> int:
 
 def _acknowledge(arguments: argparse.Namespace) -> int:
     return pass_on(arguments, Acknowledge(arguments.path))
+
+
+_RESET, _FAINT = "\x1b[0m", "\x1b[2m"
+_COLOURS = {Level.OK: "\x1b[32m", Level.WARN: "\x1b[33m", Level.ERROR: "\x1b[1;31m", Level.STALE: "\x1b[35m"}
+_STEP = "  "
+_WIDEST = 40  # columns of a name; longer ones move their message to the right
+_LONGEST = 1000  # characters of a message
+
+
+def tree_lines(
+    robot: str, tree: DiagnosticsTree, *, values: bool = False, colour: bool = False, width: int = 0
+) -> Iterator[str]:
+    """Yield the robot with its level and the cause, then a line for each group and part; `width` 0 cuts nothing."""
+    names = [f"{_STEP * (one.depth + 1)}{plain(one.name)}" for one in tree.lines]
+    column = max((len(name) for name in (robot, *names) if len(name) <= _WIDEST), default=0)
+    yield _row(robot, tree.level, tree.cause, column, colour, width)
+    for name, line in zip(names, tree.lines, strict=True):
+        message = "" if line.is_group and line.message == line.level.name else line.message
+        yield _row(name, line.level, message, column, colour, width)
+        if values and not line.is_group:
+            yield from _values(line, colour, width)
+    notes = [f"{tree.left_out:,} more are on /diagnostics_agg"] if tree.left_out else []
+    notes += [f"{tree.dropped:,} statuses were refused; the log says why"] if tree.dropped else []
+    for text in notes:
+        yield fitted(text, width) if width else text
+
+
+def _row(name: str, level: Level, message: str, column: int, colour: bool, width: int) -> str:
+    text = f"{name:<{column}}  {level.name:<5}  {plain(message, _LONGEST)}".rstrip()
+    text = fitted(text, width) if width else text
+    if not colour:
+        return text
+    start = len(f"{name:<{column}}  ")
+    word = text[start : start + 5]
+    return f"{text[:start]}{_COLOURS[level]}{word}{_RESET}{text[start + 5 :]}"
+
+
+def _values(line: TreeLine, colour: bool, width: int) -> Iterator[str]:
+    pairs = [*((("hardware_id", line.hardware_id),) if line.hardware_id else ()), *line.values]
+    keys = max((len(plain(key)) for key, _ in pairs), default=0)
+    for key, value in pairs:
+        text = f"{_STEP * (line.depth + 2)}{plain(key):<{keys}}  {plain(value, _LONGEST)}"
+        text = fitted(text, width) if width else text
+        yield f"{_FAINT}{text}{_RESET}" if colour else text
+
+
+def change_line(change: LevelChange, colour: bool) -> str:
+    """Return a change as a line: `   12.30  /power  OK -> WARN  battery: Medium battery`."""
+    old, new = (f"{_COLOURS[one]}{one.name}{_RESET}" if colour else one.name for one in (change.old, change.new))
+    cause = "" if change.cause == change.new.name else plain(change.cause, _LONGEST)
+    return f"{change.time:8.2f}  {plain(change.path)}  {old} -> {new}  {cause}".rstrip()
+
+
+def told_change(change: LevelChange) -> dict[str, Any]:
+    """Return a change as data for JSON; levels are words."""
+    return {**to_data(change), "old": change.old.name.lower(), "new": change.new.name.lower()}
+
+
+def told_tree(tree: DiagnosticsTree) -> dict[str, Any]:
+    """Return the tree as data for JSON: levels are words, values a map."""
+    lines = [{**to_data(line), "level": line.level.name.lower(), "values": dict(line.values)} for line in tree.lines]
+    return {**to_data(tree), "level": tree.level.name.lower(), "lines": lines}

@@ -12,12 +12,11 @@ import platform
 import sys
 import time
 
-from rbxcompose.cli.bus.entities import add_json_option
 from rbxcompose.cli.bus.guest import Guest, HeardMessage
 from rbxcompose.cli.bus.messages import to_json
-from rbxcompose.cli.bus.place import place_of
-from rbxcompose.cli.output.console import FINDINGS, has_colour, refuse, tell, tell_report
-from rbxcompose.cli.robots.lookup import NotDoneError, add_robot_option, find_robot, robots_up
+from rbxcompose.cli.output.console import FINDINGS, NotDoneError, has_colour, refuse, tell, tell_report
+from rbxcompose.cli.output.options import add_json_option
+from rbxcompose.cli.robots.lookup import add_robot_option, find_robot, place_of, robots_up
 from rbxcompose.compiler import compile_robot
 from rbxcompose.devices.serial_ports import latency_timers, serial_ports
 from rbxcompose.doctor import machine

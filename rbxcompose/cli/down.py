@@ -5,10 +5,9 @@ from __future__ import annotations
 import argparse
 import json
 
-from rbxcompose.cli.output.console import refuse, tell
-from rbxcompose.cli.project.kinds import is_system
-from rbxcompose.cli.robots.lookup import NO_ANSWER, NOT_UP, NotDoneError, add_robot_option, find_robot, known_state
-from rbxcompose.cli.systems.options import add_system_options
+from rbxcompose.cli.output.console import FINDINGS, NotDoneError, refuse, tell
+from rbxcompose.cli.output.options import add_system_options, is_system
+from rbxcompose.cli.robots.lookup import NO_ANSWER, NOT_UP, add_robot_option, find_robot, known_state
 from rbxcompose.requests import Refused
 from rbxcompose.runtime.control import NoAnswerError, ask, supervisor_of
 from rbxcompose.runtime.folder import RobotFolder, RobotState
@@ -32,10 +31,12 @@ def run(arguments: argparse.Namespace) -> int:
     """End the robot: orderly if its supervisor answers, else by force."""
     wanted = arguments.robot or arguments.path
     if wanted is not None and is_system(wanted):
-        from rbxcompose.cli.systems.everywhere import ask_everywhere  # only needed for systems
+        from rbxcompose.cli.systems.hosts import ask_all, every_share  # only needed for systems
 
+        if (shares := every_share(wanted, arguments)) is None:
+            return FINDINGS
         options = ["--json"] if arguments.json else []  # the end on one host may end it on the others before they do
-        return ask_everywhere(wanted, arguments, lambda robot: ["down", robot, *options], tolerates=NOT_UP.code)
+        return ask_all(shares, lambda robot: ["down", robot, *options], in_json=arguments.json, tolerates=NOT_UP.code)
     try:
         folder = find_robot(wanted)
         told = _end(folder)

@@ -10,8 +10,7 @@ import argparse
 import json
 
 from rbxcompose.cli.output.console import FINDINGS, tell, tell_report
-from rbxcompose.cli.project.robot_choice import add_path_argument, robot_path
-from rbxcompose.cli.project.robot_options import add_layer_options, layers_of
+from rbxcompose.cli.robots.targets import add_layer_options, add_path_argument, layers_of, robot_path
 from rbxcompose.compiler import compile_robot
 from rbxcompose.inspection.expand import expand, expand_data
 from rbxcompose.printable import escaped

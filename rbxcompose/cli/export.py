@@ -18,7 +18,7 @@ from pathlib import Path
 
 from rbxcompose import __version__
 from rbxcompose.cli.output.console import FINDINGS, refuse, tell, tell_report
-from rbxcompose.cli.project.kinds import is_system
+from rbxcompose.cli.output.options import is_system
 from rbxcompose.compiler import Compilation, compile_robot
 from rbxcompose.exporting import compose, kubernetes, ros2, systemd
 from rbxcompose.exporting.exported_share import shares

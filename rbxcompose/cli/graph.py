@@ -11,8 +11,7 @@ from pathlib import Path
 
 from rbxcompose.atomic_files import replace_file
 from rbxcompose.cli.output.console import FINDINGS, refuse, tell, tell_report
-from rbxcompose.cli.project.robot_choice import add_path_argument, robot_path
-from rbxcompose.cli.project.robot_options import add_layer_options, layers_of
+from rbxcompose.cli.robots.targets import add_layer_options, add_path_argument, layers_of, robot_path
 from rbxcompose.compiler import compile_robot
 from rbxcompose.inspection.diagram import diagram_of
 from rbxcompose.inspection.graph_dot import dot

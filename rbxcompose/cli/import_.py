@@ -12,8 +12,8 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
-from rbxcompose.cli.bus.entities import add_json_option
 from rbxcompose.cli.output.console import FINDINGS, refuse, tell, tell_report
+from rbxcompose.cli.output.options import add_json_option
 from rbxcompose.findings import Finding, Report, Sources
 from rbxcompose.importing.foreign_files import read_files
 from rbxcompose.importing.importer import ImportedFiles, broken_importers, imported, importers

@@ -10,11 +10,10 @@ import sys
 import time
 from collections.abc import Iterable, Sequence
 
-from rbxcompose.cli.output.console import has_colour, refuse, tell
-from rbxcompose.cli.project.kinds import is_system
-from rbxcompose.cli.robots.lookup import NOT_UP, NotDoneError, add_robot_option, find_robot, known_state
+from rbxcompose.cli.output.console import FINDINGS, NotDoneError, has_colour, refuse, tell
+from rbxcompose.cli.output.options import add_system_options, is_system
+from rbxcompose.cli.robots.lookup import NOT_UP, add_robot_option, find_robot, known_state
 from rbxcompose.cli.robots.story import StoryWriter
-from rbxcompose.cli.systems.options import add_system_options
 from rbxcompose.findings import suggest
 from rbxcompose.levels import LOG_LEVELS
 from rbxcompose.runtime.folder import RobotFolder, base_folder
@@ -73,13 +72,15 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _of_system(arguments: argparse.Namespace) -> int:
-    from rbxcompose.cli.systems.everywhere import follow_everywhere  # only needed for systems
+    from rbxcompose.cli.systems.hosts import every_share, follow_all  # only needed for systems
 
     options = ["--level", arguments.level, *(["-f"] if arguments.follow else [])]
     options += ["-n", str(arguments.lines)] if arguments.lines is not None else []
     options += ["--json"] if arguments.json else []
     system, *names = arguments.names
-    return follow_everywhere(system, arguments, lambda robot: ["logs", robot, *names, *options])
+    if (shares := every_share(system, arguments)) is None:
+        return FINDINGS
+    return follow_all(shares, lambda robot: ["logs", robot, *names, *options])
 
 
 def _meant(robot: str | None, names: Sequence[str]) -> tuple[RobotFolder, Sequence[str]]:

@@ -9,17 +9,13 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from typing import TYPE_CHECKING, NoReturn
+from collections.abc import Sequence
+from typing import Any, NoReturn
 
 import rbxcompose
 from rbxcompose import cli
 from rbxcompose.cli.verbs import load, module_of, parser_of, verbs
 from rbxcompose.manifest.garbage_collection import collect_rarely
-
-if TYPE_CHECKING:
-    import argparse
-    from collections.abc import Sequence
-    from types import FrameType
 
 USAGE, INTERRUPTED = 2, 130
 _ABOUT = "Docker Compose for robots: YAML in, a checked and running robot out."
@@ -38,7 +34,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.write(f"rbxcompose {rbxcompose.__version__}\n")
         return 0
     if words[0] == "__complete":  # the query of the scripts of `completion`
-        from rbxcompose.cli.completions.known_values import complete
+        from rbxcompose.cli.completion import complete
 
         return complete(words[1:])
     if words[0] not in verbs():
@@ -50,7 +46,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return _run(words[0], words[1:])
 
 
-def _interrupted(number: int, frame: FrameType | None) -> NoReturn:
+def _interrupted(number: int, frame: object) -> NoReturn:
     # Immediately and silently, even in the middle of an import; `up` itself notifies its robot.
     os._exit(INTERRUPTED)
 
@@ -64,19 +60,18 @@ def _run(name: str, words: Sequence[str]) -> int:
         with answered(in_json="--json" in words):
             arguments = parser_of(name, verb).parse_args(words)
             if (where := getattr(verb, "ON_SYSTEM", "")) and (system := _system_of(arguments, where)):
-                from rbxcompose.cli.systems.forward import forward  # only needed for systems
+                from rbxcompose.cli.systems.hosts import forward  # only needed for systems
 
-                return forward(system, where, [name, *words], arguments)
+                return forward(verb, system, where, [name, *words], arguments)
             return verb.run(arguments)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # so that the flush at exit has somewhere to go
         return 1
 
 
-def _system_of(arguments: argparse.Namespace, where: str) -> str:
+def _system_of(arguments: Any, where: str) -> str:
     """Return the argument that names a system, or a robot of one; empty if there is none."""
-    from rbxcompose.cli.project.kinds import system_and_robot
-    from rbxcompose.cli.systems.options import EACH
+    from rbxcompose.cli.output.options import EACH, system_and_robot
 
     written = arguments.robot if "robot" in arguments else None
     written = written or (arguments.path if where == EACH and "path" in arguments else None)

@@ -11,9 +11,9 @@ import time
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
-from rbxcompose.cli.output.console import refuse, tell
-from rbxcompose.cli.robots.commands import add_asking_options, pass_on
-from rbxcompose.cli.robots.lookup import REFUSED, WHICH, NotDoneError, answer_of, find_robot
+from rbxcompose.cli.output.console import NotDoneError, refuse, tell
+from rbxcompose.cli.output.options import Action, Declare, add_actions, argument, run_action
+from rbxcompose.cli.robots.lookup import REFUSED, WHICH, add_asking_options, answer_of, find_robot, pass_on
 from rbxcompose.executive.requests import (
     MISSION,
     CancelMission,
@@ -40,61 +40,58 @@ _FORMATS = "text", "mermaid", "dot", "html"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
-
-    def add(action: str, words: str, do: Callable[[argparse.Namespace], int]) -> argparse.ArgumentParser:
-        made = actions.add_parser(action, help=words, description=words)
-        made.set_defaults(do=do)
-        return made
-
-    add_asking_options(add("ls", "list the robot's missions with their states", _list))
-    begin = _named(add("run", "start a mission beside those that run", _run), needed=True)
-    begin.add_argument("--set", action="append", default=[], dest="sets", metavar="K=V", help="give it an input")
-    begin.add_argument("--from", dest="start", default="", metavar="STATE", help="start in this state: 'outer.inner'")
-    _named(add("cancel", "end a mission for good", _to(CancelMission)))
-    _named(add("pause", "hold a mission; its timers stand still", _to(PauseMission)))
-    _named(add("resume", "resume a mission where it was held", _to(ResumeMission)))
-    _named(add("status", "show where a mission is, with its data", _status))
-    _named(add("watch", "show a mission live", _watch))
-    log = _named(add("log", "print what missions did, as JSON, one line each", _log))
-    log.add_argument("-f", "--follow", action="store_true", help="follow new records, until interrupted")
-    log.add_argument("--all", action="store_true", help="also its inputs, so that it can be run again")
-    again = add("replay", "run missions again from their log, and report the first difference", _replay)
-    again.add_argument("log", metavar="FILE", help="the output of 'mission log --all'")
-    _on_file(again)
-    show = _on_file(add("show", "draw a mission; a running one with the states of its nodes", _show), "name")
-    show.add_argument("--format", choices=_FORMATS, default="text", help="output format")
-    show.add_argument("--out", metavar="FILE", help="write it to this file")
-    _on_file(add("skills", "list the skills that missions may use on a robot", _skills)).add_argument(
-        "--json", action="store_true", help="answer in JSON"
+    mission = argument("name", nargs="?", default="", metavar="MISSION", help="which one")
+    the_mission = argument("name", metavar="MISSION", help="which one")
+    robot = argument("path", nargs="?", metavar="ROBOT", help="the robot's file; without it, the running robot")
+    sets = argument("--set", action="append", default=[], dest="sets", metavar="K=V", help="give it an input")
+    json_ = argument("--json", action="store_true", help="answer in JSON")
+    named = (mission, add_asking_options)
+    started = (
+        argument("name", nargs=None, default="", metavar="MISSION", help="which one"),
+        add_asking_options,
+        sets,
+        argument("--from", dest="start", default="", metavar="STATE", help="start in this state: 'outer.inner'"),
     )
-    explore = _on_file(add("explore", "look for dead ends by trying everything that may happen", _explore), "name")
-    explore.add_argument("--set", action="append", default=[], dest="sets", metavar="K=V", help="give it an input")
-    explore.add_argument("--states", type=int, default=2000, metavar="N", help="most states to look at")
-    explore.add_argument("--depth", type=int, default=30, metavar="N", help="most events on a path")
-    explore.add_argument("--json", action="store_true", help="answer in JSON")
-
-
-def _named(parser: argparse.ArgumentParser, *, needed: bool = False) -> argparse.ArgumentParser:
-    parser.add_argument("name", nargs=None if needed else "?", default="", metavar="MISSION", help="which one")
-    add_asking_options(parser)
-    return parser
-
-
-def _on_file(parser: argparse.ArgumentParser, *names: str) -> argparse.ArgumentParser:
-    for name in names:
-        parser.add_argument(name, metavar="MISSION", help="which one")
-    parser.add_argument("path", nargs="?", metavar="ROBOT", help="the robot's file; without it, the running robot")
-    return parser
+    logged = (
+        *named,
+        argument("-f", "--follow", action="store_true", help="follow new records, until interrupted"),
+        argument("--all", action="store_true", help="also its inputs, so that it can be run again"),
+    )
+    again = (argument("log", metavar="FILE", help="the output of 'mission log --all'"), robot)
+    drawn = (
+        the_mission,
+        robot,
+        argument("--format", choices=_FORMATS, default="text", help="output format"),
+        argument("--out", metavar="FILE", help="write it to this file"),
+    )
+    explored = (
+        the_mission,
+        robot,
+        sets,
+        argument("--states", type=int, default=2000, metavar="N", help="most states to look at"),
+        argument("--depth", type=int, default=30, metavar="N", help="most events on a path"),
+        json_,
+    )
+    table: tuple[tuple[str, str, Callable[[argparse.Namespace], int], tuple[Declare, ...]], ...] = (
+        ("ls", "list the robot's missions with their states", _list, (add_asking_options,)),
+        ("run", "start a mission beside those that run", _run, started),
+        ("cancel", "end a mission for good", _to(CancelMission), named),
+        ("pause", "hold a mission; its timers stand still", _to(PauseMission), named),
+        ("resume", "resume a mission where it was held", _to(ResumeMission), named),
+        ("status", "show where a mission is, with its data", _status, named),
+        ("watch", "show a mission live", _watch, named),
+        ("log", "print what missions did, as JSON, one line each", _log, logged),
+        ("replay", "run missions again from their log, and report the first difference", _replay, again),
+        ("show", "draw a mission; a running one with the states of its nodes", _show, drawn),
+        ("skills", "list the skills that missions may use on a robot", _skills, (robot, json_)),
+        ("explore", "look for dead ends by trying everything that may happen", _explore, explored),
+    )
+    add_actions(parser, (Action(name, words, do, own, words) for name, words, do, own in table), metavar="ACTION")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the chosen subcommand."""
-    do: Callable[[argparse.Namespace], int] = arguments.do
-    try:
-        return do(arguments)
-    except NotDoneError as error:
-        return refuse(error.finding)
+    return run_action(arguments)
 
 
 def ask(robot: str | None, query: Query[A]) -> A:
@@ -189,7 +186,7 @@ def _log(arguments: argparse.Namespace) -> int:
 
 
 def _replay(arguments: argparse.Namespace) -> int:
-    from rbxcompose.cli.missions.replay import replay_log
+    from rbxcompose.cli.missions.files import replay_log
 
     return replay_log(arguments)
 
@@ -207,6 +204,6 @@ def _skills(arguments: argparse.Namespace) -> int:
 
 
 def _explore(arguments: argparse.Namespace) -> int:
-    from rbxcompose.cli.missions.exploration import explore
+    from rbxcompose.cli.missions.files import explore
 
     return explore(arguments)

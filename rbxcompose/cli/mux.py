@@ -11,10 +11,9 @@ import json
 import time
 from collections.abc import Callable, Iterator
 
-from rbxcompose.cli.bus.entities import count, seconds, table
-from rbxcompose.cli.output.console import refuse, tell
-from rbxcompose.cli.robots.commands import add_asking_options, show_answer
-from rbxcompose.cli.robots.lookup import REFUSED, NotDoneError, answer_of, find_robot, known_state
+from rbxcompose.cli.output.console import NotDoneError, table, tell
+from rbxcompose.cli.output.options import Action, add_actions, argument, count, run_action, seconds
+from rbxcompose.cli.robots.lookup import REFUSED, add_asking_options, answer_of, find_robot, known_state, show_answer
 from rbxcompose.findings import suggest
 from rbxcompose.mux.requests import (
     MUX,
@@ -38,49 +37,32 @@ _LOOK = 0.2  # [s] between two looks of `watch`; no change is missed between the
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    actions = parser.add_subparsers(dest="action", metavar="ls|why|select|lock|...", required=True)
-    ls = actions.add_parser("ls", help="list muxes, their modes, and who holds each output")
-    ls.set_defaults(do=_ls)
-    why = actions.add_parser("why", help="show who holds an output until when, and what keeps the others from it")
-    why.set_defaults(do=_why)
-    watch = actions.add_parser("watch", help="print each change of who holds an output, until interrupted")
-    watch.add_argument("-n", "--count", type=count, metavar="N", help="end after N changes")
-    watch.set_defaults(do=_watch)
-    select = actions.add_parser("select", help="let an input through, in the mode `select`; '__none' for none")
-    select.set_defaults(do=_select)
-    add = actions.add_parser("add", help="add an input")
-    add.add_argument("--topic", metavar="TOPIC", default="", help="its topic, if that is not MUX/INPUT")
-    add.add_argument("--priority", type=int, metavar="N", help="its priority; only where priorities count")
-    add.add_argument("--timeout", type=seconds, metavar="T", help="it counts as silent after this time")
-    add.set_defaults(do=_add)
-    delete = actions.add_parser("delete", help="remove an input")
-    delete.set_defaults(do=_delete)
-    lock = actions.add_parser("lock", help="hold inputs back by hand, all if none is named")
-    lock.add_argument("--for", dest="seconds", type=seconds, metavar="T", help="unlock them after this time")
-    lock.set_defaults(do=_lock)
-    unlock = actions.add_parser(
-        "unlock",
-        help="end what was locked by hand",
-        description="What still commands goes on at once.",
+    maybe = argument("names", metavar="MUX", nargs="*", help="the mux, if the robot has several")
+    words = "the mux, if there are several, and the input"
+    one_input = argument("names", metavar="MUX|INPUT", nargs="+", help=words)
+    inputs = argument("names", metavar="MUX|INPUT", nargs="*", help="the mux, if there are several, and inputs")
+    until = argument("-n", "--count", type=count, metavar="N", help="end after N changes")
+    topic = argument("--topic", metavar="TOPIC", default="", help="its topic, if that is not MUX/INPUT")
+    priority = argument("--priority", type=int, metavar="N", help="its priority; only where priorities count")
+    timeout = argument("--timeout", type=seconds, metavar="T", help="it counts as silent after this time")
+    while_ = argument("--for", dest="seconds", type=seconds, metavar="T", help="unlock them after this time")
+    select = "let an input through, in the mode `select`; '__none' for none"
+    actions = (
+        Action("ls", "list muxes, their modes, and who holds each output", _ls),
+        Action("why", "show who holds an output until when, and what keeps the others from it", _why, (maybe,)),
+        Action("watch", "print each change of who holds an output, until interrupted", _watch, (until, maybe)),
+        Action("select", select, _select, (one_input,)),
+        Action("add", "add an input", _add, (topic, priority, timeout, one_input)),
+        Action("delete", "remove an input", _delete, (one_input,)),
+        Action("lock", "hold inputs back by hand, all if none is named", _lock, (while_, inputs)),
+        Action("unlock", "end what was locked by hand", _unlock, (inputs,), "What still commands goes on at once."),
     )
-    unlock.set_defaults(do=_unlock)
-    for one in (why, watch):
-        one.add_argument("names", metavar="MUX", nargs="*", help="the mux, if the robot has several")
-    for one in (select, add, delete):
-        one.add_argument("names", metavar="MUX|INPUT", nargs="+", help="the mux, if there are several, and the input")
-    for one in (lock, unlock):
-        one.add_argument("names", metavar="MUX|INPUT", nargs="*", help="the mux, if there are several, and inputs")
-    for one in (ls, why, watch, select, add, delete, lock, unlock):
-        add_asking_options(one)
+    add_actions(parser, actions, add_asking_options, metavar="ls|why|select|lock|...")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the chosen subcommand."""
-    do: Callable[[argparse.Namespace], int] = arguments.do
-    try:
-        return do(arguments)
-    except NotDoneError as error:
-        return refuse(error.finding)
+    return run_action(arguments)
 
 
 def _names(folder: RobotFolder) -> list[str]:

@@ -12,10 +12,9 @@ import os
 from collections.abc import Iterable, Iterator
 from importlib.util import find_spec
 
-from rbxcompose.cli.bus.entities import add_json_option, table
-from rbxcompose.cli.output.console import FINDINGS, tell, tell_report
-from rbxcompose.cli.project.robot_options import add_layer_options, compiled
-from rbxcompose.cli.project.targets import targets
+from rbxcompose.cli.output.console import FINDINGS, table, tell, tell_report
+from rbxcompose.cli.output.options import add_json_option
+from rbxcompose.cli.robots.targets import add_layer_options, compiled, targets
 from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Report, Severity
 from rbxcompose.model.robot import Robot

@@ -7,18 +7,28 @@ option. It never overwrites a file.
 from __future__ import annotations
 
 import argparse
+import os
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
+from io import TextIOWrapper
+from pathlib import Path, PurePosixPath
+from typing import TypeVar
 
+from rbxcompose.atomic_files import replace_file
 from rbxcompose.cli.output.console import FINDINGS, refuse, tell, tell_report
-from rbxcompose.cli.project.new_mission import MistakenRobotError, find_home
-from rbxcompose.cli.project.questions import Asker, CancelledError
+from rbxcompose.compiler import Compilation, compile_robot
 from rbxcompose.dataclass import dataclass
-from rbxcompose.manifest.files import shown_name
+from rbxcompose.manifest.files import find, project_of, shown_name
+from rbxcompose.manifest.library import PREFIX
+from rbxcompose.manifest.limits import FILE_BYTES
+from rbxcompose.model.charge import navigator_of, top_speed
+from rbxcompose.model.robot import Robot
 from rbxcompose.printable import plain
+from rbxcompose.regular_files import read_regular
 from rbxcompose.scaffold import component, mission, part, robot
-from rbxcompose.scaffold.answers import AnswerError, read_name, read_text, read_yes
+from rbxcompose.scaffold.answers import ANSWER, AnswerError, read_name, read_text, read_yes
+from rbxcompose.scaffold.mission import MissionAnswers, with_entry
 from rbxcompose.scaffold.new_files import write_new
 
 INTERRUPTED = 130
@@ -151,3 +161,133 @@ _MAKERS: dict[str, Callable[[argparse.Namespace, Asker], New]] = {
     "part": _part,
     "component": _component,
 }
+T = TypeVar("T")
+Read = Callable[[str], T]
+
+
+class CancelledError(Exception):
+    """Raised when a person stops answering (Ctrl-D)."""
+
+
+class Asker:
+    """Asks, or takes given answers; `is_asking` is whether somebody is there to answer."""
+
+    def __init__(self, *, is_asking: bool) -> None:
+        self.is_asking = is_asking and sys.stdin.isatty()
+        if self.is_asking and isinstance(sys.stdin, TextIOWrapper):
+            sys.stdin.reconfigure(errors="replace")  # a key that sends invalid UTF-8 is a wrong letter, not an abort
+
+    def ask(self, question: str, read: Read[T], default: str, *, given: str | None = None) -> T:
+        """Return what `read` makes of the answer; report a refused answer and ask again.
+
+        Raises:
+            AnswerError: if `given`, or the default, is refused.
+            CancelledError: if there is no answer.
+        """
+        if given is not None or not self.is_asking:
+            return read(default if given is None else given)
+        while True:
+            try:
+                return read(_line(f"{question} [{default}]: ") or default)
+            except AnswerError as error:
+                refuse(error.finding)
+
+    def ask_several(self, question: str, read: Callable[[str, list[T]], T]) -> list[T]:
+        """Return what `read` makes of each answer and those before it, until an empty one; none if nobody is there."""
+        found: list[T] = []
+        while self.is_asking and (text := _line(f"{question}: ")):
+            try:
+                found.append(read(text, found))
+            except AnswerError as error:
+                refuse(error.finding)
+        return found
+
+
+def _line(prompt: str) -> str:
+    sys.stdout.write(prompt)
+    sys.stdout.flush()
+    text = sys.stdin.readline()
+    if not text:
+        sys.stdout.write("\n")
+        raise CancelledError
+    return text.strip()
+
+
+class MistakenRobotError(Exception):
+    """Raised with the compiler's result when the robot itself has mistakes."""
+
+    def __init__(self, compilation: Compilation) -> None:
+        super().__init__("the robot has errors")
+        self.compilation = compilation
+
+
+@dataclass(frozen=True, slots=True)
+class MissionHome:
+    """The robot that gets a mission, its file, and the project of both."""
+
+    robot: Robot
+    file: Path
+    project: Path
+
+    def usual(self, name: str) -> MissionAnswers:
+        """Return the default answers for a mission of this robot."""
+        file = PurePosixPath(self.file.relative_to(self.project))
+        places = tuple(self.robot.manifest.places.values())
+        for skill in sorted(self.robot.skills) if places else ():
+            if driver := navigator_of(self.robot, skill):
+                return MissionAnswers(name, file, places, skill, top_speed(self.robot, *driver))
+        return MissionAnswers(name, file)
+
+    def add(self, answers: MissionAnswers) -> bool:
+        """Write the mission's entry into the robot's file, if that surely changes nothing else; return whether done."""
+        before = read_regular(self.file, FILE_BYTES)
+        text = with_entry(before.decode("utf-8"), answers)
+        if text is None:
+            return False
+        unsaved = {self.file: text.removeprefix("\ufeff").replace("\r\n", "\n")}
+        after = compile_robot(str(self.file), environment=os.environ, unsaved=unsaved)
+        if after.plan is None or after.robot is None or answers.name not in after.robot.missions:
+            return False
+        if before != read_regular(self.file, FILE_BYTES):
+            return False
+        try:
+            replace_file(self.file, text.encode("utf-8"))
+        except OSError:  # the caller reports what to write by hand
+            return False
+        return True
+
+
+def find_home(written: str) -> MissionHome:
+    """Return the robot that gets the mission; if none is named, the only one below `robots/`.
+
+    Raises:
+        AnswerError: if there is no such robot, if there are several, or if it belongs to the library.
+        MistakenRobotError: if it has mistakes.
+    """
+    file = _file(written)
+    out = compile_robot(str(file), environment=os.environ)
+    if out.robot is None or out.report.has_errors:
+        raise MistakenRobotError(out)
+    return MissionHome(out.robot, file, project_of(file))
+
+
+def _file(written: str) -> Path:
+    if written.startswith(PREFIX):
+        help_text = "create your own with 'rbxcompose new robot NAME'"
+        raise AnswerError(
+            ANSWER.at(None, f"'{written}' is a robot of the library, which stays as it is", help=help_text)
+        )
+    path = find(written or _only())
+    if isinstance(path, Path):
+        return path
+    raise AnswerError(path)
+
+
+def _only() -> str:
+    files = sorted(Path("robots").glob("*/robot.yaml"))
+    if len(files) == 1:
+        return str(files[0])
+    if files:
+        names = ", ".join(shown_name(file.parent) for file in files)
+        raise AnswerError(ANSWER.at(None, "which robot is the mission for?", help=f"name it with '--robot': {names}"))
+    raise AnswerError(ANSWER.at(None, "there is no robot below 'robots/'", help="name one with '--robot PATH'"))

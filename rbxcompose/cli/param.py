@@ -9,67 +9,91 @@ Exit codes: 0 done, 1 refused (`diff`: there is a difference), 2 wrong usage.
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 
-from rbxcompose.cli.bus.entities import add_count_options, add_json_option, add_timeout_option, visit
-from rbxcompose.cli.bus.parameter_nodes import ParameterNodes
-from rbxcompose.cli.bus.place import add_bus_options
-from rbxcompose.cli.systems.options import BUS, add_system_options
+from rbxcompose.cli.bus.guest import visit
+from rbxcompose.cli.output.options import (
+    BUS,
+    Action,
+    Declare,
+    add_actions,
+    add_count_options,
+    add_json_option,
+    add_system_options,
+    add_timeout_option,
+    argument,
+)
+from rbxcompose.cli.parameters.nodes import ParameterNodes
+from rbxcompose.cli.robots.lookup import add_bus_options
+from rbxcompose.cli.systems.hosts import SystemCommand
 
 ON_SYSTEM = BUS
-_MODULES = {  # where each is carried out; some import the compiler, which others do not need
-    "listed_values": ("ls", "get", "describe"),
-    "set_verbs": ("set", "load", "reset", "undo"),
-    "history_verbs": ("history", "watch"),
-    "manifest_verbs": ("diff", "dump", "save"),
-}
+_WITH_FILES = ("load", "save", "diff", "reset")
+
+
+def _home(module: str, action: str) -> Callable[[ParameterNodes, argparse.Namespace], int]:
+    """Return what carries an action out; it imports its module, since some need the compiler and others do not."""
+
+    def do(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
+        found = import_module(f"rbxcompose.cli.parameters.{module}")
+        return int(getattr(found, f"param_{action}")(nodes, arguments))
+
+    return do
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    verbs = [verb for each in _MODULES.values() for verb in each]
-    actions = parser.add_subparsers(dest="action", metavar="|".join(verbs), required=True)
-
-    def add(verb: str, help: str) -> argparse.ArgumentParser:
-        return actions.add_parser(verb, help=help)
-
-    ls = add("ls", "list parameters with their values")
-    get = add("get", "print the value of a parameter")
-    describe = add("describe", "tell what a parameter is, its limits, and whether it may change")
-    set_ = add("set", "change parameters, all or none")
-    load = add("load", "set all parameters of a file, all or none")
-    reset = add("reset", "set parameters to the values in the manifest")
-    undo = add("undo", "take back the last change, or another one")
-    history = add("history", "list the changes: who, when, from what to what")
-    watch = add("watch", "follow the changes")
-    add("diff", "show what is not as in the manifest")
-    dump = add("dump", "write the live parameters as YAML, for `load`")
-    save = add("save", "write changed values into the manifest, each at its place")
-    for one in (ls, history, watch, dump):
-        one.add_argument("component", metavar="COMPONENT", nargs="?", help="only those of this component or node")
-    for one in (get, describe):
-        one.add_argument("component", metavar="COMPONENT", help="a component or node, such as battery")
-    get.add_argument("name", metavar="PARAMETER", help="the parameter, such as runtime")
-    describe.add_argument("name", metavar="PARAMETER", nargs="?", help="the parameter, such as runtime; else all")
+    only = argument("component", metavar="COMPONENT", nargs="?", help="only those of this component or node")
+    component = argument("component", metavar="COMPONENT", help="a component or node, such as battery")
+    name = argument("name", metavar="PARAMETER", help="the parameter, such as runtime")
+    any_name = argument("name", metavar="PARAMETER", nargs="?", help="the parameter, such as runtime; else all")
     words = "COMPONENT PARAMETER VALUE, or several COMPONENT.PARAMETER=VALUE; values as in a manifest: '30 s', [1, 2]"
-    set_.add_argument("words", metavar="COMPONENT|SETTING|PARAMETER", nargs="+", help=words)
-    load.add_argument("file", metavar="FILE", type=Path, help="as `dump` writes it, or `ros2 param dump`; - is stdin")
-    for one in (reset, save):
-        one.add_argument("names", metavar="COMPONENT|SETTING", nargs="*", help="only these: battery, battery.runtime")
-    undo.add_argument("--change", metavar="CHANGE", default="", help="this one, as `history` calls it: battery:3")
-    history.add_argument("-n", "--last", metavar="N", type=int, default=0, help="only the last N")
-    save.add_argument("--dry-run", action="store_true", help="only show what would be written")
-    add_count_options(watch)
-    for verb in verbs:
-        add_timeout_option(actions.choices[verb], "5s")
-        add_json_option(actions.choices[verb])
-        add_bus_options(actions.choices[verb])
-        add_system_options(actions.choices[verb])
+    values = argument("words", metavar="COMPONENT|SETTING|PARAMETER", nargs="+", help=words)
+    words = "as `dump` writes it, or `ros2 param dump`; - is stdin"
+    file = argument("file", metavar="FILE", type=Path, help=words)
+    names = argument("names", metavar="COMPONENT|SETTING", nargs="*", help="only these: battery, battery.runtime")
+    words = "this one, as `history` calls it: battery:3"
+    change = argument("--change", metavar="CHANGE", default="", help=words)
+    last = argument("-n", "--last", metavar="N", type=int, default=0, help="only the last N")
+    dry = argument("--dry-run", action="store_true", help="only show what would be written")
+    table: tuple[tuple[str, str, str, tuple[Declare, ...]], ...] = (
+        ("ls", "nodes", "list parameters with their values", (only,)),
+        ("get", "nodes", "print the value of a parameter", (component, name)),
+        ("describe", "nodes", "tell what a parameter is, its limits, and whether it may change", (component, any_name)),
+        ("set", "changes", "change parameters, all or none", (values,)),
+        ("load", "changes", "set all parameters of a file, all or none", (file,)),
+        ("reset", "files", "set parameters to the values in the manifest", (names,)),
+        ("undo", "changes", "take back the last change, or another one", (change,)),
+        ("history", "changes", "list the changes: who, when, from what to what", (only, last)),
+        ("watch", "changes", "follow the changes", (only, add_count_options)),
+        ("diff", "files", "show what is not as in the manifest", ()),
+        ("dump", "files", "write the live parameters as YAML, for `load`", (only,)),
+        ("save", "files", "write changed values into the manifest, each at its place", (names, dry)),
+    )
+    actions = (Action(verb, words, _home(module, verb), own) for verb, module, words, own in table)
+    timeout = partial(add_timeout_option, default="5s")
+    add_actions(parser, actions, timeout, add_json_option, add_bus_options, add_system_options)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the chosen subcommand."""
-    home = next(module for module, verbs in _MODULES.items() if arguments.action in verbs)
-    do = getattr(import_module(f"rbxcompose.cli.parameters.{home}"), f"param_{arguments.action}")
-    return visit(arguments, lambda guest: int(do(ParameterNodes(guest, arguments.timeout), arguments)))
+    return visit(arguments, lambda guest: int(arguments.do(ParameterNodes(guest, arguments.timeout), arguments)))
+
+
+def run_on_system(command: SystemCommand) -> int | None:
+    """Run what works with the files of a robot on another host: its live values, and the files of this one."""
+    action = command.arguments.action
+    if action not in _WITH_FILES:
+        return None
+    if len(command.shares) > 1:
+        return command.refuse(f"'param {action}' works with the files of one robot")
+    ((_, robot), remote), *_ = command.shares.items()
+    if remote.is_here:
+        return None
+    from rbxcompose.cli.parameters.files import RemoteParameters  # the compiler
+
+    parameters = RemoteParameters(command.system, command.system.robots[robot], remote, command.words_for(robot))
+    return parameters.run(command.arguments)

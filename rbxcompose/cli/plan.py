@@ -12,9 +12,8 @@ import sys
 from pathlib import Path
 
 from rbxcompose.cli.output.console import FINDINGS, refuse, tell, tell_report
-from rbxcompose.cli.project.kinds import is_system
-from rbxcompose.cli.project.robot_choice import add_path_argument, robot_path
-from rbxcompose.cli.project.robot_options import add_layer_options, layers_of
+from rbxcompose.cli.output.options import is_system
+from rbxcompose.cli.robots.targets import add_layer_options, add_path_argument, layers_of, robot_path
 from rbxcompose.compiler import compile_robot
 from rbxcompose.findings import Finding, kind
 from rbxcompose.inspection.plan_text import plan_text

@@ -8,9 +8,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
-from rbxcompose.cli.output.console import refuse, tell
-from rbxcompose.cli.robots.lookup import NotDoneError, add_robot_option, answer_of, find_robot, known_state, robots_up
-from rbxcompose.cli.systems.options import EACH, add_system_options
+from rbxcompose.cli.output.console import NotDoneError, refuse, tell
+from rbxcompose.cli.output.options import EACH, add_system_options
+from rbxcompose.cli.robots.lookup import add_robot_option, answer_of, find_robot, known_state, robots_up
 from rbxcompose.runtime.clock_offset import ClockOffset
 from rbxcompose.runtime.folder import SUSPENDED, ComponentState, RobotFolder, RobotState
 from rbxcompose.runtime.processes import Process

@@ -10,26 +10,30 @@ import argparse
 import json
 import math
 import re
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from datetime import datetime
+from itertools import count
 from pathlib import Path
 
-from rbxcompose.cli.bus.entities import add_json_option, seconds
+from rbxcompose.bus.attachment import decode_attachment
+from rbxcompose.bus.names import data_key
+from rbxcompose.bus.tokens import SPACE, EndpointToken, parse_token
+from rbxcompose.bus.transport import Arrival
 from rbxcompose.cli.bus.guest import Guest
-from rbxcompose.cli.bus.place import BusPlace, add_bus_options, find_place
-from rbxcompose.cli.output.console import refuse, tell
-from rbxcompose.cli.recordings.options import (
-    add_selection_options,
-    count_table,
-    recover_in,
-    selection_of,
-    warn,
-)
-from rbxcompose.cli.recordings.tap import Tap
-from rbxcompose.cli.robots.lookup import NotDoneError, find_robot
+from rbxcompose.cli.output.console import NotDoneError, refuse, table, tell, tell_report
+from rbxcompose.cli.output.options import add_json_option, seconds
+from rbxcompose.cli.robots.lookup import BusPlace, add_bus_options, find_place, find_robot
+from rbxcompose.findings import Finding, Report
 from rbxcompose.printable import plain
-from rbxcompose.recording.codes import LOST, UNWRITABLE
-from rbxcompose.recording.files import ENDING
+from rbxcompose.qos import Qos
+from rbxcompose.recording.codes import LOST, RECOVERED, UNWRITABLE
+from rbxcompose.recording.definitions import definition_of
+from rbxcompose.recording.files import ENDING, recover_all
+from rbxcompose.recording.message import Recorded
 from rbxcompose.recording.recorder import Recorder, Split
+from rbxcompose.recording.topics import RecordedTopic, Selection, by_name, topic_of
 
 _PAUSE = 0.02  # [s] between checks for messages
 _SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*([kMG])B")
@@ -123,3 +127,123 @@ def _split(text: str) -> Split:
         return Split(time=seconds(text))
     except argparse.ArgumentTypeError:
         raise argparse.ArgumentTypeError(f"'{text}' is neither a size nor a time; write '500MB' or '10min'") from None
+
+
+def add_selection_options(parser: argparse.ArgumentParser) -> None:
+    """Declare `--topics` and `--class`."""
+    parser.add_argument(
+        "--topics",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="PATTERN",
+        help="only these, such as odom '/camera/*'",
+    )
+    parser.add_argument(
+        "--class",
+        nargs="+",
+        action="extend",
+        default=[],
+        dest="classes",
+        type=_class,
+        metavar="CLASS",
+        help=f"only these classes: {', '.join(Qos)}",
+    )
+
+
+def selection_of(arguments: argparse.Namespace) -> Selection:
+    """Return the selection of topics."""
+    return Selection(tuple(arguments.topics), tuple(arguments.classes))
+
+
+def _class(text: str) -> Qos:
+    try:
+        return Qos(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a class; choose from {', '.join(Qos)}") from None
+
+
+def recover_in(folder: Path) -> None:
+    """Recover the unfinished recordings of a folder and report them."""
+    for one in recover_all(folder):
+        if one.problem:
+            warn(RECOVERED.at(None, f"'{plain(str(one.path))}' is unfinished and stays so: {plain(one.problem)}"))
+        else:
+            warn(
+                RECOVERED.at(None, f"'{plain(str(one.path))}' was unfinished: {one.messages:,} messages are recovered")
+            )
+
+
+def warn(finding: Finding) -> None:
+    """Report a finding that does not end the command."""
+    report = Report()
+    report.add(finding)
+    tell_report(report, {})
+
+
+def count_table(counts: Mapping[RecordedTopic, int]) -> str:
+    """Return one line for each topic: name, type, class, number of messages."""
+    rows = [("topic", "type", "class", "messages")]
+    together = by_name(counts)
+    topics = sorted(together, key=lambda topic: (topic.name, topic.type))
+    rows += [(one.name, one.type or "-", one.qos.value, f"{together[one]:,}") for one in topics]
+    return table(rows)
+
+
+MOST_WAITING = 20_000  # messages that arrived and are not yet written
+MOST_TOPICS = 2_000
+
+
+class Tap:
+    """Receives the messages of all selected topics, including those that appear while it runs."""
+
+    def __init__(self, guest: Guest, wanted: Selection) -> None:
+        self._guest, self._wanted = guest, wanted
+        self._tokens: deque[str] = deque(maxlen=MOST_WAITING)
+        self._waiting: deque[Callable[[], Recorded]] = deque(maxlen=MOST_WAITING)
+        self._arrivals = count(1)
+        self._arrived = self._taken = 0
+        self._keys: set[str] = set()
+        guest.transport.watch(f"{SPACE}/{guest.domain}/**", self._noticed)
+
+    @property
+    def lost(self) -> int:
+        """Return how many messages had to make room for newer ones."""
+        return max(0, self._arrived - self._taken - len(self._waiting))
+
+    def take(self) -> Iterator[Recorded]:
+        """Yield the messages that have arrived, and subscribe to new topics."""
+        while self._tokens:
+            self._subscribe(self._tokens.popleft())
+        for _ in range(len(self._waiting)):
+            self._taken += 1
+            yield self._waiting.popleft()()
+
+    def _noticed(self, token: str, is_there: bool) -> None:
+        if is_there:
+            self._tokens.append(token)
+
+    def _subscribe(self, key: str) -> None:
+        token = parse_token(key)
+        topic = topic_of(token) if isinstance(token, EndpointToken) else None
+        if topic is None or not self._wanted.takes(topic) or len(self._keys) >= MOST_TOPICS:
+            return
+        data = data_key(self._guest.domain, topic.name, topic.type, topic.hash)
+        if data in self._keys:
+            return
+        self._keys.add(data)
+        whole = replace(topic, definition=definition_of(topic.type))
+        self._guest.transport.subscribe(data, topic.qos, lambda arrival: self._arrive(whole, arrival))
+
+    def _arrive(self, topic: RecordedTopic, arrival: Arrival) -> None:
+        stamp = self._guest.clock.stamp()
+        self._waiting.append(lambda: _recorded(topic, stamp, arrival))
+        self._arrived = next(self._arrivals)
+
+
+def _recorded(topic: RecordedTopic, stamp: int, arrival: Arrival) -> Recorded:
+    try:
+        sequence, published, _ = decode_attachment(arrival.attachment)
+    except ValueError:
+        sequence, published = 0, stamp  # it comes from no ROS participant: only its time of arrival is known
+    return Recorded(topic, stamp, max(0, published), max(0, sequence), arrival.payload)

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import argparse
 
-from rbxcompose.cli.robots.commands import add_asking_options, pass_on
-from rbxcompose.cli.systems.options import BUS
+from rbxcompose.cli.output.options import BUS
+from rbxcompose.cli.robots.lookup import add_asking_options, pass_on
 from rbxcompose.runtime.requests import ReleaseRobot
 
 ON_SYSTEM = BUS

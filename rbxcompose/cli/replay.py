@@ -14,39 +14,91 @@ from __future__ import annotations
 import argparse
 import json
 import math
-from collections.abc import Iterator
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
 
-from rbxcompose.bus.names import resolve
-from rbxcompose.cli.bus.entities import seconds
-from rbxcompose.cli.bus.guest import Guest
-from rbxcompose.cli.bus.place import BusPlace, add_bus_options
-from rbxcompose.cli.output.console import misused, refuse, tell
-from rbxcompose.cli.project.robot_options import add_layer_options
-from rbxcompose.cli.recordings.component_replay import run_again
-from rbxcompose.cli.recordings.options import (
-    add_selection_options,
-    count_table,
-    recover_in,
-    selection_of,
-    warn,
-)
-from rbxcompose.cli.recordings.replay_bus import replay_bus
-from rbxcompose.cli.recordings.tap import Player
-from rbxcompose.cli.robots.lookup import NotDoneError
-from rbxcompose.findings import MOST_NAMES, Finding, Severity
+from rbxcompose.bus.attachment import Attachment
+from rbxcompose.bus.classes import ros_qos
+from rbxcompose.bus.names import data_key, dds_type, resolve
+from rbxcompose.bus.tokens import EntityKind, NodeToken, gid
+from rbxcompose.bus.transport import RemotePublisher
+from rbxcompose.bus.wire import WIRE_PROFILES
+from rbxcompose.bus.zenoh_session import open_router
+from rbxcompose.cli.bus.guest import NO_ROUTER, Guest
+from rbxcompose.cli.output.console import NotDoneError, misused, refuse, tell, tell_report
+from rbxcompose.cli.output.options import seconds
+from rbxcompose.cli.record import add_selection_options, count_table, recover_in, selection_of, warn
+from rbxcompose.cli.robots.lookup import BusPlace, add_bus_options, find_place, robots_up
+from rbxcompose.cli.robots.targets import add_layer_options, compiled
+from rbxcompose.config import HIDDEN
+from rbxcompose.endpoints import tcp_endpoint
+from rbxcompose.findings import MOST_NAMES, Finding, Severity, suggest
+from rbxcompose.plan.dump import PlanTextError, dump, load
+from rbxcompose.plan.model import Instance, Plan
 from rbxcompose.printable import plain
 from rbxcompose.qos import Qos
-from rbxcompose.recording.codes import DAMAGED, NOT_REPLAYED, NOTHING, SENT_ALREADY, UNREADABLE
-from rbxcompose.recording.files import PART
+from rbxcompose.recording.codes import (
+    DAMAGED,
+    DIFFERENT,
+    NOT_ENOUGH,
+    NOT_REPLAYED,
+    NOTHING,
+    SENT_ALREADY,
+    UNREADABLE,
+    UNWRITABLE,
+)
+from rbxcompose.recording.files import PART, write_problem
 from rbxcompose.recording.message import Recorded
 from rbxcompose.recording.reader import NotARecordingError, RecordingReader
+from rbxcompose.recording.recorder import Recorder
 from rbxcompose.recording.schedule import playlist
 from rbxcompose.recording.summary import RecordingSummary, summary_of
+from rbxcompose.recording.tape import PLAN
 from rbxcompose.recording.topics import RecordedTopic, Selection, by_name, is_replayable
 from rbxcompose.regular_files import NotRegularError, open_regular
+from rbxcompose.replay.comparison import RunDifference
+from rbxcompose.replay.run import ReplayResult, missing_topics, replayed
+
+_MATCHING = 1.0  # [s] maximum wait until subscribers have found a new publisher
+_MATCH_PAUSE = 0.01  # [s] between two checks for them
+
+
+class Player:
+    """Publishes recorded messages as the node `replay`, below a namespace (`/old`) if there is one."""
+
+    def __init__(self, guest: Guest, topics: Iterable[RecordedTopic], namespace: str = "") -> None:
+        self._guest = guest
+        self._sequence = count(1)
+        transport, domain = guest.transport, guest.domain
+        node = NodeToken(domain, transport.session, 0, "replay")
+        transport.announce(node.key)
+        self._publishers: dict[RecordedTopic, tuple[RemotePublisher, bytes]] = {}
+        for number, topic in enumerate(topics, 1):
+            qos = WIRE_PROFILES["jazzy"].qos_text(ros_qos(topic.qos))
+            name = f"{namespace}{topic.name}"
+            place = (EntityKind.PUBLISHER, number, name, dds_type(topic.type), topic.hash, qos)
+            token = node.endpoint_key(*place)
+            publisher = transport.publisher(data_key(domain, name, topic.type, topic.hash), topic.qos)
+            transport.announce(token)
+            self._publishers[topic] = publisher, gid(token)
+
+    def wait_for_subscribers(self) -> None:
+        """Wait until each topic has a subscriber, but only briefly: many will never have one."""
+        publishers = [one for one, _ in self._publishers.values()]
+        deadline = self._guest.clock.now() + _MATCHING
+        while not all(one.has_match for one in publishers) and self._guest.clock.now() < deadline:
+            if self._guest.run(lambda: self._guest.is_interrupted, _MATCH_PAUSE):
+                return
+
+    def put(self, message: Recorded) -> None:
+        """Publish a message again."""
+        publisher, sender = self._publishers[message.topic]
+        publisher.put(message.payload, Attachment(next(self._sequence), self._guest.clock.stamp(), sender).encode())
+
 
 _PAUSE = 0.05  # [s] before a recording restarts
 
@@ -247,3 +299,144 @@ def _rate(text: str) -> float:
     if not 0 < rate < math.inf:
         raise argparse.ArgumentTypeError(f"'{text}' is not a rate; write '2x' or '0.5x'")
     return rate
+
+
+_PORT, _TRIES = 7447, 20  # the port at which ROS 2 looks for a router, and those behind it
+
+
+@contextmanager
+def replay_bus(arguments: argparse.Namespace) -> Iterator[BusPlace]:
+    """Yield the bus that the options name; with `--alone`, or if no robot is up, one with a router of its own.
+
+    Raises:
+        NotDoneError: if there is none.
+    """
+    is_named = arguments.router is not None or arguments.robot is not None
+    if is_named or (robots_up() and not arguments.alone):
+        yield find_place(arguments)
+        return
+    with _own_router() as endpoint:
+        tell(f"a router of its own is at {endpoint}: 'rbxcompose topic echo TOPIC --router {endpoint}'")
+        yield BusPlace(endpoint, arguments.domain or 0)
+
+
+@contextmanager
+def _own_router() -> Iterator[str]:
+    for port in range(_PORT, _PORT + _TRIES):
+        endpoint = tcp_endpoint(port)
+        try:
+            session = open_router(endpoint)
+        except OSError:
+            continue
+        try:
+            yield endpoint
+        finally:
+            session.close()  # type: ignore[no-untyped-call]
+        return
+    raise NotDoneError(NO_ROUTER.at(None, f"no port from {_PORT} to {_PORT + _TRIES - 1} is free for a router"))
+
+
+HOW = "'rbxcompose up PATH --rate max --record FILE' records everything that is needed"
+
+
+def run_again(arguments: argparse.Namespace, path: Path, reader: RecordingReader) -> int:
+    """Run the component that `--into` names and report the first difference; return 0 if there is none.
+
+    Raises:
+        NotDoneError: if the recording lacks something needed, or the outputs cannot be written.
+    """
+    deque(reader.messages(), maxlen=0)  # the index of a truncated recording has no attachments
+    plan = _plan(arguments, path, reader)
+    instance = _instance(plan, arguments.into)
+    if missing := missing_topics(plan, instance, reader.topics):
+        names = plain(", ".join(missing))
+        raise NotDoneError(NOT_ENOUGH.at(None, f"'{plain(str(path))}' lacks inputs of '{instance.name}': {names}"))
+    with open_regular(path) as file, _kept(arguments.write) as keep:
+        found = replayed(plan, instance, RecordingReader(file).messages(), keep)
+    return _told(arguments, instance.name, found)
+
+
+def _plan(arguments: argparse.Namespace, path: Path, reader: RecordingReader) -> Plan:
+    if PLAN not in reader.attachments:
+        message = f"'{plain(str(path))}' was not recorded within a stepped run"
+        raise NotDoneError(NOT_ENOUGH.at(None, message, help=HOW))
+    if arguments.robot is not None:
+        compilation = compiled(arguments.robot, arguments)
+        tell_report(compilation.report, compilation.sources)
+        if compilation.plan is None:
+            raise NotDoneError(NOT_ENOUGH.at(None, f"'{plain(arguments.robot)}' has errors"))
+        return compilation.plan
+    try:
+        return load(reader.attachments[PLAN].decode())
+    except ValueError as error:
+        reason = str(error) if isinstance(error, PlanTextError) else "its plan is not text"
+        raise NotDoneError(NOT_ENOUGH.at(None, f"'{plain(str(path))}': {plain(reason)}")) from error
+
+
+def _instance(plan: Plan, name: str) -> Instance:
+    instance = next((one for one in plan.instances if one.name == name), None)
+    if instance is None:
+        names = [one.name for one in plan.instances]
+        message = f"the robot '{plain(plan.robot)}' has no component '{plain(name, 60)}'"
+        raise NotDoneError(NOT_ENOUGH.at(None, message, help=suggest(name, names, "components")))
+    if HIDDEN in _settings(plan, instance):
+        message = f"'{name}' has a secret, which a recording does not hold"
+        raise NotDoneError(NOT_ENOUGH.at(None, message, help="'--robot PATH' takes it from the robot's file"))
+    return instance
+
+
+def _settings(plan: Plan, instance: Instance) -> list[object]:
+    """Return the values of a recorded configuration."""
+    whole = json.loads(dump(Plan(plan.robot, plan.file, (instance,))))
+    left: list[object] = [whole["instances"][0]["config"]]
+    found: list[object] = []
+    while left:
+        one = left.pop()
+        if isinstance(one, dict):
+            left += one.values()
+        elif isinstance(one, list):
+            left += one
+        else:
+            found.append(one)
+    return found
+
+
+@contextmanager
+def _kept(path: Path | None) -> Iterator[Callable[[Recorded], None] | None]:
+    """Yield a function that takes the outputs, and write them to a file if one is requested."""
+    if path is None:
+        yield None
+        return
+    if problem := write_problem(path):
+        raise NotDoneError(UNWRITABLE.at(None, problem))
+    try:
+        recorder = Recorder(path, 0.0)
+        yield recorder.add
+        recorder.finish()
+    except OSError as error:
+        reason = plain(error.strerror or str(error))
+        raise NotDoneError(UNWRITABLE.at(None, f"'{plain(str(path))}' cannot be written: {reason}")) from error
+
+
+def _told(arguments: argparse.Namespace, name: str, found: ReplayResult) -> int:
+    for text in found.errors:
+        tell(plain(text))
+    if arguments.json:
+        tell(json.dumps({"component": name, "equal": found.equal, "difference": _difference_fields(found.difference)}))
+    elif found.difference is None:
+        tell(f"'{name}' sends the same as recorded: {found.equal:,} messages")
+    else:
+        return refuse(DIFFERENT.at(None, _difference_text(name, found.difference, found.equal)))
+    return 0 if found.difference is None else 1
+
+
+def _difference_text(name: str, one: RunDifference, equal: int) -> str:
+    where = f", field '{plain(one.field)}'" if one.field else ""
+    values = f"recorded {plain(one.recorded)}, now {plain(one.now)}"
+    return f"'{name}' differs at {one.time:.3f} s on {plain(one.topic)}{where}: {values}; {equal:,} messages were equal"
+
+
+def _difference_fields(one: RunDifference | None) -> dict[str, object] | None:
+    if one is None:
+        return None
+    return {"time": one.time, "topic": one.topic, "field": one.field, "recorded": one.recorded, "now": one.now}

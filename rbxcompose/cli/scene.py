@@ -17,11 +17,14 @@ from rbxcompose.body.extra import MissingLibraryError
 from rbxcompose.body.model import Body, Geometry
 from rbxcompose.body.urdf import read_body
 from rbxcompose.body.xml_reader import read_urdf
-from rbxcompose.cli.bodies.arm_picture import write_picture
-from rbxcompose.cli.bus.entities import table
-from rbxcompose.cli.output.console import misused, refuse, tell, tell_report
-from rbxcompose.cli.robots.commands import add_asking_options, pass_on
-from rbxcompose.cli.robots.lookup import NotDoneError, answer_of, find_robot
+from rbxcompose.cli.output.console import NotDoneError, misused, refuse, table, tell, tell_report
+from rbxcompose.cli.output.options import Action, Declare, add_actions, argument, run_action
+from rbxcompose.cli.robots.lookup import (
+    add_asking_options,
+    answer_of,
+    find_robot,
+    pass_on,
+)
 from rbxcompose.findings import Finding, Report, kind, suggest
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.validate import validate
@@ -46,59 +49,52 @@ from rbxcompose.typed_json import to_data
 NO_PAIR = kind("RBX9426")
 ON_SYSTEM = SCENE
 _SHOWN = "OBJECT"  # name of the object's text in findings
-Actions = Callable[[argparse.Namespace], int]
+Do = Callable[[argparse.Namespace], int]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    actions = parser.add_subparsers(
-        dest="action", metavar="ls|add|remove|attach|detach|load|save|watch|check|distance|picture", required=True
-    )
-
-    def action(name: str, do: Actions, about: str, *words: tuple[str, str], more: str = "") -> argparse.ArgumentParser:
-        made = actions.add_parser(name, help=about, description=more or about)
-        for metavar, text in words:
-            made.add_argument(metavar.lower(), metavar=metavar, help=text)
-        made.set_defaults(do=do)
-        add_asking_options(made)
-        return made
-
-    named = ("NAME", "the object")
-    written = "as in a manifest: '{box: [60 cm, 40 cm, 2 cm], at: {x: 50 cm}}'"
+    name = argument("name", metavar="NAME", help="the object")
+    words = "as in a manifest: '{box: [60 cm, 40 cm, 2 cm], at: {x: 50 cm}}'"
+    written = argument("object", metavar="OBJECT", help=words)
+    carrier = argument("link", metavar="LINK", help="a link of the body, such as right_gripper_link")
+    words = "a link that it may touch"
+    touch = argument("--touch", metavar="LINK", action="append", default=[], help=words)
+    file = argument("file", metavar="FILE", help="a scene file of MoveIt, such as table.scene")
+    words = "the link in whose frame they are (default: the root)"
+    link = argument("--link", metavar="LINK", default="", help=words)
+    arm = argument("--arm", metavar="NAME", default="", help="the arm that watches (default: the first one)")
+    pair = argument("pair", metavar="NAME", nargs="*", help="one or two links or objects")
+    out = argument("--out", metavar="FILE", default="scene.png", help="the picture (default: scene.png)")
+    ask = add_asking_options
+    hold = "let an object move with a link, as when a gripper holds it"
     stays = "It stays where it is, and may touch the link and all that this carries, or the links of --touch."
-    action("ls", _ls, "list the objects")
-    action("add", _add, "put an object into the scene", named, ("OBJECT", written))
-    action("remove", _remove, "take an object out of the scene", named)
-    carrier = ("LINK", "a link of the body, such as right_gripper_link")
-    about = "let an object move with a link, as when a gripper holds it"
-    attach = action("attach", _attach, about, named, carrier, more=stays)
-    attach.add_argument("--touch", metavar="LINK", action="append", default=[], help="a link that it may touch")
-    action("detach", _detach, "let an object stay where it is", named)
-    file = ("FILE", "a scene file of MoveIt, such as table.scene")
-    load = action("load", _load, "put the objects of a file into the scene", file)
-    load.add_argument("--link", metavar="LINK", default="", help="the link in whose frame they are (default: the root)")
-    action("save", _save, "write the objects around the robot into a file, in the frame of the body's root", file)
-    action("watch", _watch, "tell the goals and plans of arms, and the scene, as they change, until Ctrl-C")
-    for name, do, about in (
-        ("check", _check, "tell what collides now: links and objects that are nearer than they may be"),
-        ("distance", _distance, "tell which two links or objects are the nearest to each other, or those of A [and B]"),
-        ("picture", _picture, "draw the robot as it stands now, with what is around it, and the way that is planned"),
-    ):
-        made = action(name, do, about)
-        made.add_argument("--arm", metavar="NAME", default="", help="the arm that watches (default: the first one)")
-        if name == "distance":
-            made.add_argument("pair", metavar="NAME", nargs="*", help="one or two links or objects")
-        if name == "picture":
-            made.add_argument("--out", metavar="FILE", default="scene.png", help="the picture (default: scene.png)")
+    save = "write the objects around the robot into a file, in the frame of the body's root"
+    watch = "tell the goals and plans of arms, and the scene, as they change, until Ctrl-C"
+    check = "tell what collides now: links and objects that are nearer than they may be"
+    distance = "tell which two links or objects are the nearest to each other, or those of A [and B]"
+    picture = "draw the robot as it stands now, with what is around it, and the way that is planned"
+    table: tuple[tuple[str, str, Do, tuple[Declare, ...]], ...] = (
+        ("ls", "list the objects", _ls, (ask,)),
+        ("add", "put an object into the scene", _add, (name, written, ask)),
+        ("remove", "take an object out of the scene", _remove, (name, ask)),
+        ("attach", hold, _attach, (name, carrier, ask, touch)),
+        ("detach", "let an object stay where it is", _detach, (name, ask)),
+        ("load", "put the objects of a file into the scene", _load, (file, ask, link)),
+        ("save", save, _save, (file, ask)),
+        ("watch", watch, _watch, (ask,)),
+        ("check", check, _check, (ask, arm)),
+        ("distance", distance, _distance, (ask, arm, pair)),
+        ("picture", picture, _picture, (ask, arm, out)),
+    )
+    add_actions(
+        parser, (Action(verb, about, do, own, stays if do is _attach else about) for verb, about, do, own in table)
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the chosen subcommand."""
-    do: Actions = arguments.do
-    try:
-        return do(arguments)
-    except NotDoneError as error:
-        return refuse(error.finding)
+    return run_action(arguments)
 
 
 def _objects(arguments: argparse.Namespace) -> tuple[PlacedObject, ...]:
@@ -209,7 +205,7 @@ def _view(arguments: argparse.Namespace, *between: str) -> ArmView:
 
 
 def _watch(arguments: argparse.Namespace) -> int:
-    from rbxcompose.cli.robots.scene_watch import watch  # a visitor on the bus, which other actions are not
+    from rbxcompose.cli.arms.scene_watch import watch  # a visitor on the bus, which other actions are not
 
     return watch(find_robot(arguments.robot), as_json=arguments.json)
 
@@ -247,7 +243,8 @@ def _distance_row(one: PairDistance) -> tuple[str, str, str]:
 
 
 def _picture(arguments: argparse.Namespace) -> int:
-    from rbxcompose.motion.picture import ArmPicture, draw_arm  # numpy, which other actions do not need
+    from rbxcompose.cli.arms.pictures import write_picture  # numpy, which other actions do not need
+    from rbxcompose.motion.picture import ArmPicture, draw_arm
 
     view = _view(arguments)
     hit = [one for one in view.pairs if one.collides]

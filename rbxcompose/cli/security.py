@@ -17,10 +17,9 @@ from itertools import groupby
 from pathlib import Path
 
 from rbxcompose.cli.output.console import FINDINGS, refuse, tell, tell_report
-from rbxcompose.cli.project.kinds import is_system
-from rbxcompose.cli.systems.options import add_system_options
-from rbxcompose.cli.systems.own_certificate import certificate_findings
-from rbxcompose.findings import Finding, Report, kind
+from rbxcompose.cli.output.options import add_system_options, is_system
+from rbxcompose.findings import Finding, Report, Severity, kind
+from rbxcompose.plan.model import LinkTls
 from rbxcompose.regular_files import read_regular
 from rbxcompose.systems.audit import listeners, reachable_keys
 from rbxcompose.systems.certificates import (
@@ -29,11 +28,14 @@ from rbxcompose.systems.certificates import (
     KEY,
     LARGEST,
     NO_SECURITY,
+    CertificateError,
     OpensslError,
     common_name,
+    days_left,
     folder_of,
     make_authority,
     make_certificate,
+    missing,
     tls_of,
 )
 from rbxcompose.systems.model import System
@@ -94,7 +96,7 @@ def _init(system: System, arguments: argparse.Namespace) -> int:
 
 
 def _bring(system: System, host: str, folder: Path, arguments: argparse.Namespace) -> Finding | None:
-    from rbxcompose.cli.systems.remote import Remote  # starts programs, which `audit` does not need
+    from rbxcompose.cli.systems.hosts import Remote  # starts programs, which `audit` does not need
     from rbxcompose.systems.bundle import archive_of
 
     remote = Remote(host, system.hosts[host], arguments.ssh_config)
@@ -130,3 +132,25 @@ def _certificates(system: System, path: str) -> Iterator[Finding]:
     for host in system.hosts if system.security != NO_SECURITY else ():
         if (folder / host).is_dir():
             yield from certificate_findings(tls_of(folder, host, system.security), common_name(system.name, host), path)
+
+
+SOON = 30.0  # [days] before a certificate expires
+NO_CERTIFICATE = kind("RBX6117")
+REFUSED_CERTIFICATE = kind("RBX6143")
+SOON_EXPIRED = kind(
+    "RBX6144",
+    Severity.WARNING,
+)
+
+
+def certificate_findings(tls: LinkTls, name: str, path: str) -> Iterator[Finding]:
+    """Yield what keeps other hosts from accepting the certificate of a host, or soon will; `name` must be in it."""
+    again = f"rbxcompose security init {path}"
+    if lacking := missing(tls):
+        yield NO_CERTIFICATE.at(None, f"'{lacking[0]}' cannot be read", help=again)
+        return
+    try:
+        if (days := days_left(tls, name)) < SOON:
+            yield SOON_EXPIRED.at(None, f"'{tls.certificate}' expires in {days:.0f} days", help=again)
+    except (CertificateError, OSError) as error:
+        yield REFUSED_CERTIFICATE.at(None, f"other hosts will refuse '{tls.certificate}': {error}", help=again)

@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import argparse
 
-from rbxcompose.cli.bus.entities import add_server_verbs, tell_list, visit
-from rbxcompose.cli.bus.guest import Guest
-from rbxcompose.cli.systems.options import BUS
+from rbxcompose.cli.bus.guest import Guest, add_server_verbs, tell_list, visit
+from rbxcompose.cli.output.options import BUS
 
 ON_SYSTEM = BUS
 _VERB = ("call", "send a request and print the response")
@@ -30,6 +29,6 @@ def _ls(guest: Guest, arguments: argparse.Namespace) -> int:
 
 
 def _call(guest: Guest, arguments: argparse.Namespace) -> int:
-    from rbxcompose.cli.bus.service_call import call  # the imports for messages would slow down the list
+    from rbxcompose.cli.bus.exchange import call  # the imports for messages would slow down the list
 
     return call(guest, arguments)

@@ -8,10 +8,17 @@ from __future__ import annotations
 
 import argparse
 
-from rbxcompose.cli.output.console import refuse
-from rbxcompose.cli.robots.commands import add_asking_options, show_answer
-from rbxcompose.cli.robots.lookup import NO_ANSWER, NotDoneError, answer_of, find_robot, known_state
-from rbxcompose.cli.systems.options import EACH
+from rbxcompose.cli.output.console import NotDoneError, refuse
+from rbxcompose.cli.output.options import EACH
+from rbxcompose.cli.robots.lookup import (
+    NO_ANSWER,
+    add_asking_options,
+    answer_of,
+    find_robot,
+    known_state,
+    place_of,
+    show_answer,
+)
 from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.runtime.requests import StopRobot
 
@@ -42,6 +49,27 @@ def _stopped(folder: RobotFolder) -> str:
         except NotDoneError as error:
             if error.finding.code != NO_ANSWER.code:
                 raise
-    from rbxcompose.cli.robots.stop_by_bus import stop_by_bus  # importing the bus takes time
-
     return stop_by_bus(folder)
+
+
+_ANSWER = 1.0  # [s] for all processes together
+_OTHERS = ("parent", "router")  # processes in which nothing moves
+
+
+def stop_by_bus(folder: RobotFolder) -> str:
+    """Stop the robot without its supervisor, and return which processes were reached and which were not.
+
+    Raises:
+        NotDoneError: if no process can be reached.
+    """
+    from rbxcompose.cli.bus.guest import Guest  # importing the bus takes time
+    from rbxcompose.runtime.process_group.stop_line import stop_key
+
+    name, state = folder.path.name, known_state(folder)
+    with Guest(place_of(folder)) as guest:
+        told = sorted(answer.decode() for answer in guest.ask(stop_key(name), _ANSWER))
+    missing = sorted({*(state.alive() if state else ())} - {*told, *_OTHERS})
+    if not told:
+        raise NotDoneError(NO_ANSWER.at(None, f"'{name}' does not answer, nor does any of its processes"))
+    rest = f"; NOT stopped: {', '.join(missing)}" if missing else ""
+    return f"the supervisor does not answer: stopped over the bus: {', '.join(told)}{rest}"

@@ -7,33 +7,40 @@ from __future__ import annotations
 
 import argparse
 import math
+import sys
+from functools import partial
 from typing import Any
 
 from rbxcompose.body.pose_history import SPAN
 from rbxcompose.body.transform_errors import TransformError, UnknownFrameError
 from rbxcompose.body.transforms import TransformTree
-from rbxcompose.cli.bus.entities import (
-    NO_NAME,
-    NOBODY,
+from rbxcompose.cli.bodies.heard import HeardFrames
+from rbxcompose.cli.bus.guest import NAME, NO_NAME, NOBODY, Guest, visit
+from rbxcompose.cli.bus.messages import shown, to_json
+from rbxcompose.cli.output.console import NotDoneError, refuse, tell
+from rbxcompose.cli.output.options import (
+    BUS,
+    Action,
+    add_actions,
     add_count_options,
     add_json_option,
+    add_system_options,
     add_timeout_option,
+    argument,
     hertz,
     signed,
-    visit,
 )
-from rbxcompose.cli.bus.guest import Guest
-from rbxcompose.cli.bus.heard_frames import HeardFrames
-from rbxcompose.cli.bus.messages import shown, to_json
-from rbxcompose.cli.bus.place import add_bus_options
-from rbxcompose.cli.bus.tf_static import add_static_arguments, publish_static
-from rbxcompose.cli.output.console import refuse, tell
-from rbxcompose.cli.systems.options import BUS, add_system_options
+from rbxcompose.cli.robots.lookup import BusPlace, add_bus_options, find_place
 from rbxcompose.clock import NANOSECONDS
-from rbxcompose.findings import Finding
-from rbxcompose.geometry import Transform3, yaw_of
+from rbxcompose.findings import Finding, kind
+from rbxcompose.geometry import Transform3, quaternion_from_rpy, yaw_of
+from rbxcompose.msgs.geometry_msgs import Quaternion, Transform, TransformStamped, Vector3
+from rbxcompose.msgs.stamps import to_time
+from rbxcompose.msgs.std_msgs import Header
+from rbxcompose.msgs.tf2_msgs import TFMessage
 from rbxcompose.printable import plain
-from rbxcompose.units import TIME
+from rbxcompose.qos import Qos
+from rbxcompose.units import ANGLE, LENGTH, TIME
 
 ON_SYSTEM = BUS
 _DIGITS = 4  # decimal places of metres and degrees
@@ -41,27 +48,24 @@ _DIGITS = 4  # decimal places of metres and degrees
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    actions = parser.add_subparsers(dest="action", metavar="tree|echo|static", required=True)
-    tree = actions.add_parser("tree", help="show the tree of frames")
-    tree.set_defaults(do=_tree)
-    echo = actions.add_parser("echo", help="print where FRAME is in PARENT")
-    echo.add_argument("parent", metavar="PARENT", help="the frame to look from, such as map")
-    echo.add_argument("frame", metavar="FRAME", help="the frame to find, such as base_link")
     words = (
         "where it was so long before the newest known time; it collects that long first (default: newest of each frame)"
     )
-    echo.add_argument("--at", type=_past, metavar="-0.5s", help=words)
-    echo.add_argument("--rate", type=hertz, default=1.0, metavar="1Hz", help="how often (default: 1 Hz)")
-    add_count_options(echo)
-    echo.set_defaults(do=_echo)
-    static = actions.add_parser("static", help="place CHILD in PARENT until Ctrl-C; who has heard of it keeps it there")
-    add_static_arguments(static)
-    for one in (tree, echo, static):
-        add_timeout_option(one, "2s")
-        add_bus_options(one)
-        add_system_options(one)
-    for one in (tree, echo):
-        add_json_option(one)
+    echoed = (
+        argument("parent", metavar="PARENT", help="the frame to look from, such as map"),
+        argument("frame", metavar="FRAME", help="the frame to find, such as base_link"),
+        argument("--at", type=_past, metavar="-0.5s", help=words),
+        argument("--rate", type=hertz, default=1.0, metavar="1Hz", help="how often (default: 1 Hz)"),
+        add_count_options,
+    )
+    shared = (partial(add_timeout_option, default="2s"), add_bus_options, add_system_options)
+    place = "place CHILD in PARENT until Ctrl-C; who has heard of it keeps it there"
+    actions = (
+        Action("tree", "show the tree of frames", _tree, (*shared, add_json_option)),
+        Action("echo", "print where FRAME is in PARENT", _echo, (*echoed, *shared, add_json_option)),
+        Action("static", place, publish_static, (add_static_arguments, *shared)),
+    )
+    add_actions(parser, actions)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -176,3 +180,64 @@ def _past(text: str) -> int:
     if time > 0:
         raise argparse.ArgumentTypeError("must not be in the future: write '-0.5s'")
     return round(time * NANOSECONDS)
+
+
+_TOPIC = "/tf_static"
+_LONGEST = 1000  # characters of a note
+NO_PLACE = kind("RBX9043")
+
+
+def add_static_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the frames and the pose."""
+    parser.add_argument("parent", metavar="PARENT", help="the frame in which it is placed, such as base_link")
+    parser.add_argument("frame", metavar="CHILD", help="the frame to place, such as laser")
+    for axis, words in (("x", "forward"), ("y", "left"), ("z", "up")):
+        parser.add_argument(f"--{axis}", type=signed(LENGTH), default=0.0, metavar="20cm", help=f"{words} (default: 0)")
+    for angle, axis in (("roll", "x"), ("pitch", "y"), ("yaw", "z")):
+        words = f"turned about {axis} (default: 0)"
+        parser.add_argument(f"--{angle}", type=signed(ANGLE), default=0.0, metavar="90deg", help=words)
+
+
+def publish_static(arguments: argparse.Namespace) -> int:
+    """Place a frame until an interrupt."""
+    parent, child = arguments.parent, arguments.frame
+    turned = quaternion_from_rpy(arguments.roll, arguments.pitch, arguments.yaw)
+    pose = Transform3((arguments.x, arguments.y, arguments.z), turned)
+    try:
+        place = find_place(arguments)
+        with Guest(place) as looking:  # through the router, which knows everyone
+            frames = HeardFrames(looking)
+            looking.run(lambda: frames.is_whole, arguments.timeout)
+        if refusal := _refusal(frames, parent, child, pose):
+            return refuse(NO_PLACE.at(None, refusal))
+        return _hold(place, frames, parent, child, pose)
+    except NotDoneError as error:
+        return refuse(error.finding)
+
+
+def _refusal(frames: HeardFrames, parent: str, child: str, pose: Transform3) -> str:
+    """Return why a frame cannot be placed; if it can, place it in the tree that was heard."""
+    if child.startswith("/") or parent.startswith("/"):
+        return "names of frames do not begin with '/'"
+    before, writer = frames.tree.parent_of(child), frames.writers.get(child, "")
+    if before is not None and parent != child:
+        who = "another 'rbxcompose tf static'" if writer.endswith(f"/{NAME}") else writer or "an unknown node"
+        return f"'{child}' is already placed in '{before}', by {who}"
+    if parent not in frames.tree.frames and parent != child:
+        sys.stderr.write(f"note: {plain(str(UnknownFrameError(parent, frames.tree.frames)), _LONGEST)}\n")
+    answer = frames.tree.set(parent, child, pose, stamp=0.0, static=True)
+    return "" if answer.accepted else answer.message
+
+
+def _hold(place: BusPlace, frames: HeardFrames, parent: str, child: str, pose: Transform3) -> int:
+    with Guest(place, stays=True) as guest, guest.interruptible():
+        publisher = guest.bus(frames.kind).publisher(NAME, _TOPIC, TFMessage, Qos.LATCHED)
+        link = TransformStamped(
+            header=Header(stamp=to_time(guest.clock.stamp()), frame_id=parent),
+            child_frame_id=child,
+            transform=Transform(translation=Vector3(*pose.translation), rotation=Quaternion(*pose.rotation)),
+        )
+        publisher(TFMessage(transforms=(link,)))
+        tell(f"'{plain(child)}' is in '{plain(parent)}'; Ctrl-C ends it")
+        guest.run(lambda: guest.is_interrupted)
+    return 0

@@ -7,24 +7,28 @@ messages; the share of a process is that of one processor. Of a system, it shows
 from __future__ import annotations
 
 import argparse
-import os
-import shutil
+import json
+import subprocess
 import sys
+import threading
+import time
+from collections.abc import Mapping
+from functools import partial
+from typing import Any
 
-from rbxcompose.cli.bus.entities import add_json_option
 from rbxcompose.cli.bus.guest import Guest
 from rbxcompose.cli.bus.messages import to_json
-from rbxcompose.cli.bus.place import place_of
-from rbxcompose.cli.output.console import has_colour, refuse, tell
-from rbxcompose.cli.output.terminal import full_screen, raw, show
-from rbxcompose.cli.robots.lookup import NOT_UP, NotDoneError, add_robot_option, find_robot
-from rbxcompose.cli.robots.picture import RobotPicture, lines_of
+from rbxcompose.cli.output.console import NotDoneError, has_colour, refuse, tell
+from rbxcompose.cli.output.options import EACH, add_json_option, add_system_options
+from rbxcompose.cli.output.terminal import LiveScreen, is_terminal
+from rbxcompose.cli.robots.lookup import NOT_UP, add_robot_option, find_robot, place_of
+from rbxcompose.cli.robots.picture import RobotPicture, ShareView, lines_of, system_lines
 from rbxcompose.cli.robots.sampler import Sampler
-from rbxcompose.cli.systems.options import EACH, add_system_options
+from rbxcompose.cli.systems.hosts import Remote, Shares, SystemCommand
+from rbxcompose.printable import plain
 
 ON_SYSTEM = EACH
 _PERIOD = 1.0  # [s] between two samples
-_MOST_READ = 1024  # bytes of keys per read
 _WIDTH, _HEIGHT = 100, 1000  # columns and lines of a picture without a terminal
 
 
@@ -47,13 +51,21 @@ def run(arguments: argparse.Namespace) -> int:
             try:
                 if arguments.json and arguments.follow:
                     return _follow(guest, sampler)
-                if arguments.json or arguments.once or not (sys.stdin.isatty() and sys.stdout.isatty()):
+                if arguments.json or arguments.once or not is_terminal():
                     return _once(guest, sampler, arguments.json)
                 return _live(guest, sampler)
             finally:
                 sampler.close()
     except NotDoneError as error:
         return refuse(error.finding)
+
+
+def run_on_system(command: SystemCommand) -> int | None:
+    """Show the robots of a system in one picture, on a terminal."""
+    arguments = command.arguments
+    if len(command.shares) == 1 or arguments.json or arguments.once or not is_terminal():
+        return None
+    return show_system(command.system.name, command.shares)
 
 
 def _once(guest: Guest, sampler: Sampler, as_json: bool) -> int:
@@ -77,20 +89,12 @@ def _follow(guest: Guest, sampler: Sampler) -> int:
 
 
 def _live(guest: Guest, sampler: Sampler) -> int:
-    keyboard, colour = sys.stdin.fileno(), has_colour(sys.stdout)
-    is_over = False
-
-    def read() -> None:
-        nonlocal is_over
-        keys = os.read(keyboard, _MOST_READ)
-        is_over = not keys or b"q" in keys.lower()
-
-    with guest.interruptible(), raw(keyboard), full_screen(sys.stdout):
-        guest.watch(keyboard, read)
+    colour = has_colour(sys.stdout)
+    with LiveScreen() as screen, guest.interruptible():
+        guest.watch(screen.keyboard, screen.read)
         while True:
-            size = shutil.get_terminal_size()  # takes 80 x 24 for a terminal that reports 0 x 0
-            show(sys.stdout, lines_of(_sampled(sampler), size.columns, size.lines, colour=colour))
-            if guest.run(lambda: is_over or guest.is_interrupted, _PERIOD):
+            screen.draw(lambda width, height: lines_of(_sampled(sampler), width, height, colour=colour))
+            if guest.run(lambda: screen.is_over or guest.is_interrupted, _PERIOD):
                 return 0
 
 
@@ -99,3 +103,76 @@ def _sampled(sampler: Sampler) -> RobotPicture:
     if picture is None:
         raise NotDoneError(NOT_UP.at(None, "the robot is down"))
     return picture
+
+
+_SYSTEM_PERIOD = 0.5  # [s] between two pictures
+_AGAIN = 3.0  # [s] after a command has ended until it is started again
+
+
+class LiveShare:
+    """Follows what a host tells of a share; a command that ends is started again."""
+
+    def __init__(self, host: str, robot: str, remote: Remote) -> None:
+        self._host, self._robot = host, robot
+        self._command = remote.rbxcompose(["top", robot, "--json", "--follow"])
+        self._told: Mapping[str, Any] | None = None
+        self._since = self._ended = time.monotonic()
+        self._problem = self._last = ""
+        self._started()
+
+    def _started(self) -> None:
+        self._process = process = subprocess.Popen(
+            self._command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            errors="replace",
+            start_new_session=True,  # an interrupt is for us
+        )
+        self._thread = threading.Thread(target=self._read, args=(process,), daemon=True)
+        self._thread.start()
+
+    def _read(self, process: subprocess.Popen[str]) -> None:
+        for line in process.stdout or ():
+            try:
+                told = json.loads(line)
+            except ValueError:
+                self._last = self._last or plain(line.strip())
+                continue
+            if isinstance(told, dict) and "components" in told:
+                self._told, self._since, self._problem, self._last = told, time.monotonic(), "", ""
+        if process.stdout is not None:
+            process.stdout.close()
+        process.wait()
+        self._problem, self._ended, self._last = self._last or "it has ended", time.monotonic(), ""
+
+    def view(self) -> ShareView:
+        """Return what is known now."""
+        now = time.monotonic()
+        if not self._thread.is_alive() and now - self._ended > _AGAIN:
+            self._started()
+        return ShareView(self._robot, self._host, self._told, now - self._since, self._problem)
+
+    def close(self) -> None:
+        """End the command."""
+        self._process.terminate()
+        self._thread.join()
+
+
+def show_system(name: str, shares: Shares) -> int:
+    """Show all shares until q or Ctrl-C."""
+    colour = has_colour(sys.stdout)
+    live = [
+        LiveShare(host, robot, remote) for (host, robot), remote in sorted(shares.items(), key=lambda one: one[0][::-1])
+    ]
+    try:
+        with LiveScreen() as screen:
+            while not screen.is_over:
+                views = [one.view() for one in live]
+                screen.draw(partial(system_lines, name, views, colour=colour))
+                screen.wait(_SYSTEM_PERIOD)
+    finally:
+        for one in live:
+            one.close()
+    return 0

@@ -7,26 +7,26 @@ from __future__ import annotations
 
 import argparse
 import json
+from functools import partial
 
 from rbxcompose.bus.graph import GraphEnd
-from rbxcompose.cli.bus.entities import (
+from rbxcompose.cli.bus.guest import Guest, described, tell_list, visit, wanted
+from rbxcompose.cli.output.console import table, tell
+from rbxcompose.cli.output.options import (
+    BUS,
+    Action,
+    add_actions,
     add_count_options,
     add_json_option,
     add_ls_options,
+    add_system_options,
     add_timeout_option,
+    argument,
     count,
-    described,
     hertz,
     seconds,
-    table,
-    tell_list,
-    visit,
-    wanted,
 )
-from rbxcompose.cli.bus.guest import Guest
-from rbxcompose.cli.bus.place import add_bus_options
-from rbxcompose.cli.output.console import tell
-from rbxcompose.cli.systems.options import BUS, add_system_options
+from rbxcompose.cli.robots.lookup import add_bus_options
 
 ON_SYSTEM = BUS
 _ENDS = ("publishers", "subscriptions")
@@ -35,35 +35,23 @@ _WINDOW = 100  # messages
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    actions = parser.add_subparsers(dest="action", metavar="ls|show|echo|hz|pub", required=True)
-    ls = actions.add_parser("ls", help="list the topics with their types")
-    add_ls_options(ls)
-    ls.set_defaults(do=_ls)
-    show = actions.add_parser("show", help="show publishers and subscribers")
-    add_json_option(show)
-    show.set_defaults(do=_show)
-    echo = actions.add_parser("echo", help="print the messages")
-    add_count_options(echo)
-    add_json_option(echo)
-    echo.set_defaults(do=_echo)
-    hz = actions.add_parser("hz", help="measure how often messages arrive")
-    hz.add_argument("--window", type=count, default=_WINDOW, metavar="N", help=f"over so many messages ({_WINDOW})")
-    hz.add_argument("--for", dest="duration", type=seconds, metavar="T", help="end after this time")
-    add_json_option(hz)
-    hz.set_defaults(do=_hz)
-    pub = actions.add_parser("pub", help="publish a message, by default once")
-    for one in (show, echo, hz, pub):
-        one.add_argument("topic", metavar="TOPIC", help="its name, such as /odom")
-    pub.add_argument("type", metavar="TYPE", help="such as geometry_msgs/Twist")
-    pub.add_argument("message", metavar="MESSAGE", nargs="?", default="", help="YAML; missing fields are zero")
-    pub.add_argument("--rate", type=hertz, metavar="10Hz", help="publish again and again, until interrupted")
-    pub.add_argument("-n", "--count", type=count, metavar="N", help="end after this many")
-    add_timeout_option(pub, "2s")
-    add_json_option(pub)
-    pub.set_defaults(do=_pub)
-    for one in (ls, show, echo, hz, pub):
-        add_bus_options(one)
-        add_system_options(one)
+    topic = argument("topic", metavar="TOPIC", help="its name, such as /odom")
+    window = argument("--window", type=count, default=_WINDOW, metavar="N", help=f"over so many messages ({_WINDOW})")
+    duration = argument("--for", dest="duration", type=seconds, metavar="T", help="end after this time")
+    type_ = argument("type", metavar="TYPE", help="such as geometry_msgs/Twist")
+    message = argument("message", metavar="MESSAGE", nargs="?", default="", help="YAML; missing fields are zero")
+    rate = argument("--rate", type=hertz, metavar="10Hz", help="publish again and again, until interrupted")
+    most = argument("-n", "--count", type=count, metavar="N", help="end after this many")
+    timeout = partial(add_timeout_option, default="2s")
+    sent = (topic, type_, message, rate, most, timeout, add_json_option)
+    actions = (
+        Action("ls", "list the topics with their types", _ls, (add_ls_options,)),
+        Action("show", "show publishers and subscribers", _show, (add_json_option, topic)),
+        Action("echo", "print the messages", _echo, (add_count_options, add_json_option, topic)),
+        Action("hz", "measure how often messages arrive", _hz, (window, duration, add_json_option, topic)),
+        Action("pub", "publish a message, by default once", _pub, sent),
+    )
+    add_actions(parser, actions, add_bus_options, add_system_options)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -100,18 +88,18 @@ def _qos(end: GraphEnd) -> str:
 
 
 def _echo(guest: Guest, arguments: argparse.Namespace) -> int:
-    from rbxcompose.cli.bus.topic_echo import echo
+    from rbxcompose.cli.bus.exchange import echo
 
     return echo(guest, arguments)
 
 
 def _hz(guest: Guest, arguments: argparse.Namespace) -> int:
-    from rbxcompose.cli.bus.topic_hz import measure
+    from rbxcompose.cli.bus.exchange import measure
 
     return measure(guest, arguments)
 
 
 def _pub(guest: Guest, arguments: argparse.Namespace) -> int:
-    from rbxcompose.cli.bus.topic_pub import publish
+    from rbxcompose.cli.bus.exchange import publish
 
     return publish(guest, arguments)

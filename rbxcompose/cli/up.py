@@ -12,14 +12,18 @@ import sys
 from pathlib import Path
 
 from rbxcompose.cli.output.console import FINDINGS, refuse, tell_report
-from rbxcompose.cli.project.kinds import is_system
-from rbxcompose.cli.project.robot_choice import add_path_argument, robot_path
-from rbxcompose.cli.project.robot_options import add_layer_options, chosen_layers, compiled, layers_of
-from rbxcompose.cli.robots.live_reload import LiveReload
+from rbxcompose.cli.output.options import add_system_options, is_system
+from rbxcompose.cli.robots.changes import LiveReload
 from rbxcompose.cli.robots.live_rules import LiveRules
-from rbxcompose.cli.robots.run_view import run_plan
-from rbxcompose.cli.robots.this_machine import is_fit
-from rbxcompose.cli.systems.options import add_system_options
+from rbxcompose.cli.robots.run_view import is_fit, run_plan
+from rbxcompose.cli.robots.targets import (
+    add_layer_options,
+    add_path_argument,
+    chosen_layers,
+    compiled,
+    layers_of,
+    robot_path,
+)
 from rbxcompose.compiler import compile_robot
 from rbxcompose.recording.codes import UNWRITABLE
 from rbxcompose.runtime.options import RunOptions
@@ -101,7 +105,7 @@ def _options(arguments: argparse.Namespace) -> RunOptions:
 
 
 def _run_share(path: str, arguments: argparse.Namespace) -> int:
-    from rbxcompose.cli.systems.share_run import run_share  # only needed for systems
+    from rbxcompose.cli.systems.up_system import run_share  # only needed for systems
 
     return run_share(path, arguments, _options(arguments))
 

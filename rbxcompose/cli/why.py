@@ -10,8 +10,7 @@ import argparse
 import json
 
 from rbxcompose.cli.output.console import FINDINGS, refuse, tell, tell_report
-from rbxcompose.cli.project.robot_choice import robot_path
-from rbxcompose.cli.project.robot_options import add_layer_options, layers_of
+from rbxcompose.cli.robots.targets import add_layer_options, layers_of, robot_path
 from rbxcompose.compiler import compile_robot
 from rbxcompose.findings import Finding
 from rbxcompose.inspection.why import why

@@ -26,7 +26,7 @@ MAY_OPEN = {
     "actuation/dynamixel_port.py",
     "devices/serial_ports.py",
     "atomic_files.py",
-    "cli/parameters/changed_values.py",
+    "cli/parameters/changes.py",
     "runtime/process_group/capture.py",
     "runtime/folder.py",
     "runtime/follow.py",

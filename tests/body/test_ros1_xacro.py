@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rbxcompose.body.xacro import Expanded, expand
-from rbxcompose.cli.project.fixes import fix
+from rbxcompose.cli.check import fix
 from rbxcompose.edits import apply
 from rbxcompose.finding_pages import body_of
 from rbxcompose.findings import KINDS, Finding, Span

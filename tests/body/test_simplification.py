@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbxcompose.body.simplification import distance, faces_for, nearest, scaled, simplify
-from rbxcompose.cli.bodies.mesh_names import file_names
+from rbxcompose.cli.body import file_names
 
 ONE = (1.0, 1.0, 1.0)
 

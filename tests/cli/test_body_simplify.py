@@ -9,7 +9,7 @@ import trimesh
 
 from rbxcompose.body import extra
 from rbxcompose.body.simplification import SimplifiedMesh
-from rbxcompose.cli.bodies.simplify import counted
+from rbxcompose.cli.body import counted
 from rbxcompose.cli.main import main
 from rbxcompose.testing.golden import Golden
 

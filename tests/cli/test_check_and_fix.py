@@ -14,8 +14,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rbxcompose.atomic_files import replace_file
+from rbxcompose.cli import check as fixes
 from rbxcompose.cli import main as command
-from rbxcompose.cli.project import fixes
 from rbxcompose.edits import safe_fixes
 from rbxcompose.findings import Finding, Fix, Sources
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.bus.graph import GraphEnd, GraphName, WireType
-from rbxcompose.cli.bus.command_topic import command_topic
-from rbxcompose.cli.robots.lookup import NotDoneError
+from rbxcompose.cli.drive import command_topic
+from rbxcompose.cli.output.console import NotDoneError
 from rbxcompose.msgs.geometry_msgs import Twist
 from rbxcompose.runtime.supervision.teleoperation import teleoperated
 from rbxcompose.testing import check_text

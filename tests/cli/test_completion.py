@@ -14,10 +14,8 @@ import pytest
 from rbxcompose.bus.graph import Graph, GraphName
 from rbxcompose.cli import main as command
 from rbxcompose.cli import verbs
-from rbxcompose.cli.bus.place import BusPlace
-from rbxcompose.cli.completion import SCRIPTS
-from rbxcompose.cli.completions.candidates import candidates, for_shell
-from rbxcompose.cli.completions.known_values import KnownValues, files
+from rbxcompose.cli.completion import SCRIPTS, KnownValues, candidates, files, for_shell
+from rbxcompose.cli.robots.lookup import BusPlace
 from rbxcompose.runtime.folder import ComponentState, RobotFolder, RobotState
 from rbxcompose.runtime.processes import Process, boot_id
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.cli import diag
+from rbxcompose.cli.diag import change_line, tree_lines
 from rbxcompose.cli.main import main
-from rbxcompose.cli.robots.health import change_line, tree_lines
 from rbxcompose.diagnostics.requests import DiagnosticsTree, LevelChange, TreeLine
 from rbxcompose.levels import Level
 from rbxcompose.runtime.folder import RobotFolder

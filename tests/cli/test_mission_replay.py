@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from rbxcompose.cli import main as command
-from rbxcompose.cli.missions import replay as replaying
+from rbxcompose.cli.missions import files as replaying
 from rbxcompose.executive.requests import ReadLog
 from rbxcompose.testing import Bench, check_file
 

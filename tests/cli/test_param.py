@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.cli.parameters.texts import value_of
+from rbxcompose.cli.parameters.changes import value_of
 from rbxcompose.params.values import from_message
 
 ROOT = Path(__file__).parents[2]

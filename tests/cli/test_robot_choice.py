@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.cli import main as command
-from rbxcompose.cli.project.robot_choice import only_path
-from rbxcompose.cli.robots.lookup import NotDoneError
+from rbxcompose.cli.output.console import NotDoneError
+from rbxcompose.cli.robots.targets import only_path
 from rbxcompose.runtime.folder import RobotFolder, RobotState
 from rbxcompose.runtime.processes import Process, boot_id
 from tests.conftest import ROOT

@@ -15,9 +15,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.cli.parameters.saved_values import NewTexts, files_with, write
-from rbxcompose.cli.robots.live_settings import LiveSettings, compiled_as_it_runs
-from rbxcompose.cli.robots.lookup import NotDoneError
+from rbxcompose.cli.output.console import NotDoneError
+from rbxcompose.cli.parameters.files import LiveSettings, NewTexts, compiled_as_it_runs, files_with, write
 from rbxcompose.config import Config
 from rbxcompose.params.core import settings
 from rbxcompose.runtime.folder import RobotState

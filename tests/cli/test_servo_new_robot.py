@@ -70,7 +70,7 @@ def test_it_has_no_findings_and_moves_in_simulation(made: Making, tmp_path: Path
 
 
 def test_its_port_has_the_name_that_stays(made: Making, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = "rbxcompose.cli.servos.new_robot.serial_ports"
+    path = "rbxcompose.cli.servos.actions.serial_ports"
     monkeypatch.setattr(
         path, lambda: [SerialPort(os.path.realpath(tmp_path / "servos"), ["/dev/serial/by-id/usb-FT4"])]
     )

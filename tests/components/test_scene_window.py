@@ -9,8 +9,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.cli.robots.scene_watch import line_of
-from rbxcompose.cli.robots.window_views import WindowViews
+from rbxcompose.cli.arms.scene_watch import WindowViews, line_of
 from rbxcompose.key_feed import KeyFeed, added, whole
 from rbxcompose.msgs.moveit_msgs import CollisionObject
 from rbxcompose.msgs.rbxcompose_msgs import MoveArm

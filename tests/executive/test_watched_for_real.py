@@ -17,8 +17,8 @@ from typing import Any
 import pytest
 
 from rbxcompose.cli.bus.guest import Guest
-from rbxcompose.cli.bus.place import BusPlace
-from rbxcompose.cli.missions.replicas import MissionsSeen
+from rbxcompose.cli.robots.lookup import BusPlace
+from rbxcompose.cli.robots.sampler import MissionsSeen
 
 ROOT = Path(__file__).parents[2]
 PATIENCE = 20.0  # [s]

@@ -15,7 +15,7 @@ from typing import Any
 
 from rbxcompose.atomic_files import replace_file
 from rbxcompose.cli import main as command
-from rbxcompose.cli.project.fixes import fix
+from rbxcompose.cli.check import fix
 from rbxcompose.clock import SteppedClock
 from rbxcompose.compiler import compile_robot
 from rbxcompose.levels import Level

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from rbxcompose.cli.systems import apply_system
-from rbxcompose.cli.systems.remote import Remote
+from rbxcompose.cli.systems.hosts import Remote
 from rbxcompose.manifest.system_file import HostModel
 from rbxcompose.systems.model import System
 from rbxcompose.testing.golden import Golden

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.cli.main import main
-from rbxcompose.cli.systems.own_certificate import certificate_findings
+from rbxcompose.cli.security import certificate_findings
 from rbxcompose.plan.model import LinkTls
 from rbxcompose.systems.audit import NETWORK, ReachableKey, listeners, reachable_keys
 from rbxcompose.systems.certificates import common_name, make_authority, make_certificate, tls_of

@@ -9,10 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from rbxcompose.cli import fleet
 from rbxcompose.cli.main import main
-from rbxcompose.cli.systems import fleet
-from rbxcompose.cli.systems.everywhere import Shares, shares_of
-from rbxcompose.cli.systems.remote import Remote
+from rbxcompose.cli.systems.hosts import Remote, Shares, shares_of
 from rbxcompose.manifest.system_file import HostModel
 from rbxcompose.systems.model import System
 from rbxcompose.testing.golden import Golden

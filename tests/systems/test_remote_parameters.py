@@ -11,9 +11,9 @@ import pytest
 
 from rbxcompose.cli.main import main
 from rbxcompose.cli.robots.live_rules import compiled_with
-from rbxcompose.cli.systems import everywhere, forward
-from rbxcompose.cli.systems.everywhere import Shares, shares_of
-from rbxcompose.cli.systems.remote import Remote
+from rbxcompose.cli.systems import hosts as everywhere
+from rbxcompose.cli.systems import hosts as forward
+from rbxcompose.cli.systems.hosts import Remote, Shares, shares_of
 from rbxcompose.compiler import Compilation
 from rbxcompose.manifest.system_file import HostModel
 from rbxcompose.runtime.options import ChosenLayers
@@ -104,7 +104,7 @@ def test_a_robot_with_real_devices_is_compiled_as_that(folder: Path, monkeypatch
         chosen.append(layers)
         return compiled(file, layers, unsaved)
 
-    monkeypatch.setattr("rbxcompose.cli.systems.parameters.compiled_with", noted)
+    monkeypatch.setattr("rbxcompose.cli.parameters.files.compiled_with", noted)
     assert main(["param", "diff", "--robot", "lab.yaml"]) == 1
     assert {one.real for one in chosen} == {False}
     chosen.clear()

@@ -6,9 +6,9 @@ import sys
 from collections.abc import Sequence
 from typing import Any
 
-from rbxcompose.cli.systems.remote import Remote
-from rbxcompose.cli.systems.system_picture import SILENT, ShareView, system_lines
-from rbxcompose.cli.systems.top_system import LiveShare
+from rbxcompose.cli.robots.picture import SILENT, ShareView, system_lines
+from rbxcompose.cli.systems.hosts import Remote
+from rbxcompose.cli.top import LiveShare
 from rbxcompose.manifest.system_file import HostModel
 from rbxcompose.testing.golden import Golden
 from tests.systems.test_links import until

@@ -1,4 +1,4 @@
-"""`arm setup`: tries random positions of a whole body, and writes which pairs of links need not be watched."""
+"""`arm setup`: pairs of links that need not be watched, poses that collide, and arms that a body seems to have."""
 
 from __future__ import annotations
 
@@ -6,26 +6,33 @@ import argparse
 import json
 import os
 import sys
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
+from rbxcompose.arm_config import ArmConfig
 from rbxcompose.atomic_files import replace_file
 from rbxcompose.body.description import Description
-from rbxcompose.body.link_pairs import CollisionMatrix, read_matrix
-from rbxcompose.cli.arms.told_pairs import told_pairs
+from rbxcompose.body.link_pairs import CollisionMatrix, LinkPair, read_matrix
+from rbxcompose.cli.arms.goals import works_of
 from rbxcompose.cli.bodies.source import bare_body, is_description
-from rbxcompose.cli.output.console import refuse, tell, tell_report
-from rbxcompose.cli.project.robot_choice import robot_path
-from rbxcompose.cli.project.robot_options import compiled
-from rbxcompose.cli.robots.this_machine import missing_extras
+from rbxcompose.cli.output.console import FINDINGS, refuse, tell, tell_report
+from rbxcompose.cli.robots.targets import compiled, robot_path
 from rbxcompose.compiler import Compilation
 from rbxcompose.findings import Finding, Report, Severity, Sources, kind
+from rbxcompose.importing.arm_drafts import manifest_of
+from rbxcompose.importing.arm_proposals import proposed_arms
 from rbxcompose.manifest.files import find, shown_name
 from rbxcompose.manifest.library import PREFIX
 from rbxcompose.manifest.reader import read_source
 from rbxcompose.manifest.tree import ScalarNode, at
 from rbxcompose.model.robot import Robot
+from rbxcompose.motion.collisions import MeshChecker, adjacent_pairs
 from rbxcompose.printable import plain
+from rbxcompose.scaffold.answers import name_like
+from rbxcompose.scaffold.new_files import write_new
 from rbxcompose.sections.arms import arms
 
 NO_SETUP = kind("RBX9420")
@@ -111,7 +118,6 @@ def _file(robot_file: Path, robot: Robot, arguments: argparse.Namespace) -> Path
 
 
 def _propose(path: str, arguments: argparse.Namespace) -> int:
-    from rbxcompose.cli.arms.propose import NO_ARM, run_proposal  # only needed for proposals
 
     if not is_description(path):
         words = f"'{plain(path)}' is a robot, and --propose makes one of a .urdf file"
@@ -126,11 +132,12 @@ def _propose(path: str, arguments: argparse.Namespace) -> int:
 
 
 def _checked(robot: Robot, compilation: Compilation, *, is_json: bool) -> int:
+    from rbxcompose.cli.robots.run_view import missing_extras  # what starts robots
+
     lacking = Report([*missing_extras(robot)])
     if lacking.has_errors:
         tell_report(lacking, compilation.sources)
         return 1
-    from rbxcompose.cli.arms.pose_check import run_check  # imports numpy and planning
 
     return run_check(robot, compilation, is_json=is_json)
 
@@ -190,3 +197,81 @@ def _tell(file: Path, matrix: CollisionMatrix, sources: Sources, *, is_json: boo
     if resting := matrix.having("default"):
         message = f"these collide at rest and stay watched: {told_pairs(resting)}"
         tell_report(Report([TOUCH_AT_REST.at(None, message)]), sources)
+
+
+COLLIDES = kind("RBX9423")
+UNWATCHED = kind(
+    "RBX9424",
+    Severity.WARNING,
+)
+
+
+def run_check(robot: Robot, compilation: Compilation, *, is_json: bool) -> int:
+    """Examine all poses; tell what collides."""
+    found = list(_findings(robot))
+    report = Report([one for _, _, _, one in found])
+    if is_json:
+        keys = ("arm", "pose", "pairs", "code")
+        tell(
+            json.dumps([dict(zip(keys, (arm, pose, pairs, one.code), strict=True)) for arm, pose, pairs, one in found])
+        )
+    else:
+        tell_report(report, compilation.sources)
+    if not found and not is_json:
+        count = sum(len(one.model.poses) for one in robot.manifest.contents.of(arms).values())
+        tell(f"{count} poses, none of them in collision")
+    return FINDINGS if report.has_errors else 0
+
+
+def _findings(robot: Robot) -> Iterator[tuple[str, str, list[tuple[str, str]], Finding]]:
+    contents, description = robot.manifest.contents, robot.manifest.body
+    if description is None:
+        return
+    matrix = description.matrix.pairs if description.matrix is not None else {}
+    for name, arm in contents.of(arms).items():
+        config = robot.components[name].config
+        if not isinstance(config, ArmConfig):
+            continue
+        works = works_of(robot, config, description, is_fast=False)
+        every = MeshChecker(works.kinematics, description.meshes, adjacent_pairs(description.body))
+        rest = [description.body.joints[joint].rest for joint in works.space.names]
+        for pose in arm.model.poses:
+            at = config.poses[pose]
+            values = np.array([at.get(joint, still) for joint, still in zip(works.space.names, rest, strict=True)])
+            span = robot.value("arms", name, "poses", pose)
+            if pairs := works.planner.checker.colliding(values):
+                message = f"the pose '{pose}' of '{name}' is in collision: {told_pairs(pairs)}"
+                yield name, pose, pairs, COLLIDES.at(span, message)
+            if hidden := [one for one in every.colliding(values) if matrix.get(one) in ("never", "user")]:
+                reasons = " and ".join(sorted({f"'{matrix[one]}'" for one in hidden}))
+                message = (
+                    f"links collide in the pose '{pose}' of '{name}' that are there as {reasons}: {told_pairs(hidden)}"
+                )
+                yield name, pose, hidden, UNWATCHED.at(span, message)
+
+
+NO_ARM = kind("RBX9422")
+
+
+def run_proposal(arguments: argparse.Namespace, description: Description, file: Path) -> int:
+    """Write a robot with the arms that a body seems to have, or print it; it is never written over a file."""
+    drafts = proposed_arms(description.body)
+    if not drafts:
+        return refuse(NO_ARM.at(None, f"'{shown_name(file)}' has no row of joints that could be an arm"))
+    name = name_like(file.stem) or "robot"
+    top = f"# Proposed by `rbxcompose arm setup --propose` for {file.name}: correct what is a guess.\n"
+    text = f"{top}rbx: 1\nkind: Robot\nname: {name}\n\n{manifest_of(description.body, drafts, file.name)}"
+    if arguments.out is None:
+        tell(text.rstrip("\n"))
+        return 0
+    out = Path(arguments.out)
+    if (problem := write_new(out.parent, {out.name: text})) is not None:
+        return refuse(problem)
+    tell(f"wrote {shown_name(out.absolute())}: {', '.join(one.name for one in drafts)}")
+    return 0
+
+
+def told_pairs(pairs: Sequence[LinkPair], most: int = 10) -> str:
+    """Return pairs of links in words."""
+    words = ", ".join(f"{one} - {other}" for one, other in pairs[:most])
+    return words + (f" and {len(pairs) - most} more" if len(pairs) > most else "")

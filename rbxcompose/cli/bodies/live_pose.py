@@ -3,27 +3,21 @@
 from __future__ import annotations
 
 import argparse
-import os
 import random
-import select
-import shutil
-import sys
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 
 from rbxcompose.body.model import Body
 from rbxcompose.bus.graph import find
 from rbxcompose.bus.topics import Publisher
-from rbxcompose.cli.bodies.actions import UNKNOWN
-from rbxcompose.cli.bodies.heard_body import described, described_body
+from rbxcompose.cli.bodies.heard import HeardFrames, described, described_body
 from rbxcompose.cli.bodies.sliders import PERIOD, Slider, SliderPanel, is_end, sliders_of, split_keys
-from rbxcompose.cli.bus.entities import NOBODY, visit
-from rbxcompose.cli.bus.guest import NAME, Guest
-from rbxcompose.cli.bus.heard_frames import HeardFrames
-from rbxcompose.cli.output.console import misused, refuse, tell
-from rbxcompose.cli.output.terminal import NO_TERMINAL, full_screen, raw, show
-from rbxcompose.cli.robots.lookup import NotDoneError
+from rbxcompose.cli.bodies.source import UNKNOWN
+from rbxcompose.cli.bus.guest import NAME, NOBODY, Guest, visit
+from rbxcompose.cli.output.console import NotDoneError, misused, refuse, tell
+from rbxcompose.cli.output.terminal import NO_TERMINAL, LiveScreen, is_terminal
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header
@@ -32,14 +26,13 @@ from rbxcompose.qos import Qos
 
 HEARD = 1.5  # [s] in which transforms of all joints should come
 _JOINTS = "joint_states"
-_MOST_READ = 4096  # bytes of keys per read
 
 
 def pose(arguments: argparse.Namespace) -> int:
     """Move the joints of a robot by sliders, or to the positions that are given."""
     if arguments.duration is not None and not arguments.joint:
         return misused("body", "--duration is for the positions of --joint")
-    if not arguments.joint and not (sys.stdin.isatty() and sys.stdout.isatty()):
+    if not arguments.joint and not is_terminal():
         message = "there is no terminal for the sliders"
         return refuse(NO_TERMINAL.at(None, message, help="name the positions: --joint NAME=POSITION"))
     arguments.robot = arguments.robot or arguments.name
@@ -119,59 +112,42 @@ def _send(
 
 def _slide(guest: Guest, publisher: Publisher[JointState], panel: SliderPanel, name: str) -> int:
     """Show sliders until q, an interrupt, or the end of the terminal."""
-    screen = _Screen(guest, publisher, panel, name)
-    keyboard = sys.stdin.fileno()
-    with guest.interruptible(), raw(keyboard):
-        screen.read_early()
+    with LiveScreen() as screen, guest.interruptible():
+        sliders = _Sliders(guest, publisher, panel, name, screen)
+        sliders.pressed(screen.typed_early())  # such keys move nothing, but may end the command
         if not screen.is_over:
-            _run(guest, screen, keyboard)
+            guest.watch(screen.keyboard, sliders.read)
+            guest.scheduler.every(PERIOD, NAME, lambda dt: sliders.send())
+            sliders.send()
+            guest.run(lambda: screen.is_over or guest.is_interrupted)
     return 0
 
 
-def _run(guest: Guest, screen: _Screen, keyboard: int) -> None:
-    with full_screen(sys.stdout):
-        guest.watch(keyboard, screen.read)
-        guest.scheduler.every(PERIOD, NAME, lambda dt: screen.send())
-        screen.send()
-        guest.run(lambda: screen.is_over or guest.is_interrupted)
-
-
-class _Screen:
+class _Sliders:
     """Turns keys into messages, and shows the sliders."""
 
-    def __init__(self, guest: Guest, publisher: Publisher[JointState], panel: SliderPanel, title: str) -> None:
-        self.is_over = False
-        self._guest, self._publisher, self._panel, self._title = guest, publisher, panel, title
+    def __init__(
+        self, guest: Guest, publisher: Publisher[JointState], panel: SliderPanel, title: str, screen: LiveScreen
+    ) -> None:
+        self._guest, self._publisher, self._panel, self._screen = guest, publisher, panel, screen
+        self._picture = partial(panel.lines, title)
         self._begun = ""  # of a key whose rest has not arrived yet
-        self._shown: list[str] = []
 
     def read(self) -> None:
         """Handle the pressed keys."""
-        changes = [self._panel.press(key) for key in self._pressed()]
+        changes = [self._panel.press(key) for key in self.pressed(self._screen.typed())]
         if any(changes):
             self.send()
         else:
-            self._show()
+            self._screen.draw(self._picture)
 
-    def read_early(self) -> None:
-        """Handle keys that were pressed before the start: they move nothing, but may end the command."""
-        if select.select([sys.stdin], [], [], 0)[0]:
-            self._pressed()
-
-    def _pressed(self) -> list[str]:
-        data = os.read(sys.stdin.fileno(), _MOST_READ)
-        keys, self._begun = split_keys(self._begun + data.decode(errors="replace"))
-        self.is_over = self.is_over or not data or any(map(is_end, keys))
+    def pressed(self, text: str) -> list[str]:
+        """Return the keys in what was typed; some end the command."""
+        keys, self._begun = split_keys(self._begun + text)
+        self._screen.is_over = self._screen.is_over or any(map(is_end, keys))
         return keys
 
     def send(self) -> None:
         """Publish all positions, and show them."""
         self._publisher(_message(self._guest, self._panel.positions))
-        self._show()
-
-    def _show(self) -> None:
-        size = shutil.get_terminal_size()  # takes 80 x 24 for a terminal that reports 0 x 0
-        lines = self._panel.lines(self._title, size.columns, size.lines)
-        if lines != self._shown:
-            self._shown = lines
-            show(sys.stdout, lines)
+        self._screen.draw(self._picture)

@@ -1,19 +1,22 @@
-"""The body that PATH names: that of a robot, or a URDF or xacro file without a robot."""
+"""The body that PATH names, of a robot or of a bare file; and the files that actions write."""
 
 from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import field
 from pathlib import Path
 
+from rbxcompose.atomic_files import replace_file
 from rbxcompose.body.description import BodyPart, Description, describe
 from rbxcompose.body.files import BodyFile
-from rbxcompose.cli.project.robot_options import add_layer_options, compiled
+from rbxcompose.cli.output.console import FINDINGS, misused, refuse, tell, tell_report
+from rbxcompose.cli.robots.targets import add_layer_options, compiled, robot_path
 from rbxcompose.dataclass import dataclass
-from rbxcompose.findings import Finding, Report, Span
+from rbxcompose.findings import Finding, Report, Span, kind
 from rbxcompose.manifest.files import find, shown_name
 from rbxcompose.per_compile import one_compile
 from rbxcompose.sections.body import as_xacro_text
@@ -128,3 +131,61 @@ def _folder(written: str) -> Path:
     if not folder.is_dir():
         raise MisuseError(f"--package: '{written}' is not a folder")
     return folder
+
+
+NO_BODY = kind("RBX2008")
+UNKNOWN = kind("RBX2018")
+Use = Callable[[argparse.Namespace, Description], int]
+Read = Callable[[argparse.Namespace, DescribedBody], int]
+Do = Callable[[argparse.Namespace], int]
+
+
+def using(use: Use) -> Do:
+    """Return an action that uses a body, after its findings are written to stderr."""
+    return lambda arguments: read(arguments, lambda same, found: used(same, found, use))
+
+
+def reading(do: Read) -> Do:
+    """Return an action that does something with what was read at PATH."""
+    return lambda arguments: read(arguments, do)
+
+
+def read(arguments: argparse.Namespace, do: Read) -> int:
+    """Do something with what was read at PATH; return the exit code."""
+    arguments.path = robot_path(arguments.path)
+    if arguments.path is None:
+        return FINDINGS
+    try:
+        found = described(arguments)
+    except MisuseError as error:
+        return misused("body", str(error))
+    return do(arguments, found)
+
+
+def used(arguments: argparse.Namespace, found: DescribedBody, use: Use) -> int:
+    """Write the findings to stderr, and use the body if there is one; return the exit code."""
+    tell_report(found.report, found.sources)
+    if found.description is None:
+        return FINDINGS if found.report.has_errors else refuse(no_body(arguments.path))
+    return use(arguments, found.description) or (FINDINGS if found.report.has_errors else 0)
+
+
+def no_body(path: str) -> Finding:
+    """Return the finding that there is no body."""
+    message = "this file has no links" if is_description(path) else "this robot has no body"
+    return NO_BODY.at(None, message)
+
+
+def file_of(arguments: argparse.Namespace, description: Description, ending: str) -> Path:
+    """Return the file that `--out` names, or one in this folder that has the name of the body."""
+    return Path(arguments.out or f"{re.sub(r'[^A-Za-z0-9_-]', '_', description.body.name) or 'body'}{ending}")
+
+
+def write(file: Path, content: bytes) -> int:
+    """Write a file and say so; return the exit code."""
+    try:
+        replace_file(file.resolve(), content)
+    except OSError as error:
+        return misused("body", f"'{file}' cannot be written: {error.strerror}")
+    tell(f"wrote {file}")
+    return 0

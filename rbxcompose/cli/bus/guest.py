@@ -1,29 +1,42 @@
-"""A visitor on a bus: a session for the duration of one command, with a loop of its own."""
+"""A visitor on a bus: a session for the duration of one command, with a loop of its own; and what it lists there."""
 
 from __future__ import annotations
 
+import argparse
+import json
 import math
 import selectors
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import asdict
+from functools import partial
 from types import FrameType, TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import zenoh
 
 from rbxcompose.bus.attachment import Attachment, decode_attachment
-from rbxcompose.bus.graph import Graph, GraphName, WireType
+from rbxcompose.bus.graph import Graph, GraphEnd, GraphName, WireType, find
 from rbxcompose.bus.inbox import Inbox
 from rbxcompose.bus.names import data_key
 from rbxcompose.bus.tokens import SPACE
 from rbxcompose.bus.transport import Arrival
 from rbxcompose.bus.zenoh_session import open_client, open_peer
 from rbxcompose.bus.zenoh_transport import ZenohTransport
-from rbxcompose.cli.bus.place import BusPlace
-from rbxcompose.cli.robots.lookup import NotDoneError
+from rbxcompose.cli.output.console import NotDoneError, refuse, table, tell
+from rbxcompose.cli.output.options import (
+    Action,
+    add_actions,
+    add_json_option,
+    add_ls_options,
+    add_system_options,
+    add_timeout_option,
+    argument,
+)
+from rbxcompose.cli.robots.lookup import BusPlace, add_bus_options, find_place
 from rbxcompose.clock import MonotonicClock
 from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import kind
@@ -40,7 +53,6 @@ PATIENCE = 2.0  # [s] to wait for an answer of the router
 _EACH = zenoh.ConsolidationMode.NONE
 _PAUSE = 0.01  # [s] between two looks for the router
 NO_HASHES = "TypeHashNotSupported"  # ROS 2 Humble writes this in place of a hash
-
 NO_ROUTER = kind("RBX9020")
 
 
@@ -210,3 +222,84 @@ def _short(router: str) -> zenoh.Session:
 
 def _complain(owner: str, text: str) -> None:
     sys.stderr.write(f"{text}\n")
+
+
+Do = Callable[[Guest, argparse.Namespace], int]
+NO_NAME = kind("RBX9022")
+NOBODY = kind("RBX9025")
+SAID_NO = kind("RBX9026")
+
+
+def visit(arguments: argparse.Namespace, do: Callable[[Guest], int]) -> int:
+    """Join the chosen bus, run `do` there, and return the exit code."""
+    try:
+        with Guest(find_place(arguments)) as guest:
+            return do(guest)
+    except NotDoneError as error:
+        return refuse(error.finding)
+
+
+def wanted(names: Sequence[GraphName], name: str, what: str) -> GraphName:
+    """Return the topic, service or action of that name.
+
+    Raises:
+        NotDoneError: if there is none.
+    """
+    found = find(names, name)
+    if found is None:
+        words = f"there is no {what} '{name}'"
+        raise NotDoneError(NO_NAME.misspelt(None, words, name, [one.name for one in names], f"{what}s"))
+    return found
+
+
+def tell_list(names: Sequence[GraphName], ends: tuple[str, str], arguments: argparse.Namespace) -> int:
+    """List names with their types and the counts of both `ends`; hidden names only with `--all`."""
+    listed = [one for one in names if arguments.all or not one.is_hidden]
+    if arguments.json:
+        tell(json.dumps([_counted(one, ends) for one in listed]))
+        return 0
+    rows = [
+        (one.name, ", ".join(one.types), str(len(one.givers)), str(len(one.takers)), one.clash and f"! {one.clash}")
+        for one in listed
+    ]
+    tell(table([("name", "type", *ends, ""), *rows]))
+    return 0
+
+
+def described(one: GraphName, ends: tuple[str, str]) -> dict[str, Any]:
+    """Return all that is known about a name, for JSON."""
+    return {
+        "name": one.name,
+        "types": one.types,
+        "clash": one.clash,
+        ends[0]: [_end(end) for end in one.givers],
+        ends[1]: [_end(end) for end in one.takers],
+    }
+
+
+def add_server_verbs(
+    parser: argparse.ArgumentParser, noun: str, verb: tuple[str, str], content: str, example: str, do: Sequence[Do]
+) -> None:
+    """Declare the subcommands of services or actions: `ls`, and a `verb` with its help, which sends a `content`.
+
+    `do` has the functions that carry them out, in this order.
+    """
+    named = argument("name", metavar=noun.upper(), help=f"its name, such as {example}")
+    words = "YAML; missing fields are zero"
+    written = argument("content", metavar=content.upper(), nargs="?", default="", help=words)
+    sent = (named, written, partial(add_timeout_option, default="5s"), add_json_option)
+    actions = (
+        Action("ls", f"list the {noun}s with their types", do[0], (add_ls_options,)),
+        Action(*verb, do[1], sent),
+    )
+    add_actions(parser, actions, add_bus_options, add_system_options)
+
+
+def _counted(one: GraphName, ends: tuple[str, str]) -> dict[str, Any]:
+    counts = {ends[0]: len(one.givers), ends[1]: len(one.takers)}
+    return {"name": one.name, "types": one.types, "clash": one.clash, **counts}
+
+
+def _end(end: GraphEnd) -> dict[str, Any]:
+    qos = None if end.qos is None else asdict(end.qos)
+    return {"node": end.node, "type": end.kind.type, "hash": end.kind.hash, "gid": end.gid.hex(), "qos": qos}

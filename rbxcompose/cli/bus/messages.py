@@ -4,29 +4,29 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 from collections.abc import Callable
 from typing import Any, TypeVar
 
 import yaml
 
-from rbxcompose.bus.graph import WireType
-from rbxcompose.cli.output.console import tell_report
-from rbxcompose.cli.robots.lookup import NotDoneError
+from rbxcompose.bus.graph import GraphName, WireType
+from rbxcompose.cli.bus.guest import HeardMessage
+from rbxcompose.cli.output.console import NotDoneError, refuse, tell_report
 from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Report, Span, kind
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode, key_span, value_span
 from rbxcompose.msgs import registry
+from rbxcompose.msgs.cdr import CdrError, decode
 from rbxcompose.msgs.plain import KeyPath, from_plain
 from rbxcompose.msgs.types import Interface, Message
 from rbxcompose.printable import FORBIDDEN
 
 NO_TYPE = kind("RBX9021")
-
 MOST_SHOWN = 128  # values of a list that text shows; JSON shows all
 _SHOWN = "MESSAGE"  # name of the message text in findings
-
 M = TypeVar("M", bound=Message)
 T = TypeVar("T", bound=Interface)
 
@@ -138,3 +138,29 @@ def _finite(data: Any) -> Any:
     if isinstance(data, list):
         return [_finite(one) for one in data]
     return None if isinstance(data, float) and not math.isfinite(data) else data
+
+
+class EchoReader:
+    """Decodes the messages of a topic; it counts those it cannot read and reports each such type once."""
+
+    def __init__(self, topic: GraphName) -> None:
+        self.malformed = 0
+        self._types: dict[WireType, type[Message]] = {}
+        for one in topic.kinds:
+            try:
+                self._types[one] = type_of(one, "msg", registry.message)
+            except NotDoneError as error:
+                refuse(error.finding)
+        self.is_useless = not self._types
+
+    def read(self, heard: HeardMessage) -> Message | None:
+        """Return the message, or None if it cannot be read."""
+        if heard.kind not in self._types:
+            return None
+        try:
+            return decode(self._types[heard.kind], heard.arrival.payload)
+        except CdrError as error:
+            self.malformed += 1
+            if self.malformed == 1:
+                sys.stderr.write(f"left out: {error}\n")
+            return None

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import json
-import os
-import select
-import shutil
 import sys
 import time
 from collections.abc import Mapping
 from typing import Any
 
 from rbxcompose.cli.output.console import has_colour, tell
-from rbxcompose.cli.output.terminal import full_screen, raw, show
+from rbxcompose.cli.output.terminal import LiveScreen, is_terminal
 from rbxcompose.cli.robots.lookup import answer_of
 from rbxcompose.executive.requests import LookAtMission, ShowPicture
 from rbxcompose.expressions.text import show_value
@@ -69,19 +66,19 @@ def watch(folder: RobotFolder, name: str, period: float) -> int:
     picture = picture_from_data(answer_of(folder, ShowPicture(name)))
     seen = joined({"statuses": {}, "data": {}}, answer_of(folder, LookAtMission(name)))
     colour = has_colour(sys.stdout)
-    if not (sys.stdin.isatty() and sys.stdout.isatty()):
+    if not is_terminal():
         tell("\n".join(lines_of(picture, seen, _WIDTH, colour=colour)))
         return 0
-    keyboard = sys.stdin.fileno()
-    try:
-        with raw(keyboard), full_screen(sys.stdout):
-            while seen["state"] in ACTIVE:
-                size = shutil.get_terminal_size()  # takes 80 x 24 for a terminal that reports 0 x 0
-                show(sys.stdout, lines_of(picture, seen, size.columns, colour=colour)[: size.lines])
-                if select.select([keyboard], [], [], period)[0] and os.read(keyboard, 100).lower().count(b"q"):
-                    return 0
-                seen = joined(seen, answer_of(folder, LookAtMission(name, seen["version"])))
-    except KeyboardInterrupt:
-        return 0
+
+    def drawn(width: int, height: int) -> list[str]:
+        return lines_of(picture, seen, width, colour=colour)
+
+    with LiveScreen() as screen:
+        while seen["state"] in ACTIVE:
+            screen.draw(drawn)
+            screen.wait(period)
+            if screen.is_over:
+                return 0
+            seen = joined(seen, answer_of(folder, LookAtMission(name, seen["version"])))
     tell("\n".join(lines_of(picture, seen, _WIDTH, colour=colour)))
     return 0

@@ -10,13 +10,14 @@ import json
 import os
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import field
 from typing import Any, NoReturn, TextIO
 
 from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, Report, Severity, Sources
+from rbxcompose.printable import plain
 from rbxcompose.rendering.text import render_text
 
 FINDINGS, USAGE = 1, 2  # exit codes
@@ -122,3 +123,20 @@ class Parser(argparse.ArgumentParser):
         """Note the error, report it with the usage, and end the command."""
         output().misuse = message
         super().error(message)
+
+
+class NotDoneError(Exception):
+    """Raised with the finding when it is unclear which robot is addressed, or none is up."""
+
+    def __init__(self, finding: Finding) -> None:
+        super().__init__(finding.message)
+        self.finding = finding
+
+
+def table(rows: Sequence[Sequence[str]]) -> str:
+    """Return rows of cells as lines in aligned columns; make foreign names safe for a terminal."""
+    cells = [[plain(cell) for cell in row] for row in rows]
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    return "\n".join(
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in cells
+    )

@@ -1,35 +1,30 @@
-"""Find the robot that a command addresses: by `--robot NAME`, by its name or file, or the only running one."""
+"""Find the robot that a command addresses, or its bus; ask it, and show its answer."""
 
 from __future__ import annotations
 
 import argparse
+import json
 import os
 from collections.abc import Iterable
 from contextlib import suppress
 from typing import TypeVar
 
+from rbxcompose.cli.output.console import NotDoneError, refuse, tell
+from rbxcompose.cli.output.options import add_system_options
+from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding, kind, suggest
-from rbxcompose.requests import Refused, Request
+from rbxcompose.requests import Command, Refused, Request
 from rbxcompose.runtime.control import ANSWER, NoAnswerError, ask
 from rbxcompose.runtime.folder import BrokenStateError, RobotFolder, RobotState, UnsafeFolderError, all_folders
 from rbxcompose.runtime.requests import RobotStatus
 
 A = TypeVar("A")
-
 ALREADY_UP = kind("RBX9001")
 NOT_UP = kind("RBX9002")
 WHICH = kind("RBX9003")
 REFUSED = kind("RBX9004")
 NO_ANSWER = kind("RBX9005")
 UNSAFE = kind("RBX9006")
-
-
-class NotDoneError(Exception):
-    """Raised with the finding when it is unclear which robot is addressed, or none is up."""
-
-    def __init__(self, finding: Finding) -> None:
-        super().__init__(finding.message)
-        self.finding = finding
 
 
 def add_robot_option(parser: argparse.ArgumentParser) -> None:
@@ -123,3 +118,67 @@ def no_answer(folder: RobotFolder) -> Finding:
     return NO_ANSWER.at(
         None, f"'{name}' does not answer{why}", help=f"'rbxcompose down {name}' ends what is left of it"
     )
+
+
+@dataclass(frozen=True, slots=True)
+class BusPlace:
+    """A Zenoh endpoint (`tcp/127.0.0.1:7447`) and a ROS domain."""
+
+    router: str
+    domain: int = 0
+
+
+def add_bus_options(parser: argparse.ArgumentParser) -> None:
+    """Declare `--robot NAME`, `--router ENDPOINT` and `--domain N`."""
+    add_robot_option(parser)
+    parser.add_argument("--router", metavar="ENDPOINT", help="another bus, by its Zenoh router: tcp/192.168.1.7:7447")
+    parser.add_argument("--domain", type=int, metavar="N", help="the ROS domain (default: that of the robot, or 0)")
+
+
+def find_place(arguments: argparse.Namespace) -> BusPlace:
+    """Return the place that the options name.
+
+    Raises:
+        NotDoneError: if no robot is found, or it has no router.
+    """
+    if arguments.router is not None:
+        return BusPlace(arguments.router, arguments.domain or 0)
+    found = place_of(find_robot(arguments.robot))
+    return found if arguments.domain is None else BusPlace(found.router, arguments.domain)
+
+
+def place_of(folder: RobotFolder) -> BusPlace:
+    """Return the place of a robot's own bus.
+
+    Raises:
+        NotDoneError: if it has no router.
+    """
+    state = known_state(folder)
+    if state is not None and not state.is_supervised:
+        raise NotDoneError(no_answer(folder))  # its router is gone, too, or about to go
+    if state is None or state.router is None:
+        raise NotDoneError(NO_ANSWER.at(None, f"'{folder.path.name}' has no known router"))
+    return BusPlace(state.router, state.domain)
+
+
+def add_asking_options(parser: argparse.ArgumentParser) -> None:
+    """Declare `--robot NAME`, which may be a robot of a system, and `--json`."""
+    add_robot_option(parser)
+    add_system_options(parser)
+    parser.add_argument("--json", action="store_true", help="answer in JSON")
+
+
+def pass_on(arguments: argparse.Namespace, command: Command) -> int:
+    """Send a command, print the answer, return the exit code."""
+    try:
+        folder = find_robot(arguments.robot)
+        answer = answer_of(folder, command)
+    except NotDoneError as error:
+        return refuse(error.finding)
+    show_answer(arguments, folder, answer)
+    return 0
+
+
+def show_answer(arguments: argparse.Namespace, folder: RobotFolder, answer: str) -> None:
+    """Print a robot's answer."""
+    tell(json.dumps({"robot": folder.path.name, "answer": answer}) if arguments.json else answer)

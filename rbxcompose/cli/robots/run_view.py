@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
+from importlib.util import find_spec
 
-from rbxcompose.cli.output.console import good, has_colour, refuse, tell
-from rbxcompose.cli.robots.live_reload import LiveReload
+from rbxcompose.cli.output.console import good, has_colour, refuse, tell, tell_report
+from rbxcompose.cli.robots.changes import LiveReload
 from rbxcompose.cli.robots.live_rules import LiveRules
 from rbxcompose.cli.robots.lookup import ALREADY_UP, UNSAFE
 from rbxcompose.cli.robots.story import StoryWriter, summary
+from rbxcompose.devices.serial_ports import serial_ports
+from rbxcompose.doctor.serial_ports import look_at, port_findings
+from rbxcompose.findings import Finding, Report, kind
 from rbxcompose.levels import Level
+from rbxcompose.model.robot import Robot
 from rbxcompose.plan.model import Plan, extent
 from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.runtime.follow import Follower
@@ -28,6 +33,7 @@ from rbxcompose.runtime.supervision.launch import (
     Up,
     start_supervisor,
 )
+from rbxcompose.sdk.capabilities import NeedsExtra
 
 _LOOK = 0.05  # [s] between checks of the log
 
@@ -110,3 +116,22 @@ class _Watch:
                 tell("\n".join([good(first) if exit_code == 0 else first, *rest]))
                 self._started.wait()
                 return exit_code
+
+
+NO_EXTRA = kind("RBX2253")
+
+
+def is_fit(robot: Robot, sources: Mapping[str, str]) -> bool:
+    """Tell what is wrong with this machine for a robot, and return whether it may start."""
+    report = Report([*missing_extras(robot), *port_findings(robot, serial_ports(), look_at)])
+    tell_report(report, sources)
+    return not report.has_errors
+
+
+def missing_extras(robot: Robot) -> Iterator[Finding]:
+    """Yield a finding for each component whose extra is not installed."""
+    for component, needed in robot.declared(NeedsExtra):
+        if find_spec(needed.module.value) is None:
+            message = f"'{component.name}' needs the package '{needed.module.value}', which is not installed"
+            help_text = f"pip install 'rbxcompose[{needed.extra.value}]'"
+            yield NO_EXTRA.at(robot.component_span(component.name), message, help=help_text)

@@ -7,13 +7,10 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from rbxcompose.cli.output.console import FINDINGS, misused, refuse, tell
-from rbxcompose.cli.robots.change_outcome import carry_out, unsure
-from rbxcompose.cli.robots.lookup import NotDoneError
-from rbxcompose.cli.robots.proposal import Proposal
-from rbxcompose.cli.systems.everywhere import Shares, is_reachable, reached, shares_of
-from rbxcompose.cli.systems.remote import Running, on_all
-from rbxcompose.cli.systems.share_run import chosen_robots, compiled_for, layers_of, planned
+from rbxcompose.cli.output.console import FINDINGS, NotDoneError, misused, refuse, tell
+from rbxcompose.cli.robots.changes import Proposal, carry_out, unsure
+from rbxcompose.cli.systems.hosts import Running, Shares, is_reachable, on_all, reached, shares_of
+from rbxcompose.cli.systems.up_system import chosen_robots, compiled_for, layers_of, planned
 from rbxcompose.findings import Finding, kind
 from rbxcompose.inspection.changes_text import changes_text
 from rbxcompose.runtime.supervision.changes import Fate

@@ -1,1 +1,0 @@
-"""The subcommands of `udev`, one file each, and what they share."""

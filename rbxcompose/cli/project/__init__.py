@@ -1,1 +1,0 @@
-"""Files of a project: the robots that they make, their fixes, new missions."""

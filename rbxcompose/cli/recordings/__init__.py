@@ -1,1 +1,0 @@
-"""Recordings: receiving and sending messages, options, and the replay of one component."""
