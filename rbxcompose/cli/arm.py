@@ -43,7 +43,14 @@ from rbxcompose.cli.arms.pictures import add_reach_options, draw_motion, run_rea
 from rbxcompose.cli.arms.setup import add_options, run_setup
 from rbxcompose.cli.bus.guest import Guest, visit, wanted
 from rbxcompose.cli.output.console import NotDoneError, misused, table, tell
-from rbxcompose.cli.output.options import Action, add_actions, add_json_option, add_timeout_option, argument, run_action
+from rbxcompose.cli.output.options import (
+    Subcommand,
+    add_actions,
+    add_json_option,
+    add_timeout_option,
+    argument,
+    run_action,
+)
 from rbxcompose.cli.robots.lookup import add_bus_options
 from rbxcompose.cli.robots.targets import add_layer_options, add_path_argument
 from rbxcompose.findings import suggest
@@ -86,15 +93,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     bench = "measure kinematics, and motions, also those of published problems"
     plan = "plan a motion and tell how long it takes, or why there is none"
     actions = (
-        Action("ls", "list the arms of a robot with their joints and poses", _ls, shared),
-        Action("fk", "print where the tip is (forward kinematics)", _fk, (goal, fk_picture, *of_arm)),
-        Action("ik", ik, run_inverse, (add_inverse_options, start, *of_arm)),
-        Action("plan", plan, _plan, (goal, picture, start, *of_arm, keep)),
-        Action("trace", trace, _trace, (way, picture, start, *of_arm)),
-        Action("picture", "draw where the tip gets, and how well, as PNG", _picture, (add_reach_options, *of_arm)),
-        Action("bench", bench, _bench, (add_bench_options, *of_arm)),
-        Action("setup", setup, run_setup, (add_options, *shared)),
-        Action("go", "move an arm of a running robot, and print how that ends", run_go, (add_go_options, keep)),
+        Subcommand("ls", "list the arms of a robot with their joints and poses", _ls, shared),
+        Subcommand("fk", "print where the tip is (forward kinematics)", _fk, (goal, fk_picture, *of_arm)),
+        Subcommand("ik", ik, run_inverse, (add_inverse_options, start, *of_arm)),
+        Subcommand("plan", plan, _plan, (goal, picture, start, *of_arm, keep)),
+        Subcommand("trace", trace, _trace, (way, picture, start, *of_arm)),
+        Subcommand("picture", "draw where the tip gets, and how well, as PNG", _picture, (add_reach_options, *of_arm)),
+        Subcommand("bench", bench, _bench, (add_bench_options, *of_arm)),
+        Subcommand("setup", setup, run_setup, (add_options, *shared)),
+        Subcommand("go", "move an arm of a running robot, and print how that ends", run_go, (add_go_options, keep)),
     )
     add_actions(parser, actions)
 

@@ -36,8 +36,8 @@ from rbxcompose.cli.bodies.source import (
 )
 from rbxcompose.cli.output.console import FINDINGS, has_colour, misused, refuse, table, tell, tell_report
 from rbxcompose.cli.output.options import (
-    Action,
     Declare,
+    Subcommand,
     add_actions,
     add_json_option,
     add_timeout_option,
@@ -81,7 +81,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_actions(
         parser,
         (
-            Action(name, words, do, own, f"{words[:1].upper()}{words[1:]}.\n\n{more[name]}" if name in more else words)
+            Subcommand(
+                name, words, do, own, f"{words[:1].upper()}{words[1:]}.\n\n{more[name]}" if name in more else words
+            )
             for name, words, do, own in table
         ),
     )

@@ -293,7 +293,7 @@ def files(current: str, endings: tuple[str, ...] = ("",)) -> list[str]:
 
 def _types() -> list[str]:
     from rbxcompose.msgs import registry
-    from rbxcompose.msgs.joined import short
+    from rbxcompose.msgs.packages import short
 
     return [short(name) for name in registry.names("msg")]
 

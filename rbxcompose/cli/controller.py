@@ -7,7 +7,7 @@ import json
 from collections.abc import Iterator
 
 from rbxcompose.cli.output.console import NotDoneError, table, tell
-from rbxcompose.cli.output.options import Action, add_actions, argument, run_action
+from rbxcompose.cli.output.options import Subcommand, add_actions, argument, run_action
 from rbxcompose.cli.robots.lookup import REFUSED, add_asking_options, answer_of, find_robot, known_state, show_answer
 from rbxcompose.controller_requests import BUS, ControllerState, ListControllers, ScaleMotion, SwitchControllers
 from rbxcompose.findings import suggest
@@ -21,16 +21,20 @@ ON_SYSTEM = BUS
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     apart = "No joint may be led by two controllers, so name those that give way with --off."
-    slowed = """The goal on its way stays on its path, and is slowed down, too. 0 % holds it where it is, 100 %
-lets it go on. Motions led by hand keep their speed."""
+    slowed = (
+        "The goal on its way stays on its path, and is slowed down, too. 0 % holds it where it is, 100 % lets it go on."
+        " Motions led by hand keep their speed."
+    )
     on = argument("on", metavar="NAME", nargs="*", help="a controller that becomes active")
     off = argument("--off", metavar="NAME", action="append", default=[], help="one that becomes inactive")
     name = argument("name", metavar="NAME", help="the controller")
     share = argument("share", metavar="SHARE", help="from 0 %% to 100 %%")
     actions = (
-        Action("ls", "list controllers, whether they are active, and their joints", _ls),
-        Action("switch", "switch controllers on and off, all at once or not at all", _switch, (on, off), apart),
-        Action("speed", "let a controller follow its goals at a share of their speed", _speed, (name, share), slowed),
+        Subcommand("ls", "list controllers, whether they are active, and their joints", _ls),
+        Subcommand("switch", "switch controllers on and off, all at once or not at all", _switch, (on, off), apart),
+        Subcommand(
+            "speed", "let a controller follow its goals at a share of their speed", _speed, (name, share), slowed
+        ),
     )
     add_actions(parser, actions, add_asking_options)
 

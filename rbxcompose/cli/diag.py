@@ -15,7 +15,7 @@ from functools import partial
 from typing import Any
 
 from rbxcompose.cli.output.console import has_colour, tell
-from rbxcompose.cli.output.options import Action, add_actions, argument, run_action
+from rbxcompose.cli.output.options import Subcommand, add_actions, argument, run_action
 from rbxcompose.cli.output.terminal import LiveScreen, is_terminal
 from rbxcompose.cli.robots.lookup import add_asking_options, answer_of, find_robot, pass_on
 from rbxcompose.diagnostics.requests import (
@@ -48,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ("history", "print the last changes of levels, oldest first", _history, below),
         ("ack", "let latched levels follow the present again", _acknowledge, group),
     )
-    described = (Action(name, words, do, (add_asking_options, *own), words) for name, words, do, *own in actions)
+    described = (Subcommand(name, words, do, (add_asking_options, *own), words) for name, words, do, *own in actions)
     add_actions(parser, described, metavar="ACTION")
 
 

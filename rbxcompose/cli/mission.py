@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 from rbxcompose.cli.output.console import NotDoneError, refuse, tell
-from rbxcompose.cli.output.options import Action, Declare, add_actions, argument, run_action
+from rbxcompose.cli.output.options import Declare, Subcommand, add_actions, argument, run_action
 from rbxcompose.cli.robots.lookup import REFUSED, WHICH, add_asking_options, answer_of, find_robot, pass_on
 from rbxcompose.executive.requests import (
     MISSION,
@@ -86,7 +86,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ("skills", "list the skills that missions may use on a robot", _skills, (robot, json_)),
         ("explore", "look for dead ends by trying everything that may happen", _explore, explored),
     )
-    add_actions(parser, (Action(name, words, do, own, words) for name, words, do, own in table), metavar="ACTION")
+    add_actions(parser, (Subcommand(name, words, do, own, words) for name, words, do, own in table), metavar="ACTION")
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Iterator
 
 from rbxcompose.cli.output.console import NotDoneError, table, tell
-from rbxcompose.cli.output.options import Action, add_actions, argument, count, run_action, seconds
+from rbxcompose.cli.output.options import Subcommand, add_actions, argument, count, run_action, seconds
 from rbxcompose.cli.robots.lookup import REFUSED, add_asking_options, answer_of, find_robot, known_state, show_answer
 from rbxcompose.findings import suggest
 from rbxcompose.mux.requests import (
@@ -48,14 +48,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     while_ = argument("--for", dest="seconds", type=seconds, metavar="T", help="unlock them after this time")
     select = "let an input through, in the mode `select`; '__none' for none"
     actions = (
-        Action("ls", "list muxes, their modes, and who holds each output", _ls),
-        Action("why", "show who holds an output until when, and what keeps the others from it", _why, (maybe,)),
-        Action("watch", "print each change of who holds an output, until interrupted", _watch, (until, maybe)),
-        Action("select", select, _select, (one_input,)),
-        Action("add", "add an input", _add, (topic, priority, timeout, one_input)),
-        Action("delete", "remove an input", _delete, (one_input,)),
-        Action("lock", "hold inputs back by hand, all if none is named", _lock, (while_, inputs)),
-        Action("unlock", "end what was locked by hand", _unlock, (inputs,), "What still commands goes on at once."),
+        Subcommand("ls", "list muxes, their modes, and who holds each output", _ls),
+        Subcommand("why", "show who holds an output until when, and what keeps the others from it", _why, (maybe,)),
+        Subcommand("watch", "print each change of who holds an output, until interrupted", _watch, (until, maybe)),
+        Subcommand("select", select, _select, (one_input,)),
+        Subcommand("add", "add an input", _add, (topic, priority, timeout, one_input)),
+        Subcommand("delete", "remove an input", _delete, (one_input,)),
+        Subcommand("lock", "hold inputs back by hand, all if none is named", _lock, (while_, inputs)),
+        Subcommand("unlock", "end what was locked by hand", _unlock, (inputs,), "What still commands goes on at once."),
     )
     add_actions(parser, actions, add_asking_options, metavar="ls|why|select|lock|...")
 

@@ -17,8 +17,8 @@ from pathlib import Path
 from rbxcompose.cli.bus.guest import visit
 from rbxcompose.cli.output.options import (
     BUS,
-    Action,
     Declare,
+    Subcommand,
     add_actions,
     add_count_options,
     add_json_option,
@@ -67,13 +67,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ("load", "changes", "set all parameters of a file, all or none", (file,)),
         ("reset", "files", "set parameters to the values in the manifest", (names,)),
         ("undo", "changes", "take back the last change, or another one", (change,)),
-        ("history", "changes", "list the changes: who, when, from what to what", (only, last)),
-        ("watch", "changes", "follow the changes", (only, add_count_options)),
+        ("history", "history", "list the changes: who, when, from what to what", (only, last)),
+        ("watch", "history", "follow the changes", (only, add_count_options)),
         ("diff", "files", "show what is not as in the manifest", ()),
         ("dump", "files", "write the live parameters as YAML, for `load`", (only,)),
         ("save", "files", "write changed values into the manifest, each at its place", (names, dry)),
     )
-    actions = (Action(verb, words, _home(module, verb), own) for verb, module, words, own in table)
+    actions = (Subcommand(verb, words, _home(module, verb), own) for verb, module, words, own in table)
     timeout = partial(add_timeout_option, default="5s")
     add_actions(parser, actions, timeout, add_json_option, add_bus_options, add_system_options)
 

@@ -18,7 +18,7 @@ from rbxcompose.body.model import Body, Geometry
 from rbxcompose.body.urdf import read_body
 from rbxcompose.body.xml_reader import read_urdf
 from rbxcompose.cli.output.console import NotDoneError, misused, refuse, table, tell, tell_report
-from rbxcompose.cli.output.options import Action, Declare, add_actions, argument, run_action
+from rbxcompose.cli.output.options import Declare, Subcommand, add_actions, argument, run_action
 from rbxcompose.cli.robots.lookup import (
     add_asking_options,
     answer_of,
@@ -88,7 +88,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ("picture", picture, _picture, (ask, arm, out)),
     )
     add_actions(
-        parser, (Action(verb, about, do, own, stays if do is _attach else about) for verb, about, do, own in table)
+        parser, (Subcommand(verb, about, do, own, stays if do is _attach else about) for verb, about, do, own in table)
     )
 
 

@@ -13,8 +13,8 @@ from pathlib import Path
 from rbxcompose.actuation.servo_findings import NOT_INSTALLED
 from rbxcompose.cli.output.console import refuse
 from rbxcompose.cli.output.options import (
-    Action,
     Declare,
+    Subcommand,
     add_actions,
     add_json_option,
     add_timeout_option,
@@ -67,7 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ("new-robot", made, robot),
     )
     actions = (
-        Action(name, text, _carried_out, (partial(_add_bus, is_survey=name in _SURVEYS), *own), text)
+        Subcommand(name, text, _carried_out, (partial(_add_bus, is_survey=name in _SURVEYS), *own), text)
         for name, text, own in table
     )
     add_actions(parser, actions)

@@ -20,7 +20,7 @@ from rbxcompose.cli.bus.messages import shown, to_json
 from rbxcompose.cli.output.console import NotDoneError, refuse, tell
 from rbxcompose.cli.output.options import (
     BUS,
-    Action,
+    Subcommand,
     add_actions,
     add_count_options,
     add_json_option,
@@ -61,9 +61,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     shared = (partial(add_timeout_option, default="2s"), add_bus_options, add_system_options)
     place = "place CHILD in PARENT until Ctrl-C; who has heard of it keeps it there"
     actions = (
-        Action("tree", "show the tree of frames", _tree, (*shared, add_json_option)),
-        Action("echo", "print where FRAME is in PARENT", _echo, (*echoed, *shared, add_json_option)),
-        Action("static", place, publish_static, (add_static_arguments, *shared)),
+        Subcommand("tree", "show the tree of frames", _tree, (*shared, add_json_option)),
+        Subcommand("echo", "print where FRAME is in PARENT", _echo, (*echoed, *shared, add_json_option)),
+        Subcommand("static", place, publish_static, (add_static_arguments, *shared)),
     )
     add_actions(parser, actions)
 

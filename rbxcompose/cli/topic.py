@@ -7,14 +7,19 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import asdict
 from functools import partial
+from itertools import pairwise
 
 from rbxcompose.bus.graph import GraphEnd
 from rbxcompose.cli.bus.guest import Guest, described, tell_list, visit, wanted
 from rbxcompose.cli.output.console import table, tell
 from rbxcompose.cli.output.options import (
     BUS,
-    Action,
+    Subcommand,
     add_actions,
     add_count_options,
     add_json_option,
@@ -27,6 +32,7 @@ from rbxcompose.cli.output.options import (
     seconds,
 )
 from rbxcompose.cli.robots.lookup import add_bus_options
+from rbxcompose.dataclass import dataclass
 
 ON_SYSTEM = BUS
 _ENDS = ("publishers", "subscriptions")
@@ -45,11 +51,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     timeout = partial(add_timeout_option, default="2s")
     sent = (topic, type_, message, rate, most, timeout, add_json_option)
     actions = (
-        Action("ls", "list the topics with their types", _ls, (add_ls_options,)),
-        Action("show", "show publishers and subscribers", _show, (add_json_option, topic)),
-        Action("echo", "print the messages", _echo, (add_count_options, add_json_option, topic)),
-        Action("hz", "measure how often messages arrive", _hz, (window, duration, add_json_option, topic)),
-        Action("pub", "publish a message, by default once", _pub, sent),
+        Subcommand("ls", "list the topics with their types", _ls, (add_ls_options,)),
+        Subcommand("show", "show publishers and subscribers", _show, (add_json_option, topic)),
+        Subcommand("echo", "print the messages", _echo, (add_count_options, add_json_option, topic)),
+        Subcommand("hz", "measure how often messages arrive", measure, (window, duration, add_json_option, topic)),
+        Subcommand("pub", "publish a message, by default once", _pub, sent),
     )
     add_actions(parser, actions, add_bus_options, add_system_options)
 
@@ -93,13 +99,73 @@ def _echo(guest: Guest, arguments: argparse.Namespace) -> int:
     return echo(guest, arguments)
 
 
-def _hz(guest: Guest, arguments: argparse.Namespace) -> int:
-    from rbxcompose.cli.bus.exchange import measure
-
-    return measure(guest, arguments)
-
-
 def _pub(guest: Guest, arguments: argparse.Namespace) -> int:
     from rbxcompose.cli.bus.exchange import publish
 
     return publish(guest, arguments)
+
+
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """Figures of the intervals between arrivals; `jitter` is their standard deviation."""
+
+    rate: float  # [Hz]
+    shortest: float  # [s]
+    longest: float  # [s]
+    jitter: float  # [s]
+    messages: int
+
+
+class PaceMeter:
+    """Keeps the times of the last `window` arrivals."""
+
+    def __init__(self, window: int) -> None:
+        self._times: deque[float] = deque(maxlen=window)
+        self._news = 0
+
+    def arrived(self, time: float) -> None:
+        """Count an arrival at `time` [s]."""
+        self._times.append(time)
+        self._news += 1
+
+    def take(self) -> Pace | None:
+        """Return the pace; None if nothing has arrived since the last call, or too little to measure."""
+        news, self._news = self._news, 0
+        return measured(list(self._times)) if news else None
+
+
+def measured(times: Sequence[float]) -> Pace | None:
+    """Return the pace of arrivals at these times [s]; None for fewer than two different times."""
+    if len(times) < 2 or times[-1] <= times[0]:
+        return None
+    intervals = [after - before for before, after in pairwise(times)]
+    mean = (times[-1] - times[0]) / len(intervals)
+    jitter = math.sqrt(sum((one - mean) ** 2 for one in intervals) / len(intervals))
+    return Pace(1 / mean, min(intervals), max(intervals), jitter, len(times))
+
+
+_LINE_PERIOD = 1.0  # [s] between two lines
+
+
+def measure(guest: Guest, arguments: argparse.Namespace) -> int:
+    """Print every second how often messages arrive."""
+    topic = wanted(guest.graph().topics, arguments.topic, "topic")
+    meter = PaceMeter(arguments.window)
+    guest.listen(topic, lambda heard: meter.arrived(heard.time))
+    left = math.inf if arguments.duration is None else arguments.duration
+    while left > 0:
+        guest.run(lambda: False, min(_LINE_PERIOD, left))
+        left -= _LINE_PERIOD
+        _tell_pace(meter, arguments.json)
+    return 0
+
+
+def _tell_pace(meter: PaceMeter, as_json: bool) -> None:
+    pace = meter.take()
+    if as_json:
+        tell(json.dumps(asdict(pace) if pace else None))
+    elif pace is None:
+        tell("nothing new")
+    else:
+        intervals = f"min {pace.shortest:.4f} s, max {pace.longest:.4f} s, jitter {pace.jitter:.4f} s"
+        tell(f"{pace.rate:.2f} Hz, {intervals}, {pace.messages} messages")

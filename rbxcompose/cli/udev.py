@@ -28,7 +28,7 @@ from rbxcompose.cli.output.console import (
     tell,
     tell_report,
 )
-from rbxcompose.cli.output.options import Action, Declare, add_actions, add_json_option, argument, run_action
+from rbxcompose.cli.output.options import Declare, Subcommand, add_actions, add_json_option, argument, run_action
 from rbxcompose.cli.robots.targets import add_layer_options, add_path_argument, compiled, only_path, robot_path
 from rbxcompose.dataclass import dataclass
 from rbxcompose.devices.match import names_of, proposed
@@ -63,7 +63,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_actions(
         parser,
-        (Action(name, about, do, (*shared, *own), f"{about[0].upper()}{about[1:]}.") for name, about, do, own in table),
+        (
+            Subcommand(name, about, do, (*shared, *own), f"{about[0].upper()}{about[1:]}.")
+            for name, about, do, own in table
+        ),
     )
 
 

@@ -1,15 +1,10 @@
-"""What sends or shows messages: `topic echo`, `hz` and `pub`, `service call`, `action send`."""
+"""What sends or shows messages: `topic echo` and `pub`, `service call`, `action send`."""
 
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import sys
-from collections import deque
-from collections.abc import Sequence
-from dataclasses import asdict
-from itertools import pairwise
 from typing import Any
 
 from rbxcompose.bus.graph import GraphName, WireType, find
@@ -17,7 +12,6 @@ from rbxcompose.bus.names import name_problem
 from rbxcompose.cli.bus.guest import NAME, NO_NAME, NOBODY, SAID_NO, Guest, HeardMessage, wanted
 from rbxcompose.cli.bus.messages import EchoReader, message_from, message_type, shown, to_json, to_text, type_of
 from rbxcompose.cli.output.console import NotDoneError, refuse, tell
-from rbxcompose.dataclass import dataclass
 from rbxcompose.findings import Finding
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.plain import to_plain
@@ -62,72 +56,6 @@ def echo(guest: Guest, arguments: argparse.Namespace) -> int:
             sys.stderr.write(f"left out: {guest.dropped - dropped} messages, which came too fast to show\n")
             dropped = guest.dropped
     return 0
-
-
-@dataclass(frozen=True, slots=True)
-class Pace:
-    """Figures of the intervals between arrivals; `jitter` is their standard deviation."""
-
-    rate: float  # [Hz]
-    shortest: float  # [s]
-    longest: float  # [s]
-    jitter: float  # [s]
-    messages: int
-
-
-class PaceMeter:
-    """Keeps the times of the last `window` arrivals."""
-
-    def __init__(self, window: int) -> None:
-        self._times: deque[float] = deque(maxlen=window)
-        self._news = 0
-
-    def arrived(self, time: float) -> None:
-        """Count an arrival at `time` [s]."""
-        self._times.append(time)
-        self._news += 1
-
-    def take(self) -> Pace | None:
-        """Return the pace; None if nothing has arrived since the last call, or too little to measure."""
-        news, self._news = self._news, 0
-        return measured(list(self._times)) if news else None
-
-
-def measured(times: Sequence[float]) -> Pace | None:
-    """Return the pace of arrivals at these times [s]; None for fewer than two different times."""
-    if len(times) < 2 or times[-1] <= times[0]:
-        return None
-    intervals = [after - before for before, after in pairwise(times)]
-    mean = (times[-1] - times[0]) / len(intervals)
-    jitter = math.sqrt(sum((one - mean) ** 2 for one in intervals) / len(intervals))
-    return Pace(1 / mean, min(intervals), max(intervals), jitter, len(times))
-
-
-_LINE_PERIOD = 1.0  # [s] between two lines
-
-
-def measure(guest: Guest, arguments: argparse.Namespace) -> int:
-    """Print every second how often messages arrive."""
-    topic = wanted(guest.graph().topics, arguments.topic, "topic")
-    meter = PaceMeter(arguments.window)
-    guest.listen(topic, lambda heard: meter.arrived(heard.time))
-    left = math.inf if arguments.duration is None else arguments.duration
-    while left > 0:
-        guest.run(lambda: False, min(_LINE_PERIOD, left))
-        left -= _LINE_PERIOD
-        _tell_pace(meter, arguments.json)
-    return 0
-
-
-def _tell_pace(meter: PaceMeter, as_json: bool) -> None:
-    pace = meter.take()
-    if as_json:
-        tell(json.dumps(asdict(pace) if pace else None))
-    elif pace is None:
-        tell("nothing new")
-    else:
-        intervals = f"min {pace.shortest:.4f} s, max {pace.longest:.4f} s, jitter {pace.jitter:.4f} s"
-        tell(f"{pace.rate:.2f} Hz, {intervals}, {pace.messages} messages")
 
 
 def publish(guest: Guest, arguments: argparse.Namespace) -> int:

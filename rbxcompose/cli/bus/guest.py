@@ -28,7 +28,7 @@ from rbxcompose.bus.zenoh_session import open_client, open_peer
 from rbxcompose.bus.zenoh_transport import ZenohTransport
 from rbxcompose.cli.output.console import NotDoneError, refuse, table, tell
 from rbxcompose.cli.output.options import (
-    Action,
+    Subcommand,
     add_actions,
     add_json_option,
     add_ls_options,
@@ -289,8 +289,8 @@ def add_server_verbs(
     written = argument("content", metavar=content.upper(), nargs="?", default="", help=words)
     sent = (named, written, partial(add_timeout_option, default="5s"), add_json_option)
     actions = (
-        Action("ls", f"list the {noun}s with their types", do[0], (add_ls_options,)),
-        Action(*verb, do[1], sent),
+        Subcommand("ls", f"list the {noun}s with their types", do[0], (add_ls_options,)),
+        Subcommand(*verb, do[1], sent),
     )
     add_actions(parser, actions, add_bus_options, add_system_options)
 

@@ -21,7 +21,7 @@ Declare = Callable[[argparse.ArgumentParser], object]  # declares some arguments
 
 
 @dataclass(frozen=True, slots=True)
-class Action:
+class Subcommand:
     """A subcommand: its name, its help, what carries it out, and its arguments in their order in the help."""
 
     name: str
@@ -37,7 +37,7 @@ def argument(*names: str, **options: Any) -> Declare:
 
 
 def add_actions(
-    parser: argparse.ArgumentParser, actions: Iterable[Action], *common: Declare, metavar: str = ""
+    parser: argparse.ArgumentParser, actions: Iterable[Subcommand], *common: Declare, metavar: str = ""
 ) -> None:
     """Declare subcommands, each with its own arguments and then the `common` ones; `metavar` names them all."""
     made = parser.add_subparsers(dest="action", required=True)

@@ -18,7 +18,8 @@ from rbxcompose.bus.names import resolve
 from rbxcompose.cli.bus.guest import NO_NAME
 from rbxcompose.cli.bus.messages import to_json
 from rbxcompose.cli.output.console import NotDoneError, refuse, tell
-from rbxcompose.cli.parameters.changes import PIPED, change_values, changes_of, exact_text, message_of, tell_values
+from rbxcompose.cli.parameters.changes import PIPED, change_values, message_of, tell_values
+from rbxcompose.cli.parameters.history import changes_of
 from rbxcompose.cli.parameters.nodes import ParameterNodes, listed
 from rbxcompose.cli.robots.live_rules import compiled_with
 from rbxcompose.cli.robots.lookup import NO_ANSWER, answer_of, find_robot, known_state
@@ -327,6 +328,11 @@ def param_reset(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
         return 0
     change_values(nodes, wanted, "reset")
     return tell_values(nodes, wanted, arguments)
+
+
+def exact_text(value: object, dimension: Dimension | None) -> str:
+    """Return a value as `value_of` reads it, exact to the last but one bit."""
+    return value_text(value, dimension).replace("$$", "$")
 
 
 def param_dump(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
