@@ -20,6 +20,7 @@ from typing import Any
 
 from rbxcompose.arm_config import ArmConfig, ArmWorks
 from rbxcompose.clock import Clock
+from rbxcompose.motion.numba_cache import is_empty, is_installed
 from rbxcompose.motion.ways_ahead import PlanJob, Planned
 from rbxcompose.process_end import end_with
 
@@ -59,6 +60,12 @@ class PlanningProcess:
         """Return whether it can begin a job."""
         self._receive()
         return not self._is_due and self._job is None and not self._connection.closed
+
+    def wait(self) -> None:
+        """Wait until it can begin its first job, or is gone."""
+        while self._is_due and not self._connection.closed:
+            self._connection.poll(None)
+            self._receive()
 
     def begin(self, job: PlanJob) -> None:
         """Plan a motion."""
@@ -107,6 +114,14 @@ class PlanningProcess:
         if not self._connection.closed:
             self.close()
             self._warn(f"a process that plans for '{self._name}' {how}: there is one less until the arm starts again")
+
+
+def compile_elsewhere(config: ArmConfig, clock: Clock) -> None:
+    """Fill empty caches of compiled code by another process: the memory of compiling, 100 MB, is given back with it."""
+    if clock.is_real and is_installed() and is_empty():
+        process = PlanningProcess(config, lambda text: None, time.monotonic)
+        process.wait()
+        process.close()
 
 
 def planning_processes(config: ArmConfig, clock: Clock, warn: Callable[[str], None]) -> tuple[PlanningProcess, ...]:

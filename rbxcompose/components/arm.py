@@ -30,7 +30,7 @@ from rbxcompose.arm_moveit import (
     moveit_ports,
     moveit_task,
 )
-from rbxcompose.arm_processes import planning_processes
+from rbxcompose.arm_processes import compile_elsewhere, planning_processes
 from rbxcompose.arm_servo import PERIOD, ArmServo, servo_ports
 from rbxcompose.geometry import Vector3
 from rbxcompose.key_feed import KeyFeed, whole
@@ -167,6 +167,7 @@ class Arm(PicksAndPlaces, TellsWhereItIs, AnswersPrograms, Component[ArmConfig])
         """Build the model of the body, its shapes and the planner."""
         if (size := mesh_bytes(self.config)) > LARGE:
             self.info(f"reads {size / 1e6:.0f} MB of meshes; the first time on a machine takes longer")
+        compile_elsewhere(self.config, self.context.clock)
         self.works = ArmWorks(self.config, lambda: self.now)
         self.works.helpers = self.helpers = planning_processes(self.config, self.context.clock, self.warn)
         if self.works.always:

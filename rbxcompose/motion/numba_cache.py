@@ -31,6 +31,11 @@ def is_installed() -> bool:
     return find_spec("numba") is not None
 
 
+def is_empty() -> bool:
+    """Return whether there is a folder for compiled functions, and none in it."""
+    return bool(folder := cache_folder()) and not any(Path(folder).rglob("*.nbc"))
+
+
 def compiled(function: F) -> F:
     """Return a function that numba compiles without Python's objects; it releases Python's lock while it runs.
 
