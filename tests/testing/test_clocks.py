@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.testing import clock_uses
-from tests.project.test_layers import CORES, PACKAGE
+from tests.project.package import PACKAGE
+from tests.project.test_layers import CORES
 
 GIVEN_TIME = sorted({*CORES, "components", "sdk"})
 
