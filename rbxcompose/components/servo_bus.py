@@ -192,6 +192,8 @@ class ServoBusDriver(Component[ServoBusConfig]):
             self.lost_at = -math.inf
         self.keep_torque()
         self.periods.begin(self.now)
+        if self.is_parking:
+            self.park_the_rest()
         self.cycle.run(self.now, self.period, () if self.is_parking else self.controllers.leading)
         self.reboots.step(self.now)
         while self.cycle.notes:
@@ -384,6 +386,12 @@ class ServoBusDriver(Component[ServoBusConfig]):
         for name, position in self.config.park.items() if self.is_parking else ():
             if self.cycle.drives[name].has_torque:
                 self.cycle.drives[name].ask(MoveTo(position))
+
+    def park_the_rest(self) -> None:
+        """Move joints on that came to rest on their way, as where replies were lost for a moment."""
+        for name, drive in self.cycle.drives.items():
+            if self.is_on_the_way(name) and drive.is_at_rest:
+                drive.ask(MoveTo(self.config.park[name]))
 
     def cleanup(self) -> None:
         """Relax the joints, unless they are to hold, and give the port back."""

@@ -86,3 +86,17 @@ def test_a_command_beyond_the_limits_is_clamped_and_said(head: Head) -> None:
     head.commands["pan"](Float64(data=0.0))
     head.robot.advance(2.5)
     assert "clamped" not in told[-1].message
+
+
+def test_a_joint_whose_replies_are_lost_on_its_way_is_parked_all_the_same() -> None:
+    mute = {"silent": {"at": 2.4, "fault": "mute", "joint": "pan", "lasts": 0.3}}
+    head = Head(twin="servo", on_shutdown="park", park={"pan": -1.0}, park_time=20.0, faults=mute)
+    head.commands["pan"](Float64(data=1.0))
+    head.robot.advance(2.0)
+    head.robot.component("servos").brake()
+    head.robot.advance(1.0)
+    driver: Any = head.robot.component("servos")
+    assert not driver.is_at_rest
+    head.robot.advance(8.0)
+    assert driver.is_at_rest
+    assert head.at["pan"] == pytest.approx(-1.0, abs=0.02)

@@ -57,7 +57,7 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
     "clock": (92, 1, 0, 5),
     "cloud_config": (21, 1, 1, 5),
     "compiler": (137, 1, 0, 21),
-    "components": (3353, 28, 5, 639),
+    "components": (3359, 28, 5, 639),
     "composition": (1673, 18, 4, 241),
     "config": (124, 1, 0, 20),
     "control": (1631, 17, 2, 144),
@@ -135,7 +135,7 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
 """Of each room: lines of code, files, files of at most 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 93_888,
+    "lines of code": 93_894,
     "files": 1_312,
     "files of at most 30 lines of code": 391,
     "lines of imports": 13_330,
