@@ -13,14 +13,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from rbxcompose.arm_config import ArmConfig, ArmJointConfig, ArmWorks, LinkPairsConfig
-from rbxcompose.body.link_pairs import pair_of
-from rbxcompose.body.model import Geometry
-from rbxcompose.geometry import Transform3, quaternion_from_rpy
-from rbxcompose.motion.arm_figures import ended
-from rbxcompose.motion.inverse_kinematics import PoseTarget, solved
-from rbxcompose.motion.problem_sets import MotionProblem
-from rbxcompose.motion.scene import PlacedObject
+from rbxcompose.base.geometry import Transform3, quaternion_from_rpy
+from rbxcompose.domains.arms.arm_config import ArmConfig, ArmJointConfig, ArmWorks, LinkPairsConfig
+from rbxcompose.domains.arms.motion.figures import MotionProblem, ended
+from rbxcompose.domains.arms.motion.inverse_kinematics import PoseTarget, solved
+from rbxcompose.domains.arms.motion.scene import PlacedObject
+from rbxcompose.domains.body.link_pairs import pair_of
+from rbxcompose.domains.body.model import Geometry
 
 Array = NDArray[np.float64]
 Boxes = list[tuple[tuple[float, float, float], tuple[float, float, float]]]  # sizes, and where their middles are
@@ -51,7 +50,7 @@ class BoxProblem:
 
     def problem(self, joints: Sequence[str]) -> MotionProblem:
         """Return it in the form of published ones."""
-        start, goal = (dict(zip(joints, one.tolist(), strict=True)) for one in (self.start, self.goal))
+        start, goal = (dict(zip(joints, array.tolist(), strict=True)) for array in (self.start, self.goal))
         return MotionProblem(self.scenario, "", start, goal, self.objects)
 
 
@@ -81,9 +80,9 @@ def panda(urdf: Path) -> ArmWorks:
     )
     limits = {name: joint.limits for name, joint in ArmWorks(config, time.process_time).kinematics.body.joints.items()}
     joints = {
-        name: ArmJointConfig(lower=one.lower, upper=one.upper, velocity=one.velocity)
+        name: ArmJointConfig(lower=limit.lower, upper=limit.upper, velocity=limit.velocity)
         for name in config.joints
-        if (one := limits[name]) is not None
+        if (limit := limits[name]) is not None
     }
     return ArmWorks(config.model_copy(update={"joints": joints}), time.process_time)
 
@@ -140,7 +139,7 @@ def _box(random: np.random.Generator) -> tuple[Boxes, tuple[float, float, float]
 def _cage(random: np.random.Generator) -> tuple[Boxes, tuple[float, float, float], tuple[float, float]]:
     turn, height = random.uniform((-0.6, 0.3), (0.6, 0.6)).tolist()
     angles = [turn + (2 * number + 1) * math.pi / 10 for number in range(10)]
-    bars: Boxes = [((0.03, 0.03, 1.2), (0.62 * math.cos(one), 0.62 * math.sin(one), 0.6)) for one in angles]
+    bars: Boxes = [((0.03, 0.03, 1.2), (0.62 * math.cos(angle), 0.62 * math.sin(angle), 0.6)) for angle in angles]
     return bars, (0.5 * math.cos(turn), 0.5 * math.sin(turn), height), DOWN
 
 

@@ -16,21 +16,29 @@ import numpy as np
 
 from benchmarks.arm_scenes import PANDA, described, panda, problems
 from benchmarks.measuring import ROOT, Row, Samples
-from rbxcompose.arm_config import ArmConfig, ArmWorks
-from rbxcompose.body.description import Description
-from rbxcompose.body.link_pairs import pair_of
-from rbxcompose.body.urdf import read_body
-from rbxcompose.body.xml_reader import XmlElement, read_urdf
-from rbxcompose.compiler import compile_robot
-from rbxcompose.control.limits import MotionLimits
-from rbxcompose.motion.arm_figures import NO_TRIES, Tries, call_time, free_pairs, inverse_tries, motion_tries
-from rbxcompose.motion.arm_kinematics import ArmKinematics
-from rbxcompose.motion.compiled_chain import matrix_of
-from rbxcompose.motion.groups import chain
-from rbxcompose.motion.inverse_kinematics import SolverSettings
-from rbxcompose.motion.joint_space import ArmJoint, JointSpace, interpolated
-from rbxcompose.motion.problem_sets import MotionProblem, problem_files, read_problem
-from rbxcompose.motion.second_checker import SecondChecker
+from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.domains.arms.arm_config import ArmConfig, ArmWorks
+from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
+from rbxcompose.domains.arms.motion.compiled_collisions import matrix_of
+from rbxcompose.domains.arms.motion.figures import (
+    NO_TRIES,
+    MotionProblem,
+    Tries,
+    call_time,
+    free_pairs,
+    inverse_tries,
+    motion_tries,
+    problem_files,
+    read_problem,
+)
+from rbxcompose.domains.arms.motion.groups import ArmJoint, JointSpace, chain, interpolated
+from rbxcompose.domains.arms.motion.inverse_kinematics import SolverSettings
+from rbxcompose.domains.arms.motion.second_checker import SecondChecker
+from rbxcompose.domains.body.description import Description
+from rbxcompose.domains.body.link_pairs import pair_of
+from rbxcompose.domains.body.urdf import read_body
+from rbxcompose.domains.body.xml_reader import XmlElement, read_urdf
+from rbxcompose.domains.servos.limits import MotionLimits
 
 TARGETS, MOTIONS, PROBLEMS, SOME, EXACT, STEP = 1000, 40, 10, 30, 1e-4, 0.005
 PEER = "RBXCOMPOSE_ROBOPLAN"  # names a Python that has RoboPlan, if this one has not
@@ -84,7 +92,7 @@ def _arm(path: Path, base: str, tip: str) -> tuple[ArmKinematics, JointSpace]:
     group = chain(description.body, base, tip)
     if group is None:
         raise ValueError(f"{path.name} has no arm from {base} to {tip}")
-    return ArmKinematics(description, group), JointSpace(tuple(_joint(description, one) for one in group.joints))
+    return ArmKinematics(description, group), JointSpace(tuple(_joint(description, joint) for joint in group.joints))
 
 
 def _joint(description: Description, name: str) -> ArmJoint:
@@ -125,13 +133,17 @@ def _published() -> list[Row]:
     if not (folder := os.environ.get(PUBLISHED)):
         return []
     made = compile_robot(folder, environment={}).robot
-    config = next(one.config for one in made.components.values() if isinstance(one.config, ArmConfig)) if made else None
+    config = (
+        next(component.config for component in made.components.values() if isinstance(component.config, ArmConfig))
+        if made
+        else None
+    )
     if not isinstance(config, ArmConfig):
         raise ValueError(f"{folder} has no arm")
     works, given = ArmWorks(config, time.process_time), dict[str, list[MotionProblem]]()
     for files in problem_files(Path(folder), SOME):
-        one = read_problem(*files, works.kinematics.body.root)
-        given.setdefault(one.scenario, []).append(one)
+        problem = read_problem(*files, works.kinematics.body.root)
+        given.setdefault(problem.scenario, []).append(problem)
     found = []
     for scenario, some in given.items():
         mine, theirs = _tried(works, config.urdf, some)
@@ -142,32 +154,32 @@ def _published() -> list[Row]:
 def _tried(works: ArmWorks, urdf: str, given: Sequence[MotionProblem]) -> tuple[Tries, Tries | None]:
     """Return how we do, and how RoboPlan does, if it is installed, with the same shapes and pairs."""
     names, total, asked, seconds = works.space.names, NO_TRIES, list[object](), list[SecondChecker]()
-    for one in given:
-        others = {name: at for name, at in one.start.items() if name not in names}
+    for problem in given:
+        others = {name: at for name, at in problem.start.items() if name not in names}
         works.kinematics.place(others)
-        works.place_objects(one.objects)
-        second = works.second_checker(one.objects, others)
-        ends = [np.array([at[name] for name in names]) for at in (one.start, one.goal)]
+        works.place_objects(problem.objects)
+        second = works.second_checker(problem.objects, others)
+        ends = [np.array([at[name] for name in names]) for at in (problem.start, problem.goal)]
         total = total.with_(motion_tries(works.planner, [(ends[0], ends[1])], second.is_free_along, time.process_time))
         seconds.append(second)
-        asked.append(_asked(works, one, others, [end.tolist() for end in ends]))
+        asked.append(_asked(works, problem, others, [end.tolist() for end in ends]))
     for name, file in works.meshes.items():
         urdf = urdf.replace(f'"{name}"', f'"{file.absolute()}"')
     return total, _roboplan({"urdf": urdf, "joints": names, "step": 0.02, "problems": asked}, seconds)
 
 
-def _asked(works: ArmWorks, one: MotionProblem, others: Mapping[str, float], ends: list[list[float]]) -> object:
+def _asked(works: ArmWorks, problem: MotionProblem, others: Mapping[str, float], ends: list[list[float]]) -> object:
     """Return a problem for RoboPlan: pieces of objects are `NAME/NUMBER`; it watches the pairs that we do."""
     pieces = {
         f"{each.name}/{number}": (each.name, piece)
-        for each in one.objects
+        for each in problem.objects
         for number, piece in enumerate(each.all_pieces)
     }
     owners = {name: owner for name, (owner, _) in pieces.items()}
     owners |= {name: name for name, link in works.kinematics.body.links.items() if link.collisions}
-    watched = works.checker(one.objects).watched_pairs
+    watched = works.checker(problem.objects).watched_pairs
     return {
-        "scenario": one.scenario,
+        "scenario": problem.scenario,
         "shapes": [
             (name, piece.shape.kind, piece.shape.size, matrix_of(piece.pose).tolist())
             for name, (_, piece) in pieces.items()

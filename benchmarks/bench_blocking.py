@@ -8,18 +8,18 @@ from dataclasses import dataclass
 from typing import Any
 
 from benchmarks.measuring import Row, Samples
+from rbxcompose.base.clock import MonotonicClock
+from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.bus import Bus
+from rbxcompose.bus.endpoints import tcp_endpoint
 from rbxcompose.bus.zenoh_session import open_peer, open_router
 from rbxcompose.bus.zenoh_transport import ZenohTransport
-from rbxcompose.clock import MonotonicClock
-from rbxcompose.endpoints import tcp_endpoint
+from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.msgs.std_msgs import Float64
-from rbxcompose.plan.model import Plan
-from rbxcompose.qos import Qos
+from rbxcompose.runtime.process_group.connection import CallbackInbox
 from rbxcompose.runtime.process_group.host import Host
-from rbxcompose.runtime.process_group.inbox import CallbackInbox
-from rbxcompose.scheduler import Scheduler
 from rbxcompose.sdk import Component, Config, In, component
+from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import instance
 
 COMPUTE = 0.02  # [s] per message

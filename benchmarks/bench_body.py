@@ -14,11 +14,11 @@ import yaml
 import yourdfpy
 
 from benchmarks.measuring import COMMAND, ROOT, Row, in_turns, program
-from rbxcompose.body.description import Description
-from rbxcompose.body.pinocchio_model import PinocchioModel
-from rbxcompose.body.urdf import read_body
-from rbxcompose.body.xml_reader import XmlElement, read_urdf
-from rbxcompose.compiler import compile_robot
+from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.domains.body.description import Description
+from rbxcompose.domains.body.pinocchio_model import PinocchioModel
+from rbxcompose.domains.body.urdf import read_body
+from rbxcompose.domains.body.xml_reader import XmlElement, read_urdf
 
 ROBOT = ROOT / "robots" / "box_robot"
 TIMES, ROUNDS, CHECKS, JOINTS = 200, 15, 5, 7
@@ -38,7 +38,7 @@ def rows() -> list[Row]:
 
 
 def _arm() -> Description:
-    joints = [JOINT.format(one, one / 10, f"link{one - 1}") for one in range(1, JOINTS + 1)]
+    joints = [JOINT.format(index, index / 10, f"link{index - 1}") for index in range(1, JOINTS + 1)]
     text = f'<robot name="arm"><link name="link0"/>{"".join(joints)}</robot>'
     root = read_urdf(text, "arm.urdf")
     if not isinstance(root, XmlElement):
@@ -49,8 +49,8 @@ def _arm() -> Description:
 def _kinematics(name: str, description: Description) -> list[Row]:
     body = description.body
     at = [{joint.name: 0.001 * step for joint in body.moving} for step in range(TIMES)]
-    jobs = (lambda: [body.poses(one) for one in at], _by_yourdfpy(description, at), _by_pinocchio(description, at))
-    ours, slow, fast = (TIMES / one.median for one in in_turns(*jobs, rounds=ROUNDS))
+    jobs = (lambda: [body.poses(entry) for entry in at], _by_yourdfpy(description, at), _by_pinocchio(description, at))
+    ours, slow, fast = (TIMES / samples.median for samples in in_turns(*jobs, rounds=ROUNDS))
     what = f"forward kinematics of {name}, all {len(body.links)} links"
     how = "`Body.poses` from positions by name, beside"
     peer = f"{how} `update_cfg` and `get_transform` of each link"
@@ -66,8 +66,8 @@ def _by_yourdfpy(description: Description, at: list[dict[str, float]]) -> Callab
     links, root = list(description.body.links), description.body.root
 
     def run() -> object:
-        for one in at:
-            robot.update_cfg(one)
+        for entry in at:
+            robot.update_cfg(entry)
             poses = [robot.get_transform(link, root) for link in links]
         return poses
 
@@ -76,7 +76,7 @@ def _by_yourdfpy(description: Description, at: list[dict[str, float]]) -> Callab
 
 def _by_pinocchio(description: Description, at: list[dict[str, float]]) -> Callable[[], object]:
     built = PinocchioModel(description)
-    found = [built.q(one) for one in at]
+    found = [built.q(entry) for entry in at]
     return lambda: [pinocchio.framesForwardKinematics(built.model, built.data, q) for q in found]
 
 

@@ -17,8 +17,8 @@ from typing import Any
 from benchmarks.bus_ends import FLOOD, OUR_FLOOD
 from benchmarks.measuring import ROOT, Row, Samples
 from benchmarks.peers import ROS_PYTHON, Ros, free_port
+from rbxcompose.bus.endpoints import tcp_endpoint
 from rbxcompose.bus.zenoh_session import open_router
-from rbxcompose.endpoints import tcp_endpoint
 
 ROUNDS = 5
 HOPS = 200  # per round

@@ -11,7 +11,7 @@ import yaml
 
 from benchmarks.generate import of_lines, robot, write
 from benchmarks.measuring import BARE, COMMAND, Row, in_turns, program
-from rbxcompose.compiler import compile_robot
+from rbxcompose.compiler.compile import compile_robot
 
 LINES, COMPONENTS = 3200, 1000
 

@@ -13,7 +13,7 @@ from benchmarks.measuring import Row, Samples, in_turns
 from benchmarks.peers import ROS_PYTHON, Ros, free_port, running, wait_for
 from rbxcompose.msgs.cdr import decode, encode
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray, DiagnosticStatus, KeyValue
-from rbxcompose.qos import Qos
+from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench, instance
 
 RATE, GROUPS, ITEMS, MANY = 10, 20, 200, 10_000  # [Hz] in and out; groups; items of a robot, and of a flood

@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 
 from benchmarks.bench_robot import supervisor, up
 from benchmarks.measuring import ROOT, Row, memory_now, processor_time, tree
-from rbxcompose.compiler import compile_robot
+from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.testing.bench import Bench
 
 WATCHED = 20.0  # [s] of real time

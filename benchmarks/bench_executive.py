@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 from benchmarks.bench_robot import process_of, up
 from benchmarks.measuring import ROOT, Row, Samples, processor_time
 from benchmarks.peers import wait_for
-from rbxcompose.plugins import GROUP
+from rbxcompose.base.plugins import GROUP
 
 WATCHED = 20.0  # [s] of real time
 SETTLED = 3.0  # [s] before that

@@ -143,9 +143,9 @@ def _bring_down(folder: Path) -> None:
         RuntimeError: if one does not end.
     """
     deadline = time.monotonic() + ENDED
-    while supervisors := [one.supervisor for one in _states(folder).values() if one.is_supervised]:
-        for one in supervisors:
-            one.send_signal(signal.SIGTERM)
+    while supervisors := [state.supervisor for state in _states(folder).values() if state.is_supervised]:
+        for supervisor in supervisors:
+            supervisor.send_signal(signal.SIGTERM)
         if wait_until_ended(supervisors, max(0.0, deadline - time.monotonic())):
             raise RuntimeError(f"robots in {folder} do not go down")
 
@@ -158,11 +158,11 @@ def _write(folder: Path, number: int, how: str, options: Collection[str]) -> Non
     text = text.replace("start: patrol\n", "") if WAITING in options else text
     links = "links: router, " if LINKS in options else ""
     bots = []
-    for one in range(1, number + 1):
-        bus = BUS[how].format(links=links, number=one, name=f"bot_{one}") if how in BUS else ""
-        (folder / f"robot_{one}.yaml").write_text(text + bus, encoding="utf-8")
+    for index in range(1, number + 1):
+        bus = BUS[how].format(links=links, number=index, name=f"bot_{index}") if how in BUS else ""
+        (folder / f"robot_{index}.yaml").write_text(text + bus, encoding="utf-8")
         more = f"{', share: [odom]' if how == OWN else ''}{', profile: fleet' if FLEET in options else ''}"
-        bots.append(f"  bot_{one}: {{robot: robot_{one}.yaml{more}}}")
+        bots.append(f"  bot_{index}: {{robot: robot_{index}.yaml{more}}}")
     if how != DOMAINS:
         bus = BUS[how].format(links=links, name="watcher") if how in BUS else ""
         seen = "".join(SEEN.format(one) for one in range(1, number + 1))
@@ -188,7 +188,7 @@ def _one_router() -> Iterator[int]:
 def _looked_at(folder: Path, how: str, start: float, router: int | None) -> FleetFigures:
     time.sleep(SETTLED)
     states = _states(folder)
-    pids = {name: _pids(one) for name, one in states.items()} | {"": [router] if router else []}
+    pids = {name: _pids(state) for name, state in states.items()} | {"": [router] if router else []}
     psutil.cpu_percent()
     before = {name: _taken(some) for name, some in pids.items()}
     time.sleep(WATCHED)
@@ -268,20 +268,20 @@ def _memory(pids: list[int]) -> float:
 
 def _links(pid: int) -> int:
     found = psutil.Process(pid).net_connections("tcp")
-    return sum(1 for one in found if one.status == psutil.CONN_ESTABLISHED)
+    return sum(1 for connection in found if connection.status == psutil.CONN_ESTABLISHED)
 
 
 def _messages(states: dict[str, RobotState], how: str) -> dict[str, float]:
     """Return how many messages per second pass the bus of each robot."""
     counts: dict[str, int] = dict.fromkeys(states, 0)
     sessions = []
-    for name, one in states.items():
+    for name, state in states.items():
 
         def count(sample: zenoh.Sample, name: str = name) -> None:
             counts[name] += 1
 
-        session = _visitor(one)
-        session.declare_subscriber(f"{one.domain}/{name}/**" if how == NAMES else f"{one.domain}/**", count)
+        session = _visitor(state)
+        session.declare_subscriber(f"{state.domain}/{name}/**" if how == NAMES else f"{state.domain}/**", count)
         sessions.append(session)
     time.sleep(COUNTED)
     found = {name: number / COUNTED for name, number in counts.items()}

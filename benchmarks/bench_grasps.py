@@ -8,10 +8,10 @@ from dataclasses import replace
 from functools import partial
 
 from benchmarks.measuring import Row, in_turns
-from rbxcompose.arm_processes import PlanningProcess
-from rbxcompose.body.model import Geometry
-from rbxcompose.geometry import Transform3
-from rbxcompose.motion.scene import PlacedObject
+from rbxcompose.base.geometry import Transform3
+from rbxcompose.domains.arms.motion.scene import PlacedObject
+from rbxcompose.domains.arms.planning_processes import PlanningProcess
+from rbxcompose.domains.body.model import Geometry
 from rbxcompose.msgs.rbxcompose_msgs import PickObject
 from tests.motion.pi_hand import HandBench, made
 from tests.motion.test_ways_ahead import CONFINED, cluttered

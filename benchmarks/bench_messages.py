@@ -8,12 +8,12 @@ from typing import Any
 from rosbags.typesys import Stores, get_typestore
 
 from benchmarks.measuring import Row, in_turns
+from rbxcompose.base.clock import SteppedClock
+from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.bus import Bus
-from rbxcompose.clock import SteppedClock
 from rbxcompose.msgs.cdr import decode, encode
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
-from rbxcompose.qos import Qos
-from rbxcompose.scheduler import Scheduler
+from rbxcompose.sdk.ports import Qos
 
 MANY = 2000  # per sample
 TWIST = Twist(linear=Vector3(x=0.3), angular=Vector3(z=-1.0))

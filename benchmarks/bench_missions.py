@@ -10,9 +10,9 @@ from typing import Any
 
 from benchmarks.generate import mission
 from benchmarks.measuring import Row, in_turns
-from rbxcompose.expressions.types import TYPES
-from rbxcompose.expressions.values import NotArrived, Value
-from rbxcompose.findings import Report
+from rbxcompose.base.expressions.types import TYPES
+from rbxcompose.base.expressions.values import NotArrived, Value
+from rbxcompose.base.findings import Report
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.missions.analysis.check_runner import check_program
@@ -20,7 +20,7 @@ from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.events import MissionEvent
 from rbxcompose.missions.language.reader import read_program
 from rbxcompose.missions.program.program import Program, RobotNames
-from rbxcompose.missions.view.mirror import Mirror
+from rbxcompose.missions.view.replica import Mirror
 
 NODES = 1000
 TICKS = 50  # per sample
@@ -92,7 +92,7 @@ def _ticks(step: str, what: str, against: str, peer: Callable[[], object] | None
 
 def _row(ours: Callable[[], object], what: str, against: str, peer: Callable[[], object] | None) -> Row:
     times = in_turns(ours, *([peer] if peer else []), rounds=15)
-    speeds = [NODES * TICKS / one.median for one in times]
+    speeds = [NODES * TICKS / time.median for time in times]
     return Row(
         name=f"{NODES:,} mission nodes per tick: {what}",
         unit="M nodes/s",

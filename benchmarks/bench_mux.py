@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from benchmarks.measuring import Row, in_turns
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
-from rbxcompose.qos import Qos
+from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench, instance
 
 MANY, ROUNDS = 500, 25  # commands per sample

@@ -55,8 +55,8 @@ def rows() -> list[Row]:
     ours: dict[str, list[float]] = {"free": [], "ruled": []}
     theirs: list[float] = []
     with _robot() as robot, ros_ends() as of_ros:
-        for one in (FREE, RULED):
-            robot.ask("set", *one, WARM)
+        for pair in (FREE, RULED):
+            robot.ask("set", *pair, WARM)
         for _ in range(ROUNDS):
             ours["free"] += robot.ask("set", *FREE, SETS)
             ours["ruled"] += robot.ask("set", *RULED, SETS)

@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 
 from benchmarks.measuring import COMMAND, ROOT, Row, Samples, memory_of, program, tree
 from benchmarks.peers import Dora, Ros, free_port, missing, running, wait_for
-from rbxcompose.plugins import GROUP
+from rbxcompose.base.plugins import GROUP
 
 RELAYS = 10
 KILLED = 5  # in the middle of the row

@@ -15,8 +15,8 @@ from typing import Any
 
 from benchmarks.measuring import BARE, COMMAND, ROOT, Row, Samples, in_turns, memory_of, program, tree
 from benchmarks.peers import ROS_PYTHON, Ros, free_port, missing
-from rbxcompose.compiler import compile_robot
-from rbxcompose.levels import Level
+from rbxcompose.base.levels import Level
+from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.testing import run_robot
 
 ROBOT = str(ROOT / "robots/turtlebot/robot.yaml")
@@ -82,7 +82,10 @@ def _with_an_arm() -> list[Row]:
                 times.append(time.perf_counter() - started)
                 state = json.loads(str(program([*COMMAND, "ps", "--json"], environment)()))
                 memory = max(memory, sum(map(memory_of, tree(state["supervisor"]["pid"]))))
-                arm = max(arm, *(memory_of(one["pid"]) for one in state["components"] if one["type"] == "arm"))
+                arm = max(
+                    arm,
+                    *(memory_of(component["pid"]) for component in state["components"] if component["type"] == "arm"),
+                )
     starts, size = Samples(tuple(times)), "proportional set size"
     return [
         Row(
@@ -115,7 +118,7 @@ def supervisor(environment: dict[str, str]) -> int:
 
 def process_of(component: str, environment: dict[str, str]) -> int:
     """Return the process in which a component of the robot that is up runs."""
-    return next(int(one["pid"]) for one in _ps(environment)["components"] if one["name"] == component)
+    return next(int(entry["pid"]) for entry in _ps(environment)["components"] if entry["name"] == component)
 
 
 def _ps(environment: dict[str, str]) -> Any:
@@ -161,7 +164,7 @@ def _commands(answers: dict[str, Samples]) -> list[Row]:
 
 def _until_stale(environment: dict[str, str]) -> float:
     """Kill a process and return the time until diagnostics have told of it [s], by the clocks of one machine."""
-    pid = next(one["pid"] for one in _ps(environment)["components"] if one["process"] == KILLED)
+    pid = next(component["pid"] for component in _ps(environment)["components"] if component["process"] == KILLED)
     whole = {**os.environ, "PYTHONPATH": str(ROOT), **environment}
     command = [*COMMAND, "topic", "echo", "/diagnostics_agg", "--json"]
     with subprocess.Popen(command, env=whole, cwd=ROOT, stdout=subprocess.PIPE, text=True) as echo:
@@ -169,7 +172,7 @@ def _until_stale(environment: dict[str, str]) -> float:
         next(reports)  # it listens
         killed = time.time()
         os.kill(pid, signal.SIGKILL)
-        report = next(one for one in reports if any(map(_is_told, one["status"])))
+        report = next(entry for entry in reports if any(map(_is_told, entry["status"])))
         echo.kill()
     stamp = report["header"]["stamp"]
     return float(stamp["sec"] + stamp["nanosec"] * 1e-9 - killed)

@@ -15,8 +15,8 @@ from dynamixel_sdk import COMM_SUCCESS, GroupSyncRead, GroupSyncWrite, PacketHan
 
 from benchmarks.measuring import Row, Samples
 from benchmarks.servo_replies import BAUD, served
-from rbxcompose.actuation.dynamixel_bus import DynamixelBus
-from rbxcompose.actuation.servo_models import servo_models
+from rbxcompose.domains.servos.dynamixel_bus import DynamixelBus
+from rbxcompose.domains.servos.models import servo_models
 
 PERIOD = 0.01  # [s]
 BLOCKS, CYCLES = 4, 60  # each side runs this many blocks of cycles, in turns
@@ -34,7 +34,7 @@ def _ours(path: Path, ids: range, timeout: float) -> Iterator[Cycle]:
 
         def cycle() -> set[int]:
             found = bus.read(ids, ITEMS, budget=PERIOD / 2)
-            bus.write({one: {"goal_position": 2048} for one in ids})
+            bus.write({item: {"goal_position": 2048} for item in ids})
             return set(found)
 
         yield cycle
@@ -50,7 +50,7 @@ def _stock(path: Path, ids: range) -> Iterator[Cycle]:
 
     def cycle() -> set[int]:
         found = set(ids) if read.txRxPacket() == COMM_SUCCESS else set()
-        values = {(one, read.getData(one, at, size)) for one in found for at, size in ((126, 2), (128, 4), (132, 4))}
+        values = {(item, read.getData(item, at, size)) for item in found for at, size in ((126, 2), (128, 4), (132, 4))}
         write = GroupSyncWrite(port, packets, GOAL, GOAL_SIZE)
         for one in ids:
             write.addParam(one, list((2048).to_bytes(GOAL_SIZE, "little")))
@@ -87,7 +87,7 @@ def _compared(count: int, timeout: float, mute: tuple[int, ...] = ()) -> list[tu
 
 def _lost(found: list[set[int]], expected: set[int]) -> float:
     """Return how many of the expected readings did not come [%]."""
-    return 100 * sum(len(expected - one) for one in found) / (len(expected) * len(found))
+    return 100 * sum(len(expected - numbers) for numbers in found) / (len(expected) * len(found))
 
 
 def rows() -> list[Row]:

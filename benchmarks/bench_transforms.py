@@ -10,12 +10,12 @@ from rosbags.typesys import Stores, get_typestore
 
 from benchmarks.measuring import Row, in_turns
 from benchmarks.numpy_frames import NumpyFrames
-from rbxcompose.body.transforms import TransformTree
-from rbxcompose.geometry import Transform3, quaternion_from_rpy
+from rbxcompose.base.geometry import Transform3, quaternion_from_rpy
+from rbxcompose.base.transforms import TransformTree
 from rbxcompose.msgs.cdr import encode
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.tf2_msgs import TFMessage
-from rbxcompose.qos import Qos
+from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench, instance
 
 FRAMES, RATE, MANY = 12, 50, 200  # look-ups per sample
@@ -89,7 +89,7 @@ def _publishing() -> Row:
     robot = Bench(instance("transforms", "transforms", {"urdf": _urdf()}))
     send = robot.bus.publisher("source", "/joint_states", JointState, Qos.STATE)
     sent: list[int] = []
-    robot.bus.subscribe("taker", "/tf", TFMessage, Qos.STATE, lambda one: sent.append(len(encode(one))))
+    robot.bus.subscribe("taker", "/tf", TFMessage, Qos.STATE, lambda message: sent.append(len(encode(message))))
     names = tuple(f"joint_{index}" for index in range(JOINTS))
 
     def second() -> None:

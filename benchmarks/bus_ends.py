@@ -18,24 +18,22 @@ from typing import Any
 import zenoh
 from zenoh.handlers import Callback
 
-from rbxcompose.bus.attachment import Attachment, decode_attachment
+from rbxcompose.base.clock import MonotonicClock
+from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.bus import Bus
-from rbxcompose.bus.names import data_key
+from rbxcompose.bus.names import Attachment, data_key, decode_attachment
 from rbxcompose.bus.services import Client
 from rbxcompose.bus.zenoh_session import open_peer
 from rbxcompose.bus.zenoh_transport import ZenohTransport
-from rbxcompose.clock import MonotonicClock
+from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.msgs.cdr import decode, encode
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.msgs.rcl_interfaces import Parameter, ParameterValue, SetParameters
 from rbxcompose.msgs.std_srvs import SetBool
-from rbxcompose.plan.model import Plan
-from rbxcompose.qos import Qos
+from rbxcompose.runtime.process_group.connection import CallbackInbox, Turns
 from rbxcompose.runtime.process_group.host import Host
-from rbxcompose.runtime.process_group.inbox import CallbackInbox
-from rbxcompose.runtime.process_group.turns import Turns
-from rbxcompose.scheduler import Scheduler
 from rbxcompose.sdk.bound import Reply
+from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing.bench import instance
 
 TWIST = Twist(linear=Vector3(x=0.3), angular=Vector3(z=-1.0))
@@ -114,9 +112,9 @@ class OurAsker(Ours):
         self._back: list[float] = []
         self._handled: list[float] = []
         self._ping = self.bus.publisher("asker", "ping", Twist, Qos.COMMAND)
-        self.bus.subscribe("asker", "pong", Twist, Qos.COMMAND, lambda one: self._note_back())
+        self.bus.subscribe("asker", "pong", Twist, Qos.COMMAND, lambda message: self._note_back())
         self._flood = self.bus.subscribe(
-            "asker", "flood", Twist, Qos.EVENT, lambda one: self._handled.append(time.perf_counter())
+            "asker", "flood", Twist, Qos.EVENT, lambda message: self._handled.append(time.perf_counter())
         )
         self._ask = self.bus.client("asker", "ask", SetBool)
         self._set = self.bus.client("asker", "battery/set_parameters", SetParameters)

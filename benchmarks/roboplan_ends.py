@@ -55,13 +55,13 @@ def main() -> None:
         options.collision_check_step_size = given["step"]
         planner = RRT(scene, options)
         planner.setRngSeed(1)
-        ends = [JointConfiguration(names, np.array(problem[one])) for one in ("start", "goal")]
+        ends = [JointConfiguration(names, np.array(problem[text])) for text in ("start", "goal")]
         began = time.process_time()
         try:
             path = planner.plan(*ends)
             shortcutter = PathShortcutter(scene, PathShortcuttingOptions(group, max_step_size=given["step"], seed=1))
             path = shortcutter.shortcut(path)
-            points = [np.asarray(one).tolist() for one in path.positions]
+            points = [np.asarray(position).tolist() for position in path.positions]
         except RuntimeError as error:
             sys.stderr.write(f"{problem['scenario']}: {error}\n")
             points = []

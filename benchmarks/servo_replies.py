@@ -15,7 +15,7 @@ from collections.abc import Iterator, Sequence
 from multiprocessing.connection import Connection
 from pathlib import Path
 
-from rbxcompose.twins.servo_packets import SYNC_READ, ServoPacket, packets, status
+from rbxcompose.domains.servos.twins.servo_line import SYNC_READ, ServoPacket, packets, status
 
 BAUD = 1_000_000  # [bit/s]
 _BITS, _SLICE = 10, 0.001  # of a byte on the wire; [s]
@@ -27,7 +27,7 @@ def _replies(packet: ServoPacket, canned: dict[int, bytes]) -> bytes:
 
 def _serve(count: int, length: int, mute: Sequence[int], ready: Connection) -> None:
     """Answer on `count` terminals until the other process ends."""
-    canned = {one: status(2, one, 0, bytes([one] * length)) for one in range(1, 253) if one not in mute}
+    canned = {index: status(2, index, 0, bytes([index] * length)) for index in range(1, 253) if index not in mute}
     ends = [os.openpty() for _ in range(count)]
     for _, near in ends:
         tty.setraw(near)

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 
-from rbxcompose.compiler import compile_robot
+from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.msgs.nav_msgs import Odometry
-from rbxcompose.robot_events import MissionOver
+from rbxcompose.sdk.robot_events import MissionOver
 from rbxcompose.testing.bench import Bench
 
 ROOT = Path(__file__).parents[1]

@@ -13,24 +13,23 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from rbxcompose.cli.missions import live_view
-from rbxcompose.cli.robots.picture import ComponentPicture, RobotPicture, Tree
-from rbxcompose.cli.robots.picture import lines_of as lines_of_top
-from rbxcompose.cli.robots.story import StoryWriter
-from rbxcompose.compiler import compile_robot
-from rbxcompose.components.mission import Mission
-from rbxcompose.executive.requests import LookAtMission, ShowPicture
-from rbxcompose.inspection.mission_html import mission_html
-from rbxcompose.inspection.mission_style import STYLE
-from rbxcompose.inspection.mission_text import running_lines
-from rbxcompose.levels import level_of
-from rbxcompose.missions.view.mirror import joined, status_list
+from rbxcompose.base.levels import level_of
+from rbxcompose.commands.story import StoryWriter
+from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.compiler.plan.model import Plan
+from rbxcompose.missions.components.mission import Mission
+from rbxcompose.missions.execution.requests import LookAtMission, ShowPicture
 from rbxcompose.missions.view.picture import picture_from_data
+from rbxcompose.missions.view.replica import joined, status_list
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray
 from rbxcompose.msgs.std_msgs import Float32
-from rbxcompose.plan.model import Plan
 from rbxcompose.testing.bench import Bench
+from rbxcompose.tools import mission_view as live_view
+from rbxcompose.tools.inspection.mission_html import STYLE, mission_html
+from rbxcompose.tools.inspection.mission_text import running_lines
+from rbxcompose.tools.robot_picture import ComponentPicture, RobotPicture, Tree
+from rbxcompose.tools.robot_picture import lines_of as lines_of_top
 
 DOCS = Path(__file__).parent
 ROBOT, MISSION = DOCS.parent / "robots/turtlebot/robot.yaml", "patrol"
@@ -58,7 +57,7 @@ def svg(title: str, lines: Sequence[str]) -> str:
     """Return a terminal with a title and lines, whose colours are those of the terminal's codes."""
     width, height = round(2 * LEFT + WIDTH * CELL), TOP + LINE * len(lines)
     dots = "".join(f'<circle cx="{LEFT + 4 + 16 * turn}" cy="17" r="5" fill="#46525f"/>' for turn in range(3))
-    texts = "\n".join(one for turn, line in enumerate(lines) if (one := _line(line, TOP + LINE * turn)))
+    texts = "\n".join(text for turn, line in enumerate(lines) if (text := _line(line, TOP + LINE * turn)))
     size = f'viewBox="0 0 {width} {height}" width="{width}" height="{height}"'
     return f"""<svg xmlns="http://www.w3.org/2000/svg" {size} role="img">
 <title>{escape(title)}</title>
@@ -88,8 +87,8 @@ def _painted(line: str) -> Iterator[tuple[str, str]]:
     colour, at = INK, 0
     for match in _PAINT.finditer(line):
         yield line[at : match.start()], colour
-        at, codes = match.end(), [int(one) for one in match[1].split(";") if one]
-        colours = [COLOURS[one % 60] for one in codes if one % 60 in COLOURS]
+        at, codes = match.end(), [int(part) for part in match[1].split(";") if part]
+        colours = [COLOURS[code % 60] for code in codes if code % 60 in COLOURS]
         colour = colours[-1] if colours else FAINT if 2 in codes else INK
     yield line[at:], colour
 
@@ -100,14 +99,14 @@ class Run:
     def __init__(self, plan: Plan) -> None:
         self.plan, self.bench = plan, Bench(plan=plan)
         self.heard = {
-            (one.name, wire.port): self.bench.collect(wire.topic, registry.message(wire.type))
-            for one in self.bench.plan.instances
-            for wire in one.wires
+            (instance.name, wire.port): self.bench.collect(wire.topic, registry.message(wire.type))
+            for instance in self.bench.plan.instances
+            for wire in instance.wires
             if wire.kind == "out"
         }
         self.charge = self.bench.collect("/battery_level", Float32)
         self.health = self.bench.collect("/diagnostics_agg", DiagnosticArray)
-        self.bench.run_until(lambda: any(one.text.startswith(MOMENT) for one in self.bench.records))
+        self.bench.run_until(lambda: any(record.text.startswith(MOMENT) for record in self.bench.records))
         self.bench.advance(DOCKING - 1.0)
         self.counts = {name: len(messages) for name, messages in self.heard.items()}
         self.bench.advance(1.0)
@@ -115,12 +114,12 @@ class Run:
     def log(self) -> list[str]:
         """Return the lines that `up` writes around the moment."""
         bench = Bench(plan=self.plan)
-        bench.run_until(lambda: any("battery_low done" in one.text for one in bench.records))
+        bench.run_until(lambda: any("battery_low done" in record.text for record in bench.records))
         bench.advance(10.0)
-        told = [one for one in bench.records if one.source == "mission"]
-        there = next(turn for turn, one in enumerate(told) if one.text.startswith(MOMENT))
-        writer = StoryWriter([one.name for one in self.plan.instances], colour=True)
-        return [writer.line(one) for one in told[there - BEFORE : there + AFTER]]
+        told = [record for record in bench.records if record.source == "mission"]
+        there = next(turn for turn, record in enumerate(told) if record.text.startswith(MOMENT))
+        writer = StoryWriter([instance.name for instance in self.plan.instances], colour=True)
+        return [writer.line(record) for record in told[there - BEFORE : there + AFTER]]
 
     def mission(self) -> list[str]:
         """Return the lines of `mission watch`."""
@@ -138,18 +137,20 @@ class Run:
 
     def top(self) -> list[str]:
         """Return the lines of `top`, without the loads of processes."""
-        statuses = {one.name: one for one in self.health[-1].status}
-        leaves = {name.rpartition("/")[2]: one for name, one in statuses.items() if name.count("/") > 1}
+        statuses = {status.name: status for status in self.health[-1].status}
+        leaves = {name.rpartition("/")[2]: status for name, status in statuses.items() if name.count("/") > 1}
         components = []
-        for one in self.plan.instances:
-            told = leaves.get(one.name)
-            rates = [len(self.heard[key]) - self.counts[key] for key in self.heard if key[0] == one.name]
+        for instance in self.plan.instances:
+            told = leaves.get(instance.name)
+            rates = [len(self.heard[key]) - self.counts[key] for key in self.heard if key[0] == instance.name]
             level = None if told is None else level_of(told.level)
             message = "" if told is None else told.message
             rate = float(sum(rates)) if any(rates) else None
-            components.append(ComponentPicture(one.name, one.type, "active", one.process, 0, rate, level, message))
-        groups = [one for one in statuses.values() if one.name.count("/") == 1]
-        health = [(one.name.lstrip("/"), level_of(one.level), one.message) for one in groups]
+            components.append(
+                ComponentPicture(instance.name, instance.type, "active", instance.process, 0, rate, level, message)
+            )
+        groups = [status for status in statuses.values() if status.name.count("/") == 1]
+        health = [(group.name.lstrip("/"), level_of(group.level), group.message) for group in groups]
         picture = RobotPicture(
             self.plan.robot, True, None, "", self._charge(), components, (), health, (), self._trees()
         )

@@ -28,7 +28,7 @@ examples), `make soak` the numbers in the table. A failure becomes a file that e
 - **Storms over simulated robots** (`tests/simulated_faults`): runs the patrol robot with its real conductor and
   processes, in virtual time, over a network that delays, loses, duplicates and reorders. Processes are killed and
   hang, links break, components raise, commands make no sense, people stop, release and set parameters, all from one
-  seed. `rbxcompose/testing/invariants.py` defines what is safe and judges the record of the run.
+  seed. `rbxcompose/testing/safety.py` defines what is safe and judges the record of the run.
 - **Disks that fail** (`tests/io`): each system call of a writer fails once, in each way that a disk can
   fail. Existing data is never torn or lost, the failure is reported, and the next try works.
 - **Links that fail** (`tests/net`): a proxy before the router delays, slows down, cuts and freezes the links.

@@ -2,7 +2,7 @@
 
 import sys
 
-from rbxcompose.cli.main import main
+from rbxcompose.commands.main import main
 
 if __name__ == "__main__":
     sys.exit(main())

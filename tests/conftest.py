@@ -39,7 +39,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 def pytest_collection_finish() -> None:
     """Compile what arms need before any test: on a busy machine, that takes longer than a test may."""
-    if "rbxcompose.motion.arm_kinematics" in sys.modules:
+    if "rbxcompose.domains.arms.motion.arm_kinematics" in sys.modules:
         from tests.motion.toy_arm import fast_planner, kinematics
 
         kinematics().hasten()
@@ -48,9 +48,9 @@ def pytest_collection_finish() -> None:
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Let tests of real processes try again: a machine that stands still for a moment keeps none of their deadlines."""
-    for one in items:
-        if one.nodeid.startswith(REAL_TIME):
-            one.add_marker(pytest.mark.flaky(reruns=2))
+    for item in items:
+        if item.nodeid.startswith(REAL_TIME):
+            item.add_marker(pytest.mark.flaky(reruns=2))
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -6,7 +6,7 @@ import tempfile
 from functools import cache
 from pathlib import Path
 
-from rbxcompose.plan.model import Plan
+from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.testing import Checked, check_file, check_text
 from tests.conftest import ROOT
 

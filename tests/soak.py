@@ -37,5 +37,5 @@ class Soak:
     def write(self) -> None:
         """Write down the figures, beside those of suites that were not run now."""
         known = json.loads(RESULTS.read_text(encoding="utf-8")) if RESULTS.exists() else []
-        rows = {row["suite"]: row for row in known} | {name: asdict(one) for name, one in self.figures.items()}
+        rows = {row["suite"]: row for row in known} | {name: asdict(figure) for name, figure in self.figures.items()}
         RESULTS.write_text(json.dumps([rows[name] for name in sorted(rows)], indent=1) + "\n", encoding="utf-8")

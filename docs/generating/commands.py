@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Iterator
 
 from docs.generating.markdown import code, page, table
-from rbxcompose.cli.verbs import load, parser_of, verbs
+from rbxcompose.commands.verbs import load, parser_of, verbs
 
 
 def whole_page() -> str:

@@ -6,14 +6,12 @@ from typing import Any
 
 from docs.generating.markdown import about, code, example, example_of, indented, page, table
 from docs.generating.shapes import keys_table
-from rbxcompose.config import Place
-from rbxcompose.manifest.options import ComponentOptions
+from rbxcompose.base.config import PLACE, Place
+from rbxcompose.compiler.schema.entries import examples_of
+from rbxcompose.manifest.section import ComponentOptions
 from rbxcompose.missions.program.goals import typed_fields
-from rbxcompose.qos import Qos
-from rbxcompose.references import PLACE
-from rbxcompose.schema.entries import examples_of
 from rbxcompose.sdk.component import Component
-from rbxcompose.sdk.ports import In, Looks, Out, Port, ServesAction, ServesTopic
+from rbxcompose.sdk.ports import In, Looks, Out, Port, Qos, ServesAction, ServesTopic
 from rbxcompose.sdk.registry import PLUGINS, component_type
 
 DIRECTIONS = {

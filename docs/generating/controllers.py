@@ -8,7 +8,7 @@ from typing import Any
 from docs.generating.components import DIRECTIONS, remarks
 from docs.generating.markdown import about, code, example, example_of, indented, page, table
 from docs.generating.robot import tables
-from rbxcompose.controller_interface import PLUGINS, controller_type
+from rbxcompose.domains.servos.controller import PLUGINS, controller_type
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.manifest.validate import to_plain
@@ -32,7 +32,7 @@ def of_type(name: str) -> str:
         f"{facts(cls)}\n",
         example(f"controllers:\n{indented(example_of(cls))}", "text"),
         *tables(cls.config_type(), ""),
-        table(("port", "does", "what", "topic", "remarks"), [port_row(*one) for one in ports_of(name).items()]),
+        table(("port", "does", "what", "topic", "remarks"), [port_row(*pair) for pair in ports_of(name).items()]),
     ]
     return "\n".join(part for part in parts if part)
 

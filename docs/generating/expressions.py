@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from docs.generating.markdown import code, page, table
-from rbxcompose.expressions.functions import FUNCTIONS
-from rbxcompose.expressions.operators import OPERATORS
-from rbxcompose.expressions.parser import LEVELS, LONGEST, STEPS
-from rbxcompose.expressions.values import LONGEST_TEXT, MOST_ITEMS
-from rbxcompose.units import DIMENSIONS, Dimension, example, needs_unit, units_of
+from rbxcompose.base.expressions.functions import FUNCTIONS
+from rbxcompose.base.expressions.parser import LEVELS, LONGEST, OPERATORS, STEPS
+from rbxcompose.base.expressions.values import LONGEST_TEXT, MOST_ITEMS
+from rbxcompose.base.units import DIMENSIONS, Dimension, example, needs_unit, units_of
 
 UNITS = """## Types and units
 A quantity is a number with a unit. A bare number is in the first unit of its row; where the row says
@@ -62,7 +61,7 @@ def of_dimension(dimension: Dimension) -> tuple[str, str, str]:
 
 def operators() -> str:
     """Return the operators."""
-    rows = [(" ".join(map(code, one.symbols)), one.about, code(one.example)) for one in OPERATORS]
+    rows = [(" ".join(map(code, operator.symbols)), operator.about, code(operator.example)) for operator in OPERATORS]
     return "## Operators\nFrom weakest to strongest binding.\n\n" + table(
         ("operators", "what they give", "example"), rows
     )
@@ -70,7 +69,7 @@ def operators() -> str:
 
 def functions() -> str:
     """Return the functions."""
-    rows = [(code(one.form), one.about) for one in FUNCTIONS.values()]
+    rows = [(code(function.form), function.about) for function in FUNCTIONS.values()]
     return "## Functions\nThere are no others.\n\n" + table(("function", "gives"), rows)
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import rbxcompose
 from docs.generating.markdown import table
-from rbxcompose.finding_pages import FAMILIES
+from rbxcompose.commands.finding_pages import FAMILIES
 
 _DECLARED = re.compile(r"\w\(\s*\"(RBX\d{4})\"")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from itertools import groupby
 
-from rbxcompose.finding_pages import all_kinds, family_of, markdown_of, title_of
+from rbxcompose.commands.finding_pages import all_kinds, family_of, markdown_of, title_of
 
 INTRODUCTION = """# Findings
 

@@ -7,6 +7,9 @@ from collections.abc import Mapping
 from docs.generating.components import ports_of
 from docs.generating.markdown import about, code, example, example_of, lowered, page, table
 from docs.generating.shapes import keys_table
+from rbxcompose.compiler.schema.mission import mission_schema
+from rbxcompose.compiler.schema.scalars import SHARED, Schema
+from rbxcompose.compiler.schema.settle import referred
 from rbxcompose.manifest.arguments import ArgumentModel
 from rbxcompose.missions.language.fields import Field, first_line
 from rbxcompose.missions.language.grammar import Takes
@@ -14,9 +17,6 @@ from rbxcompose.missions.language.reader import INTERRUPT_KEYS
 from rbxcompose.missions.modifiers.registry import modifiers
 from rbxcompose.missions.program.goals import skill_of, topic_skill
 from rbxcompose.missions.program.registry import StepType, kinds
-from rbxcompose.schema.mission import mission_schema
-from rbxcompose.schema.scalars import SHARED, Schema
-from rbxcompose.schema.settle import referred
 from rbxcompose.sdk.ports import ServesAction, ServesTopic
 from rbxcompose.sdk.registry import PLUGINS, component_type
 
@@ -36,7 +36,7 @@ _HEAD = ("key", "takes", "what it is")
 def whole_page() -> str:
     """Return the page."""
     schema = mission_schema(sorted(PLUGINS.shipped))
-    states = {key: referred(one, schema) for key, one in schema[SHARED]["state"]["properties"].items()}
+    states = {key: referred(property_, schema) for key, property_ in schema[SHARED]["state"]["properties"].items()}
     interrupt = schema["properties"]["interrupts"]["additionalProperties"]["properties"]
     return page(
         "Missions",
@@ -54,14 +54,14 @@ def whole_page() -> str:
 
 def described(properties: Mapping[str, Schema], required: list[str]) -> str:
     """Return a table of keys with what they are for."""
-    rows = [(code(key), "yes" if key in required else "", one["description"]) for key, one in properties.items()]
+    rows = [(code(key), "yes" if key in required else "", schema["description"]) for key, schema in properties.items()]
     return table(("key", "required", "what it is"), rows)
 
 
 def of_kind(kind: StepType) -> str:
     """Return what is known of a kind: what it does, its keys, an example."""
     absent = {True: "", False: "; optional"}
-    others = [(code(one.key), takes(one) + absent[one.is_required], one.help) for one in kind.options()]
+    others = [(code(option.key), takes(option) + absent[option.is_required], option.help) for option in kind.options()]
     rows = [(code(kind.name), takes(kind.fields[kind.name]), ""), *others]
     return "\n".join(
         [
@@ -84,7 +84,7 @@ def of_modifier(name: str) -> str:
     """Return what is known of a modifier."""
     cls = modifiers()[name]
     words = f"### {code(name)}\n{about(cls)} It takes {takes(cls.fields[name])}.\n"
-    others = [(code(one.key), takes(one), one.help) for one in cls.options()]
+    others = [(code(option.key), takes(option), option.help) for option in cls.options()]
     return "\n".join([words, *([table(_HEAD, others)] if others else []), example(example_of(cls), "yaml mission")])
 
 
@@ -97,7 +97,7 @@ def skills() -> list[tuple[str, ...]]:
             if isinstance(port, ServesAction | ServesTopic) and port.interface and named is not None:
                 make = skill_of if isinstance(port, ServesAction) else topic_skill
                 skill = make(port.interface, named or port.topic.rpartition("/")[2], entries=port.entries)
-                arguments = [f"{code(key)}: {one.phrase}" for key, one in skill.arguments.items()]
+                arguments = [f"{code(key)}: {argument.phrase}" for key, argument in skill.arguments.items()]
                 what = f"{code(name)}: {lowered(first_line(component_type(name).__doc__))}"
                 rows.append((code(skill.name), ", ".join(arguments) or "none", what, code(port.interface.TYPE)))
     return rows

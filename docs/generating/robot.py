@@ -8,15 +8,14 @@ from typing import Any, get_args, get_type_hints
 from docs.generating.markdown import about, code, example, lowered, page
 from docs.generating.sections import OVERLAY, PART
 from docs.generating.shapes import keys_table
-from rbxcompose.config import Config
+from rbxcompose.base.config import Config
+from rbxcompose.compiler.sections.components import components
+from rbxcompose.compiler.sections.profiles import profiles
 from rbxcompose.manifest import section as files
+from rbxcompose.manifest.documents import ManifestHeader
 from rbxcompose.manifest.file_models import file_model
-from rbxcompose.manifest.header import ManifestHeader
-from rbxcompose.manifest.options import ComponentOptions
 from rbxcompose.manifest.registry import sections
-from rbxcompose.manifest.section import Section
-from rbxcompose.sections.components import components
-from rbxcompose.sections.profiles import profiles
+from rbxcompose.manifest.section import ComponentOptions, Section
 
 COMPONENTS = "\nEach type also has settings of its own: see [components](components.md).\n"
 PROFILES = "Each profile has the sections of a robot except `profiles`, and is laid over the robot.\n"

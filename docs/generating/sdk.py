@@ -18,12 +18,14 @@ HEAD = """Everything that the author of a component imports, from `rbxcompose.sd
 def whole_page() -> str:
     """Return the page `sdk.md`."""
     things: dict[str, Any] = {name: getattr(sdk, name) for name in sdk.__all__}
-    ports = {name: one for name, one in things.items() if isinstance(one, type) and issubclass(one, Port)}
-    capabilities = {name: one for name, one in things.items() if isinstance(one, type) and issubclass(one, Capability)}
-    methods = {name: one for name, one in vars(Component).items() if _is_method(name, one)}
+    ports = {name: entry for name, entry in things.items() if isinstance(entry, type) and issubclass(entry, Port)}
+    capabilities = {
+        name: entry for name, entry in things.items() if isinstance(entry, type) and issubclass(entry, Capability)
+    }
+    methods = {name: entry for name, entry in vars(Component).items() if _is_method(name, entry)}
     shown = {*ports, *capabilities}
-    others = {name: one for name, one in things.items() if name not in shown and _has_docstring(one)}
-    fields = ", ".join(code(name) for name, one in things.items() if not _has_docstring(one))
+    others = {name: entry for name, entry in things.items() if name not in shown and _has_docstring(entry)}
+    fields = ", ".join(code(name) for name, entry in things.items() if not _has_docstring(entry))
     return page(
         "The SDK",
         HEAD,
@@ -44,5 +46,5 @@ def _is_method(name: str, thing: object) -> bool:
 
 
 def _section(title: str, things: Mapping[str, object]) -> str:
-    rows = [(code(name), (inspect.getdoc(one) or "").partition("\n")[0]) for name, one in things.items()]
+    rows = [(code(name), (inspect.getdoc(entry) or "").partition("\n")[0]) for name, entry in things.items()]
     return f"## {title}\n{table(('name', 'what it is'), rows)}"

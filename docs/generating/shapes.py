@@ -9,15 +9,24 @@ from annotated_types import Ge, Gt, Le, Lt, MinLen
 from pydantic.fields import FieldInfo
 
 from docs.generating.markdown import code, table
-from rbxcompose.config import Config, Dimensioned, Name, Secret
-from rbxcompose.field_docs import field_docs
+from rbxcompose.base.config import (
+    ANYTHING,
+    FILE,
+    PORT,
+    TOPIC,
+    Config,
+    Dimensioned,
+    Name,
+    Refers,
+    Restart,
+    Secret,
+    field_docs,
+)
+from rbxcompose.base.units import Dimension, format_number, format_quantity
 from rbxcompose.manifest.fields import DottedName, InterfaceName
-from rbxcompose.manifest.options import RestartModel
 from rbxcompose.manifest.registry import naming
-from rbxcompose.manifest.unit_choice import rounder_unit
-from rbxcompose.references import ANYTHING, FILE, PORT, TOPIC, Refers
-from rbxcompose.restarts import Restart
-from rbxcompose.units import Dimension, format_number, format_quantity
+from rbxcompose.manifest.section import RestartModel
+from rbxcompose.manifest.written import rounder_unit
 
 _NAMED: tuple[tuple[object, str], ...] = (
     (Name, "name"),
@@ -67,8 +76,10 @@ def _row(key: str, field: FieldInfo, hint: object, about: str) -> tuple[str, str
 
 def takes_of(hint: object) -> str:
     """Return what a key with this annotation takes."""
-    if get_origin(hint) is Annotated and (marks := [one for one in get_args(hint) if isinstance(one, Refers)]):
-        base, *others = [one for one in get_args(hint) if one not in marks]
+    if get_origin(hint) is Annotated and (
+        marks := [argument for argument in get_args(hint) if isinstance(argument, Refers)]
+    ):
+        base, *others = [argument for argument in get_args(hint) if argument not in marks]
         return _referring(marks[0].kind) or takes_of(Annotated[(base, *others)] if others else base)
     for known, words in _NAMED:
         if hint == known:
@@ -78,7 +89,11 @@ def takes_of(hint: object) -> str:
         return dimension.name.replace("_", " ")
     if origin is Annotated:
         return takes_of(get_args(hint)[0])
-    inner = [takes_of(one) for one in get_args(hint) if not isinstance(one, str) and one not in (type(None), ...)]
+    inner = [
+        takes_of(argument)
+        for argument in get_args(hint)
+        if not isinstance(argument, str) and argument not in (type(None), ...)
+    ]
     if origin in (Union, UnionType):
         return " or ".join(inner)
     if origin is Literal:
@@ -105,15 +120,15 @@ def plural(words: str) -> str:
 
 def _own_dimension(hint: object) -> Dimension | None:
     """Return what a quantity measures; None for a choice of several types, of which one may be a quantity."""
-    is_choice = any(get_origin(one) in (Union, UnionType) for one in get_args(hint)[:1])
+    is_choice = any(get_origin(argument) in (Union, UnionType) for argument in get_args(hint)[:1])
     return None if is_choice else dimension_of(hint)
 
 
 def dimension_of(hint: object) -> Dimension | None:
     """Return what a quantity of this annotation measures, None for other things."""
     inner = get_args(hint)
-    marks = (one.dimension for one in inner if isinstance(one, Dimensioned))
-    return next(marks, None) or next((found for one in inner if (found := dimension_of(one))), None)
+    marks = (argument.dimension for argument in inner if isinstance(argument, Dimensioned))
+    return next(marks, None) or next((found for argument in inner if (found := dimension_of(argument))), None)
 
 
 def limits(field: FieldInfo, dimension: Dimension | None) -> list[str]:

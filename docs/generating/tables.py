@@ -36,9 +36,9 @@ def filled(text: str) -> str:
 def components() -> str:
     """Return the component types that stand under `components`, with their settings."""
     types = {name: component_type(name) for name in sorted(PLUGINS.shipped)}
-    rows = [(name, one, with_default(one.config_type())) for name, one in types.items() if not one.made_by]
+    rows = [(name, cls, with_default(cls.config_type())) for name, cls in types.items() if not cls.made_by]
     linked = [
-        (f"[{code(name)}](reference/components.md#{name})", title(one), ", ".join(keys)) for name, one, keys in rows
+        (f"[{code(name)}](reference/components.md#{name})", title(cls), ", ".join(keys)) for name, cls, keys in rows
     ]
     return table(("type", "what it is", "settings (default)"), linked)
 
@@ -49,9 +49,9 @@ def sections() -> str:
     return table(("section", "what it is", "keys"), [(name, doc.rstrip("."), words) for name, doc, words in rows])
 
 
-def keys(one: Section[Any, Any]) -> str:
+def keys(section: Section[Any, Any]) -> str:
     """Return the keys of a section's models, without repetition."""
-    fields = (field for _, model in models_below(one.type, "") for field in model.model_fields.items())
+    fields = (field for _, model in models_below(section.type, "") for field in model.model_fields.items())
     return ", ".join(dict.fromkeys(code(field.alias or name) for name, field in fields))
 
 
@@ -68,9 +68,9 @@ def commands() -> str:
 def leaves(parser: argparse.ArgumentParser, words: str = "") -> Iterator[tuple[str, str]]:
     """Give the row of a command, or those of the commands below it."""
     below = [one for one in parser._actions if isinstance(one, argparse._SubParsersAction)]
-    for one in below:
-        helps = {choice.dest: choice.help or "" for choice in one._choices_actions}
-        for name, inner in one.choices.items():
+    for action in below:
+        helps = {choice.dest: choice.help or "" for choice in action._choices_actions}
+        for name, inner in action.choices.items():
             yield from leaves(inner, helps[name])
     if not below:
         values = [written(one).strip("`") for one in parser._actions if not one.option_strings]
@@ -86,7 +86,7 @@ def nodes() -> str:
 
 def of_node(kind: StepType) -> tuple[str, str, str, str]:
     """Return the row of a kind."""
-    options = [f"{code(one.key)}: {takes(one)}" for one in kind.options()]
+    options = [f"{code(option.key)}: {takes(option)}" for option in kind.options()]
     return linked(kind), takes(kind.fields[kind.name]), "; ".join(options), about(kind).partition("\n\n")[0]
 
 

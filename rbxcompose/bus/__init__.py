@@ -1,1 +1,1 @@
-"""Topics, services and actions: by reference within a process, between processes over Zenoh in the format of ROS 2."""
+"""Topics, services and actions, in the process and over Zenoh."""

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
+from rbxcompose.base.dataclass import dataclass
 from rbxcompose.bus.names import ADMIN, DENIED, EXCHANGE_DOMAIN, topic_pattern
-from rbxcompose.dataclass import dataclass
 
 _TOKENS = ("liveliness_token", "liveliness_query", "declare_liveliness_subscriber")
 _GIVE = ("put", "delete", "reply", "declare_queryable")
@@ -35,26 +35,28 @@ def access_control(robot: str, domain: int, hosts: Sequence[AllowedHost]) -> dic
     subjects: list[Mapping[str, object]] = [{"id": "this host", "link_protocols": list(_LOCAL)}]
     tried = [f"{DENIED}{robot}/*"]
     tokens = [f"@ros2_lv/{domain}/**"]
-    for one in hosts:
-        gives, takes, both = (_patterns(domain, names) for names in (one.gives, one.takes, one.both))
+    for host in hosts:
+        gives, takes, both = (_patterns(domain, names) for names in (host.gives, host.takes, host.both))
         everything = [*gives, *takes, *both, f"{ADMIN}{robot}/**"]
         own = {
-            "gives": _rule(f"{one.certificate} gives", _GIVE, ("ingress",), gives),
-            "takes": _rule(f"{one.certificate} takes", _TAKE, ("ingress",), takes),
-            "runtime": _rule(f"{one.certificate} runtime", _ALL, ("ingress",), [*both, f"{ADMIN}{robot}/**"]),
-            "gets": _rule(f"{one.certificate} gets", _ALL, ("egress",), everything),
+            "gives": _rule(f"{host.certificate} gives", _GIVE, ("ingress",), gives),
+            "takes": _rule(f"{host.certificate} takes", _TAKE, ("ingress",), takes),
+            "runtime": _rule(f"{host.certificate} runtime", _ALL, ("ingress",), [*both, f"{ADMIN}{robot}/**"]),
+            "gets": _rule(f"{host.certificate} gets", _ALL, ("egress",), everything),
             "tokens": _rule(
-                f"{one.certificate} tokens", _TOKENS, ("ingress", "egress"), [*tokens, *_caches(everything)]
+                f"{host.certificate} tokens", _TOKENS, ("ingress", "egress"), [*tokens, *_caches(everything)]
             ),
             # A message at these keys is asked for and sent, so that it is known to be stopped where it comes in.
-            "asked": _rule(f"{one.certificate} asked", ["declare_subscriber"], ("ingress", "egress"), tried),
-            "tried": _rule(f"{one.certificate} tried", ["put"], ("egress",), tried),
-            "caches": _rule(f"{one.certificate} caches", _ALL, ("ingress", "egress"), _caches([*gives, *takes, *both])),
+            "asked": _rule(f"{host.certificate} asked", ["declare_subscriber"], ("ingress", "egress"), tried),
+            "tried": _rule(f"{host.certificate} tried", ["put"], ("egress",), tried),
+            "caches": _rule(
+                f"{host.certificate} caches", _ALL, ("ingress", "egress"), _caches([*gives, *takes, *both])
+            ),
         }
         kept = [rule for rule in own.values() if rule["key_exprs"]]
         rules += kept
-        policies.append({"rules": [str(rule["id"]) for rule in kept], "subjects": [one.certificate]})
-        subjects.append(_proven(one.certificate))
+        policies.append({"rules": [str(rule["id"]) for rule in kept], "subjects": [host.certificate]})
+        subjects.append(_proven(host.certificate))
     return {"enabled": True, "default_permission": "deny", "rules": rules, "subjects": subjects, "policies": policies}
 
 
@@ -64,7 +66,7 @@ def exchange_access(gives: Iterable[str], takes: Iterable[str], hosts: Sequence[
     With `hosts`, robots on each of them `take` and `give` what is theirs, and all those on this host.
     """
     here: Mapping[str, object] = {"id": "this host", "link_protocols": list(_LOCAL)} if hosts else {"id": "others"}
-    ends = [(here, gives, takes), *((_proven(one.certificate), one.takes, one.gives) for one in hosts)]
+    ends = [(here, gives, takes), *((_proven(host.certificate), host.takes, host.gives) for host in hosts)]
     rules, policies = list[dict[str, object]](), list[dict[str, object]]()
     for subject, out, back in ends:
         name = subject["id"]

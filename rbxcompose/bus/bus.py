@@ -6,24 +6,19 @@ import math
 from collections.abc import Callable, Collection, Sequence
 from typing import Any, TypeVar
 
-from rbxcompose.bus.action_client import ActionClient
-from rbxcompose.bus.action_server import ActionServer
-from rbxcompose.bus.gate import REQUESTS
-from rbxcompose.bus.inbox import Inbox
-from rbxcompose.bus.local import BusProcess, Participant, Refusing
-from rbxcompose.bus.orders import OrderPublisher
+from rbxcompose.base.clock import Clock
+from rbxcompose.base.scheduler import Scheduler
+from rbxcompose.bus.actions import ActionClient, ActionServer
+from rbxcompose.bus.graph import Writers
+from rbxcompose.bus.local import REQUESTS, BusProcess, Inbox, Participant, Refusing, Witness
 from rbxcompose.bus.services import Client, ServedRequest, Server, Services
 from rbxcompose.bus.tokens import publishers_pattern
-from rbxcompose.bus.topics import Publisher, Subscription, Topics
+from rbxcompose.bus.topics import OrderPublisher, Publisher, Subscription, Topics
 from rbxcompose.bus.transport import Closable, NoTransport, Transport
 from rbxcompose.bus.window import Window
 from rbxcompose.bus.wire import WIRE_PROFILES
-from rbxcompose.bus.witness import Witness
-from rbxcompose.bus.writers import Writers
-from rbxcompose.clock import Clock
 from rbxcompose.msgs.types import Action, Message, Service
-from rbxcompose.qos import Qos
-from rbxcompose.scheduler import Scheduler
+from rbxcompose.sdk.ports import Qos
 
 M = TypeVar("M", bound=Message)
 Q = TypeVar("Q", bound=Message)

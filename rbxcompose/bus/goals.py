@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from enum import IntEnum
 from typing import Generic, TypeVar
 
-from rbxcompose.dataclass import dataclass
+from rbxcompose.base.dataclass import dataclass
 
 G = TypeVar("G")
 R = TypeVar("R")

@@ -1,23 +1,203 @@
-"""State shared by the ends of one process: who serves a name here, and all that is needed to declare an end."""
+"""State shared by the ends of one process, and the gates through which messages come in."""
 
 from __future__ import annotations
 
+import math
+from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import field
+from enum import StrEnum
 from itertools import chain, count
-from typing import Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
-from rbxcompose.bus.names import data_key, dds_type, resolve
-from rbxcompose.bus.refusals import Refusals
+from rbxcompose.base.clock import Clock
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.scheduler import Scheduler
+from rbxcompose.bus.names import AttachmentError, data_key, dds_type, decode_attachment, resolve
 from rbxcompose.bus.tokens import EntityKind, NodeToken, endpoint_pattern, gid
-from rbxcompose.bus.transport import Closable, Transport
+from rbxcompose.bus.transport import Closable, Question, Transport
 from rbxcompose.bus.wire import RosQos, WireProfile
-from rbxcompose.clock import Clock
-from rbxcompose.dataclass import dataclass
-from rbxcompose.msgs.types import Interface
-from rbxcompose.scheduler import Scheduler
+from rbxcompose.msgs.types import Interface, Message, Service
+
+BURST = 0.1  # [s]; what may come in this time may also come all at once
+MOST_SOURCES = 16  # sources with an allowance of their own
+QUIET = 1.0  # [s] of silence after which a source makes room for another one
+
+
+class Allowance:
+    """A token bucket: at most `rate` messages a second [Hz] in the long run."""
+
+    def __init__(self, rate: float, burst: float = BURST) -> None:
+        self.rate = rate
+        self._most = max(1.0, rate * burst)
+        self._left = self._most
+        self._filled = -math.inf
+
+    def is_quiet(self, now: float) -> bool:
+        """Return whether nothing has come for a while."""
+        return now - self._filled > QUIET
+
+    def takes(self, now: float) -> bool:
+        """Return whether to take a message that arrives at `now` [s]."""
+        self._left = min(self._most, self._left + max(0.0, now - self._filled) * self.rate)
+        self._filled = now
+        if self._left < 1.0:
+            return False
+        self._left -= 1.0
+        return True
+
+
+class Allowances:
+    """An allowance for each source, so that one that sends too much costs the others nothing.
+
+    Beyond `MOST_SOURCES`, new sources share one; else a sender could evade the limit with a new name for each message.
+    """
+
+    def __init__(self, rate: float, burst: float = BURST) -> None:
+        self._rate, self._burst = rate, burst
+        self._strangers = Allowance(rate, burst)
+        self._own: dict[bytes, Allowance] = {}
+
+    def takes(self, source: bytes, now: float) -> bool:
+        """Return whether to take a message of a source that arrives at `now` [s]."""
+        return (self._own.get(source) or self._of_new(source, now)).takes(now)
+
+    def _of_new(self, source: bytes, now: float) -> Allowance:
+        if len(self._own) >= MOST_SOURCES:
+            self._own = {name: allowance for name, allowance in self._own.items() if not allowance.is_quiet(now)}
+        if len(self._own) >= MOST_SOURCES:
+            return self._strangers
+        return self._own.setdefault(source, Allowance(self._rate, self._burst))
+
+
+class RefusalReason(StrEnum):
+    """Why a message is refused; the words complete the sentence `12 messages were refused: ...`."""
+
+    TOO_MANY = "too many at once"
+    TOO_LARGE = "too large"
+    ATTACHMENT = "no ROS attachment"
+    LENGTH = "wrong length"
+    CONTENT = "unreadable content"
+    NOT_FINITE = "a number is not finite"
+
+
+class Refusals:
+    """Counts refusals. Any thread may call `add`; only the scheduler's may call the rest."""
+
+    def __init__(self) -> None:
+        self._numbers = {reason: count(1) for reason in RefusalReason}  # `next` is atomic
+        self._counted = dict.fromkeys(RefusalReason, 0)
+        self._told = dict.fromkeys(RefusalReason, 0)
+        self._told_total = 0
+
+    def add(self, reason: RefusalReason) -> None:
+        """Count one more."""
+        self._counted[reason] = next(self._numbers[reason])
+
+    @property
+    def total(self) -> int:
+        """Return how many messages have been refused."""
+        return sum(self._counted.values())
+
+    def news(self) -> dict[RefusalReason, int]:
+        """Return how many messages were refused since the last call, by reason."""
+        if self.total == self._told_total:
+            return {}
+        counted = dict(self._counted)
+        new = {reason: counted[reason] - self._told[reason] for reason in RefusalReason}
+        self._told, self._told_total = counted, sum(counted.values())
+        return {reason: number for reason, number in new.items() if number > 0}
+
+
+def sentence(name: str, news: dict[RefusalReason, int], what: str = "message") -> str:
+    """Return a sentence on what a topic or service has refused."""
+    total = sum(news.values())
+    messages = f"1 {what} was" if total == 1 else f"{total} {what}s were"
+    reasons = [reason if len(news) == 1 else f"{number} {reason}" for reason, number in news.items()]
+    return f"{messages} refused on {name}: {', '.join(reasons)}"
+
+
+@dataclass(frozen=True, slots=True)
+class WitnessedCall:
+    """A request, or the reply to one, as it leaves `node`."""
+
+    node: str  # the client's for a request, the server's for a reply
+    name: str  # of the service, with its leading slash
+    service: type[Service[Any, Any]]
+    client: bytes  # GID
+    sequence: int  # of the request among those of its client; a reply has the same
+    is_reply: bool
+    message: Message | None  # None: a reply without a response, since the request was refused or failed
+
+
+Witness = Callable[[WitnessedCall], None]
+
 
 T = TypeVar("T")
+Post = Callable[[str, Callable[[], None]], object]  # makes the scheduler run a callback for an owner, soon
+
+
+class Inbox(Generic[T]):
+    """A bounded queue that keeps the newest items; any thread may call `put`, only the scheduler's the rest."""
+
+    def __init__(self, owner: str, depth: int | None, handle: Callable[[T], None], post: Post) -> None:
+        """Call `handle` for `owner` once per item; without a `depth`, nothing is ever dropped."""
+        self._owner, self._handle, self._post = owner, handle, post
+        self._items: deque[T] = deque(maxlen=depth)
+        self._is_posted = False
+        self._arrivals = count(1)  # unlike `+= 1`, its `next` is atomic
+        self._arrived = 0
+        self._taken = 0
+
+    def put(self, item: T, post: Post, *, at: int = 1) -> None:
+        """Put in an item. `post` must suit the calling thread; it is called once `at` items wait."""
+        self._items.append(item)
+        self._arrived = next(self._arrivals)
+        # One wake-up suffices, however much arrives before it takes effect.
+        if not self._is_posted and len(self._items) >= at:
+            self._is_posted = True
+            post(self._owner, self._take)
+
+    def take_all(self) -> None:
+        """Handle all waiting items immediately."""
+        while self._items:
+            self._taken += 1
+            self._handle(self._items.popleft())
+
+    def hold(self) -> None:
+        """Keep arriving items waiting until `go_on`."""
+        self._is_posted = True  # as if the items were about to be taken
+
+    def go_on(self) -> None:
+        """Handle the waiting items, and new ones as they arrive."""
+        self._is_posted = bool(self._items)
+        if self._is_posted:
+            self._post(self._owner, self._take)
+
+    @property
+    def dropped(self) -> int:
+        """Return how many items had to make room for newer ones."""
+        return max(0, self._arrived - self._taken - len(self._items))
+
+    def close(self) -> list[T]:
+        """Handle no more items and return those left."""
+        left = list(self._items)
+        self._items = deque(maxlen=0)
+        return left
+
+    def _take(self) -> None:
+        self._is_posted = False  # before looking: later arrivals post again
+        if not self._items:
+            return
+        item = self._items.popleft()
+        self._taken += 1
+        if self._items and not self._is_posted:
+            # One item per event: a busy inbox takes turns with the others, and an exception loses only one item.
+            self._is_posted = True
+            self._post(self._owner, self._take)
+        self._handle(item)
+
+
 Route = tuple[str, str]  # full name and ROS type: only ends where both agree are connected
 
 
@@ -134,3 +314,40 @@ class Participant:
         """Withdraw all that was declared, last first."""
         while self._declared:
             self._declared.pop().close()
+
+
+REQUESTS = 1000.0  # [Hz] per client, for services
+GOALS = 50.0  # [Hz] per client: a new goal replaces the one before, which costs more than a request
+QUESTIONS = 100.0  # [Hz] to a window
+GATE_BURST = 1.0  # [s]; the requests allowed in this time may also come all at once
+
+SOMEBODY = b""  # a client that does not identify itself
+
+
+class Gate:
+    """Lets in what each client may request. It runs in threads of the transport and wakes nobody for the rest."""
+
+    def __init__(self, node: Participant, name: str, rate: float, put: Callable[[Question], None]) -> None:
+        """Pass at most `rate` requests per second [Hz] of each client to `put`; `name` is used in findings."""
+        self.owner, self.name = node.owner, name
+        self.refusals = Refusals()
+        self._clock, self._rate, self._put = node.process.clock, rate, put
+        self._allowances = Allowances(rate, GATE_BURST)
+        self._gates = node.process.gates
+        self._gates[self] = None
+
+    def __call__(self, question: Question) -> None:
+        """Let a request in, or refuse it."""
+        try:
+            asker = decode_attachment(question.attachment).gid
+        except AttachmentError:  # a tool at a window; a service refuses such a request when it reads it
+            asker = SOMEBODY
+        if self._allowances.takes(asker, self._clock.now()):
+            self._put(question)
+        else:
+            self.refusals.add(RefusalReason.TOO_MANY)
+            question.fail(f"more than {self._rate:g} requests a second")
+
+    def close(self) -> None:
+        """Remove the gate; no more requests may arrive."""
+        self._gates.pop(self, None)

@@ -1,10 +1,12 @@
-"""Names on the wire: ROS names, the type names of DDS, Zenoh keys, the parts of an action."""
+"""Names on the wire, and the attachment of every message: ROS names, types of DDS, Zenoh keys."""
 
 from __future__ import annotations
 
 import re
+import struct
+from typing import NamedTuple
 
-from rbxcompose.dataclass import dataclass
+from rbxcompose.base.dataclass import dataclass
 
 LONGEST_NAME = 247  # rmw's limit: 255 bytes less the prefixes that some middleware adds
 ADMIN = "rbx/"  # prefix of the keys that are not part of ROS 2
@@ -85,3 +87,35 @@ class ActionNames:
     def of(cls, action: str) -> ActionNames:
         """Return the names for the action named `action`."""
         return cls(*(f"{action}/_action/{part}" for part in cls.__slots__))
+
+
+_LAYOUT = struct.Struct("<qqB16s")
+_READ = struct.Struct("<qqx16s")
+_GID_SIZE = 16
+
+
+class Attachment(NamedTuple):
+    """The origin of a message; ROS drops messages without it."""
+
+    sequence: int  # counts from 1 for each publisher or client
+    stamp: int  # [ns] time of sending, by the sender's clock
+    gid: bytes  # 16 bytes that identify the sender
+
+    def encode(self) -> bytes:
+        """Return the 33 bytes that go over the wire."""
+        return _LAYOUT.pack(self.sequence, self.stamp, _GID_SIZE, self.gid)
+
+
+class AttachmentError(ValueError):
+    """Raised when bytes are not an attachment."""
+
+
+def decode_attachment(data: bytes) -> Attachment:
+    """Read an attachment.
+
+    Raises:
+        AttachmentError: if `data` is not one.
+    """
+    if len(data) != _LAYOUT.size or data[16] != _GID_SIZE:
+        raise AttachmentError(f"expected an attachment of {_LAYOUT.size} bytes, got {len(data)}")
+    return Attachment._make(_READ.unpack(data))

@@ -14,7 +14,7 @@ from rbxcompose.bus.transport import (
     Transport,
     TransportReply,
 )
-from rbxcompose.qos import Qos
+from rbxcompose.sdk.ports import Qos
 
 RENEWED = "the session on the bus was opened again"
 

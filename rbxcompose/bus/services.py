@@ -9,19 +9,16 @@ from functools import partial
 from itertools import count
 from typing import Any, Generic, TypeVar
 
-from rbxcompose.bus.attachment import Attachment, decode_attachment
-from rbxcompose.bus.classes import SERVICE_QOS
-from rbxcompose.bus.gate import REQUESTS, Gate
-from rbxcompose.bus.inbox import Inbox
-from rbxcompose.bus.local import Participant, Registry
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.requests import Refused
+from rbxcompose.base.scheduler import ScheduledCallback
+from rbxcompose.bus.local import REQUESTS, Gate, Inbox, Participant, Registry, Witness, WitnessedCall
+from rbxcompose.bus.names import Attachment, decode_attachment
 from rbxcompose.bus.tokens import EntityKind, gid, session_of
 from rbxcompose.bus.transport import Closable, Question, TransportReply
-from rbxcompose.bus.witness import Witness, WitnessedCall
-from rbxcompose.dataclass import dataclass
+from rbxcompose.bus.wire import SERVICE_QOS
 from rbxcompose.msgs.cdr import decode, encode
 from rbxcompose.msgs.types import Message, Service
-from rbxcompose.requests import Refused
-from rbxcompose.scheduler import ScheduledCallback
 from rbxcompose.sdk.bound import Reply
 
 Q = TypeVar("Q", bound=Message)

@@ -6,7 +6,7 @@ from enum import StrEnum
 
 import xxhash
 
-from rbxcompose.dataclass import dataclass
+from rbxcompose.base.dataclass import dataclass
 
 SPACE = "@ros2_lv"
 

@@ -1,27 +1,25 @@
-"""Topics: messages go by reference to subscribers in the process, and are encoded only if there are others."""
+"""Topics: messages go by reference within the process and are encoded only if another one subscribes."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import field
+from functools import partial
 from itertools import count
 from typing import Any, Generic, NamedTuple, TypeVar
 
-from rbxcompose.bus.allowance import Allowances
-from rbxcompose.bus.attachment import Attachment, AttachmentError, decode_attachment
-from rbxcompose.bus.classes import expects_speech, most_per_second, queue_depth, ros_qos
-from rbxcompose.bus.inbox import Inbox
-from rbxcompose.bus.local import Participant, Registry
-from rbxcompose.bus.refusals import RefusalReason, Refusals
-from rbxcompose.bus.tokens import EntityKind
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.bus.graph import TopicReader
+from rbxcompose.bus.local import Allowances, Inbox, Participant, RefusalReason, Refusals, Registry
+from rbxcompose.bus.names import Attachment, AttachmentError, decode_attachment
+from rbxcompose.bus.tokens import EndpointToken, EntityKind, gid, parse_token, session_of
 from rbxcompose.bus.transport import Arrival, Closable
-from rbxcompose.bus.writers import TopicReader
-from rbxcompose.dataclass import dataclass
+from rbxcompose.bus.wire import expects_speech, most_per_second, queue_depth, ros_qos
 from rbxcompose.msgs.cdr import CdrError, CdrLengthError, decode, encode
-from rbxcompose.msgs.finite import NotFiniteError, require_finite
+from rbxcompose.msgs.fields import NotFiniteError, require_finite
 from rbxcompose.msgs.types import Message
-from rbxcompose.qos import Qos
+from rbxcompose.sdk.ports import Qos
 
 M = TypeVar("M", bound=Message)
 
@@ -268,3 +266,62 @@ _REASONS: dict[type[ValueError], RefusalReason] = {
     CdrError: RefusalReason.CONTENT,
     NotFiniteError: RefusalReason.NOT_FINITE,
 }
+
+
+class OrderPublisher(Publisher[M]):
+    """Publishes orders for the components `servers`.
+
+    Only these count as listeners: a recorder or a person looking on does not carry out an order.
+    """
+
+    def __init__(
+        self, topics: Topics, node: Participant, topic: str, message: type[M], qos: Qos, servers: Collection[str]
+    ) -> None:
+        super().__init__(topics, node, topic, message, qos)
+        self._servers = frozenset(servers)
+        self._elsewhere: dict[str, bytes] = {}  # tokens of subscriptions in other processes, each with its GID
+        self._watchers: list[Callable[[], None]] = []
+        self._inbox: Inbox[Callable[[], None]] = Inbox(
+            node.owner, None, lambda callback: callback(), node.process.scheduler.post
+        )
+        pattern = node.peers(EntityKind.SUBSCRIPTION, topic, message)
+        self._tokens = node.process.transport.watch(pattern, self._token_changed)
+
+    @property
+    def listeners(self) -> frozenset[bytes]:
+        """Return the GIDs of the subscriptions that would receive an order now."""
+        here = {one.gid for one in self._topics.subscriptions.at(self.route) if one.owner in self._servers}
+        # A token may be known before its connection can be used.
+        return frozenset(here | set(self._elsewhere.values() if self.has_match else ()))
+
+    def watch(self, changed: Callable[[], None], /) -> None:
+        """Call `changed` whenever a subscriber comes or goes."""
+        self._watchers.append(changed)
+
+    def look_again(self) -> None:
+        """React to a change of the subscriptions in this process."""
+        self._inbox.put(self._tell, self._process.scheduler.post)
+
+    def close(self) -> None:
+        """Withdraw the publisher and stop watching."""
+        super().close()
+        self._tokens.close()
+        self._inbox.close()
+
+    def _token_changed(self, key: str, is_there: bool) -> None:
+        # In a thread of the transport.
+        token = parse_token(key)
+        is_ours = session_of(key) == self._process.transport.session
+        if isinstance(token, EndpointToken) and token.node.name in self._servers and not is_ours:
+            self._inbox.put(partial(self._note, key, is_there), self._process.transport.wake)
+
+    def _note(self, key: str, is_there: bool) -> None:
+        if is_there:
+            self._elsewhere[key] = gid(key)
+        else:
+            self._elsewhere.pop(key, None)
+        self._tell()
+
+    def _tell(self) -> None:
+        for watcher in self._watchers:
+            watcher()

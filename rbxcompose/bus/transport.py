@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol
 
-from rbxcompose.dataclass import dataclass
-from rbxcompose.qos import Qos
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.sdk.ports import Qos
 
 LONGEST_WAIT = 600.0  # [s] of real time for an answer; the transport keeps a little of each request that long
 EXPIRED = "no answer in time"

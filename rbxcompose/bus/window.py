@@ -11,12 +11,10 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 
-from rbxcompose.bus.gate import QUESTIONS, Gate
-from rbxcompose.bus.inbox import Inbox
-from rbxcompose.bus.local import Participant
+from rbxcompose.base.requests import Refused
+from rbxcompose.bus.local import QUESTIONS, Gate, Inbox, Participant
 from rbxcompose.bus.transport import Closable, Question
-from rbxcompose.qos import Qos
-from rbxcompose.requests import Refused
+from rbxcompose.sdk.ports import Qos
 
 SCHEMA = 1
 GRACE = 2.0  # [s] after a query in which somebody counts as listening: the transport may report a listener late
@@ -50,8 +48,8 @@ class Window:
 
     def close(self) -> None:
         """Withdraw the window."""
-        for one in self._declared:
-            one.close()
+        for closable in self._declared:
+            closable.close()
 
     def _asked(self, question: Question) -> None:
         self._asked_at = self._clock.now()

@@ -1,14 +1,12 @@
-"""Wire profiles: how the distributions of ROS 2 differ on Zenoh, and how quality of service is written there.
-
-Keys, payloads and the 33-byte attachment are the same for all of them.
-"""
+"""Wire profiles of ROS 2's distributions, and what a QoS class means for Zenoh."""
 
 from __future__ import annotations
 
 from dataclasses import field
 
-from rbxcompose.dataclass import dataclass
+from rbxcompose.base.dataclass import dataclass
 from rbxcompose.msgs.types import Interface
+from rbxcompose.sdk.ports import Qos
 
 DEFAULT_DEPTH = 42  # of rmw_zenoh, since its version 0.2
 
@@ -78,3 +76,60 @@ WIRE_PROFILES = {
         WireProfile("lyrical"),
     )
 }
+
+
+SERVICE_QOS = RosQos(depth=10)  # ROS's default for services
+
+COMMAND_RATE = 1000.0  # [Hz]; a higher rate is no control loop but a mistake
+LATCHED_QUEUE = 100  # several publishers may each have a latched message for one subscriber
+
+
+@dataclass(frozen=True, slots=True)
+class Sending:
+    """How Zenoh sends what is published: `priority` is a name of its `Priority`."""
+
+    priority: str
+    is_express: bool = False  # sent immediately, never batched
+    blocks: bool = False  # when the link is congested: wait, rather than drop
+    is_reliable: bool = True
+
+
+# `event` has a priority of its own, since its waiting messages would hold up all others of that priority.
+_SENDING = {
+    Qos.COMMAND: Sending("REAL_TIME", is_express=True),
+    Qos.STATE: Sending("INTERACTIVE_HIGH"),
+    Qos.EVENT: Sending("DATA_HIGH", blocks=True),
+    Qos.LATCHED: Sending("DATA"),
+    Qos.BULK: Sending("DATA_LOW", is_reliable=False),
+}
+
+SERVICE_SENDING = Sending("INTERACTIVE_LOW", is_express=True, blocks=True)
+
+
+def sending(qos: Qos) -> Sending:
+    """Return how messages of this class are sent."""
+    return _SENDING[qos]
+
+
+def queue_depth(qos: Qos) -> int:
+    """Return how many messages a subscription holds before the oldest is dropped."""
+    return LATCHED_QUEUE if qos is Qos.LATCHED else qos.depth
+
+
+def most_per_second(qos: Qos) -> float | None:
+    """Return the default limit on messages that a subscription takes from each publisher of another process [Hz]."""
+    return COMMAND_RATE if qos is Qos.COMMAND else None
+
+
+def expects_speech(qos: Qos) -> bool:
+    """Return whether a publisher that exists should publish something before long."""
+    return qos in (Qos.STATE, Qos.LATCHED)
+
+
+def ros_qos(qos: Qos) -> RosQos:
+    """Return the quality of service that ROS tools see for this class."""
+    if qos is Qos.EVENT:
+        return RosQos(keeps_all=True)
+    return RosQos(
+        is_reliable=sending(qos).is_reliable, is_transient_local=qos is Qos.LATCHED, keeps_all=False, depth=qos.depth
+    )

@@ -1,7 +1,9 @@
-"""The transport over Zenoh. Its callbacks run in Zenoh's own threads, where a slow one would stall the session."""
+"""The transport over Zenoh. Its callbacks run in Zenoh's own threads, where a slow one would hold up all others."""
 
 from __future__ import annotations
 
+import ctypes
+import threading
 from collections.abc import Callable
 from functools import partial
 from typing import Any, Protocol
@@ -10,11 +12,27 @@ import zenoh
 from zenoh import ext
 from zenoh.handlers import Callback
 
-from rbxcompose.bus.classes import SERVICE_SENDING, Sending, sending
-from rbxcompose.bus.inbox import Post
-from rbxcompose.bus.threads import keep_attached
+from rbxcompose.bus.local import Post
 from rbxcompose.bus.transport import EXPIRED, LONGEST_WAIT, Arrival, Closable, Question, RemotePublisher, TransportReply
-from rbxcompose.qos import Qos
+from rbxcompose.bus.wire import SERVICE_SENDING, Sending, sending
+from rbxcompose.sdk.ports import Qos
+
+_attach = ctypes.pythonapi.PyGILState_Ensure
+
+
+class _Attached(threading.local):
+    is_kept = False
+
+
+_attached = _Attached()
+
+
+def keep_attached() -> None:
+    """Keep Python's state for the calling thread, which Python did not create."""
+    if not _attached.is_kept:
+        _attached.is_kept = True  # part of that state, and lost with it
+        _attach()  # never released, so that the state's reference count does not reach zero
+
 
 HEARTBEAT = 0.5  # [s] after a latched message until its sequence number is repeated
 ZENOH_EXPIRED = "Timeout"  # Zenoh's answer in place of a server's

@@ -2,14 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from typing import Any
 
 from pydantic import Field
 
-from rbxcompose.config import Config, Secret
-from rbxcompose.dataclass import dataclass
-from rbxcompose.expressions.types import TYPES, Type, TypeKind, choice_of
-from rbxcompose.findings import DID_YOU_MEAN, Finding, FindingKind, Report, Span, replacement
+from rbxcompose.base.config import Config, Secret
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.expressions.types import TYPES, Type, TypeKind, choice_of
+from rbxcompose.base.findings import DID_YOU_MEAN, Finding, FindingKind, Related, Report, Span, replacement
+from rbxcompose.base.printable import plain
+from rbxcompose.base.units import (
+    NUMBER,
+    UNITS,
+    Dimension,
+    Quantity,
+    UnitError,
+    format_number,
+    format_quantity,
+    to_si,
+    written_unit,
+)
 from rbxcompose.manifest.foreign_words import TYPES as FOREIGN_TYPES
 from rbxcompose.manifest.scalars import describe
 from rbxcompose.manifest.tree import (
@@ -19,6 +33,8 @@ from rbxcompose.manifest.tree import (
     ScalarNode,
     SequenceNode,
     TreeNode,
+    at,
+    children,
     key_span,
     value_span,
 )
@@ -32,18 +48,6 @@ from rbxcompose.manifest.validate import (
     unit_finding,
     validate,
     where,
-)
-from rbxcompose.printable import plain
-from rbxcompose.units import (
-    NUMBER,
-    UNITS,
-    Dimension,
-    Quantity,
-    UnitError,
-    format_number,
-    format_quantity,
-    to_si,
-    written_unit,
 )
 
 CHOICE = "choice"
@@ -212,3 +216,53 @@ def show(value: object) -> str:
         case int() | float():
             return format_number(value)
     return str(value)
+
+
+class GivenSpan(Span):
+    """The place of a value that was given to an argument; `uses` are the places where it is used, outermost first.
+
+    It equals the plain place of the value.
+    """
+
+    uses: tuple[Span, ...] = ()
+
+
+def given_span(given: Span, use: Span) -> GivenSpan:
+    """Return the place `given` with `use`, where it is filled in; `given` may already have been passed on itself."""
+    made = GivenSpan(*given)
+    made.uses = (*(given.uses if isinstance(given, GivenSpan) else ()), use)
+    return made
+
+
+def decided_at(root: TreeNode, path: KeyPath, otherwise: Span) -> Span:
+    """Return the place of the one value that was given for something at `path` or below it; else another place."""
+    node = at(root, path)
+    given, waiting = {}, [node] if node is not None else []
+    while waiting:
+        one = waiting.pop()
+        waiting += (child for _, child in children(one))
+        if isinstance(one.span, GivenSpan):
+            given[Span(*one.span)] = one.span
+    return next(iter(given.values())) if len(given) == 1 else otherwise
+
+
+def told_where_given(finding: Finding) -> Finding:
+    """Return a finding with plain places; if it is about a given value, it also shows where that value is used."""
+    related = [one for other in finding.related for one in _plain(other)]
+    if not isinstance(finding.span, GivenSpan):
+        return finding if related == list(finding.related) else replace(finding, related=_once(related))
+    uses = [Related(use, "passed on here") for use in finding.span.uses[:-1]]
+    uses += [Related(use, "used here") for use in finding.span.uses[-1:]]
+    return replace(finding, span=Span(*finding.span), related=_once([*uses, *related]))
+
+
+def _plain(related: Related) -> Iterator[Related]:
+    if not isinstance(related.span, GivenSpan):
+        yield related
+        return
+    yield Related(Span(*related.span), related.message)
+    yield from (Related(use, "used here") for use in related.span.uses[-1:])
+
+
+def _once(related: Iterable[Related]) -> tuple[Related, ...]:
+    return tuple(dict.fromkeys(related))

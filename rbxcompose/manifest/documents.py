@@ -2,21 +2,55 @@
 
 from __future__ import annotations
 
-from dataclasses import field
+from collections.abc import Collection, Mapping
+from dataclasses import field, replace
 from dataclasses import replace as changed
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-from rbxcompose.dataclass import dataclass
-from rbxcompose.findings import DID_YOU_MEAN, Finding, Related, Report, Span, kind, replacement
+from rbxcompose.base.config import Config, Name
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.findings import DID_YOU_MEAN, Finding, Related, Report, Span, kind, replacement, surely_meant
+from rbxcompose.base.printable import plain
 from rbxcompose.manifest.files import ROBOT_FILE, shown_name
 from rbxcompose.manifest.foreign_words import FOREIGN
-from rbxcompose.manifest.header import ManifestHeader
-from rbxcompose.manifest.meant_keys import meant_keys, with_keys
 from rbxcompose.manifest.reader import Texts, read_file
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode
 from rbxcompose.manifest.validate import KEYS, UNKNOWN_KEY, validate, where
-from rbxcompose.printable import plain
+
+KINDS = ("Robot", "Part", "Overlay", "Mission", "Test", "System")
+"""What a manifest may describe."""
+
+
+class ManifestHeader(Config):
+    """The keys at the start of every manifest."""
+
+    rbx: Literal[1]
+    """Version of the language."""
+    kind: str
+    """What this file describes: `Robot`, `Part`, `Overlay`, `Mission`, `Test` or `System`."""
+    name: Name
+    """Its name: lower-case letters, digits and underscores."""
+    about: str = ""
+    """What it is for, in a sentence."""
+
+
+def meant_keys(root: MappingNode, keys: Collection[str]) -> dict[str, str]:
+    """Return the misspelt keys of a map, each with the one of `keys` that it was surely meant to be."""
+    found: dict[str, str] = {}
+    for name in root.entries.keys() - {*keys}:
+        meant = FOREIGN[name] if FOREIGN.get(name) in keys else surely_meant(name, keys)
+        if meant is not None and meant not in root and meant not in found.values():
+            found[name] = meant
+    return found
+
+
+def with_keys(root: MappingNode, meant: Mapping[str, str]) -> MappingNode:
+    """Return a map whose misspelt keys are those that were meant."""
+    if not meant:
+        return root
+    return replace(root, entries={meant.get(name, name): entry for name, entry in root.entries.items()})
+
 
 OTHER_KIND = kind("RBX1304", is_fixable=True)
 

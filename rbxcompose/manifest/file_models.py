@@ -1,4 +1,4 @@
-"""The keys of each kind of manifest that consists of sections."""
+"""The keys of each kind of manifest: of files with sections, of systems, and of tests of missions."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import Field, create_model
 
-from rbxcompose.manifest.header import ManifestHeader
+from rbxcompose.manifest.documents import ManifestHeader
 from rbxcompose.manifest.registry import sections
 from rbxcompose.manifest.section import OVERLAY, PART, ROBOT
 
@@ -20,7 +20,7 @@ FILES = {
 
 def file_model(kind: str) -> type[ManifestHeader]:
     """Return the model of a robot's, part's or overlay's file: its keys, with anything allowed in each section."""
-    return _model(kind, tuple((one.name, one.doc) for one in sections(kind)))
+    return _model(kind, tuple((section.name, section.doc) for section in sections(kind)))
 
 
 @cache
@@ -31,4 +31,4 @@ def _model(kind: str, sections: tuple[tuple[str, str], ...]) -> type[ManifestHea
 
 def robot_keys() -> list[str]:
     """Return the keys of a robot's file, its header's first."""
-    return [*ManifestHeader.model_fields, *(one.name for one in sections(ROBOT))]
+    return [*ManifestHeader.model_fields, *(section.name for section in sections(ROBOT))]

@@ -7,11 +7,20 @@ import re
 from itertools import islice
 from pathlib import Path
 
-from rbxcompose.findings import Finding, Span, kind, replacement
-from rbxcompose.manifest.library import PARTS, PREFIX, library_root
+from rbxcompose.base.findings import Finding, Span, kind, once, replacement
+from rbxcompose.base.printable import plain
 from rbxcompose.manifest.reader import UNREADABLE
-from rbxcompose.per_compile import once
-from rbxcompose.printable import plain
+
+PREFIX = "rbx:"
+PARTS = "parts"  # the library's folder of parts
+_PACKAGE = Path(__file__).resolve().parent.parent
+
+
+def library_root() -> Path:
+    """Return the folder that `rbx:` refers to: inside the installed package, or beside it in a checkout."""
+    inside = _PACKAGE / "library"
+    return inside if inside.is_dir() else _PACKAGE.parent
+
 
 PROFILE = "--profile"
 """What stands for a file in findings about profiles that a command chooses."""
@@ -40,7 +49,11 @@ def project_of(path: Path) -> Path:
 
 
 def _project_around(folder: Path) -> Path:
-    above = (one for one in (folder, *folder.parents) if any((one / name).is_dir() for name in ("robots", "missions")))
+    above = (
+        parent
+        for parent in (folder, *folder.parents)
+        if any((parent / name).is_dir() for name in ("robots", "missions"))
+    )
     return next(above, folder)
 
 
@@ -52,7 +65,9 @@ def resolve(written: str, writer: Path, span: Span) -> Path | Finding:
         message, folder = f"'{plain(written)}' is outside the project", plain(shown_name(project_of(writer)))
         where = f"'{folder}'" if folder != "." else "this folder"
         if namesakes := files_named(Path(written).name, writer):
-            return OUTSIDE.at(span, message, help="did you mean " + " or ".join(f"'{one}'" for one in namesakes) + "?")
+            return OUTSIDE.at(
+                span, message, help="did you mean " + " or ".join(f"'{namesake}'" for namesake in namesakes) + "?"
+            )
         return OUTSIDE.at(span, message, help=f"the project is {where}: move the file there, or use what 'rbx:' has")
     return path if path.is_file() else _missing(written, path, span, writer)
 
@@ -106,7 +121,10 @@ def _missing(written: str, path: Path, span: Span | None, writer: Path | None = 
     if writer is not None and BACKSLASH in written and span is not None:
         return _with_backslashes(written, span, writer)
     if writer is not None and (namesakes := files_named(path.name, writer)):
-        message, help_text = f"'{plain(written)}' does not exist", " or ".join(f"'{one}'" for one in namesakes)
+        message, help_text = (
+            f"'{plain(written)}' does not exist",
+            " or ".join(f"'{namesake}'" for namesake in namesakes),
+        )
         return UNREADABLE.at(span, message, help=f"did you mean {help_text}?")
     if (library_root() / written).is_file() and written.startswith(f"{PARTS}/"):
         fix = replacement(span, written, f"{PREFIX}{written}") if span else None
@@ -115,7 +133,16 @@ def _missing(written: str, path: Path, span: Span | None, writer: Path | None = 
     if (neighbours := _names_in(path.parent)) is None:
         return UNREADABLE.at(span, f"'{plain(written)}' does not exist", help=_nearest_folder(path))
     message, there = f"'{plain(written)}' does not exist", f"in '{plain(shown_name(path.parent))}'"
-    if len(whole := [one for one in neighbours if Path(one).stem == path.name and one.endswith(_ENDINGS)]) == 1:
+    if (
+        len(
+            whole := [
+                neighbour
+                for neighbour in neighbours
+                if Path(neighbour).stem == path.name and neighbour.endswith(_ENDINGS)
+            ]
+        )
+        == 1
+    ):
         meant = f"{written.removesuffix(path.name)}{whole[0]}"
         fix = replacement(span, written, meant) if span else None
         return UNREADABLE.at(span, message, help=f"did you mean '{plain(meant)}'?", fix=fix)
@@ -127,19 +154,19 @@ def _no_robot(written: str, folder: Path, span: Span | None, writer: Path | None
     where = "this folder" if folder == Path.cwd() and writer is None else f"the folder '{plain(written)}'"
     names = sorted(_names_in(folder) or ())
     if writer is not None:
-        files = [f"'{plain(written.rstrip('/'))}/{plain(one)}'" for one in names if one.endswith(_ENDINGS)]
+        files = [f"'{plain(written.rstrip('/'))}/{plain(name)}'" for name in names if name.endswith(_ENDINGS)]
         help_text = f"name a file in it: {', '.join(files[:_MOST_NAMESAKES])}" if files else "name a file"
         return UNREADABLE.at(span, f"{where} is no file", help=help_text)
-    robots = _robots_in(folder) or [f"{_ROBOTS}/{one}" for one in _robots_in(folder / _ROBOTS)]
+    robots = _robots_in(folder) or [f"{_ROBOTS}/{robot}" for robot in _robots_in(folder / _ROBOTS)]
     base = "" if written in (".", "./") else f"{written.rstrip('/')}/"
-    listed = " or ".join(f"'{plain(base + one)}'" for one in robots[:_MOST_NAMESAKES])
+    listed = " or ".join(f"'{plain(base + robot)}'" for robot in robots[:_MOST_NAMESAKES])
     help_text = f"did you mean {listed}?" if robots else f"'rbxcompose new robot NAME' makes one in '{_ROBOTS}/NAME'"
     return UNREADABLE.at(span, f"there is no robot in {where}: it has no {ROBOT_FILE}", help=help_text)
 
 
 def _robots_in(folder: Path) -> list[str]:
     """Return the folders in a folder that are robots."""
-    return sorted(one for one in _names_in(folder) or () if (folder / one / ROBOT_FILE).is_file())
+    return sorted(name for name in _names_in(folder) or () if (folder / name / ROBOT_FILE).is_file())
 
 
 def _with_backslashes(written: str, span: Span, writer: Path) -> Finding:
@@ -166,7 +193,7 @@ def _by_name(project: Path) -> dict[str, list[Path]]:
     found: dict[str, list[Path]] = {}
     looked_at = 0
     for above, folders, files in os.walk(project):
-        folders[:] = sorted(one for one in folders if not one.startswith("."))
+        folders[:] = sorted(folder for folder in folders if not folder.startswith("."))
         looked_at += len(folders) + len(files)
         for name in files:
             found.setdefault(name, []).append(Path(above, name))

@@ -1,34 +1,160 @@
-"""Filling in `${...}` after composition: arguments, the robot's name, the environment, expressions over them."""
+"""Filling in `${...}` after composition: arguments, the robot's name, the environment, expressions."""
 
 from __future__ import annotations
 
 import re
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import field, replace
 from operator import is_
+from typing import NamedTuple, TypeVar
 
-from rbxcompose.config import Secret
-from rbxcompose.dataclass import dataclass
-from rbxcompose.expressions.check import check
-from rbxcompose.expressions.evaluate import evaluate
-from rbxcompose.expressions.parser import parse_fill
-from rbxcompose.expressions.tree import Expression, ExpressionError
-from rbxcompose.expressions.types import Type, TypeKind
-from rbxcompose.expressions.values import EvaluationError
-from rbxcompose.findings import DID_YOU_MEAN, Report, correction, kind, replacement, suggest
+from rbxcompose.base.config import Secret
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.expressions import types
+from rbxcompose.base.expressions.check import check
+from rbxcompose.base.expressions.evaluate import evaluate
+from rbxcompose.base.expressions.parser import parse_fill
+from rbxcompose.base.expressions.tree import Expression, ExpressionError
+from rbxcompose.base.expressions.types import Type, TypeKind
+from rbxcompose.base.expressions.values import EvaluationError
+from rbxcompose.base.findings import DID_YOU_MEAN, Report, Span, correction, kind, replacement, suggest
+from rbxcompose.base.printable import plain
+from rbxcompose.base.units import NUMBER, QUOTIENT, Quantity
 from rbxcompose.manifest import tree
-from rbxcompose.manifest.arguments import show
-from rbxcompose.manifest.fill_names import Names, NameTypes, NameValues
-from rbxcompose.manifest.given_values import given_span
-from rbxcompose.manifest.launch_syntax import PATTERN, Cure, cure_of, cure_of_variable
-from rbxcompose.manifest.limits import ALL_BYTES
-from rbxcompose.manifest.scalar_parts import part_span
+from rbxcompose.manifest.arguments import given_span, show
+from rbxcompose.manifest.foreign_words import PATTERN, Cure, cure_of, cure_of_variable
 from rbxcompose.manifest.scalars import describe
-from rbxcompose.manifest.secrets import NoSecretError
-from rbxcompose.manifest.tree import BROKEN, Entry, ScalarNode, SequenceNode, TreeNode, size
+from rbxcompose.manifest.secrets import NoSecretError, Secrets
+from rbxcompose.manifest.tree import ALL_BYTES, BROKEN, Entry, ScalarNode, SequenceNode, TreeNode, part_span, size
 from rbxcompose.manifest.validate import to_plain
 from rbxcompose.manifest.yaml_nodes import TOO_LARGE
-from rbxcompose.printable import plain
-from rbxcompose.units import NUMBER, QUOTIENT, Quantity
+
+T = TypeVar("T")
+
+
+class OpenNames(Mapping[str, T]):
+    """Things by name; one that may have been among those that could not be read is there, too, with a stand-in."""
+
+    def __init__(self, known: Mapping[str, T], may_have: Callable[[str], bool], stand_in: Callable[[str], T]) -> None:
+        self._known, self._may_have, self._stand_in = known, may_have, stand_in
+
+    def __getitem__(self, name: str) -> T:
+        if name in self._known:
+            return self._known[name]
+        if not self._may_have(name):
+            raise KeyError(name)
+        return self._stand_in(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._known)
+
+    def __len__(self) -> int:
+        return len(self._known)
+
+
+_ARGS = "args."
+
+
+class Typed(NamedTuple):
+    """A type and a value of it; `given` is the place where it was given, None for a default."""
+
+    type: Type
+    value: object
+    given: Span | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Names:
+    """The names that `${...}` may use: a type and a typed value by dotted name, the environment and the secrets.
+
+    `arguments` holds those of each scope: of the robot (the empty scope), and of each instance of a part; `may_have`
+    tells of some scopes which arguments may be among those that could not be read.
+    """
+
+    values: Mapping[str, Typed] = field(default_factory=dict)
+    environment: Mapping[str, str] = field(default_factory=dict)
+    secrets: Secrets | None = None
+    arguments: Mapping[str, Mapping[str, Typed]] = field(default_factory=dict)
+    may_have: Mapping[str, Callable[[str], bool]] = field(default_factory=dict)
+
+    def known(self, scope: str) -> Mapping[str, Typed]:
+        """Return all that a file of this scope may name in an expression."""
+        known = {**self.values, **self.arguments.get(scope, {})}
+        may_have = self.may_have.get(scope)
+        return known if may_have is None else OpenNames(known, may_have, lambda name: Typed(types.UNKNOWN, tree.BROKEN))
+
+
+def names_of(robot: str, sim: bool, environment: Mapping[str, str], secrets: Secrets | None = None) -> Names:
+    """Return the names that every file of a robot knows."""
+    return Names({"robot.name": Typed(types.TEXT, robot), "sim": Typed(types.FLAG, sim)}, environment, secrets)
+
+
+def with_arguments(
+    names: Names, arguments: Mapping[str, Typed], scope: str = "", may_have: Callable[[str], bool] | None = None
+) -> Names:
+    """Return `names` with `args.NAME` for each argument of a scope; a broken argument has the value `BROKEN`.
+
+    `may_have` tells which arguments may be among those that could not be read, if there are any.
+    """
+    known = {f"{_ARGS}{name}": value for name, value in arguments.items()}
+    names = replace(names, arguments={**names.arguments, scope: known})
+    if may_have is None:
+        return names
+
+    def may_have_argument(name: str) -> bool:
+        return name.startswith(_ARGS) and may_have(name.removeprefix(_ARGS))
+
+    return replace(names, may_have={**names.may_have, scope: may_have_argument})
+
+
+@dataclass(frozen=True, slots=True)
+class NameTypes:
+    """The names as the static check of an expression sees them."""
+
+    names: Mapping[str, Typed]
+
+    def variable(self, name: str) -> Type | None:
+        """Return None: nothing that is known while the robot runs can be filled in."""
+        return None
+
+    def word(self, name: str) -> Type | None:
+        """Return the type of a name."""
+        return self.names[name].type if name in self.names else None
+
+    def variables(self) -> Iterable[str]:
+        """Return nothing, see `variable`."""
+        return ()
+
+    def words(self) -> Iterable[str]:
+        """Return all names."""
+        return self.names
+
+
+@dataclass(frozen=True, slots=True)
+class NameValues:
+    """The names as the evaluation of an expression sees them: numbers in SI, lists and maps as plain data."""
+
+    names: Mapping[str, Typed]
+
+    def variable(self, name: str) -> object:
+        """Raise, since there is no such value."""
+        raise KeyError(name)
+
+    def word(self, name: str) -> object:
+        """Return the value of a name."""
+        value = self.names[name].value
+        if isinstance(value, Quantity):
+            return value.value
+        return to_plain(value) if isinstance(value, ScalarNode | SequenceNode | tree.MappingNode) else value
+
+    def age(self, name: str) -> float:
+        """Raise, since there is no such value."""
+        raise KeyError(name)
+
+    def is_new(self, name: str) -> bool:
+        """Raise, since there is no such value."""
+        raise KeyError(name)
+
 
 SYNTAX = kind("RBX1201", is_fixable=True)
 UNKNOWN_NAME = kind("RBX1202", is_fixable=True)

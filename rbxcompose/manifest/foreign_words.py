@@ -1,8 +1,13 @@
-"""Keys of other tools: those for which ours are known, and those that need something else here."""
+"""Words of other tools: keys, tags and launch substitutions, with what is written here instead."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Container, Mapping
+from typing import NamedTuple
+
+from rbxcompose.base.findings import Finding, Span, kind
+from rbxcompose.base.printable import plain
 
 _OURS = {
     "components": "services nodes",
@@ -93,3 +98,92 @@ MESSAGES: Mapping[str, str] = {
     **{f"{sign}Int{size}": "number" for sign in ("", "U") for size in (8, 16, 32, 64)},
 }
 """The type of a value for each message of `std_msgs` with one field."""
+
+
+_OF_VARIABLES = ("!env", "!env_var", "!ENV", "!ENV_VAR")
+
+
+def help_for_tag(tag: str, value: str) -> str:
+    """Return what to write in place of a tag that manifests do not have, and of the value after it."""
+    word = plain(value.split()[0], 60) if value.split() else "NAME"
+    if tag in _OF_VARIABLES:
+        return f"write '${{env.{word}}}'"
+    if tag == "!secret":
+        return f"write '${{secret.{word}}}'"
+    if tag.startswith("!include"):
+        return "write its contents here; a part of a robot in a file of its own is named below 'include'"
+    return "put quotes around it if it is text; the only tags are '!remove' and '!replace'"
+
+
+PATTERN = r"\$\((?P<verb>arg|var|env|optenv|find|find-pkg-share|eval|anon) (?P<of>[^)$]*)\)"
+_WITH_DEFAULT = re.compile(r"(?P<name>(?:args\.)?+[A-Za-z_]\w*+)(?P<rest>:?+[-?].*+)", re.DOTALL)
+_ARGUMENTS = ("arg", "var")
+_PATHS = ("find", "find-pkg-share")
+
+
+class Cure(NamedTuple):
+    """What to do instead, and the text that surely means the same; empty if there is none."""
+
+    help: str
+    meant: str = ""
+
+
+def cure_of_variable(body: str) -> Cure | None:
+    """Return the cure of a variable with a default as a shell and Docker Compose have it; None for anything else."""
+    found = _WITH_DEFAULT.fullmatch(body.strip())
+    if found is None:
+        return None
+    name, rest = found["name"], plain(found["rest"], 60)
+    if name.startswith("args."):
+        return Cure(f"write '${{{name}}}', and its 'default' where it is declared below 'args'")
+    return Cure(f"write '${{env.{name}{rest}}}'", f"${{env.{name}{found['rest']}}}")
+
+
+def cure_of(verb: str, of: str, known: Container[str], *, runs: bool) -> Cure:
+    """Return the cure of a substitution; `known` are the names to fill in, `runs` tells that it is in a mission."""
+    name = of.strip().partition(" ")[0]
+    if verb in _ARGUMENTS and runs:
+        return Cure(f"write '${name}', and declare '{name}' under 'inputs'")
+    if verb in _ARGUMENTS:
+        filled = f"${{args.{name}}}"
+        if f"args.{name}" in known:
+            return Cure(f"write '{filled}'", filled)
+        return Cure(f"write '{filled}', and declare '{name}' under 'args'")
+    if verb == "env":
+        return Cure(f"write '${{env.{name}}}'", f"${{env.{name}}}")
+    if verb == "optenv":
+        return Cure(f"write '${{env.{name}:-DEFAULT}}'")
+    if verb in _PATHS:
+        return Cure("a path is relative to the file that writes it: write it without this")
+    return Cure("write the value, or fill it in by '${...}'")
+
+
+XML = kind("RBX1320")
+
+_ABOVE = re.compile(r"\s*+(?:<\?.*?\?>\s*+|<!--.*?-->\s*+|<!DOCTYPE[^>]*+>\s*+)*+", re.DOTALL)
+_ROOT = re.compile(r"<([A-Za-z_][\w.:-]*+)")
+_TREE = "a behaviour tree: write it as a mission; 'fallback', 'sequence' and 'parallel' are steps"
+_FOREIGN_TEXT_CURES: Mapping[str, str] = {
+    "robot": "a URDF: a robot names it by 'body: {urdf: FILE}'",
+    "xacro": "a xacro file: a robot names it by 'body: {xacro: FILE}'",
+    "launch": "a ROS launch file: write its nodes as 'components'; 'rbxcompose new robot NAME' begins a robot",
+    "root": _TREE,
+    "BehaviorTree": _TREE,
+    "scxml": "a state machine: write it as a mission with 'machine'",
+    "sdf": "an SDF file: the body of a robot is a URDF, named by 'body: {urdf: FILE}'",
+}
+
+
+def foreign_text(text: str, file: str) -> Finding | None:
+    """Return the finding about a text that is XML, with what its root element tells; None for any other text."""
+    if not text[:1000].lstrip().startswith("<"):
+        return None
+    above = _ABOVE.match(text)
+    root = _ROOT.match(text, above.end() if above else 0)
+    if root is None:
+        return None
+    line = text.count("\n", 0, root.start()) + 1
+    column = root.start() - text.rfind("\n", 0, root.start())
+    span = Span(file, line, column, line, column + len(root[0]))
+    known = _FOREIGN_TEXT_CURES.get("xacro" if root[1] == "robot" and "xacro:" in text else root[1], "")
+    return XML.at(span, "this is XML; a manifest is YAML", help=f"this is {known}" if known else "")

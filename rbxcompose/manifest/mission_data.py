@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from rbxcompose.findings import Report
-from rbxcompose.manifest.limits import DATA_NODES
-from rbxcompose.manifest.tree import MappingNode, TreeNode, is_larger
+from rbxcompose.base.findings import Report
+from rbxcompose.manifest.tree import DATA_NODES, MappingNode, TreeNode, is_larger
 from rbxcompose.manifest.yaml_nodes import TOO_LARGE
 
 

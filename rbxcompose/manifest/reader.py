@@ -1,4 +1,4 @@
-"""Reading a manifest: bytes -> text -> located tree, with every error as a finding."""
+"""Reading a manifest: bytes to text to a located tree, with every error as a finding."""
 
 from __future__ import annotations
 
@@ -8,16 +8,53 @@ import re
 from collections.abc import Collection, Iterator, Mapping, MutableMapping
 from pathlib import Path
 
-from rbxcompose.findings import Edit, Finding, Fix, Span, kind
-from rbxcompose.manifest.foreign_text import foreign_text
-from rbxcompose.manifest.limits import ALL_BYTES, ALL_VALUES, FILE_BYTES, FILES, FILL_TEXT
-from rbxcompose.manifest.parser_error import NOT_YAML
-from rbxcompose.manifest.passwords import passwords
-from rbxcompose.manifest.tree import TreeNode, count
+from rbxcompose.base.files import NotRegularError, open_regular
+from rbxcompose.base.findings import Edit, Finding, Fix, Severity, Span, kind
+from rbxcompose.base.printable import FORBIDDEN, code_point
+from rbxcompose.manifest.foreign_words import foreign_text
+from rbxcompose.manifest.slip_registry import NOT_YAML
+from rbxcompose.manifest.tree import (
+    ALL_BYTES,
+    ALL_VALUES,
+    FILE_BYTES,
+    FILES,
+    FILL_TEXT,
+    ScalarNode,
+    TreeNode,
+    children,
+    count,
+    part_span,
+)
 from rbxcompose.manifest.walk import CHARACTER, Walk
 from rbxcompose.manifest.yaml_nodes import TOO_LARGE, compose
-from rbxcompose.printable import FORBIDDEN, code_point
-from rbxcompose.regular_files import NotRegularError, open_regular
+
+PASSWORD = kind("RBX1321", Severity.WARNING)
+
+_WITH_PASSWORD = re.compile(r"[A-Za-z][A-Za-z0-9+.-]{0,20}://[^\s/:@]{0,60}:(?P<password>[^\s/@]{1,200})@")
+_HIDDEN = re.compile(r"\*+|\$.*|<.*>")  # what stands for a password is none
+
+
+def passwords(text: str, root: TreeNode) -> Iterator[Finding]:
+    """Yield a finding for each password in the values of a file; `text` is that of the whole file."""
+    if "://" not in text or not _WITH_PASSWORD.search(text):
+        return
+    waiting = [root]
+    while waiting:
+        node = waiting.pop()
+        waiting += (child for _, child in children(node))
+        if isinstance(node, ScalarNode):
+            yield from _within(node)
+
+
+def _within(scalar: ScalarNode) -> Iterator[Finding]:
+    for found in _WITH_PASSWORD.finditer(scalar.text):
+        if not _HIDDEN.fullmatch(found["password"]):
+            yield PASSWORD.at(
+                part_span(scalar, *found.span("password")),
+                "this address contains a password, which everybody sees who sees this file",
+                help="where a secret is taken, put the whole address into 'secrets/NAME' and write '${secret.NAME}'",
+            )
+
 
 NOT_UTF8 = kind("RBX1111")
 UNREADABLE = kind("RBX1301", is_fixable=True)

@@ -9,16 +9,16 @@ from dataclasses import fields
 from functools import cache
 from typing import Any, ParamSpec, TypeVar
 
-from rbxcompose.findings import Finding
+from rbxcompose.base.findings import Finding
+from rbxcompose.base.plugins import LEFT_OUT, BrokenPluginError, Plugins
 from rbxcompose.manifest.section import Declaration, Reading, Section
 from rbxcompose.manifest.validate import ENTRY_WORDS
-from rbxcompose.plugins import LEFT_OUT, BrokenPluginError, Plugins
 
 M = TypeVar("M")
 R = TypeVar("R")
 P = ParamSpec("P")
 
-PLUGINS = Plugins("section", "rbxcompose.sections")
+PLUGINS = Plugins("section", "sections")
 _EXAMPLE = "Example:"
 _SECTIONS: dict[str, Section[Any, Any]] = {}
 
@@ -46,7 +46,7 @@ def _declared(declaration: Declaration[M], read: Callable[[Reading[M]], R]) -> S
     about, _, example = (inspect.getdoc(read) or "").partition(_EXAMPLE)
     if not about:
         raise ValueError(f"the section '{declaration.name}' has no docstring, so nobody would know what it is for")
-    traits: dict[str, Any] = {one.name: getattr(declaration, one.name) for one in fields(declaration)}
+    traits: dict[str, Any] = {field.name: getattr(declaration, field.name) for field in fields(declaration)}
     about, example = " ".join(about.split()), textwrap.dedent(example.lstrip("\n"))
     made: Section[M, R] = Section(**traits, doc=about, example=example, read=read)
     register(made)

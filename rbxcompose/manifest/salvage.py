@@ -10,12 +10,11 @@ from typing import Any, TypeVar, cast
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from rbxcompose.config import Place
-from rbxcompose.manifest.conversions import changed, repaired
+from rbxcompose.base.config import Place
+from rbxcompose.base.units import Quantity
 from rbxcompose.manifest.shapes import dimension_at
 from rbxcompose.manifest.tree import KeyPath, TreeNode
-from rbxcompose.manifest.validate import adapter, to_plain
-from rbxcompose.units import Quantity
+from rbxcompose.manifest.validate import adapter, changed, repaired, to_plain
 
 T = TypeVar("T")
 _ROUNDS = 60  # of repairs; each replaces, at every place that is refused, one value by the next stand-in
@@ -29,7 +28,7 @@ def salvaged(model: type[T], node: TreeNode, context: Mapping[str, object] | Non
 
     What is unknown or wrong is left out, so that it has its default; what must be there gets a stand-in, some value
     that the model accepts. Nothing is reported: that was done by `validate`. Nobody may conclude anything from a
-    value that is in doubt; see `rbxcompose/model/doubts.py`.
+    value that is in doubt; see `rbxcompose/compiler/model/doubts.py`.
     """
     data, tried = to_plain(node), Counter[KeyPath]()
     for _ in range(_ROUNDS):

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 import re
 
-from rbxcompose.manifest.limits import NUMBER
-from rbxcompose.manifest.tree import ScalarNode
+from rbxcompose.manifest.tree import NUMBER, ScalarNode
 
 PlainValue = bool | int | float | str | None
 

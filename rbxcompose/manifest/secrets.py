@@ -9,11 +9,11 @@ from collections.abc import Mapping
 from itertools import islice
 from pathlib import Path
 
-from rbxcompose.config import Secret
-from rbxcompose.dataclass import dataclass
-from rbxcompose.findings import DID_YOU_MEAN, nearest
-from rbxcompose.manifest.limits import SECRET
-from rbxcompose.regular_files import NotRegularError, open_regular
+from rbxcompose.base.config import Secret
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.files import NotRegularError, open_regular
+from rbxcompose.base.findings import DID_YOU_MEAN, nearest
+from rbxcompose.manifest.tree import SECRET
 
 FOLDER = "secrets"
 VARIABLE = "RBX_SECRET_"
@@ -71,7 +71,7 @@ class Secrets:
 
     def _names(self) -> list[str]:
         """Return the names of the secrets that there are."""
-        given = [one.removeprefix(VARIABLE).lower() for one in self.environment if one.startswith(VARIABLE)]
+        given = [name.removeprefix(VARIABLE).lower() for name in self.environment if name.startswith(VARIABLE)]
         try:
             with os.scandir(self.project / FOLDER) as entries:
                 return sorted([*given, *(entry.name for entry in islice(entries, _MOST_NAMES))])

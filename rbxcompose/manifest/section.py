@@ -1,36 +1,242 @@
-"""What is known about a section of the manifest, and what is read from it.
-
-Composition, renaming of parts, editors, schemas, the reference and the robot's components use this descriptor, so that
-none of them refers to a section by name.
-"""
+"""What is known about a section of the manifest, and what is read from it."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import KW_ONLY, replace
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import KW_ONLY, field, replace
 from enum import Enum
-from functools import cached_property
-from pathlib import Path
+from functools import cache, cached_property
+from pathlib import Path, PurePosixPath
 from types import GenericAlias
-from typing import Any, Generic, TypeVar, cast
+from typing import Annotated, Any, Generic, Literal, Protocol, TypeVar, cast
 
-from rbxcompose.config import Name
-from rbxcompose.dataclass import dataclass
-from rbxcompose.findings import Report
-from rbxcompose.manifest.documents import Documents
-from rbxcompose.manifest.header import ManifestHeader
-from rbxcompose.manifest.misplaced import is_misplaced, misplaced
-from rbxcompose.manifest.named_items import help_with_names
-from rbxcompose.manifest.namesakes import with_namesake
-from rbxcompose.manifest.renamer import Renames
+from pydantic import BeforeValidator
+
+from rbxcompose.base.config import COMPONENT, DEFAULT, Config, Name, Refers, Restart, When
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.findings import DID_YOU_MEAN, Finding, Report, Span, nearest, surely_meant
+from rbxcompose.base.printable import plain
+from rbxcompose.manifest.documents import Documents, ManifestHeader
+from rbxcompose.manifest.fields import ComponentName, TopicName
 from rbxcompose.manifest.salvage import salvaged
-from rbxcompose.manifest.shapes import keys_at, with_references
-from rbxcompose.manifest.short_forms import Short, entry_type_of, short_type_of
-from rbxcompose.manifest.tree import Entry, KeyPath, MappingNode, ScalarNode, TreeNode, at
-from rbxcompose.manifest.validate import WRONG_TYPE, is_broken, is_valid, label_of, validate
-from rbxcompose.manifest.wanted_components import WantedComponent, Wiring
-from rbxcompose.references import COMPONENT
+from rbxcompose.manifest.shapes import below, keys_at, kinds_of, with_references
+from rbxcompose.manifest.tree import Entry, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode, at
+from rbxcompose.manifest.validate import MISSING_KEY, UNKNOWN_KEY, WRONG_TYPE, is_broken, is_valid, label_of, validate
+
+
+@dataclass(frozen=True, slots=True)
+class RenamedTopic:
+    """The new name of a topic of a part, and where it is written."""
+
+    name: str
+    span: Span
+    key_span: Span
+
+
+class Renames(Protocol):
+    """The names of one instance of a part, and what they become in the file that includes it."""
+
+    @property
+    def prefix(self) -> str:
+        """Return the prefix of its names."""
+        ...
+
+    @property
+    def running(self) -> frozenset[str]:
+        """Return the names of all that the part runs."""
+        ...
+
+    def component(self, name: str) -> str:
+        """Return the new name of something that runs; `component.port` keeps its port."""
+        ...
+
+    def topic(self, topic: str) -> str:
+        """Return the new name of a topic."""
+        ...
+
+    def written(self, topic: str) -> RenamedTopic:
+        """Return the entry that renames a topic: its own, or that of a topic above it."""
+        ...
+
+    def topics(self, node: TreeNode, above: str = "") -> TreeNode:
+        """Return a map whose keys are topics (below `above`, if given) with these keys renamed."""
+        ...
+
+    def texts(self, node: TreeNode, change: Callable[[str], str]) -> TreeNode:
+        """Return a node with every text below it changed, except those that are filled in later."""
+        ...
+
+
+def is_misplaced(entry: TreeNode, keys: Collection[str], own: Collection[str]) -> bool:
+    """Return whether an entry with the name of a section is that section, and no entry of the section around it.
+
+    `keys` are those of the section, none if it takes any name; `own` are those of an entry.
+    """
+    if not isinstance(entry, MappingNode) or not entry.entries:
+        return False
+    is_section = not keys or any(name in keys for name in entry.entries)
+    return is_section and not any(nearest(name, own) for name in entry.entries)
+
+
+def misplaced(key: ScalarNode, around: str) -> Finding:
+    """Return the finding about the key of a section that is indented below the section `around`."""
+    span, name = key.span, key.text
+    message = f"'{name}' is a section of the file; here it belongs to '{around}'"
+    columns = "1 column" if span.column == 2 else f"{span.column - 1} columns"
+    help_text = f"move it, with all below it, {columns} to the left" if span.column > 1 else ""
+    return UNKNOWN_KEY.at(span, message, help=help_text)
+
+
+def with_namesake(findings: Iterable[Finding], name: str, names: Iterable[str]) -> Iterator[Finding]:
+    """Yield the findings about an entry; one about a key that it lacks tells the entry that was surely meant."""
+    others = [other for other in names if other != name]
+    for finding in findings:
+        is_lacking = finding.code == MISSING_KEY.code and not finding.help
+        meant = surely_meant(name, others) if is_lacking else None
+        yield replace(finding, help=f"{DID_YOU_MEAN} '{meant}', which has it?") if meant else finding
+
+
+@dataclass(frozen=True, slots=True)
+class Short:
+    """One word in place of an entry with one key: `patrol: FILE` is `{file: FILE}`."""
+
+    key: str
+    is_merged: bool = True
+    """Whether layers may change single keys of such an entry; otherwise they replace it as a whole."""
+    only_over: str = ""
+    """Meaning of the word, if only an overlay may use the short form."""
+
+
+@cache
+def short_type_of(model: Any, key: str) -> Any:
+    """Return the type of the word in place of an entry."""
+    return Annotated[(str, *(Refers(kind, is_told=True) for kind in kinds_of(next(below(model, key)))))]
+
+
+@cache  # each type is compiled once
+def entry_type_of(model: Any, short: Short) -> Any:
+    """Return the type of an entry, whole or short."""
+    word = short_type_of(model, short.key)
+    read = BeforeValidator(
+        lambda value: {short.key: value} if isinstance(value, str) else value, json_schema_input_type=model | word
+    )
+    return Annotated[model, read]
+
+
+NAME = "name"
+_MOST_SHOWN = 3
+_LONGEST = 60
+_NO_NAME = re.compile(r"[^a-z0-9_]+|^[^a-z]+")
+
+
+def name_of(item: TreeNode) -> str:
+    """Return the name that an item of a list probably has: that under `name`, or that of the file that it names."""
+    match item:
+        case MappingNode(entries=entries) if len(entries) == 1:
+            (name,) = entries
+            inner = entries[name].value
+            return name_of(inner) if isinstance(inner, ScalarNode) else name
+        case MappingNode(entries=entries):
+            named = item.get(NAME) or next((entry.value for entry in entries.values() if _is_path(entry.value)), None)
+            return name_of(named) if isinstance(named, ScalarNode) else ""
+        case ScalarNode(text=text):
+            return _NO_NAME.sub("_", PurePosixPath(text.replace("\\", "/")).stem.lower()).strip("_")
+    return ""
+
+
+def entry_of(item: TreeNode) -> TreeNode:
+    """Return what an item is below its name."""
+    if not isinstance(item, MappingNode):
+        return item
+    if len(item.entries) == 1 and not isinstance(only := next(iter(item.entries.values())).value, ScalarNode):
+        return only
+    return MappingNode({key: entry for key, entry in item.entries.items() if key != NAME}, item.span)
+
+
+def help_with_names(node: TreeNode | None) -> str:
+    """Return what to write instead of a list, or of a single file, where entries need names; empty for others."""
+    match node:
+        case ScalarNode() if _is_path(node) and name_of(node):
+            return f"it needs a name: write '{name_of(node)}: {_shown(node)}' below it"
+        case SequenceNode(items=items) if items and all(map(name_of, items)):
+            shown = " and ".join(f"'{name_of(item)}:{_rest(item)}'" for item in items[:_MOST_SHOWN])
+            rest = f", and so on for {len(items) - _MOST_SHOWN} more" if len(items) > _MOST_SHOWN else ""
+            return f"each needs a name instead of its dash: {shown}{rest}"
+        case SequenceNode():
+            return "each needs a name instead of its dash: 'NAME:'"
+    return ""
+
+
+def _rest(item: TreeNode) -> str:
+    return f" {_shown(item)}" if isinstance(item, ScalarNode) else ""
+
+
+def _shown(scalar: ScalarNode) -> str:
+    return plain(scalar.text, _LONGEST)
+
+
+def _is_path(node: TreeNode) -> bool:
+    return isinstance(node, ScalarNode) and "." in node.text and " " not in node.text
+
+
+OWN_PORT = "own port"
+"""A port of the component whose options these are."""
+
+
+def _spelt_out(value: Any) -> Any:
+    return {"when": value} if isinstance(value, str) else value
+
+
+RestartModel = Annotated[Restart, BeforeValidator(_spelt_out, json_schema_input_type=Restart | When)]
+
+
+class ComponentOptions(Config):
+    """What every component takes besides its own configuration."""
+
+    process: Name | None = None
+    """Its process group; components of one group share a process."""
+    starts_after: tuple[ComponentName, ...] = ()
+    """Components that must be active before this one starts."""
+    restart: RestartModel = DEFAULT
+    """Whether and when it restarts after a failure: a word, or a map with `when`, `max`, `within` and `backoff`."""
+    log: Literal["info", "warn", "error"] = "info"
+    """The lowest level that it logs."""
+    connect: dict[Annotated[Name, Refers(OWN_PORT, is_told=True)], TopicName] = {}
+    """Topics by port, where they differ from the port's name."""
+
+
+OPTIONS = tuple(ComponentOptions.model_fields)
+
+
+@dataclass(frozen=True, slots=True)
+class WantedComponent:
+    """A component that a section requests; `path` is the place in the manifest that does so."""
+
+    name: str
+    type_name: str
+    config: Config | Mapping[str, object]
+    """Its configuration, or the data from which its type makes one."""
+    path: KeyPath
+    options: ComponentOptions = field(default_factory=ComponentOptions)
+    places: Mapping[str, KeyPath] = field(default_factory=dict)
+    """Where the manifest has fields and ports that it got from elsewhere: `{"controllers.base": ("controllers",
+    "base")}`."""
+    is_sound: bool = True
+    """Whether its configuration is what the user meant; otherwise only its ports count."""
+
+
+class Wiring(Protocol):
+    """The wires of the components known so far."""
+
+    def message_of(self, topic: str) -> str:
+        """Return the type of a subscriber of a topic, else of a publisher below it; empty if there is none."""
+        ...
+
+    def drives(self, topic: str) -> bool:
+        """Return whether a base follows the commands on a topic."""
+        ...
+
 
 M = TypeVar("M")
 R = TypeVar("R")
@@ -132,7 +338,7 @@ class Declaration(Generic[M]):
         """Return the keys that an entry may have."""
         if self.at:
             return set(keys_at(self.model, (*self.at, entry.key.text)))
-        return {key for one in self.types_of(entry.value) for key in keys_at(one, ())}
+        return {key for type_ in self.types_of(entry.value) for key in keys_at(type_, ())}
 
     def has_names_of(self, kind: str) -> bool:
         """Return whether its keys are names of a kind; everything that runs is a component, too."""
@@ -142,7 +348,7 @@ class Declaration(Generic[M]):
         """Return whether several parts may add to the map at a path below it."""
         patterns = self.shared if self.shared is not None else [()] if self.is_map else []
         return any(
-            len(pattern) == len(path) and all(one in (ANY, key) for one, key in zip(pattern, path, strict=True))
+            len(pattern) == len(path) and all(name in (ANY, key) for name, key in zip(pattern, path, strict=True))
             for pattern in patterns
         )
 
@@ -237,16 +443,20 @@ class Contents:
     @cached_property
     def open_kinds(self) -> frozenset[str]:
         """Return the kinds of which any name may exist: a section that defines them is no map, or a file lacks."""
-        naming = [one for one in self._sections if one.names and (not self.is_whole or one.is_unreadable(self.root))]
-        return frozenset((*(one.names for one in naming), *(COMPONENT for one in naming if one.runs)))
+        naming = [
+            section
+            for section in self._sections
+            if section.names and (not self.is_whole or section.is_unreadable(self.root))
+        ]
+        return frozenset((*(section.names for section in naming), *(COMPONENT for section in naming if section.runs)))
 
     @cached_property
     def stray(self) -> frozenset[str]:
         """Return the names below keys that are no sections, which may belong to any, and those that were misspelt."""
-        known = {*ManifestHeader.model_fields, *(one.name for one in self._sections)}
+        known = {*ManifestHeader.model_fields, *(section.name for section in self._sections)}
         others = (entry.value for name, entry in self.root.entries.items() if name not in known)
         below = [name for node in others if isinstance(node, MappingNode) for name in node.entries]
-        named = (name for one in self._sections for name in one.names_in(self.root) if not name.isidentifier())
+        named = (name for section in self._sections for name in section.names_in(self.root) if not name.isidentifier())
         return frozenset((*below, *(re.sub(r"\W+", "_", name) for name in named)))
 
     def is_misplaced(self, section: Section[Any, Any], entry: Entry) -> bool:
@@ -260,12 +470,12 @@ class Contents:
     @cached_property
     def known(self) -> dict[str, Mapping[str, object]]:
         """Return the names of each kind, including entries with mistakes: references to them are not wrong."""
-        naming = [one for one in self._sections if one.names]
-        kinds = {COMPONENT, *(one.names for one in naming)}
+        naming = [section for section in self._sections if section.names]
+        kinds = {COMPONENT, *(section.names for section in naming)}
         found: dict[str, Mapping[str, object]] = {
-            kind: _Names(self, kind, [one for one in naming if one.has_names_of(kind)]) for kind in kinds
+            kind: _Names(self, kind, [section for section in naming if section.has_names_of(kind)]) for kind in kinds
         }
-        return found | {kind: _Defined(self, one, kind) for one in self._sections for kind in one.defines}
+        return found | {kind: _Defined(self, section, kind) for section in self._sections for kind in section.defines}
 
 
 class _Names(Mapping[str, object]):
@@ -274,7 +484,7 @@ class _Names(Mapping[str, object]):
     def __init__(self, contents: Contents, kind: str, sections: Iterable[Section[Any, Any]]) -> None:
         self._contents, self._kind = contents, kind
         chosen = list(sections)
-        self._section = {name: one for one in chosen for name in one.names_in(contents.root)}
+        self._section = {name: section for section in chosen for name in section.names_in(contents.root)}
         self._default = chosen[0] if chosen else None
 
     def __getitem__(self, name: str) -> object:

@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
-from rbxcompose.config import BitRate, Config, Frequency, Name, Time
-from rbxcompose.manifest.header import ManifestHeader
+from rbxcompose.base.config import BitRate, Config, Frequency, Name, Time
+from rbxcompose.manifest.documents import ManifestHeader
 
 _SSH = re.compile(r"(ssh://)?([A-Za-z0-9_][A-Za-z0-9_.-]*@)?[A-Za-z0-9\[][A-Za-z0-9.:\]_-]*")
 _COMMAND = re.compile(r"[A-Za-z0-9_./][A-Za-z0-9_./+-]*")

@@ -7,9 +7,9 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BeforeValidator, Field, StringConstraints
 from pydantic_core import PydanticCustomError
 
-from rbxcompose.config import Config, Name, Time
+from rbxcompose.base.config import Config, Name, Time
+from rbxcompose.manifest.documents import ManifestHeader
 from rbxcompose.manifest.fields import TopicName
-from rbxcompose.manifest.header import ManifestHeader
 
 LONGEST_TEST = 3600.0  # [s] of robot time
 

@@ -5,9 +5,31 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import field
 
-from rbxcompose.dataclass import dataclass
-from rbxcompose.findings import Span
-from rbxcompose.manifest.limits import FILL_TEXT
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.findings import Span
+
+FILE_BYTES = 2_000_000
+URDF_BYTES = 4_000_000
+ALL_BYTES = 8_000_000  # sum over the files of one robot
+ALL_VALUES = 20_000  # of the files of one robot; a file counts each time that it is used
+FILL_TEXT = 8  # characters of a text with `${...}` that count as one value
+FILES = 500
+INSTANCES = 500  # of parts; each counts the text of its file towards `ALL_BYTES`
+INCLUDE_DEPTH = 16
+PROFILE_STEPS = 8_000  # steps of missions checked again to try the profiles of a robot
+LEAST_STEPS, STEP_BYTES = 160, 250  # what each profile counts at least, and what each step's worth of text counts
+STEP_VALUES = 8  # values of all files that take as long as a step
+SECRET = 64_000  # bytes of a secret's file
+NODES = 40_000  # values per file
+URDF_ELEMENTS = 200_000
+KEYS = 1_000  # of one map, such as the components of a robot or the states of a machine
+DEPTH = 64
+ALIAS_NODES = 10_000  # reached through aliases and merge keys
+DATA_NODES = 10_000  # of one datum or input of a mission, which is read, checked and copied as a whole
+TEXT = 64_000  # characters of one value
+KEY = 200
+NUMBER = 40
+
 
 NODE_BYTES = 40  # counted for a node in addition to its text
 BROKEN = object()
@@ -90,10 +112,12 @@ def with_children(node: TreeNode, change: Callable[[Key, TreeNode], TreeNode]) -
     changed = {key: new for key, below in children(node) if (new := change(key, below)) is not below}
     match node:
         case MappingNode(entries=entries) if changed:
-            new_ones = {name: Entry(one.key, changed.get(name, one.value)) for name, one in entries.items()}
+            new_ones = {name: Entry(entry.key, changed.get(name, entry.value)) for name, entry in entries.items()}
             return MappingNode(new_ones, node.span, node.tag)
         case SequenceNode(items=items) if changed:
-            return SequenceNode(tuple(changed.get(index, one) for index, one in enumerate(items)), node.span, node.tag)
+            return SequenceNode(
+                tuple(changed.get(index, item) for index, item in enumerate(items)), node.span, node.tag
+            )
     return node
 
 
@@ -160,3 +184,12 @@ def value_span(node: TreeNode, path: KeyPath) -> Span:
         if (found := at(node, path[:length])) is not None:
             return found.span
     return node.span
+
+
+def part_span(scalar: ScalarNode, start: int, end: int) -> Span:
+    """Return the place of `scalar.text[start:end]`, or of the whole scalar if escapes or line breaks hide it."""
+    span, quote = scalar.span, 0 if scalar.plain else 1
+    if span.line != span.end_line or span.end_column - span.column != len(scalar.text) + 2 * quote:
+        return span
+    first = span.column + quote
+    return span._replace(column=first + start, end_column=first + max(end, start + 1))

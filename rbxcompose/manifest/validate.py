@@ -3,26 +3,26 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from functools import cache
 from itertools import islice
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar, cast, get_args, get_origin
 
 from pydantic import TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
-from rbxcompose.findings import DID_YOU_MEAN, SIMILAR, Finding, Report, Span, correction, kind
-from rbxcompose.manifest.conversions import changed, place_of, repaired
+from rbxcompose.base.config import Secret
+from rbxcompose.base.expressions.parser import CURLY_QUOTES
+from rbxcompose.base.findings import DID_YOU_MEAN, SIMILAR, Finding, Report, Span, correction, kind, replacement
+from rbxcompose.base.printable import plain
+from rbxcompose.base.units import NUMBER, Quantity, UnitError, format_quantity, parse_quantity
 from rbxcompose.manifest.foreign_words import CHOICES as FOREIGN_CHOICES
 from rbxcompose.manifest.foreign_words import FOREIGN
-from rbxcompose.manifest.forms import help_of_form
-from rbxcompose.manifest.key_help import about_key, in_straight_quotes, with_cure, written_deeper
-from rbxcompose.manifest.requirements import BOUNDS, EXPECTED
 from rbxcompose.manifest.scalars import describe, number_trouble, plain_value
-from rbxcompose.manifest.shapes import dimension_at, keys_at
-from rbxcompose.manifest.slips import RefusedValue, value_slip
+from rbxcompose.manifest.shapes import alternatives, dimension_at, field_types, keys_at, models_at
+from rbxcompose.manifest.slip_registry import RefusedValue, value_slip
 from rbxcompose.manifest.tree import (
     BROKEN,
     KeyPath,
@@ -34,8 +34,189 @@ from rbxcompose.manifest.tree import (
     key_span,
     value_span,
 )
-from rbxcompose.printable import plain
-from rbxcompose.units import Quantity, UnitError, format_quantity
+
+BOUNDS: Mapping[str, tuple[str, str]] = {
+    "greater_than": ("greater than", "gt"),
+    "greater_than_equal": ("at least", "ge"),
+    "less_than": ("less than", "lt"),
+    "less_than_equal": ("at most", "le"),
+    "multiple_of": ("a multiple of", "multiple_of"),
+}
+"""The words before a bound, and where the error has the bound."""
+EXPECTED: Mapping[str, str] = {
+    "string_type": "text",
+    "int_type": "a whole number",
+    "int_from_float": "a whole number",
+    "float_type": "a number",
+    "bool_type": "true or false",
+    "list_type": "a list",
+    "tuple_type": "a list",
+    "dict_type": "a map of keys and values",
+    "model_type": "a map of keys and values",
+    "model_attributes_type": "a map of keys and values",
+    "dataclass_type": "a map of keys and values",
+}
+"""What a value must be."""
+
+
+def place_of(node: TreeNode, error: ErrorDetails) -> KeyPath:
+    """Return the place of an error in the tree, without pydantic's own steps, such as members of a union."""
+    found: KeyPath = ()
+    for step in error["loc"]:
+        if at(node, (*found, step)) is not None:
+            found = (*found, step)
+    if error["type"] == "missing":
+        found = (*found, error["loc"][-1])
+    return found
+
+
+def repaired(data: Any, error: ErrorDetails, node: TreeNode) -> Any:
+    """Return `data` with one value converted to what a strict field requires: a number to text, a list to a tuple."""
+    path, convert = place_of(node, error), _REPAIRS.get(error["type"])
+    if convert is None:
+        return data
+    try:
+        return changed(data, path, lambda value: convert(value, at(node, path)))
+    except (KeyError, IndexError, TypeError):  # the place is not in the data, such as a missing key
+        return data
+
+
+def changed(data: Any, path: KeyPath, convert: Callable[[object], object]) -> Any:
+    """Return `data` with the value at `path` converted; the same object if the value stays the same."""
+    if not path:
+        return convert(data)
+    key = path[0]
+    inner = changed(data[key], path[1:], convert)
+    if inner is data[key]:
+        return data
+    if isinstance(data, dict):
+        return {**data, key: inner}
+    return type(data)(inner if index == key else item for index, item in enumerate(data))
+
+
+def _as_text(value: object, node: TreeNode | None) -> object:
+    if isinstance(value, Quantity):
+        return format_quantity(value.value, value.dimension)
+    if isinstance(node, ScalarNode) and node.filled is None and value is not None:
+        return node.text
+    return str(value) if isinstance(value, int | float) else value
+
+
+def _as_tuple(value: object, _node: TreeNode | None) -> object:
+    return tuple(value) if isinstance(value, list) else value
+
+
+_REPAIRS: dict[str, Callable[[object, TreeNode | None], object]] = {"string_type": _as_text, "tuple_type": _as_tuple}
+
+
+def about_key(model: Any, loc: KeyPath) -> str:
+    """Return what the key at `loc` below a model is for, as words that follow its name; empty if that is not known."""
+    from rbxcompose.base.config import field_docs  # reads source files
+
+    docs = (field_docs(cls).get(str(loc[-1]), "") for cls in models_at(model, loc[:-1]))
+    about = next((text.partition(";")[0].partition(". ")[0].rstrip(".") for text in docs if text), "")
+    return f": {about[:1].lower()}{about[1:]}".replace("`", "'") if about else ""
+
+
+def _key_above(model: Any, loc: KeyPath, node: TreeNode | None) -> str:
+    """Return the key whose named entries the map `node`, at the unknown key `loc`, looks like one of; else nothing."""
+    if not isinstance(node, MappingNode) or not node.entries:
+        return ""
+    fields = (pair for cls in models_at(model, loc[:-1]) for pair in field_types(cls).items())
+    maps = (
+        (name, alternative)
+        for name, hint in fields
+        for alternative in alternatives(hint)
+        if get_origin(alternative) is dict
+    )
+    return next((name for name, one in maps if node.entries.keys() & {*keys_at(get_args(one)[1], ())}), "")
+
+
+def with_cure(
+    finding: Finding, model: Any, loc: KeyPath, node: TreeNode | None, absent: Sequence[str]
+) -> tuple[Finding, str]:
+    """Return the finding about an unknown key at `loc` with what to do, and the key that was meant instead, if any.
+
+    `absent` are keys that its map needs and does not have.
+    """
+    if above := _key_above(model, loc, node):
+        return replace(finding, help=f"write it below '{above}:', one level deeper", fix=None), above
+    if len(absent) == 1 and not finding.help.startswith(DID_YOU_MEAN):
+        about = about_key(model, (*loc[:-1], absent[0]))
+        return replace(finding, help=f"write '{absent[0]}: ...' instead, which is needed{about}", fix=None), absent[0]
+    return finding, ""
+
+
+def written_deeper(node: TreeNode, loc: KeyPath) -> set[KeyPath]:
+    """Return where the keys below the unknown key at `loc` would be one level higher."""
+    below = at(node, loc)
+    return {(*loc[:-1], key) for key in below.entries} if isinstance(below, MappingNode) else set()
+
+
+def in_straight_quotes(finding: Finding, node: TreeNode | None) -> Finding:
+    """Return the finding about a refused value; if it is in the quotes of books, with how to write those of YAML."""
+    text = node.text if isinstance(node, ScalarNode) and node.plain else ""
+    if len(text) < len("''") or text[0] not in CURLY_QUOTES or text[-1] not in CURLY_QUOTES:
+        return finding
+    right = f'"{text.strip(CURLY_QUOTES)}"'
+    return replace(
+        finding,
+        help=f"quotes are straight: write '{plain(right, 60)}'",
+        fix=replacement(finding.span, text, right) if finding.span else None,
+    )
+
+
+_NOTHING = ("", "~", "null", "Null", "NULL")  # as YAML writes it
+
+
+def help_of_form(model: Any, loc: KeyPath, value: TreeNode | None, error: str) -> str:
+    """Return the help for a value at `loc` below `model` that pydantic refuses with this error; nothing for most."""
+    if EXPECTED.get(error) == EXPECTED["model_type"] and isinstance(value, SequenceNode):
+        return _as_map(model, loc, value) or (_with_keys(model, loc) if loc else "")
+    if EXPECTED.get(error) == EXPECTED["model_type"] and loc and not _is_empty(value):
+        return _with_keys(model, loc)
+    if EXPECTED.get(error) == EXPECTED["model_type"] and _is_empty(value):
+        name = f"'{loc[-1]}: !remove'" if loc else "'!remove' behind the colon"
+        return f"write its keys below it; in a profile or an overlay, {name} removes it"
+    if not isinstance(value, ScalarNode) or not loc:
+        return ""
+    if isinstance(value.filled, Secret):
+        return "a secret may stand only in settings that hide it; what is not secret is '${env.NAME}', or written here"
+    return _without_unit(model, loc, value) if error.startswith("int_") else ""
+
+
+def _is_empty(value: TreeNode | None) -> bool:
+    """Return whether nothing is written there."""
+    return isinstance(value, ScalarNode) and value.plain and value.text in _NOTHING
+
+
+def _with_keys(model: Any, loc: KeyPath) -> str:
+    """Return what a map with the keys looks like that it needs; nothing if it needs none, or there are several."""
+    models = models_at(model, loc)
+    fields = models[0].model_fields.items() if len(models) == 1 else ()
+    needed = ", ".join(f"{one.alias or name}: ..." for name, one in fields if one.is_required())
+    return f"write '{loc[-1]}: {{{needed}}}'" if needed else ""
+
+
+def _as_map(model: Any, loc: KeyPath, value: SequenceNode) -> str:
+    """Return a list of values as a map, in the order of the keys; nothing if there may be other keys."""
+    models, words = models_at(model, loc), [item.text for item in value.items if isinstance(item, ScalarNode)]
+    names = list(models[0].model_fields) if len(models) == 1 else []
+    if not words or len(words) != len(value.items) or len(words) > len(names):
+        return ""
+    shown = plain(", ".join(f"{name}: {word}" for name, word in zip(names, words, strict=False)), 200)
+    return f"write each value with its key: '{{{shown}}}'"
+
+
+def _without_unit(model: Any, loc: KeyPath, value: ScalarNode) -> str:
+    """Return what a number without a unit counts, if one with a unit is written."""
+    try:
+        if parse_quantity(value.text).dimension == NUMBER:
+            return ""
+    except UnitError:
+        return ""
+    return f"write a number without a unit{about_key(model, loc)}"
+
 
 UNKNOWN_KEY = kind("RBX1001", is_fixable=True)
 MISSING_KEY = kind("RBX1002", is_fixable=True)
@@ -124,7 +305,7 @@ def _findings(
             finding, meant = _unknown_key(known, node, path, loc, lacking)
             slip = _slip(model, node, path, loc, error, finding, known)
             if not slip and not meant:
-                absent = [str(one[-1]) for one in lacking - said if one[:-1] == loc[:-1]]
+                absent = [str(key_path[-1]) for key_path in lacking - said if key_path[:-1] == loc[:-1]]
                 finding, meant = with_cure(finding, model, loc, at(node, loc), absent)
             said |= {loc, (*loc[:-1], meant), *(written_deeper(node, loc) & lacking)}  # these are not missing as well
             yield slip or finding
@@ -286,5 +467,5 @@ def _takes(model: Any, data: object, loc: KeyPath) -> bool:
     try:
         adapter(model).validate_python(data)
     except ValidationError as error:
-        return not any(one["loc"][: len(loc)] == loc for one in error.errors(include_url=False))
+        return not any(entry["loc"][: len(loc)] == loc for entry in error.errors(include_url=False))
     return True

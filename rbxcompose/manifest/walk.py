@@ -13,14 +13,25 @@ from typing import Any
 
 import yaml
 
-from rbxcompose.findings import Finding, Related, Severity, Span, kind, replacement
-from rbxcompose.manifest.foreign_tags import help_for_tag
-from rbxcompose.manifest.limits import ALIAS_NODES, DEPTH, KEY, KEYS, TEXT
-from rbxcompose.manifest.parser_error import QUOTE_HELP, QUOTES_NEEDED
+from rbxcompose.base.findings import Finding, Related, Severity, Span, kind, replacement
+from rbxcompose.base.printable import FORBIDDEN, code_point, plain
+from rbxcompose.manifest.foreign_words import help_for_tag
 from rbxcompose.manifest.scalars import number_trouble
-from rbxcompose.manifest.tree import BROKEN, Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
+from rbxcompose.manifest.slip_registry import QUOTE_HELP, QUOTES_NEEDED
+from rbxcompose.manifest.tree import (
+    ALIAS_NODES,
+    BROKEN,
+    DEPTH,
+    KEY,
+    KEYS,
+    TEXT,
+    Entry,
+    MappingNode,
+    ScalarNode,
+    SequenceNode,
+    TreeNode,
+)
 from rbxcompose.manifest.yaml_nodes import TOO_LARGE
-from rbxcompose.printable import FORBIDDEN, code_point, plain
 
 TWICE = kind("RBX1104")
 NOT_A_KEY = kind("RBX1105")

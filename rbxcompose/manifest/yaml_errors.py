@@ -1,4 +1,4 @@
-"""The YAML parser's errors, in plain words and with the fix."""
+"""Errors of the YAML parser, in plain words and with the fix."""
 
 from __future__ import annotations
 
@@ -7,10 +7,22 @@ from collections.abc import Callable
 
 import yaml
 
-from rbxcompose.findings import Finding, Related, Span
-from rbxcompose.manifest.parser_error import NOT_YAML, QUOTE_HELP, QUOTES_NEEDED, Trouble, indent, is_written
-from rbxcompose.manifest.slips import ANY, COLON, NO_COLON, NO_DASH, NO_KEY, text_slip
-from rbxcompose.printable import plain
+from rbxcompose.base.findings import Finding, Related, Span
+from rbxcompose.base.printable import plain
+from rbxcompose.manifest.slip_registry import (
+    ANY,
+    COLON,
+    NO_COLON,
+    NO_DASH,
+    NO_KEY,
+    NOT_YAML,
+    QUOTE_HELP,
+    QUOTES_NEEDED,
+    Trouble,
+    indent,
+    is_written,
+    text_slip,
+)
 
 _NO_SIGIL = "@`%>|"  # at the beginning of a text; `&`, `*` and `!` may have been meant as such
 _TWO_KEYS = re.compile(r"[\w.$-]+ +([a-z_]+: [^:]+)")  # the value of one key, and another key
@@ -23,7 +35,7 @@ def explain(error: yaml.YAMLError, text: str, file: str) -> Finding:
     if not isinstance(error, yaml.MarkedYAMLError):
         return NOT_YAML.at(Span(file, 1, 1, 1, 2), "this file cannot be read as YAML")
     trouble = Trouble(error, text, file)
-    words = next((one for one in _ANSWERS if one in trouble.problem or one in trouble.context), ANY)
+    words = next((name for name in _ANSWERS if name in trouble.problem or name in trouble.context), ANY)
     slips = (*text_slip.at(ANY), *(text_slip.at(words) if words else ()))
     found = next((finding for slip in slips if (finding := slip(trouble))), None)
     if found or words:

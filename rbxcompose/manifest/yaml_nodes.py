@@ -6,8 +6,8 @@ from typing import Any
 
 import yaml
 
-from rbxcompose.findings import Finding, Span, kind
-from rbxcompose.manifest.limits import DEPTH, NODES
+from rbxcompose.base.findings import Finding, Span, kind
+from rbxcompose.manifest.tree import DEPTH, NODES
 from rbxcompose.manifest.yaml_errors import explain
 
 TOO_LARGE = kind("RBX1103")

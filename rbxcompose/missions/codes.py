@@ -5,7 +5,7 @@ Findings that need the whole mission come from rules, in `missions/checks`.
 
 from __future__ import annotations
 
-from rbxcompose.findings import Finding, Related, Span, kind
+from rbxcompose.base.findings import Finding, Related, Span, kind
 
 UNKNOWN_KEY = kind("RBX4101", is_fixable=True)
 UNKNOWN_PLACE = kind("RBX4103", is_fixable=True)

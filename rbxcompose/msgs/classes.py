@@ -9,10 +9,18 @@ from threading import RLock
 from types import new_class
 from typing import Any, ClassVar, ForwardRef
 
-from rbxcompose.dataclass import dataclass
+from rbxcompose.base.dataclass import dataclass
 from rbxcompose.msgs.arrays import ArrayMessage, holds_numbers, zeros
-from rbxcompose.msgs.definitions import FLOATS, OCTETS, FieldDefinition, FieldShape, FieldType, Structure, attribute
-from rbxcompose.msgs.hashes import type_hash
+from rbxcompose.msgs.definitions import (
+    FLOATS,
+    OCTETS,
+    FieldDefinition,
+    FieldShape,
+    FieldType,
+    Structure,
+    attribute,
+    type_hash,
+)
 from rbxcompose.msgs.types import Action, Message, Service, declared
 
 _ZEROS: Mapping[str, Any] = {"string": "", "bool": False, **dict.fromkeys(FLOATS, 0.0)}  # other numbers are integers
@@ -84,9 +92,9 @@ class _Maker:
 
     def _message(self, name: str, doc: str) -> type[Any]:
         structure = self._structures[name]
-        fields = {attribute(one.name): self._field(one) for one in structure.fields}
-        constants = {one.name: one.value for one in structure.constants}
-        has_arrays = any(holds_numbers(one.type) for one in structure.fields)
+        fields = {attribute(definition.name): self._field(definition) for definition in structure.fields}
+        constants = {constant.name: constant.value for constant in structure.constants}
+        has_arrays = any(holds_numbers(definition.type) for definition in structure.fields)
         annotations = {
             **{name: ClassVar[type(value)] for name, value in constants.items()},
             **{name: type_ for name, (type_, _) in fields.items()},
@@ -96,7 +104,7 @@ class _Maker:
             doc,
             ArrayMessage if has_arrays else Message,
             {
-                "FIELDS": {one.name: str(one.type) for one in structure.fields},
+                "FIELDS": {definition.name: str(definition.type) for definition in structure.fields},
                 "__annotations__": annotations,
                 **constants,
                 **{name: default for name, (_, default) in fields.items()},

@@ -7,8 +7,7 @@ from functools import cache
 from typing import Any
 
 from rbxcompose.msgs import registry
-from rbxcompose.msgs.definitions import FieldDefinition, Structure, parse_type
-from rbxcompose.msgs.hashes import type_hash
+from rbxcompose.msgs.definitions import FieldDefinition, Structure, parse_type, type_hash
 from rbxcompose.msgs.service_msgs import ServiceEventInfo
 from rbxcompose.msgs.types import Fields, Message, Service
 

@@ -26,13 +26,13 @@ from rbxcompose.msgs.definitions import (
     interface_names,
     parts,
     read,
+    type_hash,
 )
-from rbxcompose.msgs.hashes import type_hash
 
 INDENT = "    "
 LONGEST = 120  # letters of a line
 TYPES = "rbxcompose.msgs.types"
-DATACLASS = "rbxcompose.dataclass"
+DATACLASS = "rbxcompose.base.dataclass"
 ARRAYS = "rbxcompose.msgs.arrays"
 
 
@@ -69,8 +69,10 @@ class _Module:
         ordered: dict[str, None] = {}
 
         def visit(name: str) -> None:
-            whole = (one for part, one in self.structures.items() if part == name or part.startswith(f"{name}_"))
-            for base in (field.type.base for one in whole for field in one.fields):
+            whole = (
+                structure for part, structure in self.structures.items() if part == name or part.startswith(f"{name}_")
+            )
+            for base in (field.type.base for structure in whole for field in structure.fields):
                 if base in names:
                     visit(base)
             ordered[name] = None
@@ -187,16 +189,16 @@ class _Module:
             return f"NDArray[np.{type_.base}]", self._made_by(f"lambda: {zeros}")
         if type_.shape is not FieldShape.SINGLE and type_.base in OCTETS:
             return "bytes", f"bytes({_least(type_)})" if _least(type_) else 'b""'
-        one, default = self._python_single(type_)
+        text, default = self._python_single(type_)
         if type_.shape is FieldShape.SINGLE:
-            return one, self._made_by(default) if type_.is_message else default
+            return text, self._made_by(default) if type_.is_message else default
         if not _least(type_):
-            return f"tuple[{one}, ...]", "()"
+            return f"tuple[{text}, ...]", "()"
         if type_.is_message:
-            return f"tuple[{one}, ...]", self._made_by(
+            return f"tuple[{text}, ...]", self._made_by(
                 f"lambda: ({default.removeprefix('lambda: ')}(),) * {type_.length}"
             )
-        return f"tuple[{one}, ...]", f"({default},) * {type_.length}"
+        return f"tuple[{text}, ...]", f"({default},) * {type_.length}"
 
     def _python_single(self, type_: FieldType) -> tuple[str, str]:
         """Return the annotation of one value and its zero; for a message, a factory."""

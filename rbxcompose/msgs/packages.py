@@ -66,8 +66,8 @@ def package_files(package: str, version: str, licence: str) -> dict[str, str]:
     depends = used | ({"action_msgs"} if any("/action/" in name for name in names) else set())
     lines = [f'  "{path}"\n' for path in texts]
     lines += [f"  DEPENDENCIES {' '.join(sorted(used))}\n"] if used else []
-    finds = "".join(f"find_package({one} REQUIRED)\n" for one in sorted(used))
-    tags = "".join(f"  <depend>{one}</depend>\n" for one in sorted(depends))
+    finds = "".join(f"find_package({text} REQUIRED)\n" for text in sorted(used))
+    tags = "".join(f"  <depend>{text}</depend>\n" for text in sorted(depends))
     return {
         **texts,
         "package.xml": _XML.format(package=package, version=version, licence=licence, depends=tags),
@@ -84,7 +84,7 @@ def parts(name: str, types_of: Callable[[str], Iterable[FieldType]]) -> list[str
     left = [name]
     while left:
         fresh = dict.fromkeys(type_.base for type_ in types_of(left.pop(0)) if type_.is_message)
-        new = [one for one in fresh if one not in found]
+        new = [base for base in fresh if base not in found]
         found.update(dict.fromkeys(new))
         left += new
     return list(found)
@@ -92,7 +92,7 @@ def parts(name: str, types_of: Callable[[str], Iterable[FieldType]]) -> list[str
 
 def joined(name: str, made_of: Iterable[str], text_of: Callable[[str], str]) -> str:
     """Return the text of an interface and those of all messages inside it, each below a line of `=`."""
-    texts = [f"{_SEPARATOR}\nMSG: {short(one)}\n{text_of(one)}" for one in made_of]
+    texts = [f"{_SEPARATOR}\nMSG: {short(text)}\n{text_of(text)}" for text in made_of]
     return "".join([text_of(name), *texts])
 
 

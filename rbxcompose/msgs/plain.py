@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from dataclasses import field
 from typing import Any, Generic, Protocol, TypeVar
 
-from rbxcompose.dataclass import dataclass
-from rbxcompose.findings import Finding, Span, kind, suggest
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.findings import Finding, Span, kind, suggest
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.definitions import FLOATS, OCTETS, FieldShape, FieldType, attribute, parse_type
 from rbxcompose.msgs.types import Message

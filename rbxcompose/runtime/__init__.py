@@ -1,1 +1,1 @@
-"""Running a plan: scheduler, component host, process groups and their supervisor."""
+"""What runs a plan: supervisor, process groups, recording, replay."""

@@ -7,11 +7,149 @@ import socket
 from dataclasses import field
 from typing import Any, get_args
 
-from rbxcompose.dataclass import dataclass
-from rbxcompose.robot_events import ComponentNoted, MissionOver, RobotHeld
-from rbxcompose.runtime.host_report import HostReport
-from rbxcompose.runtime.setting_messages import SettingOrder, SettingWord
-from rbxcompose.typed_json import Family
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.requests import Family
+from rbxcompose.runtime.folder import ChosenLayers, ClockOffset
+from rbxcompose.sdk.parameters import ChangeRefusal, WantedChange
+from rbxcompose.sdk.robot_events import ComponentNoted, MissionOver, RobotHeld
+
+
+@dataclass(frozen=True, slots=True)
+class RobotEnd:
+    """The robot goes down as a whole: its exit code, and why."""
+
+    exit_code: int
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class StopMark:
+    """One stop: the start of the share on which it was ordered, and its number there."""
+
+    run: str
+    number: int
+
+
+@dataclass(frozen=True, slots=True)
+class SharedStop:
+    """What a host tells of stops: its own and who ordered it, those of others that it has released, and what holds it.
+
+    `holds` are the reasons for which components of this host need the robot to stand still.
+    """
+
+    own: StopMark | None = None
+    by: str = ""
+    released: list[StopMark] = field(default_factory=list)
+    holds: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class HostReport:
+    """How one host is: `version` changes with the robot's files, `run` with each start of its share."""
+
+    host: str
+    version: str
+    run: str
+    is_going_down: bool = False
+    stop: SharedStop = SharedStop()
+    states: dict[str, str] = field(default_factory=dict)  # of its components
+    end: RobotEnd | None = None
+    clock: ClockOffset | None = None  # its clock against that of the host which hears it, which measures it
+
+
+@dataclass(frozen=True, slots=True)
+class PrepareChange:
+    """Look whether components, by name, would accept new settings, and keep them for that; send `ChangePrepared`."""
+
+    number: int
+    wanted: WantedChange
+
+
+@dataclass(frozen=True, slots=True)
+class CommitChange:
+    """Apply the settings that were prepared, then send `ChangeFollowed`."""
+
+    number: int
+
+
+@dataclass(frozen=True, slots=True)
+class UndoChange:
+    """Give components back the settings that they had before, then send `ChangeFollowed`."""
+
+    number: int
+
+
+@dataclass(frozen=True, slots=True)
+class EndChange:
+    """The change is over, done or not."""
+
+    number: int
+
+
+@dataclass(frozen=True, slots=True)
+class ChangeDecided:
+    """The answer to `AskForChange`: why it is not done, or nothing."""
+
+    number: int
+    refusal: ChangeRefusal | None
+
+
+@dataclass(frozen=True, slots=True)
+class AskRules:
+    """For the judge: may components have the configurations of `new`, if others have those of `now`?
+
+    Both are plans as text. Rules of another `generation` of the plan are made of the robot's files anew.
+    """
+
+    number: int
+    generation: int
+    file: str
+    layers: ChosenLayers
+    now: list[str]
+    new: list[str]
+
+
+@dataclass(frozen=True, slots=True)
+class AskForChange:
+    """Somebody wants to change settings of components, by their nodes; `ChangeDecided` carries the same number."""
+
+    number: int
+    wanted: WantedChange
+
+
+@dataclass(frozen=True, slots=True)
+class ChangePrepared:
+    """Why components of the process would refuse a change, or nothing.
+
+    `now` are those of its components whose settings are not those of the plan, `new` those that rules could notice, as
+    they will be; both are plans as text, or empty.
+    """
+
+    number: int
+    refusal: str
+    now: str = ""
+    new: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class ChangeFollowed:
+    """Components have applied or taken back a change; else why one of them has not."""
+
+    number: int
+    refusal: str
+
+
+@dataclass(frozen=True, slots=True)
+class RulesSay:
+    """The answer of the judge: which rule would be broken, or nothing."""
+
+    number: int
+    refusal: ChangeRefusal | None
+
+
+SettingOrder = PrepareChange | CommitChange | UndoChange | EndChange | ChangeDecided | AskRules
+SettingWord = AskForChange | ChangePrepared | ChangeFollowed | RulesSay
+
 
 _CHUNK = 65536
 

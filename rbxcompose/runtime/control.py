@@ -17,11 +17,10 @@ from dataclasses import field
 from pathlib import Path
 from typing import TypeVar
 
-from rbxcompose.dataclass import dataclass
-from rbxcompose.requests import Refused, Request, requests
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.requests import Refused, Request, UnreadableError, from_data, requests
 from rbxcompose.runtime.folder import SOCKET, RobotFolder
 from rbxcompose.runtime.processes import Process
-from rbxcompose.typed_json import UnreadableError, from_data
 
 A = TypeVar("A")
 

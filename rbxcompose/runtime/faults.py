@@ -6,7 +6,7 @@ import traceback
 from collections import deque
 from pathlib import Path
 
-from rbxcompose.restarts import DEFAULT, Restart
+from rbxcompose.base.config import DEFAULT, Restart
 
 
 class RestartPolicy:

@@ -1,20 +1,64 @@
-"""The log file of a robot: one record per line, each written by one system call; several processes write to it.
-
-A file that has grown to `LARGEST` is renamed to `log.jsonl.1`, the previous `.1` to `.2`, and so on; the oldest of
-`PARTS` is removed. The process that finds the file full does this, the others notice at their next line.
-"""
+"""The log of a robot: records, writing whole lines from several processes, reading while it is written."""
 
 from __future__ import annotations
 
 import fcntl
+import json
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from io import BufferedReader
 from itertools import pairwise
 from pathlib import Path
 
-from rbxcompose.levels import Level
-from rbxcompose.runtime.records import Record
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.levels import Level
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """What `source` (an instance, or `robot` for the whole) reported at robot time `time` [s].
+
+    It holds no wall-clock time and no process id, so that a stepped run writes the same bytes each time.
+    `detail` is for the log file only, such as a traceback.
+    """
+
+    time: float
+    level: Level
+    source: str
+    text: str
+    detail: str = ""
+
+    def to_json(self) -> str:
+        """Return the record as one line, without a newline."""
+        fields: dict[str, object] = {
+            "t": round(self.time, 6),
+            "level": self.level.name,
+            "source": self.source,
+            "text": self.text,
+        }
+        if self.detail:
+            fields["detail"] = self.detail
+        return json.dumps(fields, ensure_ascii=False)
+
+    @classmethod
+    def from_json(cls, line: str) -> Record:
+        """Read what `to_json` wrote.
+
+        Raises:
+            ValueError: if the line is torn or is no record.
+        """
+        fields = json.loads(line)
+        try:
+            return cls(
+                float(fields["t"]), Level[fields["level"]], fields["source"], fields["text"], fields.get("detail", "")
+            )
+        except (KeyError, TypeError) as error:
+            raise ValueError(f"not a log record: {line!r}") from error
+
+
+WriteRecord = Callable[[Record], None]
+
 
 NAME, PREVIOUS = "log.jsonl", "log.1.jsonl"
 LARGEST = 4_000_000  # [B] of one file
@@ -112,3 +156,97 @@ def _opened(path: Path) -> int:
 
 def _loss(time: float, number: int) -> Record:
     return Record(time, Level.WARN, "robot", f"{number} lines of the log could not be written")
+
+
+class Follower:
+    """Reads the records of a log as they arrive, older files first. `skipped` counts torn and foreign lines."""
+
+    def __init__(self, path: Path) -> None:
+        self.skipped = 0
+        self._path = path
+        self._files: list[_Part] = []  # oldest first; the last one is being written
+
+    def read(self) -> list[Record]:
+        """Return the records that have come since the last call."""
+        self._files += self._new_files()
+        records = [record for file in self._files for record in file.read()]
+        for file in self._files[
+            :-2
+        ]:  # a file that was just renamed may still get the line of a process that was about to write
+            self._close(file)
+        self._files = self._files[-2:]
+        self.skipped += sum(file.take_skipped() for file in self._files)
+        return records
+
+    def close(self) -> None:
+        """Close the files; a last line that was never ended counts as torn."""
+        while self._files:
+            self._close(self._files.pop())
+
+    def _close(self, file: _Part) -> None:
+        file.close()
+        self.skipped += file.take_skipped()
+
+    def _new_files(self) -> list[_Part]:
+        """Open the files that have begun since, oldest first.
+
+        The search begins with the newest: one that is renamed meanwhile is found again under its next name.
+        """
+        found: list[_Part] = []
+        for path in parts_of(self._path):
+            try:
+                part = _Part(path)
+            except FileNotFoundError:
+                if path == self._path:
+                    continue  # it is just being renamed
+                break
+            if any(part.is_same(other) for other in found):
+                part.close()
+            elif any(part.is_same(file) for file in self._files):
+                part.close()
+                break
+            else:
+                found.append(part)
+        return found[::-1]
+
+
+class _Part:
+    """One file of a log."""
+
+    def __init__(self, path: Path) -> None:
+        self._file: BufferedReader = path.open("rb")
+        self._identity = os.fstat(self._file.fileno())
+        self._rest = b""
+        self._skipped = 0
+
+    def is_same(self, other: _Part) -> bool:
+        return os.path.samestat(self._identity, other._identity)
+
+    def read(self) -> list[Record]:
+        *lines, self._rest = (self._rest + self._file.read()).split(b"\n")
+        records: list[Record] = []
+        for line in lines:
+            try:
+                records.append(Record.from_json(line.decode()))
+            except ValueError:
+                self._skipped += 1
+        return records
+
+    def take_skipped(self) -> int:
+        """Return the number of lines skipped since the last call."""
+        skipped, self._skipped = self._skipped, 0
+        return skipped
+
+    def close(self) -> None:
+        self._file.close()
+        self._skipped += bool(self._rest)
+        self._rest = b""
+
+
+def read_log(path: Path) -> list[Record]:
+    """Return all records of a log, none if it does not exist."""
+    follower = Follower(path)
+    try:
+        return follower.read()
+    finally:
+        follower.close()

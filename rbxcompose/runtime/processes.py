@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from rbxcompose.dataclass import dataclass
+from rbxcompose.base.dataclass import dataclass
 
 _PR_SET_CHILD_SUBREAPER = 36
 _M_MMAP_THRESHOLD = -3  # of mallopt(3)
@@ -67,7 +67,7 @@ class Process:
     def holds_file_of(self, folder: Path) -> bool:
         """Return whether it has a file open that is in `folder`, or was before it was removed."""
         try:
-            return any(os.readlink(one).startswith(f"{folder}/") for one in Path(f"/proc/{self.pid}/fd").iterdir())
+            return any(os.readlink(path).startswith(f"{folder}/") for path in Path(f"/proc/{self.pid}/fd").iterdir())
         except OSError:  # it has ended, or has closed one meanwhile
             return False
 

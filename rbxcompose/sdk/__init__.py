@@ -1,6 +1,6 @@
 """Everything that the author of a plug-in imports."""
 
-from rbxcompose.config import (
+from rbxcompose.base.config import (
     Acceleration,
     Angle,
     AngularAcceleration,
@@ -19,13 +19,10 @@ from rbxcompose.config import (
     Speed,
     Time,
 )
-from rbxcompose.diagnostics.updater import CompositeTask, FrequencyTask, StampTask, TaskStatus, heartbeat
-from rbxcompose.geometry import Pose2
-from rbxcompose.levels import Level
-from rbxcompose.msgs.entries import ArrayEntries
-from rbxcompose.qos import Qos
-from rbxcompose.requests import Command, Query, Refused, answers
-from rbxcompose.robot_events import ComponentNoted, MissionOver, MissionWaits, RobotHeld
+from rbxcompose.base.geometry import Pose2
+from rbxcompose.base.levels import Level
+from rbxcompose.base.requests import Command, Query, Refused, answers
+from rbxcompose.msgs.fields import ArrayEntries
 from rbxcompose.sdk.bound import Ended, Later, Outcome, Reply, SentGoal, ServedGoal
 from rbxcompose.sdk.capabilities import (
     BoundsGoals,
@@ -47,9 +44,11 @@ from rbxcompose.sdk.capabilities import (
 )
 from rbxcompose.sdk.component import Component
 from rbxcompose.sdk.messages import MessageName
-from rbxcompose.sdk.ports import Calls, CallsAction, In, Looks, Out, Port, Serves, ServesAction, ServesTopic
+from rbxcompose.sdk.ports import Calls, CallsAction, In, Looks, Out, Port, Qos, Serves, ServesAction, ServesTopic
 from rbxcompose.sdk.registry import component
+from rbxcompose.sdk.robot_events import ComponentNoted, MissionOver, MissionWaits, RobotHeld
 from rbxcompose.sdk.skills import Activity, skill
+from rbxcompose.sdk.updater import CompositeTask, FrequencyTask, StampTask, TaskStatus, heartbeat
 
 __all__ = [
     "Acceleration",

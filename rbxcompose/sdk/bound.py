@@ -6,8 +6,8 @@ from collections.abc import Callable
 from enum import StrEnum
 from typing import Generic, Protocol, TypeVar
 
-from rbxcompose.dataclass import dataclass
-from rbxcompose.geometry import Pose2, Transform3
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.geometry import Pose2, Transform3
 
 M = TypeVar("M")
 M_contra = TypeVar("M_contra", contravariant=True)

@@ -10,9 +10,9 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields, replace
 from typing import Any, Generic, TypeVar
 
-from rbxcompose.config import Config, Place
-from rbxcompose.dataclass import dataclass
-from rbxcompose.geometry import Pose2
+from rbxcompose.base.config import Config, Place
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.geometry import Pose2
 
 T_co = TypeVar("T_co", covariant=True)
 C = TypeVar("C", bound="Capability")
@@ -221,7 +221,7 @@ class RunsMissions(Capability):
 
 def within(capability: C, ports: str, fields_: str) -> C:
     """Return a capability of a part of a component: these begin the names of its ports, and those of its fields."""
-    changed = {one.name: _within(getattr(capability, one.name), ports, fields_) for one in fields(capability)}
+    changed = {field.name: _within(getattr(capability, field.name), ports, fields_) for field in fields(capability)}
     return replace(capability, **changed)
 
 
@@ -250,12 +250,12 @@ def require_declared(
         ValueError: if one does not.
     """
     known, declared = {"", *ports}, tuple(capabilities)
-    for one in declared:
-        what = f"the capability {type(one).__name__} of the type '{who}'"
-        for port in _ports(one):
+    for capability in declared:
+        what = f"the capability {type(capability).__name__} of the type '{who}'"
+        for port in _ports(capability):
             if port not in known:
                 raise ValueError(f"{what} names the port '{port}', which it does not have")
-        for setting in settings_of(one):
+        for setting in settings_of(capability):
             if setting.field and setting.field.partition(".")[0] not in config.model_fields:
                 raise ValueError(f"{what} names the field '{setting.field}', which its configuration does not have")
     return declared
@@ -270,4 +270,4 @@ def _ports(capability: Capability) -> Iterator[str]:
 
 
 def _values(capability: Capability) -> list[object]:
-    return [getattr(capability, one.name) for one in fields(capability)]
+    return [getattr(capability, field.name) for field in fields(capability)]

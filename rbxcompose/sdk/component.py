@@ -7,15 +7,15 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any, ClassVar, Generic, Protocol, Self, TypeVar, get_args
 
-from rbxcompose.clock import Clock
-from rbxcompose.config import Config
-from rbxcompose.diagnostics.updater import DiagnosticTask
-from rbxcompose.levels import Level
-from rbxcompose.requests import Command, Query, Refused, Request, Requests, answering, requests
-from rbxcompose.robot_events import RobotEvent
+from rbxcompose.base.clock import Clock
+from rbxcompose.base.config import Config
+from rbxcompose.base.levels import Level
+from rbxcompose.base.requests import Command, Query, Refused, Request, Requests, answering, requests
 from rbxcompose.sdk.bound import Window
 from rbxcompose.sdk.capabilities import Capability
 from rbxcompose.sdk.ports import In, Port
+from rbxcompose.sdk.robot_events import RobotEvent
+from rbxcompose.sdk.updater import DiagnosticTask
 
 A = TypeVar("A")
 C = TypeVar("C", bound=Config)

@@ -8,10 +8,10 @@ from typing import Annotated
 from pydantic import AfterValidator
 from pydantic_core import PydanticCustomError
 
-from rbxcompose.findings import nearest
+from rbxcompose.base.findings import nearest
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.definitions import FieldShape
-from rbxcompose.msgs.field_paths import NoFieldError, field_type
+from rbxcompose.msgs.fields import NoFieldError, field_type
 
 _BETWEEN = re.compile(r"[/.:]+")  # the names in that of a type: `.` in Python, `::` in C++
 
@@ -22,10 +22,10 @@ def _known(name: str) -> str:
     except KeyError:
         known = tuple(registry.names("msg"))
         short = _BETWEEN.split(name)[-1]
-        near = nearest(short, {one.rpartition("/")[-1]: one for one in known})
-        alike = tuple(one for one in known if near and one.rpartition("/")[-1] == near[0])
+        near = nearest(short, {text.rpartition("/")[-1]: text for text in known})
+        alike = tuple(text for text in known if near and text.rpartition("/")[-1] == near[0])
         if alike and short == name:
-            full = " or ".join(f"'{one}'" for one in alike)
+            full = " or ".join(f"'{item}'" for item in alike)
             told = {"name": name, "help": f"write it with its package: {full}"}
             raise PydanticCustomError("message", "there is no message type '{name}'", told) from None
         context = {"name": name, "valid": alike or known, "what": "message types"}

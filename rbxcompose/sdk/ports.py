@@ -1,19 +1,34 @@
-"""Ports: what a component publishes and subscribes to, declared in its class so that `check` can prove the wiring.
-
-On a class, a port is its declaration; on a component, it is the live object that the runtime has bound to it.
-"""
+"""Ports: what a component publishes and subscribes to, declared in its class so that `check` knows them."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from enum import StrEnum
 from types import MappingProxyType
 from typing import Any, ClassVar, Generic, Protocol, Self, TypeVar, overload
 
-from rbxcompose.msgs.entries import ArrayEntries
-from rbxcompose.msgs.measures import Measures
+from rbxcompose.msgs.fields import ArrayEntries, Measures
 from rbxcompose.msgs.types import Action, Message, Service
-from rbxcompose.qos import Qos
 from rbxcompose.sdk.bound import ActionCaller, ActionServer, Caller, Latest, Look, Sender
+
+
+class Qos(StrEnum):
+    """The purpose of a topic; the bus derives queue depth, reliability, priority and congestion control from it."""
+
+    COMMAND = "command"  # newest wins, dropped rather than late
+    STATE = "state"  # newest wins, a few kept
+    LATCHED = "latched"  # the last one is kept for late subscribers
+    EVENT = "event"  # none may be lost
+    BULK = "bulk"  # large, lowest priority
+
+    @property
+    def depth(self) -> int:
+        """Return how many messages a subscriber queues before it drops the oldest."""
+        return _DEPTH[self]
+
+
+_DEPTH = {Qos.COMMAND: 1, Qos.STATE: 10, Qos.LATCHED: 1, Qos.EVENT: 10_000, Qos.BULK: 2}
+
 
 M = TypeVar("M", bound=Message)
 Q = TypeVar("Q", bound=Message)
@@ -238,7 +253,9 @@ class ServesAction(Port[ActionServer[G, R, F]]):
         if entries is not None:
             entries.require_in(action.Goal)
         self.entries = entries
-        if wrong := [name for name, one in measures.items() if not _is_measured(action.Goal.FIELDS.get(name, ""), one)]:
+        if wrong := [
+            name for name, measure in measures.items() if not _is_measured(action.Goal.FIELDS.get(name, ""), measure)
+        ]:
             raise ValueError(f"{action.Goal.TYPE} has no number '{wrong[0]}'")
         if wrong := [name for name in choices if action.Goal.FIELDS.get(name) != "string"]:
             raise ValueError(f"{action.Goal.TYPE} has no text '{wrong[0]}'")

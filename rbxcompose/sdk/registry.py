@@ -6,8 +6,8 @@ import inspect
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from rbxcompose.config import Config
-from rbxcompose.plugins import BrokenPluginError, Plugins
+from rbxcompose.base.config import Config
+from rbxcompose.base.plugins import BrokenPluginError, Plugins
 from rbxcompose.sdk.capabilities import Capability
 from rbxcompose.sdk.component import Component
 from rbxcompose.sdk.ports import Port, ServesTopic
@@ -15,7 +15,7 @@ from rbxcompose.sdk.ports import Port, ServesTopic
 T = TypeVar("T", bound=type[Component[Any]])
 K = TypeVar("K", bound=Capability)
 
-PLUGINS = Plugins("component", "rbxcompose.components")
+PLUGINS = Plugins("component", "components")
 _TYPES: dict[str, type[Component[Any]]] = {}
 
 
@@ -71,7 +71,7 @@ def component_type(name: str) -> type[Component[Any]]:
 
 def declared(name: str, config: Config, kind: type[K]) -> list[K]:
     """Return the capabilities of a kind that a component of type `name` has with this configuration."""
-    return [one for one in component_type(name).capabilities(config) if isinstance(one, kind)]
+    return [capability for capability in component_type(name).capabilities(config) if isinstance(capability, kind)]
 
 
 def usable_names() -> list[str]:

@@ -11,14 +11,14 @@ from dataclasses import field
 from types import MappingProxyType
 from typing import Any, ClassVar, Literal, TypeVar, get_args, get_origin, get_type_hints
 
-from rbxcompose.config import Dimensioned, Place
-from rbxcompose.dataclass import dataclass
-from rbxcompose.expressions.types import COUNT, FLAG, PLACE, POSE, TEXT, Type, choice_of, quantity_of
-from rbxcompose.geometry import Pose2
-from rbxcompose.plugins import BrokenPluginError, Plugins
-from rbxcompose.units import NUMBER
+from rbxcompose.base.config import Dimensioned, Place
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.expressions.types import COUNT, FLAG, PLACE, POSE, TEXT, Type, choice_of, quantity_of
+from rbxcompose.base.geometry import Pose2
+from rbxcompose.base.plugins import BrokenPluginError, Plugins
+from rbxcompose.base.units import NUMBER
 
-PLUGINS = Plugins("skill", "rbxcompose.skills")
+PLUGINS = Plugins("skill", "skills")
 Told = bool | str | Mapping[str, object]  # how a skill ended: success or not, an outcome, or success with results
 
 F = TypeVar("F", bound=Callable[..., Any])

@@ -1,28 +1,28 @@
-"""A bench for components: virtual time, an in-process bus, no waiting."""
+"""A bench for components and for whole robots: virtual time, an in-process bus, no waiting."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 
+from rbxcompose.base.clock import SteppedClock
+from rbxcompose.base.config import PLACE, Place
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.levels import Level
+from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.bus import Bus
-from rbxcompose.clock import SteppedClock
-from rbxcompose.config import Place
-from rbxcompose.levels import Level
-from rbxcompose.model.wires import ends_of
+from rbxcompose.compiler.model.robot import ends_of
+from rbxcompose.compiler.plan.model import Instance, Plan, Wire
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray, DiagnosticStatus
 from rbxcompose.msgs.rcl_interfaces import Parameter, ParameterValue
 from rbxcompose.msgs.types import Message
-from rbxcompose.params.core import changed
-from rbxcompose.params.values import to_message
-from rbxcompose.plan.model import Instance, Plan, Wire
-from rbxcompose.qos import Qos
-from rbxcompose.references import PLACE
+from rbxcompose.runtime.log import Record
 from rbxcompose.runtime.process_group.host import Host, Notice
-from rbxcompose.runtime.records import Record
-from rbxcompose.scheduler import Scheduler
 from rbxcompose.sdk.component import Component
+from rbxcompose.sdk.parameters import changed, to_message
+from rbxcompose.sdk.ports import Qos
 from rbxcompose.sdk.registry import component_type
+from rbxcompose.sdk.robot_events import MissionOver
 
 M = TypeVar("M", bound=Message)
 OWNER = "bench"
@@ -143,3 +143,40 @@ class Bench:
 
     def _note(self, owner: str, text: str) -> None:
         self.records.append(Record(self.clock.now(), Level.WARN, owner, text))
+
+
+LONGEST = 3600.0  # [s] of robot time
+
+
+@dataclass(frozen=True, slots=True)
+class Ran:
+    """A robot whose mission has ended, or whose time is up."""
+
+    bench: Bench
+
+    @property
+    def outcome(self) -> str:
+        """Return how the mission ended: `success`, `failure`, or `running` if it has not."""
+        ends = [event.outcome for event in self.bench.events if isinstance(event, MissionOver)]
+        return str(ends[0]) if ends else "running"
+
+    @property
+    def log(self) -> str:
+        """Return the log, one record a line."""
+        return "\n".join(record.to_json() for record in self.bench.records)
+
+
+def run_robot(plan: Plan, *, most: float = LONGEST) -> Ran:
+    """Run a robot until its mission has ended, at most `most` [s] of robot time."""
+    bench = Bench(plan=plan)
+    seen = 0
+
+    def is_over() -> bool:
+        nonlocal seen  # asked after each instant, so only new events are looked at
+        if len(bench.events) == seen:
+            return False
+        news, seen = bench.events[seen:], len(bench.events)
+        return any(isinstance(event, MissionOver) for event in news)
+
+    bench.run_until(is_over, most)
+    return Ran(bench)

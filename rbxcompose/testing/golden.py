@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rbxcompose.dataclass import dataclass
+from rbxcompose.base.dataclass import dataclass
 
 
 @dataclass(frozen=True, slots=True)

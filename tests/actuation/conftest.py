@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.clock import SteppedClock
-from rbxcompose.twins.servo_fake import FakeServo
-from rbxcompose.twins.servo_line import FakeLine
-from rbxcompose.twins.servo_port import FakePort
+from rbxcompose.base.clock import SteppedClock
+from rbxcompose.domains.servos.twins.servo_fake import FakeServo
+from rbxcompose.domains.servos.twins.servo_line import FakeLine
+from rbxcompose.domains.servos.twins.servo_port import FakePort
 
 Plugged = Callable[..., FakePort]
 

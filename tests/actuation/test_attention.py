@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.actuation.attention import Attention
+from rbxcompose.domains.servos.dynamixel_bus import Attention
 
 IDS = [1, 2, 3, 4]
 PERIOD = 0.01  # [s] of a cycle
@@ -49,8 +49,8 @@ def test_a_doubtful_servo_is_asked_after_the_others() -> None:
 
 def test_each_silent_servo_has_its_turn_to_be_probed() -> None:
     attention = Attention(patience=1)
-    for one in IDS:
-        attention.missed(one, 0.0, is_corrupt=False)
+    for number in IDS:
+        attention.missed(number, 0.0, is_corrupt=False)
     probed = [one for number in range(1, 400) for one in attention.due(IDS, number * PERIOD)]
     assert set(probed) == set(IDS)
     attention.forgive()

@@ -7,18 +7,17 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.actuation.bus_load import BusLoad, cycle_load
-from rbxcompose.actuation.dynamixel_bus import DynamixelBus
-from rbxcompose.actuation.position_drive import PositionDrive
-from rbxcompose.actuation.servo_cycle import ServoCycle
-from rbxcompose.actuation.servo_joint import JointServo, ServoJoint
-from rbxcompose.actuation.servo_models import ServoModel, servo_models
-from rbxcompose.clock import SteppedClock
-from rbxcompose.control.joint_states import JointPolicy, MoveTo
-from rbxcompose.control.limits import MotionLimits
-from rbxcompose.twins.servo_fake import FakeServo
-from rbxcompose.twins.servo_line import FakeLine, FakeReply
-from rbxcompose.twins.servo_port import FakePort
+from rbxcompose.base.clock import SteppedClock
+from rbxcompose.domains.servos.dynamixel_bus import DynamixelBus
+from rbxcompose.domains.servos.joint_drive import JointServo, PositionDrive, ServoJoint
+from rbxcompose.domains.servos.joint_states import JointPolicy, MoveTo
+from rbxcompose.domains.servos.limits import MotionLimits
+from rbxcompose.domains.servos.models import ServoModel, servo_models
+from rbxcompose.domains.servos.servo_cycle import ServoCycle
+from rbxcompose.domains.servos.transfers import BusLoad, cycle_load
+from rbxcompose.domains.servos.twins.servo_fake import FakeServo
+from rbxcompose.domains.servos.twins.servo_line import FakeLine, FakeReply
+from rbxcompose.domains.servos.twins.servo_port import FakePort
 
 CYCLE = 0.01  # [s]
 BUSES = {
@@ -40,7 +39,7 @@ class TimedLine(FakeLine):
     def hear(self, data: bytes, baud: int | None = None) -> list[FakeReply]:
         """Answer, and count."""
         replies = super().hear(data, baud)
-        self.taken += 10 * len(data) / (baud or 1_000_000) + max((one.after for one in replies), default=0.0)
+        self.taken += 10 * len(data) / (baud or 1_000_000) + max((reply.after for reply in replies), default=0.0)
         return replies
 
 

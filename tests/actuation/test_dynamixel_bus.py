@@ -8,13 +8,13 @@ from typing import Any, Protocol
 
 import pytest
 
-from rbxcompose.actuation.bus import FoundServo, ServoBus
-from rbxcompose.actuation.dynamixel_bus import DynamixelBus
-from rbxcompose.actuation.servo_models import servo_models
-from rbxcompose.clock import SteppedClock
-from rbxcompose.twins.servo_fake import FakeServo
-from rbxcompose.twins.servo_packets import READ, SYNC_READ, SYNC_WRITE
-from rbxcompose.twins.servo_port import FakePort
+from rbxcompose.base.clock import SteppedClock
+from rbxcompose.domains.servos.bus import FoundServo, ServoBus
+from rbxcompose.domains.servos.dynamixel_bus import DynamixelBus
+from rbxcompose.domains.servos.models import servo_models
+from rbxcompose.domains.servos.twins.servo_fake import FakeServo
+from rbxcompose.domains.servos.twins.servo_line import READ, SYNC_READ, SYNC_WRITE
+from rbxcompose.domains.servos.twins.servo_port import FakePort
 from tests.actuation.conftest import Plugged
 
 STATE = ("present_position", "present_speed", "present_load")
@@ -43,15 +43,15 @@ def connect(plugged: Plugged) -> Iterator[Connect]:
 
 def positions(bus: ServoBus, ids: Iterable[int]) -> dict[int, int]:
     found = bus.read(sorted(ids), STATE)
-    return {one: reading.values["present_position"] for one, reading in found.items()}
+    return {number: reading.values["present_position"] for number, reading in found.items()}
 
 
 def test_servos_of_both_protocols_and_all_tables_are_read_and_written_together(
     connect: Connect, clock: SteppedClock
 ) -> None:
     bus, port = connect(MIXED)
-    for one in MIXED:
-        port.line[one].move_to(100 + one)
+    for number in MIXED:
+        port.line[number].move_to(100 + number)
     assert positions(bus, MIXED) == {one: 100 + one for one in MIXED}
     assert bus.write({one: {"torque_enable": 1} for one in MIXED}) == set()
     assert bus.write({one: {"goal_position": 200 + one} for one in MIXED}) == set()
@@ -66,7 +66,7 @@ def test_a_group_is_one_request_where_the_protocol_allows_it(connect: Connect) -
     del port.line.heard[:]
     bus.read(sorted(bus.servos), STATE)
     assert [packet.instruction for packet in port.line.heard] == [SYNC_READ, READ, READ]
-    bus.write({one: {"goal_position": 300} for one in bus.servos})
+    bus.write({servo: {"goal_position": 300} for servo in bus.servos})
     bus.read([1], STATE)
     assert [packet.instruction for packet in port.line.heard[3:5]] == [SYNC_WRITE] * 2
 
@@ -115,12 +115,12 @@ def test_a_spoilt_reply_costs_at_most_its_servo(connect: Connect, names: dict[in
     bus, port = connect(names, timeout=BRISK)
     values = {"corrupts": True, "cuts": 4, "id": 99, "garbage": b"\xff\xff\xfd\xff\x00\x01", "repeats": 2}
     setattr(port.line[2].faults, fault, values[fault])
-    for one in names:
-        port.line[one].move_to(500 + one)
+    for number in names:
+        port.line[number].move_to(500 + number)
     found = bus.read(range(1, 7), STATE)
     assert found.keys() >= {1, 3, 4, 5, 6}
     assert {one: reading.values["present_position"] for one, reading in found.items()} == {
-        one: 500 + one for one in found
+        item: 500 + item for item in found
     }
     assert (2 in found) == (fault in ("garbage", "repeats"))
     assert bool(bus.statistics[2].errors + bus.statistics[2].timeouts) == (2 not in found)
@@ -128,13 +128,13 @@ def test_a_spoilt_reply_costs_at_most_its_servo(connect: Connect, names: dict[in
 
 def test_a_late_reply_costs_its_servo_and_spoils_nothing_after_it(connect: Connect) -> None:
     bus, port = connect(SIX, timeout=BRISK, retries=0)
-    for one in SIX:
-        port.line[one].move_to(500 + one)
+    for index in SIX:
+        port.line[index].move_to(500 + index)
     port.line[4].faults.delay = 1.5 * BRISK
     for _ in range(5):
         found = positions(bus, SIX)
         assert found.keys() >= SIX.keys() - {4}
-        assert found == {one: 500 + one for one in found}
+        assert found == {number: 500 + number for number in found}
 
 
 def test_one_bad_reply_is_made_good_within_the_same_read(connect: Connect) -> None:
@@ -164,9 +164,9 @@ def test_no_retry_begins_when_the_budget_is_spent(connect: Connect) -> None:
 
 def test_an_alert_is_told_beside_the_values_and_named_by_the_hardware_error(connect: Connect) -> None:
     bus, port = connect({1: "AX-12", 2: "XL430-W250"})
-    for one in (1, 2):
-        port.line[one].heat_to(95)
-        port.line[one].step(0.1, 0.1)
+    for number in (1, 2):
+        port.line[number].heat_to(95)
+        port.line[number].step(0.1, 0.1)
     found = bus.read([1, 2], ["present_temperature", "hardware_error"])
     assert [found[one].values for one in (1, 2)] == [{"present_temperature": 95, "hardware_error": 4}] * 2
     assert (found[1].alert, found[2].alert) == (4, 128)
@@ -180,15 +180,15 @@ def test_an_alert_is_told_beside_the_values_and_named_by_the_hardware_error(conn
 def test_an_adapter_that_echoes_is_noticed_and_its_echo_dropped(connect: Connect) -> None:
     bus, port = connect(MIXED, echo=True)
     assert bus.has_echo
-    for one in MIXED:
-        port.line[one].move_to(100 + one)
+    for number in MIXED:
+        port.line[number].move_to(100 + number)
     assert positions(bus, MIXED) == {one: 100 + one for one in MIXED}
     assert bus.ping(1) == FoundServo(1, 1, 12, 1_000_000)
 
 
 def test_a_refused_write_is_told_only_if_it_is_confirmed(connect: Connect) -> None:
     bus, port = connect({1: "AX-12", 2: "XL430-W250"})
-    values = {one: {"goal_position": 5000} for one in (1, 2)}
+    values = {number: {"goal_position": 5000} for number in (1, 2)}
     assert bus.write(values, is_confirmed=True) == {1, 2}
     assert bus.write(values) == set()
     with pytest.raises(ValueError, match="goal_position must be 0 to 65535"):
@@ -198,7 +198,10 @@ def test_a_refused_write_is_told_only_if_it_is_confirmed(connect: Connect) -> No
 
 def test_a_scan_finds_servos_and_their_models(connect: Connect) -> None:
     bus, _ = connect({1: "AX-12", 9: "XL430-W250"}, timeout=BRISK)
-    assert [(one.id, one.protocol, one.name) for one in bus.scan((0, 1, 9))] == [(1, 1, "AX-12"), (9, 2, "XL430-W250")]
+    assert [(servo.id, servo.protocol, servo.name) for servo in bus.scan((0, 1, 9))] == [
+        (1, 1, "AX-12"),
+        (9, 2, "XL430-W250"),
+    ]
     assert bus.ping(5) is None
     assert bus.count(1, 1) == 1
     assert bus.count(5, 2) == 0

@@ -12,17 +12,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.actuation.dynamixel_port import BlockingPort
-from rbxcompose.devices.port_errors import (
+from rbxcompose.domains.devices.serial_ports import (
     BusyPortError,
     ForbiddenPortError,
     LostPortError,
     NoPortError,
     PortError,
     UnfitPortError,
+    latency_of,
     slow_adapter,
 )
-from rbxcompose.devices.serial_ports import latency_of
+from rbxcompose.domains.servos.dynamixel_port import BlockingPort
 
 
 class Line:

@@ -10,16 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.actuation.dynamixel_bus import DynamixelBus
-from rbxcompose.actuation.position_drive import PositionDrive
-from rbxcompose.actuation.servo_cycle import ServoCycle
-from rbxcompose.actuation.servo_joint import JointServo, ServoJoint
-from rbxcompose.actuation.servo_models import model_named, servo_models
-from rbxcompose.control.joint_states import Enable, JointMode, JointPolicy, MoveTo, Relax
-from rbxcompose.control.limits import MotionLimits
-from rbxcompose.twins.servo_fake import FakeServo
-from rbxcompose.twins.servo_stage import pseudo_terminal
-from rbxcompose.twins.servo_twin import TwinBus
+from rbxcompose.domains.servos.dynamixel_bus import DynamixelBus
+from rbxcompose.domains.servos.joint_drive import JointServo, PositionDrive, ServoJoint
+from rbxcompose.domains.servos.joint_states import Enable, JointMode, JointPolicy, MoveTo, Relax
+from rbxcompose.domains.servos.limits import MotionLimits
+from rbxcompose.domains.servos.models import model_named, servo_models
+from rbxcompose.domains.servos.servo_cycle import ServoCycle
+from rbxcompose.domains.servos.twins.servo_fake import FakeServo
+from rbxcompose.domains.servos.twins.servo_twin import TwinBus, pseudo_terminal
 
 PERIOD = 0.01
 LIMITS = MotionLimits(-1.0, 1.5, 2.0, 10.0)
@@ -60,13 +58,13 @@ class Driven:
 @pytest.mark.parametrize("name", servo_models())
 @pytest.mark.parametrize("is_inverted", [False, True])
 def test_each_tick_is_the_tick_of_its_angle(name: str, is_inverted: bool) -> None:
-    one = joint(name, is_inverted=is_inverted, neutral=100)
-    family = one.servo(1).model.family
+    servo_joint = joint(name, is_inverted=is_inverted, neutral=100)
+    family = servo_joint.servo(1).model.family
     first = family.centre - family.ticks // 2
     ticks = range(first, first + family.ticks, max(1, family.ticks // 5000))
-    assert all(one.raws(one.positions({1: tick})[1]) == {1: tick} for tick in ticks)
-    assert (one.positions({1: 101})[1] < 0) == is_inverted
-    assert one.positions({1: 100}) == {1: 0.0}
+    assert all(servo_joint.raws(servo_joint.positions({1: tick})[1]) == {1: tick} for tick in ticks)
+    assert (servo_joint.positions({1: 101})[1] < 0) == is_inverted
+    assert servo_joint.positions({1: 100}) == {1: 0.0}
 
 
 def test_a_joint_starts_without_torque_and_moves_from_where_it_is() -> None:
@@ -100,22 +98,25 @@ def test_whatever_is_asked_the_goal_keeps_to_the_limits(asked: list[list[MoveTo 
             assert driven.servo.get("torque_enable") == 0
         if len(goals) > 1:
             assert abs(goals[-1] - goals[-2]) <= 2.0 * PERIOD + tick
-            outside = (LIMITS.least - tick <= one <= LIMITS.greatest + tick for one in goals[-2:])
+            outside = (LIMITS.least - tick <= goal <= LIMITS.greatest + tick for goal in goals[-2:])
             assert all(outside) or abs(goals[-1]) <= abs(goals[-2]) + tick  # it was put outside, and moves inwards
 
 
 def test_the_same_cycle_drives_servos_by_bytes() -> None:
-    one = joint()
-    with pseudo_terminal([FakeServo("AX-12", 1)]) as port, DynamixelBus(str(port.path), {1: one.servo(1).model}) as bus:
-        drive = PositionDrive(one, JointPolicy(cycle=PERIOD))
+    servo_joint = joint()
+    with (
+        pseudo_terminal([FakeServo("AX-12", 1)]) as port,
+        DynamixelBus(str(port.path), {1: servo_joint.servo(1).model}) as bus,
+    ):
+        drive = PositionDrive(servo_joint, JointPolicy(cycle=PERIOD))
         cycle = ServoCycle(bus, {"pan": drive})
         begin = time.monotonic()
         while drive.mode is not JointMode.RELAXED and time.monotonic() < begin + 5:
             cycle.run(time.monotonic(), PERIOD)
         drive.ask(MoveTo(0.2))
-        while abs(drive.measured.position - 0.2) > one.per_tick and time.monotonic() < begin + 10:
+        while abs(drive.measured.position - 0.2) > servo_joint.per_tick and time.monotonic() < begin + 10:
             cycle.run(time.monotonic(), PERIOD)
-        assert drive.measured.position == pytest.approx(0.2, abs=one.per_tick)
+        assert drive.measured.position == pytest.approx(0.2, abs=servo_joint.per_tick)
         cycle.relax(time.monotonic(), PERIOD)
         assert bus.read([1], ["torque_enable"])[1].values["torque_enable"] == 0
 

@@ -8,14 +8,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.actuation.joint_drive import JointDrive
-from rbxcompose.actuation.servo_cycle import ServoCycle
-from rbxcompose.control.calibration import Calibration
-from rbxcompose.control.joint_states import JointMode, MoveTo
-from rbxcompose.control.transmission import Gear, Measured, Transmission
-from rbxcompose.servo_bus_config import DrivenJointConfig, JointServoConfig, ServoBusConfig, drives_of, mimics_of
-from rbxcompose.twins.servo_fake import FakeServo
-from rbxcompose.twins.servo_twin import TwinBus
+from rbxcompose.domains.servos.bus_config import (
+    DrivenJointConfig,
+    JointServoConfig,
+    ServoBusConfig,
+    drives_of,
+    mimics_of,
+)
+from rbxcompose.domains.servos.joint_drive import JointDrive
+from rbxcompose.domains.servos.joint_states import JointMode, MoveTo
+from rbxcompose.domains.servos.servo_cycle import ServoCycle
+from rbxcompose.domains.servos.transmission import Calibration, Gear, Measured, Transmission
+from rbxcompose.domains.servos.twins.servo_fake import FakeServo
+from rbxcompose.domains.servos.twins.servo_twin import TwinBus
 
 PERIOD = 0.01
 TICK = math.tau / 4096
@@ -24,7 +29,7 @@ TABLE = Measured(Calibration(((0.0, 0.0), (10.0, 0.1), (30.0, 0.4))))
 
 
 def servos(*ids: int, invert: tuple[int, ...] = ()) -> list[JointServoConfig]:
-    return [JointServoConfig(id=one, model="XL430-W250", invert=one in invert) for one in ids]
+    return [JointServoConfig(id=number, model="XL430-W250", invert=number in invert) for number in ids]
 
 
 class Machine:
@@ -113,7 +118,7 @@ def test_one_hot_joint_lets_all_rest_if_that_is_wanted(shares_heat: bool, modes:
     machine = Machine(shares_heat=shares_heat, **pair)
     machine.bus.line[1].heat_to(70)
     machine.run(10)
-    assert {str(one.mode) for one in machine.drives.values()} == modes
+    assert {str(drive.mode) for drive in machine.drives.values()} == modes
 
 
 def test_a_servo_that_its_watchdog_has_stopped_goes_on() -> None:

@@ -8,14 +8,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.actuation.preparation import prepare
-from rbxcompose.actuation.servo_joint import JointServo, ServoJoint
-from rbxcompose.actuation.servo_models import servo_models
-from rbxcompose.control.calibration import Calibration
-from rbxcompose.control.limits import MotionLimits
-from rbxcompose.control.transmission import Gear, Measured, Transmission
-from rbxcompose.twins.servo_fake import FakeServo
-from rbxcompose.twins.servo_twin import TwinBus
+from rbxcompose.domains.servos.joint_drive import JointServo, ServoJoint
+from rbxcompose.domains.servos.limits import MotionLimits
+from rbxcompose.domains.servos.models import servo_models
+from rbxcompose.domains.servos.servo_cycle import prepare
+from rbxcompose.domains.servos.transmission import Calibration, Gear, Measured, Transmission
+from rbxcompose.domains.servos.twins.servo_fake import FakeServo
+from rbxcompose.domains.servos.twins.servo_twin import TwinBus
 
 AX = servo_models()["AX-12"]
 X = servo_models()["XL430-W250"]
@@ -32,12 +31,12 @@ def test_all_positions_of_the_reach_have_ticks_and_no_others_do(
 ) -> None:
     model = servo_models()[name]
     neutral = model.family.centre + model.family.ticks // 5
-    one = joint(JointServo(1, model, neutral, is_inverted), transmission=Gear(ratio, offset))
-    least, greatest = one.reach
+    servo_joint = joint(JointServo(1, model, neutral, is_inverted), transmission=Gear(ratio, offset))
+    least, greatest = servo_joint.reach
     position = least + part * (greatest - least)
-    assert one.positions(one.raws(position))[1] == pytest.approx(position, abs=one.per_tick)
+    assert servo_joint.positions(servo_joint.raws(position))[1] == pytest.approx(position, abs=servo_joint.per_tick)
     for beyond, end in ((least - 0.1, least), (greatest + 0.1, greatest)):
-        assert one.positions(one.raws(beyond))[1] == pytest.approx(end, abs=1e-9)
+        assert servo_joint.positions(servo_joint.raws(beyond))[1] == pytest.approx(end, abs=1e-9)
 
 
 def test_two_servos_reach_what_both_of_them_reach() -> None:

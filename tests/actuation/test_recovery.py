@@ -7,14 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.actuation.dynamixel_bus import DynamixelBus
-from rbxcompose.actuation.servo_models import servo_models
-from rbxcompose.clock import SteppedClock
-from rbxcompose.devices.port_errors import LostPortError, NoDeviceError, NoPortError
-from rbxcompose.devices.serial_ports import port_path
-from rbxcompose.twins.servo_fake import FakeServo
-from rbxcompose.twins.servo_line import FakeLine
-from rbxcompose.twins.servo_port import FakePort
+from rbxcompose.base.clock import SteppedClock
+from rbxcompose.domains.devices.serial_ports import LostPortError, NoDeviceError, NoPortError, port_path
+from rbxcompose.domains.servos.dynamixel_bus import DynamixelBus
+from rbxcompose.domains.servos.models import servo_models
+from rbxcompose.domains.servos.twins.servo_fake import FakeServo
+from rbxcompose.domains.servos.twins.servo_line import FakeLine
+from rbxcompose.domains.servos.twins.servo_port import FakePort
 from tests.actuation.conftest import Plugged
 from tests.devices.machine_tree import MachineTree
 
@@ -24,7 +23,7 @@ MODELS = {1: servo_models()["AX-12"], 2: servo_models()["XL430-W250"], 3: servo_
 def test_a_bus_recovers_with_a_new_port_relaxed_and_verified(plugged: Plugged) -> None:
     port = plugged(FakeServo("AX-12", 1), FakeServo("XL430-W250", 2), FakeServo("XM430-W350", 3))
     with DynamixelBus(str(port.path), MODELS, timeout=0.2) as bus:
-        bus.write({one: {"torque_enable": 1} for one in MODELS}, is_confirmed=True)
+        bus.write({number: {"torque_enable": 1} for number in MODELS}, is_confirmed=True)
         assert port.line[2].get("torque_enable") == 1
         port.unplug()
         for _ in range(3):
@@ -35,15 +34,15 @@ def test_a_bus_recovers_with_a_new_port_relaxed_and_verified(plugged: Plugged) -
             bus.reopen()
         port.replug()
         found = bus.reopen()
-        assert [one and one.name for one in found.values()] == ["AX-12", "XL430-W250", "XM430-W350"]
-        assert [port.line[one].get("torque_enable") for one in MODELS] == [0, 0, 0]
+        assert [servo and servo.name for servo in found.values()] == ["AX-12", "XL430-W250", "XM430-W350"]
+        assert [port.line[number].get("torque_enable") for number in MODELS] == [0, 0, 0]
         assert bus.read([1, 2], ["present_position"]).keys() == {1, 2}
 
 
 def test_a_bus_that_is_named_by_its_device_is_found_under_another_number(
     tmp_path: Path, clock: SteppedClock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rbxcompose.actuation.dynamixel_bus.port_path", lambda name: port_path(name, tmp_path))
+    monkeypatch.setattr("rbxcompose.domains.servos.dynamixel_bus.port_path", lambda name: port_path(name, tmp_path))
     first, second = (MachineTree(tmp_path / name) for name in ("a", "b"))
     paths = [tree.plug(name, serial="FT4") for tree, name in ((first, "ttyUSB0"), (second, "ttyUSB1"))]
     (tmp_path / "sys").symlink_to(first.root / "sys")
@@ -60,7 +59,7 @@ def test_a_bus_that_is_named_by_its_device_is_found_under_another_number(
         for name in ("sys", "dev"):
             (tmp_path / name).symlink_to(second.root / name)
         stack.enter_context(FakePort(line, paths[1]))
-        assert [one and one.name for one in bus.reopen().values()] == ["XL430-W250"]
+        assert [servo and servo.name for servo in bus.reopen().values()] == ["XL430-W250"]
         assert bus.opened_at == str(tmp_path / "dev/ttyUSB1")
 
 
@@ -76,4 +75,4 @@ def test_servos_at_another_baud_rate_are_silent(plugged: Plugged) -> None:
     port = plugged(FakeServo("AX-12", 1, baud=57_600), FakeServo("XL430-W250", 2, baud=4_500_000))
     for baud, known in ((1_000_000, []), (57_600, [1]), (4_500_000, [2])):
         with DynamixelBus(str(port.path), baud=baud, timeout=0.05) as bus:
-            assert [one.id for one in bus.scan((1, 2))] == known
+            assert [servo.id for servo in bus.scan((1, 2))] == known

@@ -6,11 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.actuation.servo_models import servo_models
-from rbxcompose.clock import SteppedClock
-from rbxcompose.twins.servo_fake import FASTEST, FakeServo
-from rbxcompose.twins.servo_line import FakeLine
-from rbxcompose.twins.servo_packets import packet_one, packet_two, packets
+from rbxcompose.base.clock import SteppedClock
+from rbxcompose.domains.servos.models import servo_models
+from rbxcompose.domains.servos.twins.servo_fake import FASTEST, FakeServo
+from rbxcompose.domains.servos.twins.servo_line import FakeLine, packet_one, packet_two, packets
 
 MODELS = sorted(servo_models())
 ONE, TWO = ["AX-12", "MX-28"], ["XL430-W250", "XM430-W350", "PH54-200"]
@@ -173,22 +172,22 @@ def test_no_step_is_faster_than_the_fastest(name: str, goals: list[tuple[int, fl
 
 def test_both_protocols_are_heard_on_one_line() -> None:
     line = FakeLine([FakeServo("AX-12", 3), FakeServo("XL430-W250", 3)], SteppedClock().now)
-    [one] = line.hear(packet_one(3, 1))
+    [fake_reply] = line.hear(packet_one(3, 1))
     [two] = line.hear(packet_two(3, 1))
-    assert [packet.protocol for reply in (one, two) for packet in packets(bytearray(reply.data))] == [1, 2]
+    assert [packet.protocol for reply in (fake_reply, two) for packet in packets(bytearray(reply.data))] == [1, 2]
     assert line.hear(packet_one(3, 1), baud=57_600) == []
 
 
 @pytest.mark.parametrize("silences", [False, True])
 def test_a_mute_servo_is_passed_over_or_silences_those_after_it(silences: bool) -> None:
-    line = FakeLine([FakeServo("XL430-W250", one) for one in (1, 2, 3)], SteppedClock().now)
+    line = FakeLine([FakeServo("XL430-W250", number) for number in (1, 2, 3)], SteppedClock().now)
     line[2].faults.is_mute, line[2].faults.silences_next = True, silences
     replies = line.hear(packet_two(254, 0x82, bytes([132, 0, 4, 0, 1, 2, 3])))
     assert [reply.data[4] for reply in replies] == ([1] if silences else [1, 3])
 
 
 def test_replies_take_their_time_on_the_wire() -> None:
-    line = FakeLine([FakeServo("XL430-W250", one) for one in (1, 2)], SteppedClock().now)
+    line = FakeLine([FakeServo("XL430-W250", number) for number in (1, 2)], SteppedClock().now)
     first, second = line.hear(packet_two(254, 0x82, bytes([132, 0, 4, 0, 1, 2])), 1_000_000)
     assert first.after == pytest.approx(0.0005 + 15e-5)
     assert second.after == pytest.approx(2 * first.after)

@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.actuation.control_items import Coding, ControlItem
-from rbxcompose.actuation.servo_models import (
+from rbxcompose.domains.servos.models import (
+    Coding,
+    ControlItem,
     ServoModel,
     hardware_errors,
     model_named,
@@ -54,8 +55,8 @@ def test_a_table_has_what_every_servo_has_and_what_its_protocol_brings(model: Se
 @NAMED
 def test_items_do_not_overlap_but_for_the_two_meanings_of_one_speed(model: ServoModel) -> None:
     ordered = sorted(model.items.values(), key=lambda item: item.address)
-    for one, other in pairwise(ordered):
-        assert one.end <= other.address or {one.name, other.name} == {"goal_speed", "goal_velocity"}
+    for control_item, other in pairwise(ordered):
+        assert control_item.end <= other.address or {control_item.name, other.name} == {"goal_speed", "goal_velocity"}
 
 
 @NAMED

@@ -8,18 +8,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.actuation.dynamixel_bus import DynamixelBus
-from rbxcompose.actuation.servo_cycle import ServoCycle
-from rbxcompose.actuation.servo_joint import JointServo, ServoJoint
-from rbxcompose.actuation.servo_models import servo_models
-from rbxcompose.actuation.speed_limits import keep_speeds
-from rbxcompose.actuation.velocity_drive import VelocityDrive
-from rbxcompose.control.joint_states import JointPolicy
-from rbxcompose.control.limits import MotionLimits
-from rbxcompose.control.transmission import Gear
-from rbxcompose.twins.servo_fake import FakeServo
-from rbxcompose.twins.servo_stage import pseudo_terminal
-from rbxcompose.twins.servo_twin import TwinBus
+from rbxcompose.domains.servos.dynamixel_bus import DynamixelBus
+from rbxcompose.domains.servos.joint_drive import JointServo, ServoJoint, VelocityDrive
+from rbxcompose.domains.servos.joint_states import JointPolicy
+from rbxcompose.domains.servos.limits import MotionLimits
+from rbxcompose.domains.servos.models import servo_models
+from rbxcompose.domains.servos.servo_cycle import ServoCycle, keep_speeds
+from rbxcompose.domains.servos.transmission import Gear
+from rbxcompose.domains.servos.twins.servo_fake import FakeServo
+from rbxcompose.domains.servos.twins.servo_twin import TwinBus, pseudo_terminal
 
 PERIOD = 0.01
 
@@ -32,10 +29,10 @@ def wheel(model: str, ratio: float = 1.0, velocity: float | None = None) -> Velo
 
 
 def fake(model: str, limit: float) -> FakeServo:
-    one = FakeServo(model, 1)
-    one.set("operating_mode", 1)
-    one.set("velocity_limit", one.model.to_raw("velocity_limit", limit))
-    return one
+    servo = FakeServo(model, 1)
+    servo.set("operating_mode", 1)
+    servo.set("velocity_limit", servo.model.to_raw("velocity_limit", limit))
+    return servo
 
 
 @settings(max_examples=30)

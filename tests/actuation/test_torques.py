@@ -9,15 +9,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.actuation.dynamixel_bus import DynamixelBus
-from rbxcompose.actuation.servo_joint import JointServo
-from rbxcompose.actuation.servo_models import ServoModel, servo_models
-from rbxcompose.actuation.torque_limits import TorqueLimits, raw_limit
-from rbxcompose.actuation.torques import STALL_TORQUES, joint_effort, share_of, stall_torque, steepest
-from rbxcompose.control.joint_states import Enable, MoveTo
-from rbxcompose.twins.servo_fake import FakeServo
-from rbxcompose.twins.servo_stage import pseudo_terminal
-from rbxcompose.twins.servo_twin import TwinBus
+from rbxcompose.domains.servos.dynamixel_bus import DynamixelBus
+from rbxcompose.domains.servos.joint_drive import JointServo
+from rbxcompose.domains.servos.joint_states import Enable, MoveTo
+from rbxcompose.domains.servos.models import (
+    STALL_TORQUES,
+    ServoModel,
+    joint_effort,
+    servo_models,
+    share_of,
+    stall_torque,
+    steepest,
+)
+from rbxcompose.domains.servos.servo_cycle import TorqueLimits, raw_limit
+from rbxcompose.domains.servos.twins.servo_fake import FakeServo
+from rbxcompose.domains.servos.twins.servo_twin import TwinBus, pseudo_terminal
 from tests.actuation.test_joint_drive import Driven
 
 MODELS = st.sampled_from([*servo_models().values()])
@@ -31,7 +37,7 @@ def servo(model: ServoModel, torque: float = 1.0, id: int = 1) -> JointServo:
 
 def test_the_table_names_models_and_only_the_p_series_is_unknown() -> None:
     assert STALL_TORQUES.keys() <= servo_models().keys()
-    unknown = {one.family.table for one in servo_models().values() if stall_torque(one) is None}
+    unknown = {model.family.table for model in servo_models().values() if stall_torque(model) is None}
     assert unknown == {"P"}
 
 
@@ -45,10 +51,10 @@ def test_a_share_never_adds_torque_and_leaves_just_the_limit(limit: float, effor
 @given(st.lists(MODELS, min_size=1, max_size=3), st.floats(0.1, 1000.0))
 def test_servos_add_up_and_gears_multiply_whichever_way_they_turn(models: list[ServoModel], gear: float) -> None:
     effort = joint_effort(models, gear)
-    known = [stall_torque(one) for one in models]
+    known = [stall_torque(model) for model in models]
     assert (effort is None) == (None in known)
     if effort is not None:
-        assert effort == pytest.approx(gear * sum(one or 0.0 for one in known))
+        assert effort == pytest.approx(gear * sum(value or 0.0 for value in known))
         assert effort == joint_effort(models, -gear)
 
 
@@ -67,15 +73,15 @@ def test_a_limit_is_a_share_of_the_most_and_never_more_than_its_owner_allows(mod
 @pytest.mark.parametrize(("model", "raw"), [("AX-12", 614), ("XL-320", 614), ("XL430-W250", 531), ("PH54-200", 1205)])
 def test_limits_are_written_by_the_sdk_and_again_after_a_reboot_or_a_loss_of_the_supply(model: str, raw: int) -> None:
     found = servo_models()[model]
-    fake, one, limits = FakeServo(model, 1), servo(found, 0.6), TorqueLimits()
+    fake, joint_servo, limits = FakeServo(model, 1), servo(found, 0.6), TorqueLimits()
     with pseudo_terminal([fake]) as port, DynamixelBus(str(port.path), {1: found}, timeout=0.05) as bus:
-        limits.write(bus, one)
+        limits.write(bus, joint_servo)
         assert fake.get("torque_limit") == raw
         fake.reboot()
         assert fake.get("torque_limit") == fake.get("max_torque")
         values = bus.read([1], ["torque_limit", "present_temperature"])[1].values
-        assert limits.keep(bus, one, values) == "servo 1 had lost its torque limit: it is written again"
-        assert limits.keep(bus, one, values) == ""  # told once
+        assert limits.keep(bus, joint_servo, values) == "servo 1 had lost its torque limit: it is written again"
+        assert limits.keep(bus, joint_servo, values) == ""  # told once
         assert fake.get("torque_limit") == raw
 
 

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.actuation.servo_models import ServoModel, servo_models
-from rbxcompose.actuation.transfers import Stretch, read_plan, write_plans
+from rbxcompose.domains.servos.models import ServoModel, servo_models
+from rbxcompose.domains.servos.transfers import Stretch, read_plan, write_plans
 
 MODELS = list(servo_models().values())
 ASKED = st.sampled_from(MODELS).flatmap(
@@ -25,8 +25,8 @@ def test_what_is_planned_reads_just_what_memory_holds(asked: tuple[ServoModel, s
     items = {name: model.items[name] for name in names}
     expected = {name: item.decode(memory[item.address : item.end]) for name, item in items.items()}
     assert plan.values(parts, 0) == expected
-    for one, other in pairwise(plan.stretches):
-        assert other.address - one.end > 12
+    for stretch, other in pairwise(plan.stretches):
+        assert other.address - stretch.end > 12
 
 
 @given(ASKED, st.data())

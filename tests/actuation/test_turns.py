@@ -7,17 +7,14 @@ from collections.abc import Mapping, Sequence
 
 import pytest
 
-from rbxcompose.actuation.bus import ServoReading
-from rbxcompose.actuation.cycle_items import SELDOM
-from rbxcompose.actuation.position_drive import PositionDrive
-from rbxcompose.actuation.servo_cycle import ServoCycle
-from rbxcompose.actuation.servo_joint import JointServo, ServoJoint
-from rbxcompose.actuation.servo_models import servo_models
-from rbxcompose.actuation.torque_limits import LIMIT
-from rbxcompose.control.joint_states import JointPolicy
-from rbxcompose.control.limits import MotionLimits
-from rbxcompose.twins.servo_fake import FakeServo
-from rbxcompose.twins.servo_twin import TwinBus
+from rbxcompose.domains.servos.bus import SELDOM, ServoReading
+from rbxcompose.domains.servos.joint_drive import JointServo, PositionDrive, ServoJoint
+from rbxcompose.domains.servos.joint_states import JointPolicy
+from rbxcompose.domains.servos.limits import MotionLimits
+from rbxcompose.domains.servos.models import servo_models
+from rbxcompose.domains.servos.servo_cycle import TORQUE_LIMITS_LIMIT, ServoCycle
+from rbxcompose.domains.servos.twins.servo_fake import FakeServo
+from rbxcompose.domains.servos.twins.servo_twin import TwinBus
 
 CYCLE = 0.01  # [s]
 MODEL = servo_models()["XL430-W250"]
@@ -54,4 +51,4 @@ def test_no_number_of_servos_keeps_one_of_them_from_its_turn(count: int) -> None
         cycle.run(number * CYCLE, CYCLE)
     for id_ in ids:
         assert bus.read_items[id_, "present_temperature"] == bus.read_items[id_, "hardware_error"] == SELDOM - 1
-        assert bus.read_items[id_, LIMIT] == 1
+        assert bus.read_items[id_, TORQUE_LIMITS_LIMIT] == 1

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from rbxcompose.clock import MonotonicClock, SteppedClock
+from rbxcompose.base.clock import MonotonicClock, SteppedClock
 
 
 def test_a_stepped_clock_stands_still_until_it_is_moved() -> None:

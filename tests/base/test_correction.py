@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rbxcompose.findings import FindingKind, Span, correction
+from rbxcompose.base.findings import FindingKind, Span, correction
 
 PLACE = Span("f", 1, 4, 1, 8)
 

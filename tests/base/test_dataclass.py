@@ -12,7 +12,7 @@ from typing import Any, ClassVar, get_type_hints
 
 import pytest
 
-from rbxcompose.dataclass import dataclass
+from rbxcompose.base.dataclass import dataclass
 
 Decorate = Callable[..., Callable[[type], Any]]
 OPTIONS: tuple[dict[str, bool], ...] = tuple(
@@ -84,11 +84,11 @@ def test_objects_are_created_shown_and_compared_alike(decorate: Decorate, option
 @each
 def test_signatures_fields_and_changed_copies_are_alike(decorate: Decorate, options: dict[str, bool]) -> None:
     toy = made(decorate, **options)
-    assert [str(one) for one in inspect.signature(toy).parameters.values()][:2] == [
+    assert [str(parameter) for parameter in inspect.signature(toy).parameters.values()][:2] == [
         "name: 'str'",
         "size: 'float' = 1.0",
     ]
-    assert [one.name for one in fields(toy)] == ["name", "size", "parts", "serial", "seen", "colour"]
+    assert [point_field.name for point_field in fields(toy)] == ["name", "size", "parts", "serial", "seen", "colour"]
     assert replace(toy("ball"), name="cube").name == "cube"
     assert copy.copy(toy("ball", 3.0)).size == copy.deepcopy(toy("ball", 3.0)).size == 3.0
     with pytest.raises(ValueError, match="too small"):
@@ -162,8 +162,8 @@ def test_a_class_that_inherits_fields_has_them_first() -> None:
 
 
 def test_objects_survive_pickling() -> None:
-    for one in (Point(1.0, 2.0), Named(1.0, 2.0, "home"), Empty()):
-        assert pickle.loads(pickle.dumps(one)) == one
+    for point in (Point(1.0, 2.0), Named(1.0, 2.0, "home"), Empty()):
+        assert pickle.loads(pickle.dumps(point)) == point
 
 
 def test_a_class_without_fields_is_one_value() -> None:

@@ -7,8 +7,8 @@ import difflib
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.edits import apply, exact, safe_fixes
-from rbxcompose.findings import Edit, Finding, Fix, Span, replacement
+from rbxcompose.base.findings import Edit, Finding, Fix, Span, replacement
+from rbxcompose.base.fixes import apply, exact, safe_fixes
 
 TEXTS = st.text(st.sampled_from("ab:漢é \n"), max_size=60)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import zenoh
 
-from rbxcompose.endpoints import accepts, endpoint, is_private, socket_of, tcp_endpoint, unix_endpoint
+from rbxcompose.bus.endpoints import accepts, endpoint, is_private, socket_of, tcp_endpoint, unix_endpoint
 
 FINE = [
     "tcp/127.0.0.1:7447",
@@ -68,6 +68,6 @@ def test_whoever_listens_accepts_and_nobody_else_does(tmp_path: Path) -> None:
         local.listen()
         port = server.getsockname()[1]
         listening = [f"tcp/127.0.0.1:{port}", f"tls/127.0.0.1:{port}#root_ca_certificate_file=/etc/ca.pem", private]
-        assert [accepts(one, 1.0) for one in listening] == [True] * 3
+        assert [accepts(text, 1.0) for text in listening] == [True] * 3
         assert not accepts(f"quic/127.0.0.1:{port}", 1.0)
-    assert [accepts(one, 1.0) for one in listening] == [False] * 3
+    assert [accepts(text, 1.0) for text in listening] == [False] * 3

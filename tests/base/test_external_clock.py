@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.clock import DISPUTE, JUMPS, LEAP, NANOSECONDS, PATIENCE, ExternalClock, Turn
+from rbxcompose.base.clock import DISPUTE, JUMPS, LEAP, NANOSECONDS, PATIENCE, ExternalClock, Turn
 
 EPOCH = 1_700_000_000 * NANOSECONDS
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from rbxcompose.config import Config
-from rbxcompose.field_docs import field_docs
+from rbxcompose.base.config import Config, field_docs
 
 
 class Lamp(Config):
@@ -58,7 +57,7 @@ def test_a_class_without_source_has_none() -> None:
 
 def test_schemas_tell_the_docstrings() -> None:
     properties = Lamp.model_json_schema()["properties"]
-    assert [one.get("description") for one in properties.values()] == [
+    assert [property_.get("description") for property_ in properties.values()] == [
         "What it shines in,\nby name.",
         None,
         "How bright.",

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.geometry import (
+from rbxcompose.base.geometry import (
     Pose2,
     Quaternion,
     Transform3,

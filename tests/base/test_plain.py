@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.printable import FORBIDDEN, columns, escaped, fitted, plain
+from rbxcompose.base.printable import FORBIDDEN, columns, escaped, fitted, plain
 
 
 def test_control_characters_are_spelt_out() -> None:
@@ -39,7 +39,7 @@ def test_what_is_fitted_fits_and_is_the_text_or_how_it_begins(text: str, width: 
 
 
 def test_wide_characters_take_two_columns_and_combining_ones_none() -> None:
-    assert [columns(one) for one in ("robot", "\u673a", "e\u0301", "\u200b")] == [5, 2, 1, 0]
+    assert [columns(text) for text in ("robot", "\u673a", "e\u0301", "\u200b")] == [5, 2, 1, 0]
 
 
 @pytest.mark.parametrize("hidden", ["\u200b", "\u200d", "\u200e", "\u2060", "\xad", "\u061c"])

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import rbxcompose
-from rbxcompose.regular_files import NotRegularError, TooLargeError, open_regular, read_regular
+from rbxcompose.base.files import NotRegularError, TooLargeError, open_regular, read_regular
 
 PACKAGE = Path(rbxcompose.__file__).parent
 # What these open is no file that a user names: the package's own data, what the system tells, files of a running robot.

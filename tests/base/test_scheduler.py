@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.scheduler import Scheduler
+from rbxcompose.base.scheduler import Scheduler
 
 
 def test_events_run_by_time_then_owner_then_sequence() -> None:

@@ -8,8 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.findings import MOST_COMPARED, nearest, suggest
-from rbxcompose.per_compile import one_compile
+from rbxcompose.base.findings import MOST_COMPARED, nearest, one_compile, suggest
 
 MANY = [f"battery_{number}" for number in range(50 * MOST_COMPARED)]
 

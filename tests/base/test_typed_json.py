@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.typed_json import Family, UnreadableError, from_data, to_data
+from rbxcompose.base.requests import Family, UnreadableError, from_data, to_data
 
 
 class Colour(StrEnum):

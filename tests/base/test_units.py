@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose import units
-from rbxcompose.units import (
+from rbxcompose.base import units
+from rbxcompose.base.units import (
     DIMENSIONS,
     UNITS,
     Dimension,
@@ -165,7 +165,9 @@ def test_no_help_proposes_a_unit_of_another_dimension(number: int, unit: str, di
         to_si(f"{number} {unit}", dimension)
     except UnitError as error:
         proposed = re.findall(r"'([^']*)'", error.help)
-        assert all(units.UNITS[one.split(" ")[-1]].dimension == dimension for one in proposed if "," not in one)
+        assert all(
+            units.UNITS[element.split(" ")[-1]].dimension == dimension for element in proposed if "," not in element
+        )
 
 
 def test_a_wrong_dimension_says_what_must_stand_there_and_what_does() -> None:

@@ -9,11 +9,11 @@ import numpy as np
 import yourdfpy
 from numpy.typing import NDArray
 
-from rbxcompose.body.description import Description
-from rbxcompose.body.pinocchio_model import PinocchioModel
-from rbxcompose.body.urdf import read_body
-from rbxcompose.body.xml_reader import XmlElement, read_urdf
-from rbxcompose.geometry import Transform3, rotate
+from rbxcompose.base.geometry import Transform3, rotate
+from rbxcompose.domains.body.description import Description
+from rbxcompose.domains.body.pinocchio_model import PinocchioModel
+from rbxcompose.domains.body.urdf import read_body
+from rbxcompose.domains.body.xml_reader import XmlElement, read_urdf
 
 Array = NDArray[np.float64]
 Positions = Mapping[str, float]

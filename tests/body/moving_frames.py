@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 from hypothesis import strategies as st
 
-from rbxcompose.body.transforms import TransformTree
-from rbxcompose.geometry import Quaternion, Transform3, Vector3, conjugate, multiply
+from rbxcompose.base.geometry import Quaternion, Transform3, Vector3, conjugate, multiply
+from rbxcompose.base.transforms import TransformTree
 
 SECOND = 1_000_000_000  # [ns]
 MOST = 8 * SECOND  # less than a history spans

@@ -22,11 +22,11 @@ from typing import TypeVar
 
 import numpy as np
 
-from rbxcompose.body.description import BodyPart, Description, describe
-from rbxcompose.body.files import BodyFile
-from rbxcompose.body.picture import draw
-from rbxcompose.body.pinocchio_model import PinocchioModel
-from rbxcompose.findings import Finding, Span
+from rbxcompose.base.findings import Finding, Span
+from rbxcompose.domains.body.description import BodyPart, Description, describe
+from rbxcompose.domains.body.files import BodyFile
+from rbxcompose.domains.body.picture import draw
+from rbxcompose.domains.body.pinocchio_model import PinocchioModel
 from tests.body.kinematics import matrix
 
 ROOT = Path(__file__).parents[2]
@@ -86,7 +86,7 @@ def tried(path: Path) -> Tried:
     """Read, check, place and draw a robot."""
     name = f"{path.relative_to(path.parents[2]).parts[0].removesuffix('_description')}/{path.stem}"
     (description, findings), seconds = _timed(lambda: read(path), ROUNDS)
-    codes = dict(sorted(Counter(one.code for one in findings).items()))
+    codes = dict(sorted(Counter(finding.code for finding in findings).items()))
     links = len(description.body.links) if description else 0
     difference, refused, drawn, drawing = None, "", "no", 0.0
     if description:

@@ -6,7 +6,7 @@ import math
 
 from hypothesis import strategies as st
 
-from rbxcompose.body.model import Body
+from rbxcompose.domains.body.model import Body
 
 MOVING = ("revolute", "continuous", "prismatic")
 LIMIT = '<limit lower="-3" upper="3" effort="1" velocity="1"/>'
@@ -26,7 +26,7 @@ def axes(draw: st.DrawFn, kind: str) -> str:
     """Draw an axis of any length; of a prismatic joint it has length 1, since yourdfpy moves by as many lengths."""
     axis = draw(st.tuples(*[st.integers(-3, 3)] * 3).filter(any))
     length = math.hypot(*axis) if kind == "prismatic" else 1
-    return " ".join(repr(one / length) for one in axis)
+    return " ".join(repr(number / length) for number in axis)
 
 
 @st.composite
@@ -39,7 +39,7 @@ def urdfs(draw: st.DrawFn) -> str:
     for child in range(1, count):
         parent = draw(st.integers(0, child - 1) | st.just(child - 1))
         kinds[child] = kind = draw(st.sampled_from(("fixed", *MOVING)))
-        followed = [one for one in leaders if kinds[one] == kind != "continuous"]
+        followed = [leader for leader in leaders if kinds[leader] == kind != "continuous"]
         mimic = draw(st.sampled_from([None, *followed]))
         if kind != "fixed" and mimic is None:
             leaders.append(child)

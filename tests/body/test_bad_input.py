@@ -11,17 +11,17 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from rbxcompose import fence
-from rbxcompose.body.lint import lint
-from rbxcompose.body.mesh_files import FORMATS, mesh_problem
-from rbxcompose.body.model import Body
-from rbxcompose.body.picture import draw
-from rbxcompose.body.text import tree_of
-from rbxcompose.body.urdf import LARGEST, read_body
-from rbxcompose.body.xml_reader import read_urdf
-from rbxcompose.cli.main import main
-from rbxcompose.findings import Finding
-from rbxcompose.printable import FORBIDDEN
+from rbxcompose.base import processes as fence
+from rbxcompose.base.findings import Finding
+from rbxcompose.base.printable import FORBIDDEN
+from rbxcompose.commands.main import main
+from rbxcompose.domains.body.files import FORMATS, mesh_problem
+from rbxcompose.domains.body.lint import lint
+from rbxcompose.domains.body.model import Body
+from rbxcompose.domains.body.picture import draw
+from rbxcompose.domains.body.text import tree_of
+from rbxcompose.domains.body.urdf import LARGEST, read_body
+from rbxcompose.domains.body.xml_reader import read_urdf
 from rbxcompose.testing.manifests import check_file, check_text
 from tests.body.bad_bodies import ALL, MESHES, PWNED, SECRET, YAML, BadBody, computed, fixed, links, mesh, stl, urdf
 from tests.soak import Soak
@@ -35,10 +35,12 @@ def test_a_bad_description_is_a_finding_at_its_place_and_executes_nothing(
     monkeypatch.chdir(file.parent)
     before = sorted(tmp_path.rglob("*"))
     checked = check_file(Path("robot.yaml"))
-    told = [one for one in checked.compilation.report if one.code == case.code]
+    told = [finding for finding in checked.compilation.report if finding.code == case.code]
     assert told, checked.text
-    assert {one.span.file for one in told if one.span} <= {"bad.xml", "robot.yaml"}
-    assert all(one.span and (one.span.file == "bad.xml" or not case.is_placed) for one in told), checked.text
+    assert {finding.span.file for finding in told if finding.span} <= {"bad.xml", "robot.yaml"}
+    assert all(finding.span and (finding.span.file == "bad.xml" or not case.is_placed) for finding in told), (
+        checked.text
+    )
     assert not re.search(FORBIDDEN, checked.text.replace("\n", ""))
     assert SECRET not in checked.text
     assert sorted(tmp_path.rglob("*")) == before
@@ -185,10 +187,10 @@ def test_a_damaged_urdf_is_a_body_of_finite_numbers_or_a_finding_with_its_place(
         assert root.span
         return
     body, findings = read_body(root)
-    assert all(one.span and one.span.file == "bad.xml" for one in findings)
+    assert all(finding.span and finding.span.file == "bad.xml" for finding in findings)
     if not findings and body.links:
-        assert all(one.span for one in lint(body, ()))
-        numbers = [one for pose in body.poses({}).values() for one in (*pose.translation, *pose.rotation)]
+        assert all(finding.span for finding in lint(body, ()))
+        numbers = [value for pose in body.poses({}).values() for value in (*pose.translation, *pose.rotation)]
         assert all(map(math.isfinite, numbers))
 
 

@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.body.model import Body, BodyJoint
-from rbxcompose.body.text import joints_of, links_of, tree_of
-from rbxcompose.body.urdf import read_body
-from rbxcompose.body.xml_reader import XmlElement, read_urdf
-from rbxcompose.findings import Finding, Span
-from rbxcompose.geometry import Transform3, quaternion_about, quaternion_from_rpy, rotate
+from rbxcompose.base.findings import Finding, Span
+from rbxcompose.base.geometry import Transform3, quaternion_about, quaternion_from_rpy, rotate
+from rbxcompose.domains.body.model import Body, BodyJoint
+from rbxcompose.domains.body.text import joints_of, links_of, tree_of
+from rbxcompose.domains.body.urdf import read_body
+from rbxcompose.domains.body.xml_reader import XmlElement, read_urdf
 
 ARM = """<robot name="arm">
   <material name="red"><color rgba="1 0 0 1"/></material>
@@ -58,7 +58,7 @@ def test_links_and_joints_are_read_with_their_values(arm: Body) -> None:
     assert base.inertial
     assert (base.inertial.mass, base.visuals[0].geometry.size, base.visuals[0].colour) == (2, (1, 2, 3), (1, 0, 0, 1))
     assert (shoulder.axis, shoulder.origin.translation, shoulder.rest) == ((0, 1, 0), (0, 0, 1), 0.5)
-    assert (arm.root, [one.name for one in arm.moving]) == ("base", ["shoulder", "slide"])
+    assert (arm.root, [joint.name for joint in arm.moving]) == ("base", ["shoulder", "slide"])
     assert arm.joints["finger"].span[:3] == ("arm.urdf", 18, 3)
 
 
@@ -154,13 +154,13 @@ MISTAKES = {
 def test_each_mistake_is_a_finding_at_its_element(name: str) -> None:
     inside, code, words = MISTAKES[name]
     _, findings = read(f'<robot name="r">\n{inside}\n</robot>')
-    assert [(one.code, one.span and one.span.line) for one in findings] == [(code, 2)] * len(findings)
-    assert any(words in one.message for one in findings), findings
+    assert [(finding.code, finding.span and finding.span.line) for finding in findings] == [(code, 2)] * len(findings)
+    assert any(words in finding.message for finding in findings), findings
 
 
 def test_a_robot_without_links_is_told() -> None:
     _, findings = read('<robot name="r"/>')
-    assert [(one.code, one.message) for one in findings] == [("RBX2006", "this robot has no links")]
+    assert [(finding.code, finding.message) for finding in findings] == [("RBX2006", "this robot has no links")]
 
 
 @settings(deadline=None)

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.body.xml_reader import read_urdf
-from rbxcompose.composition.dump import dump_robot
-from rbxcompose.finding_pages import body_of
-from rbxcompose.findings import KINDS, Finding
-from rbxcompose.manifest.limits import DEPTH, URDF_BYTES, URDF_ELEMENTS
-from rbxcompose.plan.diff import difference
-from rbxcompose.plan.dump import dump, load
+from rbxcompose.base.findings import KINDS, Finding
+from rbxcompose.commands.finding_pages import body_of
+from rbxcompose.compiler.composition.dump import dump_robot
+from rbxcompose.compiler.plan.diff import difference
+from rbxcompose.compiler.plan.dump import dump, load
+from rbxcompose.domains.body.xml_reader import read_urdf
+from rbxcompose.manifest.tree import DEPTH, URDF_BYTES, URDF_ELEMENTS
 from rbxcompose.testing.golden import Golden
 from rbxcompose.testing.manifests import Checked, check_text
 
@@ -64,8 +64,8 @@ def check(folder: Path, robot: str = ROBOT, **files: str) -> Checked:
 
 
 def urdf_of(checked: Checked) -> object:
-    [one] = [one for one in checked.plan.instances if one.name == "robot_description"]
-    return getattr(one.config, "urdf")  # noqa: B009 - the type of the configuration is that of a plug-in
+    [instance] = [candidate for candidate in checked.plan.instances if candidate.name == "robot_description"]
+    return getattr(instance.config, "urdf")  # noqa: B009 - the type of the configuration is that of a plug-in
 
 
 def test_the_robot_runs_a_component_that_has_the_text(tmp_path: Path) -> None:
@@ -77,7 +77,7 @@ def test_the_robot_runs_a_component_that_has_the_text(tmp_path: Path) -> None:
 def test_a_robot_without_a_body_runs_none(tmp_path: Path) -> None:
     for section in ("", "body:\n"):
         checked = check(tmp_path, HEAD + section)
-        assert "robot_description" not in {one.name for one in checked.plan.instances}
+        assert "robot_description" not in {instance.name for instance in checked.plan.instances}
 
 
 def test_each_mistake_in_a_file_is_told_at_its_place(

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.body.description import Description
-from rbxcompose.compiler import compile_robot
+from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.domains.body.description import Description
 from tests.body.kinematics import Three, description_of
 from tests.body.random_bodies import positions, urdfs
 from tests.soak import Soak

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.body.inertia import Tensor, about, added, principal_moments
-from rbxcompose.geometry import Transform3, quaternion_from_rpy, rotate
+from rbxcompose.base.geometry import Transform3, quaternion_from_rpy, rotate
+from rbxcompose.domains.body.lint import Tensor, about, added, principal_moments
 
 MOMENTS = st.floats(-10.0, 10.0) | st.floats(-1e-9, 1e-9)
 TENSORS = st.builds(lambda xx, xy, xz, yy, yz, zz: ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)), *[MOMENTS] * 6)
@@ -24,7 +24,7 @@ POSES = st.builds(
 
 @given(TENSORS)
 def test_principal_moments_are_the_eigenvalues(tensor: Tensor) -> None:
-    largest = max(abs(one) for row in tensor for one in row)
+    largest = max(abs(value) for row in tensor for value in row)
     assert principal_moments(tensor) == pytest.approx(
         np.linalg.eigvalsh(tensor), rel=0.0, abs=max(1e-14 * largest, 1e-300)
     )
@@ -32,7 +32,7 @@ def test_principal_moments_are_the_eigenvalues(tensor: Tensor) -> None:
 
 @given(TENSORS, st.sampled_from([1e-300, 1e-150, 1e150, 1e300]))
 def test_moments_of_any_size_are_found(tensor: Tensor, scale: float) -> None:
-    scaled = tuple(tuple(one * scale for one in row) for row in tensor)
+    scaled = tuple(tuple(value * scale for value in row) for row in tensor)
     least, middle, most = principal_moments(scaled)  # type: ignore[arg-type]
     assert least <= middle <= most
     assert all(map(math.isfinite, (least, middle, most)))

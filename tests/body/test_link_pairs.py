@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.body.link_pairs import REASONS, CollisionMatrix, digest_of, pair_of, read_matrix
+from rbxcompose.domains.body.link_pairs import REASONS, CollisionMatrix, digest_of, pair_of, read_matrix
 from tests.body.kinematics import description_of
 from tests.motion.toy_arm import urdf
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rbxcompose.body.lint import lint
+from rbxcompose.domains.body.lint import lint
 from tests.body.kinematics import description_of
 
 BOX = '<visual><geometry><box size="1 1 1"/></geometry></visual>'

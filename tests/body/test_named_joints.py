@@ -57,7 +57,7 @@ def check(folder: Path, robot: str) -> Checked:
 
 
 def config_of(checked: Checked, name: str) -> AimerConfig:
-    [found] = [one.config for one in checked.plan.instances if one.name == name]
+    [found] = [instance.config for instance in checked.plan.instances if instance.name == name]
     assert isinstance(found, AimerConfig)
     return found
 

@@ -8,14 +8,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.body.attachment import FramePose, PieceAttachment
-from rbxcompose.body.model import Body
-from rbxcompose.body.pieces import PieceOfBody, assembled, prefixed, to_xml
-from rbxcompose.body.urdf import read_body
-from rbxcompose.body.xml_reader import XmlElement, read_urdf
-from rbxcompose.composition.dump import dump_robot
-from rbxcompose.findings import Span
-from rbxcompose.geometry import Transform3
+from rbxcompose.base.findings import Span
+from rbxcompose.base.geometry import Transform3
+from rbxcompose.compiler.composition.dump import dump_robot
+from rbxcompose.domains.body.description import PieceOfBody, assembled, prefixed, to_xml
+from rbxcompose.domains.body.model import Body
+from rbxcompose.domains.body.urdf import read_body
+from rbxcompose.domains.body.xml_reader import XmlElement, read_urdf
+from rbxcompose.manifest.fields import FramePose, PieceAttachment
 from rbxcompose.testing.golden import Golden
 from rbxcompose.testing.manifests import Checked, check_text
 
@@ -125,7 +125,7 @@ def test_the_composed_robot_reads_back_as_the_same_body(tmp_path: Path) -> None:
     assert checked.compilation.robot
     again = check(tmp_path, dump_robot(checked.compilation.robot.manifest))
     robots = [one.compilation.robot for one in (checked, again)]
-    texts = [one.manifest.body.text for one in robots if one and one.manifest.body]
+    texts = [robot.manifest.body.text for robot in robots if robot and robot.manifest.body]
     assert len(texts) == 2
     assert texts[0] == texts[1]
 

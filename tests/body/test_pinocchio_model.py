@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rbxcompose.body.pinocchio_model import PinocchioModel
+from rbxcompose.domains.body.pinocchio_model import PinocchioModel
 from tests.body.kinematics import description_of
 
 CART = """<robot name="cart">

@@ -21,12 +21,12 @@ NOTHING_TO_DRAW = "the body has no shapes"
 @pytest.mark.skipif(folder() is None, reason=f"{PACKAGE} is not installed")
 def test_every_published_robot_is_read_placed_and_drawn(soak: Soak) -> None:
     found = [tried_alone(path) for path in robots() if soak.is_on or path.stem in QUICK]
-    failures = [one for one in found if one.loads and (one.difference is None or one.difference > CLOSE)]
-    failures += [one for one in found if one.loads and one.drawn not in ("yes", NOTHING_TO_DRAW)]
-    failures += [one for one in found if not one.loads and not one.findings]
-    loaded = sum(one.loads for one in found)
-    told = sum(bool(one.findings) for one in found)
+    failures = [item for item in found if item.loads and (item.difference is None or item.difference > CLOSE)]
+    failures += [item for item in found if item.loads and item.drawn not in ("yes", NOTHING_TO_DRAW)]
+    failures += [item for item in found if not item.loads and not item.findings]
+    loaded = sum(item.loads for item in found)
+    told = sum(bool(item.findings) for item in found)
     soak.tell("published robots", len(found), len(failures), f"{loaded} read, the others refused; {told} with findings")
     if soak.is_on:
-        RESULTS.write_text(json.dumps([asdict(one) for one in found], indent=1) + "\n", encoding="utf-8")
+        RESULTS.write_text(json.dumps([asdict(item) for item in found], indent=1) + "\n", encoding="utf-8")
     assert failures == []

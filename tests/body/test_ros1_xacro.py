@@ -10,14 +10,13 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.body.xacro import Expanded, expand
-from rbxcompose.cli.check import fix
-from rbxcompose.edits import apply
-from rbxcompose.finding_pages import body_of
-from rbxcompose.findings import KINDS, Finding, Span
-from rbxcompose.manifest.files import shown_name
-from rbxcompose.manifest.library import library_root
+from rbxcompose.base.findings import KINDS, Finding, Span
+from rbxcompose.base.fixes import apply
+from rbxcompose.commands.finding_pages import body_of
+from rbxcompose.domains.body.xacro import Expanded, expand
+from rbxcompose.manifest.files import library_root, shown_name
 from rbxcompose.testing.manifests import Checked, check_file, check_text
+from rbxcompose.tools.commands.check import fix
 from tests.soak import Soak
 
 ROBOT = "rbx: 1\nkind: Robot\nname: cart\nbody:\n  xacro: cart.xacro\n"
@@ -73,7 +72,7 @@ def check(folder: Path, **files: str) -> Checked:
 
 
 def notes(checked: Checked) -> list[tuple[str, int, int, str]]:
-    found = [(one.span, one.message) for one in checked.compilation.report if one.code == "RBX2014"]
+    found = [(finding.span, finding.message) for finding in checked.compilation.report if finding.code == "RBX2014"]
     return [(Path(span.file).name, span.line, span.column, message) for span, message in found if span]
 
 
@@ -148,10 +147,10 @@ def test_a_call_is_known_if_its_macro_is_included_later_than_its_file_was_read(t
 
 def test_files_of_the_library_are_read_like_that_but_not_fixed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     write(tmp_path, cart='<robot name="cart"><property name="a" value="b"/><link name="${a}"/></robot>')
-    monkeypatch.setattr("rbxcompose.body.prefixes.library_root", lambda: tmp_path)
+    monkeypatch.setattr("rbxcompose.domains.body.xacro.library_root", lambda: tmp_path)
     found, _ = expand(tmp_path / "cart.xacro", {}, {}, [tmp_path, library_root()], SPAN)
     assert isinstance(found, Expanded)
-    assert [(one.code, one.fix) for one in found.notes] == [("RBX2014", None)]
+    assert [(note.code, note.fix) for note in found.notes] == [("RBX2014", None)]
 
 
 def test_the_page_shows_the_mistake_and_its_cure(tmp_path: Path) -> None:
@@ -200,7 +199,7 @@ def test_the_fix_of_any_file_gives_back_the_prefixes_that_it_lost(inside: str, t
     assert read.text.replace("cart.xacro", "modern.xacro").split() == found.text.split()
     assert len(read.notes) == ("[" in whole)
     file = shown_name(tmp_path / "cart.xacro")
-    assert apply([one.fix for one in read.notes if one.fix], {file: old}).texts[file] == modern
+    assert apply([note.fix for note in read.notes if note.fix], {file: old}).texts[file] == modern
 
 
 def test_a_pattern_includes_the_files_that_fit_it_in_their_order(tmp_path: Path) -> None:
@@ -244,7 +243,7 @@ def test_the_robots_of_a_ros_1_package_load_or_name_what_is_missing(soak: Soak) 
     if FOLDER not in os.environ:
         pytest.skip(f"{FOLDER} names no package: a folder with xacro files of ROS 1, which are not part of this one")
     package = Path(os.environ[FOLDER]).resolve()
-    files = [one for one in sorted(package.rglob("*.xacro")) if not one.name.endswith(".urdf.xacro")]
+    files = [path for path in sorted(package.rglob("*.xacro")) if not path.name.endswith(".urdf.xacro")]
     loaded, missing = 0, 0
     for file in files:
         found, _ = expand(file, {}, {package.name: package}, [package], SPAN)

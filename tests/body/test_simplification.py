@@ -11,8 +11,8 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.body.simplification import distance, faces_for, nearest, scaled, simplify
-from rbxcompose.cli.body import file_names
+from rbxcompose.domains.body.commands.body import file_names
+from rbxcompose.domains.body.meshes import distance, faces_for, nearest, scaled, simplify
 
 ONE = (1.0, 1.0, 1.0)
 
@@ -83,7 +83,7 @@ def test_fewer_triangles_are_further_away(file: Path) -> None:
 
 
 def test_the_error_is_told_in_the_scale_of_the_urdf(file: Path) -> None:
-    metres, millimetres = (simplify(file, "ball", [(one,) * 3], ratio=0.1) for one in (1.0, 0.001))
+    metres, millimetres = (simplify(file, "ball", [(value,) * 3], ratio=0.1) for value in (1.0, 0.001))
     assert millimetres.largest == pytest.approx(metres.largest / 1000)
     assert simplify(file, "ball", [(0.001,) * 3, ONE], ratio=0.1).largest == metres.largest
 

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.body.model import Geometry
-from rbxcompose.body.solid_boxes import SolidBox, box_within, penetration
-from rbxcompose.geometry import Transform3, Vector3, quaternion_from_rpy, rotate
+from rbxcompose.base.geometry import Transform3, Vector3, quaternion_from_rpy, rotate
+from rbxcompose.domains.arms.checks import SolidBox, box_within, penetration
+from rbxcompose.domains.body.model import Geometry
 
 lengths = st.floats(0.01, 2.0)
 places = st.tuples(*[st.floats(-2.0, 2.0)] * 3)

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rbxcompose.body.meshes import Solid
-from rbxcompose.body.solids import solid_of
+from rbxcompose.domains.body.meshes import Solid
+from rbxcompose.domains.body.picture import solid_of
 from tests.body.kinematics import description_of
 
 DAE = """<?xml version="1.0"?>

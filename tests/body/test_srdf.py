@@ -5,9 +5,17 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.body.link_pairs import REASONS, pair_of
-from rbxcompose.body.srdf import EndEffector, OuterJoint, SemanticGroup, Semantics, is_srdf, read_semantics, to_srdf
-from rbxcompose.body.xml_reader import XmlElement, read_urdf
+from rbxcompose.domains.body.link_pairs import REASONS, pair_of
+from rbxcompose.domains.body.srdf import (
+    EndEffector,
+    OuterJoint,
+    SemanticGroup,
+    Semantics,
+    is_srdf,
+    read_semantics,
+    to_srdf,
+)
+from rbxcompose.domains.body.xml_reader import XmlElement, read_urdf
 from tests.motion.toy_arm import urdf
 
 NAMES = st.text("abcXYZ_09é<&\"'", min_size=1, max_size=6)
@@ -22,7 +30,7 @@ POSES = st.dictionaries(
 SAID = st.builds(
     Semantics,
     NAMES,
-    st.lists(GROUPS, max_size=3).map(lambda found: {one.name: one for one in found}),
+    st.lists(GROUPS, max_size=3).map(lambda found: {item.name: item for item in found}),
     POSES,
     st.lists(st.builds(EndEffector, NAMES, NAMES, NAMES, NAMES | st.just("")), max_size=2).map(tuple),
     SEVERAL,

@@ -8,11 +8,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.body import pose_history, transforms
-from rbxcompose.body.pose_history import LATE, SPAN
-from rbxcompose.body.transform_errors import ExtrapolationError, NotConnectedError, TransformError, UnknownFrameError
-from rbxcompose.body.transforms import TransformAnswer, TransformTree
-from rbxcompose.geometry import Pose2, Transform3, composed, lerp, slerp
+from rbxcompose.base import transforms
+from rbxcompose.base import transforms as pose_history
+from rbxcompose.base.geometry import Pose2, Transform3, composed, lerp, slerp
+from rbxcompose.base.transforms import (
+    LATE,
+    SPAN,
+    ExtrapolationError,
+    NotConnectedError,
+    TransformAnswer,
+    TransformError,
+    TransformTree,
+    UnknownFrameError,
+)
 from tests.body.moving_frames import MOST, POSES, SECOND, Move, angle_between, fill, is_same, moves
 
 TIMES = st.integers(0, MOST)
@@ -114,7 +122,7 @@ def test_travels_in_time_can_be_joined_and_without_a_difference_are_look_ups(
     tree = TransformTree()
     fill(tree, "odom", "base", base)
     fill(tree, "base", "arm", arm)
-    first, second = (tree.lookup_across("arm", one, "arm", two, "odom") for one, two in ((a, b), (b, c)))
+    first, second = (tree.lookup_across("arm", number, "arm", two, "odom") for number, two in ((a, b), (b, c)))
     assert is_same(first.compose(second), tree.lookup_across("arm", a, "arm", c, "odom"))
     assert is_same(tree.lookup_across("odom", a, "arm", a, "base"), tree.lookup_at("odom", "arm", a))
 

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.body import transforms
-from rbxcompose.body.transforms import TransformTree
-from rbxcompose.geometry import Pose2, Transform3, wrap_angle
+from rbxcompose.base import transforms
+from rbxcompose.base.geometry import Pose2, Transform3, wrap_angle
+from rbxcompose.base.transforms import TransformTree
 
 
 def at(x: float, y: float = 0.0, heading: float = 0.0) -> Transform3:

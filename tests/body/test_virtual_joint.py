@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.body.link_pairs import digest_of
-from rbxcompose.body.model import Body
-from rbxcompose.body.virtual_joint import VirtualJoint
-from rbxcompose.findings import Span
+from rbxcompose.base.findings import Span
+from rbxcompose.domains.body.description import VirtualJoint
+from rbxcompose.domains.body.link_pairs import digest_of
+from rbxcompose.domains.body.model import Body
 from rbxcompose.msgs.tf2_msgs import TFMessage
-from rbxcompose.qos import Qos
+from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench, instance
 from tests.body.kinematics import Three, description_of
 from tests.body.random_bodies import positions, urdfs
@@ -60,8 +60,8 @@ def config(project: Project, kind: str) -> Any:
 
 def without_places(body: Body) -> tuple[object, ...]:
     joints = {
-        name: (one.kind, one.parent, one.child, one.origin, one.axis, one.mimic and one.mimic.joint)
-        for name, one in body.joints.items()
+        name: (joint.kind, joint.parent, joint.child, joint.origin, joint.axis, joint.mimic and joint.mimic.joint)
+        for name, joint in body.joints.items()
     }
     return {*body.links}, joints
 
@@ -97,7 +97,9 @@ def test_its_frame_is_one_of_links_and_others_get_the_urdf_as_it_was(tmp_path: P
     told: list[TFMessage] = []
     bench.bus.subscribe("listener", "/tf_static", TFMessage, Qos.LATCHED, told.append)
     bench.advance(0.1)
-    pairs = {(one.header.frame_id, one.child_frame_id) for message in told for one in message.transforms}
+    pairs = {
+        (transform.header.frame_id, transform.child_frame_id) for message in told for transform in message.transforms
+    }
     assert ("world", "arm_base_link") in pairs
 
 

@@ -10,11 +10,10 @@ import pinocchio
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.body.link_pairs import digest_of
-from rbxcompose.body.pieces import to_xml
-from rbxcompose.body.urdf import read_body
-from rbxcompose.body.visual_cover import covering
-from rbxcompose.body.xml_reader import XmlElement, read_urdf
+from rbxcompose.domains.body.description import covering, to_xml
+from rbxcompose.domains.body.link_pairs import digest_of
+from rbxcompose.domains.body.urdf import read_body
+from rbxcompose.domains.body.xml_reader import XmlElement, read_urdf
 from tests.parts.project import Project
 
 SIZES = st.sampled_from(("0.1", "0.25", "0.5"))
@@ -65,14 +64,14 @@ def _joint(number: int) -> str:
 
 def _shapes(text: str, kind: object) -> Iterator[tuple[str, str, str]]:
     model = pinocchio.buildModelFromXML(text)
-    for one in pinocchio.buildGeomFromUrdfString(model, text, kind).geometryObjects:
-        shape = one.geometry
+    for geometry_object in pinocchio.buildGeomFromUrdfString(model, text, kind).geometryObjects:
+        shape = geometry_object.geometry
         size = next(str(getattr(shape, name)) for name in ("halfSide", "halfLength", "radius") if hasattr(shape, name))
         size += str(getattr(shape, "radius", ""))
         yield (
-            model.frames[one.parentFrame].name,
+            model.frames[geometry_object.parentFrame].name,
             f"{type(shape).__name__} {size}",
-            str(one.placement.homogeneous.round(9)),
+            str(geometry_object.placement.homogeneous.round(9)),
         )
 
 
@@ -81,15 +80,15 @@ def test_a_robot_that_covers_what_is_seen_says_so_to_everybody(tmp_path: Path) -
     bodies = []
     for cover, codes in (("collision", ["RBX2354"]), ("visual", [])):
         project.check(ROBOT.format(cover=cover), files={"robots/one/lamp.urdf": LAMP})
-        assert [one.code for one in project.findings] == codes
+        assert [finding.code for finding in project.findings] == codes
         assert project.manifest.body is not None
         bodies.append(project.manifest.body)
         assert project.checked is not None
         assert project.checked.compilation.robot is not None
-        configs = (project.checked.compilation.robot.components[one].config for one in COMPONENTS)
-        assert {getattr(one, "urdf", "") for one in configs} == {bodies[-1].text}
+        configs = (project.checked.compilation.robot.components[component].config for component in COMPONENTS)
+        assert {getattr(config, "urdf", "") for config in configs} == {bodies[-1].text}
     assert bodies[1].text.count("<collision>") == bodies[0].text.count("<collision>") + 1
-    assert [one.geometry.size for one in bodies[1].body.links["lamp_bulb"].collisions] == [(0.04,)]
+    assert [collision.geometry.size for collision in bodies[1].body.links["lamp_bulb"].collisions] == [(0.04,)]
 
 
 def test_pairs_that_were_tried_on_other_shapes_do_not_count_and_check_says_so(tmp_path: Path) -> None:
@@ -101,4 +100,4 @@ def test_pairs_that_were_tried_on_other_shapes_do_not_count_and_check_says_so(tm
     files = {"robots/one/lamp.urdf": LAMP, "robots/one/pairs.yaml": pairs}
     for cover, codes in (("collision", ["RBX2354"]), ("visual", ["RBX2307"])):
         project.check(ROBOT.format(cover=f"{cover}, collisions: pairs.yaml"), files=files)
-        assert [one.code for one in project.findings] == codes
+        assert [finding.code for finding in project.findings] == codes

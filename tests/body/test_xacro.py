@@ -11,13 +11,12 @@ from unittest.mock import Mock
 
 import pytest
 
-from rbxcompose.body import xacro_answers
-from rbxcompose.body.xacro import Expanded, expand
-from rbxcompose.body.xacro_answer import BareFile, BareTag, XacroAnswer, read_answer
-from rbxcompose.body.xml_reader import XmlElement, read_urdf
-from rbxcompose.findings import Finding, Span
-from rbxcompose.per_compile import one_compile
-from rbxcompose.typed_json import to_data
+from rbxcompose.base.findings import Finding, Span, one_compile
+from rbxcompose.base.requests import to_data
+from rbxcompose.domains.body import xacro as xacro_answers
+from rbxcompose.domains.body.xacro import Expanded, expand
+from rbxcompose.domains.body.xacro_answer import BareFile, BareTag, XacroAnswer, read_answer
+from rbxcompose.domains.body.xml_reader import XmlElement, read_urdf
 
 HEAD = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">\n'
 TAG = BareTag(1, 2, "macro", (3, 4))
@@ -38,7 +37,10 @@ def links(found: Expanded | Finding) -> list[tuple[str, str, int, int]]:
     assert isinstance(found, Expanded), found
     root = read_urdf(found.located, "r.xacro")
     assert isinstance(root, XmlElement), root
-    return [(one.attributes["name"], Path(one.span.file).name, one.span.line, one.span.column) for one in root.children]
+    return [
+        (child.attributes["name"], Path(child.span.file).name, child.span.line, child.span.column)
+        for child in root.children
+    ]
 
 
 def test_elements_keep_their_places_through_includes_and_macros(tmp_path: Path) -> None:

@@ -11,12 +11,12 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
+from rbxcompose.base.clock import MonotonicClock, SteppedClock
+from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.bus import Bus
+from rbxcompose.bus.endpoints import tcp_endpoint
 from rbxcompose.bus.zenoh_session import open_peer, open_router
 from rbxcompose.bus.zenoh_transport import ZenohTransport
-from rbxcompose.clock import MonotonicClock, SteppedClock
-from rbxcompose.endpoints import tcp_endpoint
-from rbxcompose.scheduler import Scheduler
 
 
 class Alone:

@@ -8,13 +8,13 @@ import time
 
 import numpy as np
 
+from rbxcompose.base.clock import MonotonicClock
+from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.bus import Bus
 from rbxcompose.bus.zenoh_session import open_peer
 from rbxcompose.bus.zenoh_transport import ZenohTransport
-from rbxcompose.clock import MonotonicClock
 from rbxcompose.msgs.rcl_interfaces import ParameterValue
-from rbxcompose.qos import Qos
-from rbxcompose.scheduler import Scheduler
+from rbxcompose.sdk.ports import Qos
 
 SIZES = (60_000, 1_000_000, 8_000_000)  # bytes
 PERIOD = 0.1  # [s] between two pictures
@@ -34,8 +34,8 @@ def main(port: str) -> None:
     publish = bus.publisher("camera", "image", ParameterValue, Qos.BULK)
     pictures = [picture(size) for size in SIZES]
     while os.getppid() == parent:
-        for one in pictures:
-            publish(one)
+        for parameter_value in pictures:
+            publish(parameter_value)
             time.sleep(PERIOD)
 
 

@@ -6,12 +6,12 @@ import queue
 import sys
 from collections.abc import Callable
 
+from rbxcompose.base.clock import MonotonicClock
+from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.bus import Bus
 from rbxcompose.bus.zenoh_session import open_peer
 from rbxcompose.bus.zenoh_transport import ZenohTransport
-from rbxcompose.clock import MonotonicClock
 from rbxcompose.msgs.nav2_msgs import NavigateToPose
-from rbxcompose.scheduler import Scheduler
 
 
 def main(port: str) -> None:

@@ -2,11 +2,11 @@ from __future__ import annotations
 
 import pytest
 
-from rbxcompose.bus.action_server import ActionServer
+from rbxcompose.bus.actions import ActionServer
 from rbxcompose.msgs.action_msgs import GoalStatusArray
 from rbxcompose.msgs.nav2_msgs import NavigateToPose
-from rbxcompose.qos import Qos
 from rbxcompose.sdk.bound import Ended, Outcome
+from rbxcompose.sdk.ports import Qos
 from tests.bus.conftest import Alone
 
 Goal, Result, Feedback = NavigateToPose.Goal, NavigateToPose.Result, NavigateToPose.Feedback

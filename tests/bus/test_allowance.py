@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.bus.allowance import BURST, MOST_SOURCES, QUIET, Allowance, Allowances
+from rbxcompose.bus.local import BURST, MOST_SOURCES, QUIET, Allowance, Allowances
 
 rates = st.floats(0.5, 5000.0)
 

@@ -2,9 +2,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from rbxcompose.bus.attachment import Attachment
-from rbxcompose.bus.gate import Gate
-from rbxcompose.bus.local import Participant
+from rbxcompose.bus.local import Gate, Participant
+from rbxcompose.bus.names import Attachment
 from rbxcompose.bus.transport import Question
 from tests.bus.conftest import Alone
 

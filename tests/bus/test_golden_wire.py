@@ -12,11 +12,13 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from rbxcompose.bus.attachment import Attachment, decode_attachment
+from rbxcompose.base.clock import SteppedClock
+from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.bus import Bus
+from rbxcompose.bus.names import Attachment, decode_attachment
 from rbxcompose.bus.tokens import gid
 from rbxcompose.bus.transport import EXPIRED, LONGEST_WAIT, Arrival, TransportReply
-from rbxcompose.clock import SteppedClock
+from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.msgs import rcl_interfaces as rcl
 from rbxcompose.msgs.action_msgs import CancelGoal, GoalInfo
 from rbxcompose.msgs.cdr import encode
@@ -26,11 +28,9 @@ from rbxcompose.msgs.rbxcompose_msgs import Recharge
 from rbxcompose.msgs.std_msgs import Empty, Float32, String
 from rbxcompose.msgs.types import Message
 from rbxcompose.msgs.unique_identifier_msgs import UUID
-from rbxcompose.plan.model import Plan
-from rbxcompose.qos import Qos
 from rbxcompose.runtime.process_group.host import Host
-from rbxcompose.scheduler import Scheduler
 from rbxcompose.sdk import Ended, Outcome
+from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Golden, instance
 
 ASKER = Attachment(41, 7, bytes(range(16)))
@@ -257,4 +257,6 @@ def test_the_description_of_a_body_is_latched(wire: Wire, golden: Golden) -> Non
     host.activate(["robot_description"])
     wire.settle()
     blocks = re.split(r"^(?=\S)", wire.text(), flags=re.MULTILINE)
-    golden.check("robot_description.txt", "".join(one for one in blocks if "/std_msgs::msg::dds_::String_/" in one))
+    golden.check(
+        "robot_description.txt", "".join(block for block in blocks if "/std_msgs::msg::dds_::String_/" in block)
+    )

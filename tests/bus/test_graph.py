@@ -38,7 +38,7 @@ def test_an_action_is_told_by_the_service_that_takes_its_goals() -> None:
     graph = Graph.of([token(BASE, EntityKind.SERVER, "/go_to/_action/send_goal", NavigateToPose.SendGoal)])
     (action,) = graph.actions
     assert (action.name, action.types) == ("/go_to", ["nav2_msgs/action/NavigateToPose"])
-    assert [one.is_hidden for one in graph.services] == [True]
+    assert [service.is_hidden for service in graph.services] == [True]
 
 
 def test_different_types_on_one_topic_are_told() -> None:

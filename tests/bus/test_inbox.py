@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.bus.inbox import Inbox
-from rbxcompose.scheduler import Scheduler
+from rbxcompose.base.scheduler import Scheduler
+from rbxcompose.bus.local import Inbox
 
 
 @given(depth=st.integers(1, 5), items=st.lists(st.integers(), max_size=20))

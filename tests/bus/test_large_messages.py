@@ -7,7 +7,7 @@ import time
 import pytest
 
 from rbxcompose.msgs.std_msgs import String
-from rbxcompose.qos import Qos
+from rbxcompose.sdk.ports import Qos
 from tests.bus.conftest import Connected, Network
 
 

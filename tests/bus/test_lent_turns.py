@@ -7,15 +7,14 @@ from collections.abc import Iterator
 
 import pytest
 
+from rbxcompose.base.clock import MonotonicClock
+from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.bus import Bus
 from rbxcompose.bus.zenoh_session import open_peer
 from rbxcompose.bus.zenoh_transport import ZenohTransport
-from rbxcompose.clock import MonotonicClock
 from rbxcompose.msgs.std_msgs import Bool
-from rbxcompose.qos import Qos
-from rbxcompose.runtime.process_group.inbox import CallbackInbox
-from rbxcompose.runtime.process_group.turns import Turns
-from rbxcompose.scheduler import Scheduler
+from rbxcompose.runtime.process_group.connection import CallbackInbox, Turns
+from rbxcompose.sdk.ports import Qos
 from tests.bus.conftest import Network
 
 
@@ -55,7 +54,7 @@ def test_a_message_is_handled_where_it_arrives_and_answered_without_its_own_thre
         pong(message)
 
     lender.bus.subscribe("echo", "ping", Bool, Qos.COMMAND, answer)
-    other.bus.subscribe("asker", "pong", Bool, Qos.COMMAND, lambda one: back.append(one.data))
+    other.bus.subscribe("asker", "pong", Bool, Qos.COMMAND, lambda message: back.append(message.data))
     ping = other.bus.publisher("asker", "ping", Bool, Qos.COMMAND)
     network.until(lambda: ping.has_match and pong.has_match)
     lender.turn()
@@ -71,7 +70,7 @@ def test_a_message_is_handled_where_it_arrives_and_answered_without_its_own_thre
 def test_latched_and_bulk_messages_wait_for_the_own_thread(network: Network, lender: Lender, qos: Qos) -> None:
     other = network.process()
     threads: list[int] = []
-    lender.bus.subscribe("sink", "ping", Bool, qos, lambda one: threads.append(threading.get_ident()))
+    lender.bus.subscribe("sink", "ping", Bool, qos, lambda message: threads.append(threading.get_ident()))
     ping = other.bus.publisher("asker", "ping", Bool, qos)
     network.until(lambda: ping.has_match)
     lender.turn()
@@ -96,7 +95,7 @@ def test_what_may_wait_for_the_link_or_declares_is_left_to_the_own_thread(networ
         lender.bus.subscribe("relay", "more", Bool, Qos.COMMAND, lambda one: declared.append(one.data))
 
     lender.bus.subscribe("relay", "ping", Bool, Qos.COMMAND, relay)
-    other.bus.subscribe("asker", "event", Bool, Qos.EVENT, lambda one: events.append(one.data))
+    other.bus.subscribe("asker", "event", Bool, Qos.EVENT, lambda message: events.append(message.data))
     ping = other.bus.publisher("asker", "ping", Bool, Qos.COMMAND)
     more = other.bus.publisher("asker", "more", Bool, Qos.COMMAND)
     network.until(lambda: ping.has_match and event.has_match)

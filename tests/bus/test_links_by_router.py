@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
+from rbxcompose.bus.endpoints import tcp_endpoint
 from rbxcompose.bus.zenoh_session import open_lone, open_peer, open_router
-from rbxcompose.endpoints import tcp_endpoint
-from rbxcompose.sections.bus import BusModel
+from rbxcompose.compiler.sections.bus import BusModel
 from tests.systems.test_links import free_port, until
 
 PATIENCE = 10.0  # [s]

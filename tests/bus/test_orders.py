@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from rbxcompose.bus.orders import OrderPublisher
+from rbxcompose.bus.topics import OrderPublisher
 from rbxcompose.msgs.std_msgs import Float32
-from rbxcompose.qos import Qos
+from rbxcompose.sdk.ports import Qos
 from tests.bus.conftest import Alone, Connected, Network, network
 
 __all__ = ["network"]

@@ -13,20 +13,19 @@ from typing import Any
 import pytest
 import zenoh
 
-from rbxcompose.bus.allowance import BURST
-from rbxcompose.bus.attachment import Attachment, decode_attachment
-from rbxcompose.bus.refusals import RefusalReason
+from rbxcompose.bus.endpoints import tcp_endpoint
+from rbxcompose.bus.local import BURST, RefusalReason
+from rbxcompose.bus.names import Attachment, decode_attachment
 from rbxcompose.bus.tokens import EndpointToken, NodeToken, parse_token
 from rbxcompose.bus.zenoh_session import open_peer, open_router
-from rbxcompose.endpoints import tcp_endpoint
 from rbxcompose.msgs.cdr import encode
 from rbxcompose.msgs.example_interfaces import AddTwoInts
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.msgs.nav2_msgs import NavigateToPose
 from rbxcompose.msgs.std_msgs import Float32, String
 from rbxcompose.msgs.unique_identifier_msgs import UUID
-from rbxcompose.qos import Qos
 from rbxcompose.sdk.bound import Ended, Outcome, Reply
+from rbxcompose.sdk.ports import Qos
 from tests.bus.conftest import Connected, Network
 
 Goal, Result, Feedback = NavigateToPose.Goal, NavigateToPose.Result, NavigateToPose.Feedback

@@ -5,7 +5,7 @@ from threading import Thread
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.bus.refusals import RefusalReason, Refusals, sentence
+from rbxcompose.bus.local import RefusalReason, Refusals, sentence
 
 reasons = st.lists(st.sampled_from(RefusalReason))
 

@@ -9,7 +9,7 @@ import pytest
 
 from rbxcompose.bus.renewal import RENEWED, RenewableTransport
 from rbxcompose.bus.transport import LONGEST_WAIT, Arrival, Closable, Question, TransportReply
-from rbxcompose.qos import Qos
+from rbxcompose.sdk.ports import Qos
 
 
 @dataclass(eq=False)

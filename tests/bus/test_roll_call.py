@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.bus.roll_call import CALLS, MOST_CALLS, RollCall, roll_key
+from rbxcompose.bus.liveness import CALLS, MOST_CALLS, RollCall, roll_key
 
 NAMES = ("mission", "robot", "router", "world")
 Reaches = Callable[[str, str, int], bool]

@@ -2,9 +2,9 @@ from __future__ import annotations
 
 import math
 
+from rbxcompose.base.requests import Refused
 from rbxcompose.bus.services import LOST, ServedRequest, Server
 from rbxcompose.msgs.example_interfaces import AddTwoInts
-from rbxcompose.requests import Refused
 from rbxcompose.sdk.bound import Reply
 from tests.bus.conftest import Alone
 

@@ -9,11 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.bus import shared_memory
-from rbxcompose.bus.shared_memory import POOL, YOUNG, problem, remove_orphans
-from rbxcompose.bus.zenoh_session import peer_settings
+from rbxcompose.bus import zenoh_session as shared_memory
+from rbxcompose.bus.zenoh_session import POOL, YOUNG, peer_settings, problem, remove_orphans
 from rbxcompose.msgs.rcl_interfaces import ParameterValue
-from rbxcompose.qos import Qos
+from rbxcompose.sdk.ports import Qos
 from tests.bus.conftest import Network
 from tests.bus.lone_camera import SIZES, picture
 
@@ -94,8 +93,8 @@ def test_pictures_come_whole_from_another_process_and_nothing_is_left_of_it_when
 ) -> None:
     got: dict[int, ParameterValue] = {}
 
-    def take(one: ParameterValue) -> None:
-        got[len(one.byte_array_value)] = one
+    def take(parameter_value: ParameterValue) -> None:
+        got[len(parameter_value.byte_array_value)] = parameter_value
 
     viewer = network.process()
     viewer.bus.subscribe("viewer", "image", ParameterValue, Qos.BULK, take)

@@ -2,8 +2,8 @@ from __future__ import annotations
 
 import threading
 
-from rbxcompose.bus.attachment import Attachment
-from rbxcompose.qos import Qos
+from rbxcompose.bus.names import Attachment
+from rbxcompose.sdk.ports import Qos
 from tests.bus.conftest import Network
 
 

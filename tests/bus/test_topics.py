@@ -6,7 +6,7 @@ import pytest
 
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.msgs.std_msgs import Float32, String
-from rbxcompose.qos import Qos
+from rbxcompose.sdk.ports import Qos
 from tests.bus.conftest import Alone
 
 

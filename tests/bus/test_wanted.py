@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rbxcompose.msgs.std_msgs import String
-from rbxcompose.qos import Qos
+from rbxcompose.sdk.ports import Qos
 from tests.bus.conftest import Network
 
 

@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
+from rbxcompose.base.requests import Refused
 from rbxcompose.bus.names import admin_key
 from rbxcompose.bus.transport import TransportReply
 from rbxcompose.bus.window import GRACE, Window
-from rbxcompose.qos import Qos
-from rbxcompose.requests import Refused
+from rbxcompose.sdk.ports import Qos
 from tests.bus.conftest import Alone, Connected, Network
 
 KEY = admin_key("bot", "missions/patrol")
@@ -56,7 +56,7 @@ def test_who_asks_gets_the_whole_and_who_listens_the_news(network: Network) -> N
     window.put({"news": 1})
     window.put({"news": 2})
     network.until(lambda: len(heard) == 2)
-    assert [value_of(one) for one in heard] == [(1, {"news": 1}), (2, {"news": 2})]
+    assert [value_of(data) for data in heard] == [(1, {"news": 1}), (2, {"news": 2})]
     assert value_of(asked(network, other).payload) == (2, {"all": 1})
     listening.close()
     network.until(lambda: not window._remote.has_match)

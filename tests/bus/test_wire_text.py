@@ -8,23 +8,22 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.bus import wire
-from rbxcompose.bus.attachment import Attachment, AttachmentError, decode_attachment
-from rbxcompose.bus.classes import SERVICE_QOS, queue_depth, ros_qos, sending
-from rbxcompose.bus.names import ActionNames, data_key, dds_type, name_problem, resolve
-from rbxcompose.bus.tokens import (
-    EndpointToken,
-    EntityKind,
-    NodeToken,
-    endpoint_pattern,
-    gid,
-    parse_token,
-    session_of,
+from rbxcompose.bus.names import (
+    ActionNames,
+    Attachment,
+    AttachmentError,
+    data_key,
+    dds_type,
+    decode_attachment,
+    name_problem,
+    resolve,
 )
-from rbxcompose.bus.wire import WIRE_PROFILES, RosQos
+from rbxcompose.bus.tokens import EndpointToken, EntityKind, NodeToken, endpoint_pattern, gid, parse_token, session_of
+from rbxcompose.bus.wire import SERVICE_QOS, WIRE_PROFILES, RosQos, queue_depth, ros_qos, sending
 from rbxcompose.msgs.example_interfaces import AddTwoInts
 from rbxcompose.msgs.nav2_msgs import NavigateToPose
 from rbxcompose.msgs.std_msgs import String
-from rbxcompose.qos import Qos
+from rbxcompose.sdk.ports import Qos
 
 JAZZY = WIRE_PROFILES["jazzy"]
 

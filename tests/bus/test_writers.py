@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rbxcompose.bus.graph import SILENCE, TopicReader, Writers
 from rbxcompose.bus.names import dds_type
 from rbxcompose.bus.tokens import EntityKind, NodeToken
-from rbxcompose.bus.writers import SILENCE, TopicReader, Writers
 from rbxcompose.msgs.std_msgs import Float32, String
 
 HERE, THERE = "a1", "b2"

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.check_runner import all_checks
-from rbxcompose.compiler import compile_robot
+from rbxcompose.commands.formats.text import render_text
+from rbxcompose.compiler.check_runner import all_checks
+from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.msgs.std_msgs import Empty
-from rbxcompose.rendering.text import render_text
 from rbxcompose.sdk import Component, Config, Out, component
 from rbxcompose.testing.golden import Golden
 from tests.checks import strangers

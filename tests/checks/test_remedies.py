@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.findings import Finding
+from rbxcompose.base.findings import Finding
 from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.sdk import Component, Config, In, Out, component
 from rbxcompose.testing.manifests import check_text
@@ -94,7 +94,7 @@ def test_a_start_mission_that_lies_in_the_project_is_to_be_named(tmp_path: Path)
     text = HEAD + "start: delivery\n"
     others = {"missions/delivery.yaml": ELSEWHERE.format("Mission"), "delivery.yaml": ELSEWHERE.format("Test")}
     found = list(check_text(text, tmp_path, others=others).compilation.report)
-    assert [one.help for one in found if one.code == "RBX3009"] == [
+    assert [finding.help for finding in found if finding.code == "RBX3009"] == [
         "add 'delivery: missions/delivery.yaml' below 'missions:'"
     ]
 
@@ -105,18 +105,18 @@ def test_the_path_to_it_is_that_from_the_robot(tmp_path: Path) -> None:
     (tmp_path / "missions").mkdir()
     (tmp_path / "missions" / "delivery.yaml").write_text(ELSEWHERE.format("Mission"), encoding="utf-8")
     found = list(check_text(HEAD + "start: delivery\n", folder).compilation.report)
-    assert "add 'delivery: ../../missions/delivery.yaml' below 'missions:'" in [one.help for one in found]
+    assert "add 'delivery: ../../missions/delivery.yaml' below 'missions:'" in [finding.help for finding in found]
 
 
 def test_a_start_mission_of_the_command_line_is_to_be_named_in_the_robot(tmp_path: Path) -> None:
     others = {"missions/delivery.yaml": ELSEWHERE.format("Mission")}
     found = list(check_text(HEAD, tmp_path, others=others, sets=["start=delivery"]).compilation.report)
-    assert "add 'delivery: missions/delivery.yaml' below 'missions:'" in [one.help for one in found]
+    assert "add 'delivery: missions/delivery.yaml' below 'missions:'" in [finding.help for finding in found]
 
 
 def test_a_start_mission_that_lies_nowhere_is_told_as_before(tmp_path: Path) -> None:
     found = list(check_text(HEAD + "start: delivery\n", tmp_path).compilation.report)
-    assert [one.help for one in found if one.code == "RBX3009"] == [""]
+    assert [finding.help for finding in found if finding.code == "RBX3009"] == [""]
 
 
 def test_a_port_of_a_device_without_devices_is_told_how_to_declare_it(tmp_path: Path) -> None:
@@ -132,7 +132,7 @@ def test_a_neutral_tick_beyond_those_of_the_servo_is_told_its_range(tmp_path: Pa
     )
     servo = "actuators:\n  pan: {bus: servos, id: 1, model: AX-12A, neutral: 2048}\njoints:\n  pan: {actuator: pan}\n"
     bus = "body: {urdf: body.urdf}\nbuses:\n  servos: {type: dynamixel, port: /dev/ttyUSB0}\n"
-    codes = {one.code: one.help for one in check_text(HEAD + bus + servo, tmp_path).compilation.report}
+    codes = {finding.code: finding.help for finding in check_text(HEAD + bus + servo, tmp_path).compilation.report}
     assert codes["RBX2225"] == (
         "the ticks of servo 1, AX-12, go from 0 to 1023: the middle, 'neutral: 512', is the default"
     )

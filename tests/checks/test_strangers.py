@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.findings import Finding
+from rbxcompose.base.findings import Finding
+from rbxcompose.commands.new_files import AnswerError
 from rbxcompose.runtime.folder import Gauge
-from rbxcompose.runtime.supervision.gauges import gauges_of
-from rbxcompose.scaffold.answers import AnswerError
-from rbxcompose.scaffold.robot import RobotAnswers, read_base, robot_files
+from rbxcompose.runtime.supervision.supervisor import gauges_of
 from rbxcompose.sdk import Drains, Setting
 from rbxcompose.testing import check_text
+from rbxcompose.tools.scaffold.robot import RobotAnswers, read_base, robot_files
 from tests.checks import strangers
 from tests.misconfig.corpus import Case, cases, run
 
@@ -117,8 +117,8 @@ def test_what_is_fixed_is_told_at_the_type(tmp_path: Path) -> None:
 
 def test_how_far_above_its_limits_a_base_drops_commands_is_its_own_affair(tmp_path: Path) -> None:
     text = "  base: {{type: toy_fixed_wheels}}\n  pilot: {{type: toy_pilot, pace: {}}}\n"
-    assert {one.code for one in found(text.format("1.4 m/s"), tmp_path)} == {"RBX3501"}
-    told = [one.message for one in found(text.format("1.6 m/s"), tmp_path) if one.code == "RBX3504"]
+    assert {finding.code for finding in found(text.format("1.4 m/s"), tmp_path)} == {"RBX3501"}
+    told = [finding.message for finding in found(text.format("1.6 m/s"), tmp_path) if finding.code == "RBX3504"]
     assert told == ["'pilot' drives at 1.6 m/s, but its base 'base' drops commands above 3 times its limit of 0.5 m/s"]
 
 
@@ -127,7 +127,7 @@ def test_commands_are_followed_through_a_strangers_mux(tmp_path: Path) -> None:
         "  base: {type: toy_wheels}\n  selector: {type: toy_selector}\n"
         "  pilot: {type: toy_pilot, pace: 0.9 m/s, connect: {velocity: selected}}\n"
     )
-    assert [one.code for one in found(text, tmp_path)] == ["RBX3503"]
+    assert [finding.code for finding in found(text, tmp_path)] == ["RBX3503"]
     [past] = found(text + "  spare: {type: toy_wheels, connect: {velocity: selected, frames: spare/tf}}\n", tmp_path)
     assert (past.code, past.help) == ("RBX3102", "subscribe to the mux's output: 'velocity: cmd_vel'")
 

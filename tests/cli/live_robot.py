@@ -13,7 +13,7 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any, Self
 
-from rbxcompose.cli.robots.lookup import BusPlace, find_place
+from rbxcompose.commands.lookup import BusPlace, find_place
 from tests.conftest import ROOT
 
 PATIENCE = 20.0  # [s]

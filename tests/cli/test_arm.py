@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.cli import main as command
+from rbxcompose.commands import main as command
 from tests.conftest import ROOT
 
 PI_ROBOT = str(ROOT / "robots/pi_robot")
@@ -18,7 +18,7 @@ REACH = "{x: 22 cm, y: -12 cm, z: 55 cm}"
 
 def in_order(words: Sequence[str]) -> list[str]:
     """Return the words with the robot behind the verb and its goal, before the options."""
-    first = next((index for index, one in enumerate(words) if one.startswith("--")), len(words))
+    first = next((index for index, word in enumerate(words) if word.startswith("--")), len(words))
     return [*words[:first], PI_ROBOT, *words[first:]]
 
 
@@ -40,7 +40,7 @@ def test_what_inverse_kinematics_finds_is_where_forward_kinematics_ends(capsys: 
     solutions = answered(capsys, "ik", REACH, "--frame", "torso_link", "--any-orientation")["solutions"]
     assert isinstance(solutions, list)
     goal = ", ".join(f"{name}: {value} rad" for name, value in solutions[0].items())
-    found, root = (answered(capsys, "fk", one) for one in (f"{{{goal}}}", "resting"))
+    found, root = (answered(capsys, "fk", text) for text in (f"{{{goal}}}", "resting"))
     assert found["frame"] == root["frame"] == "base_footprint"
     position = found["position"]
     assert isinstance(position, list)
@@ -55,7 +55,7 @@ def test_an_orientation_alone_is_taken_in_the_posture_that_is_preferred(capsys: 
         solutions, errors = found["solutions"], found["errors"]
         assert isinstance(solutions, list)
         assert isinstance(errors, list)
-        assert [solutions[0][one] for one in joints] == pytest.approx([lift, elbow], abs=0.02)
+        assert [solutions[0][joint] for joint in joints] == pytest.approx([lift, elbow], abs=0.02)
         assert (errors[0]["away"], found["approximate"]) == (0.0, False)
         assert errors[0]["angle"] < math.radians(0.5)
 
@@ -92,7 +92,7 @@ def test_a_picture_tells_the_cells_that_the_tip_gets_to(capsys: pytest.CaptureFi
     assert (found["samples"], found["seed"], found["of"]) == (4000, 1, 50)
     cells = found["cells"]
     assert isinstance(cells, list)
-    assert {one["cell"][2] for one in cells} == {12}
+    assert {cell["cell"][2] for cell in cells} == {12}
     assert (tmp_path / "reach.png").read_bytes().startswith(b"\x89PNG")
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.cli import main as command
+from rbxcompose.commands import main as command
 from tests.conftest import ROOT
 
 BENCH = ["arm", "bench", str(ROOT / "robots/pi_robot"), "--arm", "right_arm", "--count", "2"]
@@ -32,13 +32,13 @@ def written(folder: Path, names: list[str]) -> None:
 @pytest.mark.timeout(120)
 def test_it_measures_kinematics_motions_and_problems(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert command.main(["arm", "ls", BENCH[2], "--json"]) == 0
-    listed = {one["name"]: one["joints"] for one in json.loads(capsys.readouterr().out)}
+    listed = {entry["name"]: entry["joints"] for entry in json.loads(capsys.readouterr().out)}
     written(tmp_path, listed["right_arm"])
     assert command.main([*BENCH, "--problems", str(tmp_path), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["compiled"] is True
     assert found["calls"].keys() == {"forward kinematics", "Jacobian"}
-    assert {name: (one["count"], one["colliding"]) for name, one in found["tries"].items()} == {
+    assert {name: (entry["count"], entry["colliding"]) for name, entry in found["tries"].items()} == {
         "inverse kinematics": (2, 0),
         "random motions": (2, 0),
         "post": (1, 0),

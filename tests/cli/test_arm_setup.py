@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.cli import main as command
-from rbxcompose.compiler import compile_robot
+from rbxcompose.commands import main as command
+from rbxcompose.compiler.compile import compile_robot
 from tests.conftest import ROOT
 
 FILE = "pairs.yaml"
@@ -43,7 +43,7 @@ def setup(robot: Path, *words: str) -> int:
 
 
 def test_the_file_that_it_writes_is_used_and_is_the_same_again(robot: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert [one.code for one in compile_robot(str(robot), environment={}).report] == ["RBX2307"]
+    assert [finding.code for finding in compile_robot(str(robot), environment={}).report] == ["RBX2307"]
     assert setup(robot) == 0
     written = robot.with_name(FILE).read_text()
     assert capsys.readouterr().out.startswith("wrote ")
@@ -59,7 +59,7 @@ def test_what_a_person_wrote_stays(robot: Path) -> None:
     assert setup(robot) == 0
     file = robot.with_name(FILE)
     text = file.read_text()
-    line = next(one for one in text.splitlines() if one.endswith("never]"))
+    line = next(candidate for candidate in text.splitlines() if candidate.endswith("never]"))
     file.write_text(text.replace(line, line.replace("never]", "user]")))
     assert setup(robot) == 0
     assert line.replace("never]", "user]") in file.read_text()

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from rbxcompose.body import extra, picture
-from rbxcompose.cli.main import main
-from rbxcompose.inspection import layout
+from rbxcompose.commands import layout
+from rbxcompose.commands.main import main
+from rbxcompose.domains.body import meshes as extra
+from rbxcompose.domains.body import picture
 from rbxcompose.testing.golden import Golden
 from tests.conftest import ROOT
 

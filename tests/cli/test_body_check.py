@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.cli.main import main
+from rbxcompose.commands.main import main
 from rbxcompose.testing.golden import Golden
 from tests.conftest import ROOT
 
@@ -51,7 +51,7 @@ def test_flaws_are_told_as_check_tells_them_and_counted(
     golden.check("body_check.txt", checked(capsys, "r.urdf", code=0))
     told = data(capsys, "r.urdf", code=0)
     assert (told["links"], told["joints"], told["errors"], told["warnings"]) == (2, 1, 0, 3)
-    assert {one["code"] for one in told["findings"]} == {"RBX2009", "RBX2011", "RBX2013"}
+    assert {finding["code"] for finding in told["findings"]} == {"RBX2009", "RBX2011", "RBX2013"}
 
 
 def test_a_robot_with_the_file_has_the_same_flaws_whatever_else_is_wrong_with_it(
@@ -65,10 +65,10 @@ def test_a_robot_with_the_file_has_the_same_flaws_whatever_else_is_wrong_with_it
 def test_errors_that_keep_a_body_from_being_read_are_told(capsys: pytest.CaptureFixture[str], home: Path) -> None:
     (home / "robot.yaml").write_text(ROBOT)
     told = data(capsys, ".", code=1)
-    assert ([one["code"] for one in told["findings"]], set(told)) == (["RBX1301"], {"error", "findings"})
+    assert ([finding["code"] for finding in told["findings"]], set(told)) == (["RBX1301"], {"error", "findings"})
     (home / "r.urdf").write_text(WRONG)
     for path in (".", "r.urdf"):
-        assert [one["code"] for one in data(capsys, path, code=1)["findings"]] == ["RBX2003"]
+        assert [finding["code"] for finding in data(capsys, path, code=1)["findings"]] == ["RBX2003"]
         assert "error[RBX2003]" in checked(capsys, path, code=1)
 
 

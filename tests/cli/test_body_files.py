@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.cli.main import main
+from rbxcompose.commands.main import main
 from tests.conftest import ROOT
 
 XACRO = str(ROOT / "parts/body/torso.urdf.xacro")

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.bus.graph import find
-from rbxcompose.cli.bus.guest import Guest
+from rbxcompose.commands.guest import Guest
 from rbxcompose.msgs.cdr import decode
 from rbxcompose.msgs.sensor_msgs import JointState
 from tests.cli.live_robot import PATIENCE, Keyboard, Robot
@@ -63,7 +63,7 @@ def heard(guest: Guest) -> Heard:
         assert message.header.stamp.sec > 0
         found.append(dict(zip(message.name, map(float, message.position), strict=True)))
 
-    guest.listen(topic, lambda one: read(one.arrival.payload))
+    guest.listen(topic, lambda message: read(message.arrival.payload))
     return found
 
 
@@ -72,7 +72,7 @@ def test_positions_are_published_and_move_the_frames(robot: Robot, guest: Guest,
     assert (done.returncode, done.stdout) == (0, "/joint_states: 1 sent\n"), done.stderr
     assert guest.run(lambda: bool(heard), PATIENCE)
     assert heard[0] == pytest.approx({"pan": math.radians(30), "lift": 0.2})
-    frames = {one["frame"]: one for one in robot.told("tf", "tree")}
+    frames = {entry["frame"]: entry for entry in robot.told("tf", "tree")}
     assert (frames["head"]["yaw"], frames["arm"]["translation"]) == (30.0, [0.0, 0.0, 0.2])
 
 

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 import trimesh
 
-from rbxcompose.body import extra
-from rbxcompose.body.simplification import SimplifiedMesh
-from rbxcompose.cli.body import counted
-from rbxcompose.cli.main import main
+from rbxcompose.commands.main import main
+from rbxcompose.domains.body import meshes as extra
+from rbxcompose.domains.body.commands.body import counted
+from rbxcompose.domains.body.meshes import SimplifiedMesh
 from rbxcompose.testing.golden import Golden
 
 LINK = '<link name="a"><visual><geometry><mesh filename="{0}" scale="0.001 0.001 0.001"/></geometry></visual></link>'
@@ -29,7 +29,7 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "meshes").mkdir()
     trimesh.creation.icosphere(subdivisions=3, radius=100.0).export("meshes/ball.stl")
     trimesh.creation.box(extents=(100.0, 100.0, 100.0)).export("meshes/box.stl")
-    links = "".join(LINK.format(one).replace('"a"', f'"l{number}"') for number, one in enumerate(MESHES))
+    links = "".join(LINK.format(mesh).replace('"a"', f'"l{number}"') for number, mesh in enumerate(MESHES))
     joint = '<joint name="j" type="fixed"><parent link="l0"/><child link="l1"/></joint>'
     (tmp_path / "r.urdf").write_text(f'<robot name="r">{links}{joint}</robot>')
     return tmp_path
@@ -39,14 +39,14 @@ def test_all_meshes_of_a_body_are_written_and_told(
     capsys: pytest.CaptureFixture[str], golden: Golden, home: Path
 ) -> None:
     golden.check("body_simplify.txt", told(capsys, "r.urdf", "--faces", "100", "--out", "simple"))
-    assert {one.name for one in (home / "simple").iterdir()} == {"ball.stl", "box.stl"}
+    assert {path.name for path in (home / "simple").iterdir()} == {"ball.stl", "box.stl"}
     assert len(trimesh.load_mesh(home / "simple/ball.stl").faces) == 100
 
 
 def test_one_mesh_is_chosen_by_its_name(capsys: pytest.CaptureFixture[str], home: Path) -> None:
     told(capsys, "r.urdf", "--mesh", "box.stl", "--out", "a")
     told(capsys, "r.urdf", "--mesh", MESHES[1], "--out", "b")
-    assert [one.name for folder in "ab" for one in (home / folder).iterdir()] == ["box.stl"] * 2
+    assert [path.name for folder in "ab" for path in (home / folder).iterdir()] == ["box.stl"] * 2
     shown = told(capsys, "r.urdf", "--mesh", "meshes/bal.stl", "--out", "c", code=1)
     assert "RBX2018" in shown
     assert "did you mean 'meshes/ball.stl'?" in shown

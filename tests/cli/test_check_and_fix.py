@@ -13,11 +13,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.atomic_files import replace_file
-from rbxcompose.cli import check as fixes
-from rbxcompose.cli import main as command
-from rbxcompose.edits import safe_fixes
-from rbxcompose.findings import Finding, Fix, Sources
+from rbxcompose.base.files import replace_file
+from rbxcompose.base.findings import Finding, Fix, Sources
+from rbxcompose.base.fixes import safe_fixes
+from rbxcompose.commands import main as command
+from rbxcompose.tools.commands import check as fixes
 
 ROOT = Path(__file__).parents[2]
 ROBOT, MISSION = Path("robots/bot/robot.yaml"), Path("missions/patrol.yaml")
@@ -145,8 +145,8 @@ def test_fix_changes_only_the_lines_that_are_told(project: Path, wrong: set[str]
     right = (ROOT / "robots/turtlebot/robot.yaml").read_text(encoding="utf-8").splitlines()
     right.insert(where % len(right), f"# {comment}")
     text = "\n".join(right) + "\n"
-    for one in sorted(wrong - {"start: patrol"}):
-        text = text.replace(one, SLIPS[one])
+    for name in sorted(wrong - {"start: patrol"}):
+        text = text.replace(name, SLIPS[name])
     (project / ROBOT).write_text(text, encoding="utf-8")
     assert command.main(["check", "--fix", str(ROBOT)]) == 0
     assert (project / ROBOT).read_text(encoding="utf-8") == "\n".join(right) + "\n"

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.bus.graph import GraphEnd, GraphName, WireType
-from rbxcompose.cli.drive import command_topic
-from rbxcompose.cli.output.console import NotDoneError
+from rbxcompose.commands.console import NotDoneError
+from rbxcompose.domains.bases.commands.drive import command_topic
 from rbxcompose.msgs.geometry_msgs import Twist
-from rbxcompose.runtime.supervision.teleoperation import teleoperated
+from rbxcompose.runtime.supervision.supervisor import teleoperated
 from rbxcompose.testing import check_text
 
 ROBOT = """rbx: 1

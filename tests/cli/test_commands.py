@@ -12,13 +12,13 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.cli import main as command
-from rbxcompose.cli import verbs
-from rbxcompose.levels import Level
+from rbxcompose.base.levels import Level
+from rbxcompose.base.rooms import file_of
+from rbxcompose.commands import main as command
+from rbxcompose.commands import verbs
 from rbxcompose.runtime.folder import ComponentState, RobotFolder, RobotState, StopState
-from rbxcompose.runtime.log import start_new
+from rbxcompose.runtime.log import Record, start_new
 from rbxcompose.runtime.processes import Process, boot_id
-from rbxcompose.runtime.records import Record
 
 ROOT = Path(__file__).parents[2]
 RUNNING = ["ps", "down", "stop", "release", "logs"]
@@ -118,7 +118,7 @@ def test_ps_lists_all_robots_that_are_up(capsys: pytest.CaptureFixture[str]) -> 
     heads = [line.partition(":")[0] for line in capsys.readouterr().out.splitlines() if "supervisor dead" in line]
     assert heads == ["a", "b"]
     assert command.main(["ps", "--json"]) == 0
-    assert [one["robot"] for one in json.loads(capsys.readouterr().out)["robots"]] == ["a", "b"]
+    assert [robot["robot"] for robot in json.loads(capsys.readouterr().out)["robots"]] == ["a", "b"]
     assert command.main(["ps", "b", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["robot"] == "b"
 
@@ -233,13 +233,13 @@ def test_a_reader_that_goes_away_is_no_error_of_ours() -> None:
 
 @pytest.mark.parametrize("verb", ["ps", "stop", "down", "logs", "mission"])
 def test_a_command_to_a_running_robot_imports_nothing_heavy(verb: str) -> None:
-    script = f"import sys; import rbxcompose.cli.verbs as m; m.load({verb!r}); print(*sys.modules)"
+    script = f"import sys; import rbxcompose.commands.verbs as m; m.load({verb!r}); print(*sys.modules)"
     found = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True)
     assert not {"pydantic", "numpy", "zenoh", "yaml", "rosbags"} & set(found.stdout.split())
 
 
 def test_check_imports_nothing_heavy_that_the_robot_does_not_need() -> None:
-    script = "import sys; from rbxcompose.cli.main import main; main(sys.argv[1:]); print(*sys.modules)"
+    script = "import sys; from rbxcompose.commands.main import main; main(sys.argv[1:]); print(*sys.modules)"
     command = [sys.executable, "-c", script, "check", "robots/turtlebot"]
     found = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
     needless = {"numpy", "zenoh", "xacro", "mcap", "jinja2", "urllib.request"}
@@ -249,7 +249,7 @@ def test_check_imports_nothing_heavy_that_the_robot_does_not_need() -> None:
 
 def test_each_verb_says_what_it_does_in_one_line() -> None:
     for verb in verbs.verbs():
-        text = (ROOT / "rbxcompose" / "cli" / f"{verbs.module_of(verb)}.py").read_text(encoding="utf-8")
+        text = Path(file_of(verbs.module_of(verb))).read_text(encoding="utf-8")
         first = (ast.get_docstring(ast.parse(text)) or "").splitlines()[0]
         assert first.endswith(".")
         assert len(first) <= 100

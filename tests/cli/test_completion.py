@@ -12,12 +12,12 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.bus.graph import Graph, GraphName
-from rbxcompose.cli import main as command
-from rbxcompose.cli import verbs
-from rbxcompose.cli.completion import SCRIPTS, KnownValues, candidates, files, for_shell
-from rbxcompose.cli.robots.lookup import BusPlace
+from rbxcompose.commands import main as command
+from rbxcompose.commands import verbs
+from rbxcompose.commands.lookup import BusPlace
 from rbxcompose.runtime.folder import ComponentState, RobotFolder, RobotState
 from rbxcompose.runtime.processes import Process, boot_id
+from rbxcompose.tools.commands.completion import SCRIPTS, KnownValues, candidates, files, for_shell
 
 ROOT = Path(__file__).parents[2]
 ECHO_OPTIONS = ["--count", "--domain", "--help", "--json", "--once", "--profile", "--robot", "--router", "--ssh-config"]

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.cli.drive import HOLD, PERIOD, DeadMan, Velocity, keys
+from rbxcompose.domains.bases.commands.drive import HOLD, PERIOD, DeadMan, Velocity, keys
 
 
 @pytest.mark.parametrize(

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.cli import diag
-from rbxcompose.cli.diag import change_line, tree_lines
-from rbxcompose.cli.main import main
-from rbxcompose.diagnostics.requests import DiagnosticsTree, LevelChange, TreeLine
-from rbxcompose.levels import Level
+from rbxcompose.base.levels import Level
+from rbxcompose.commands.main import main
+from rbxcompose.domains.diagnostics.commands import diag
+from rbxcompose.domains.diagnostics.commands.diag import change_line, tree_lines
+from rbxcompose.domains.diagnostics.requests import DiagnosticsTree, LevelChange, TreeLine
 from rbxcompose.runtime.folder import RobotFolder
 
 OK, WARN, ERROR, STALE = Level

@@ -6,9 +6,9 @@ import json
 
 import pytest
 
-from rbxcompose.cli import main as command
-from rbxcompose.finding_pages import all_kinds
-from rbxcompose.findings import KINDS
+from rbxcompose.base.findings import KINDS
+from rbxcompose.commands import main as command
+from rbxcompose.commands.finding_pages import all_kinds
 
 
 @pytest.mark.parametrize("written", ["RBX1001", "rbx1001", "1001"])
@@ -36,7 +36,7 @@ def test_an_unknown_code_is_wrong_usage_with_a_hint_of_its_family(capsys: pytest
 
 def test_programs_get_json(capsys: pytest.CaptureFixture[str]) -> None:
     assert command.main(["explain", "--json"]) == 0
-    assert [one["code"] for one in json.loads(capsys.readouterr().out)] == sorted(all_kinds())
+    assert [entry["code"] for entry in json.loads(capsys.readouterr().out)] == sorted(all_kinds())
     assert command.main(["explain", "RBX1110", "--json"]) == 0
     page = json.loads(capsys.readouterr().out)
     assert (page["severity"], page["family"], page["is_fixable"]) == ("warning", "YAML", False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from rbxcompose.cli.robots.changes import FileWatch
+from rbxcompose.tools.robot_changes import FileWatch
 
 
 def changed(watch: FileWatch) -> bool:

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.cli import main as command
-from rbxcompose.importing.importer import PLUGINS
-from rbxcompose.plugins import BrokenPluginError
+from rbxcompose.base.plugins import BrokenPluginError
+from rbxcompose.commands import main as command
+from rbxcompose.commands.importing.importer import PLUGINS
 
 HEAD = "joints: {pan: {id: 1}}\n"
 WRONG = "joints: {pan: {id: 1, nuetral: 5}}\n"
@@ -64,7 +64,7 @@ def test_json_has_the_manifest_and_the_findings(capsys: pytest.CaptureFixture[st
     told = json.loads(captured.out)
     assert "pan_servo" in told["manifest"]
     assert told["file"] is None
-    assert [one["code"] for one in told["findings"]] == ["RBX2234", "RBX2239"]
+    assert [finding["code"] for finding in told["findings"]] == ["RBX2234", "RBX2239"]
     assert command.main(["import", "arbotix", "My-head.yaml", "--json", "--out", "head.yaml"]) == 0
     assert json.loads(capsys.readouterr().out)["file"] == "head.yaml"
 

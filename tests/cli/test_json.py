@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.cli import main as command
-from rbxcompose.cli import verbs
+from rbxcompose.commands import main as command
+from rbxcompose.commands import verbs
 from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.runtime.log import start_new
 from tests.conftest import ROOT
@@ -140,12 +140,12 @@ def nothing_is_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def leaves(parser: argparse.ArgumentParser, words: str) -> Iterator[tuple[str, argparse.ArgumentParser]]:
     """Yield each verb, those below it in its place, with its parser."""
-    below = [one for one in parser._actions if isinstance(one, argparse._SubParsersAction)]
+    below = [action for action in parser._actions if isinstance(action, argparse._SubParsersAction)]
     if not below:
         yield words, parser
     for group in below:
-        for name, one in group.choices.items():
-            yield from leaves(one, f"{words} {name}")
+        for name, choice in group.choices.items():
+            yield from leaves(choice, f"{words} {name}")
 
 
 def test_each_verb_that_claims_it_is_looked_at_here() -> None:
@@ -161,7 +161,7 @@ def test_a_mistake_is_one_document(verb: str, capsys: pytest.CaptureFixture[str]
     assert set(told) == {"error", "findings"}
     assert told["error"]
     assert told["error"] in captured.err
-    assert all(one["code"] in captured.err for one in told["findings"])
+    assert all(finding["code"] in captured.err for finding in told["findings"])
 
 
 def test_words_that_no_verb_takes_are_a_document_too(capsys: pytest.CaptureFixture[str]) -> None:
@@ -190,7 +190,7 @@ def test_mistakes_in_a_file_are_told_with_their_places(tmp_path: Path, capsys: p
     for words in (["plan"], ["apply"], ["mission", "skills"]):
         assert command.main([*words, str(file), "--json"]) == 1
         told = json.loads(capsys.readouterr().out)
-        assert [(one["code"], one["line"]) for one in told["findings"]] == [("RBX3004", 5), ("RBX3004", 6)]
+        assert [(finding["code"], finding["line"]) for finding in told["findings"]] == [("RBX3004", 5), ("RBX3004", 6)]
         assert told["error"] == told["findings"][0]["message"]
 
 

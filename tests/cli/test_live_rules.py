@@ -10,16 +10,15 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.cli.robots.live_rules import LiveRules
-from rbxcompose.config import Bound, Config
-from rbxcompose.model.robot import Robot
+from rbxcompose.base.config import Bound, Config
+from rbxcompose.compiler.model.robot import Robot
+from rbxcompose.compiler.plan.diff import difference
+from rbxcompose.compiler.plan.dump import dump, load
 from rbxcompose.msgs.rcl_interfaces import Parameter
-from rbxcompose.params.core import changed
-from rbxcompose.params.values import to_message
-from rbxcompose.plan.diff import difference
-from rbxcompose.plan.dump import dump, load
 from rbxcompose.runtime.supervision.changes import Fate, changes
+from rbxcompose.sdk.parameters import changed, to_message
 from rbxcompose.testing import check_text
+from rbxcompose.tools.live_rules import LiveRules
 from tests.conftest import ROOT
 
 ROBOT = """rbx: 1
@@ -80,7 +79,7 @@ def test_what_was_broken_before_is_not_the_fault_of_a_change(robot: Robot) -> No
 
 def test_the_limits_of_an_argument_are_in_the_plan_and_change_live(tmp_path: Path) -> None:
     plan = check_text(ROBOT, tmp_path).plan
-    go_to = next(one for one in plan.instances if one.name == "go_to")
+    go_to = next(instance for instance in plan.instances if instance.name == "go_to")
     assert go_to.bounds == {"speed": (Bound(0.05, 0.6, "the argument 'speed' of the robot"),)}
     assert load(dump(plan)) == plan
     wider = check_text(ROBOT.replace("max: 0.6", "max: 0.7"), tmp_path).plan
@@ -93,8 +92,8 @@ def test_the_argument_of_a_part_is_bounded_by_the_one_that_it_is_given(tmp_path:
     head, _, _ = ROBOT.partition("  go_to:")
     text = head + "include:\n  legs: {part: legs.yaml, with: {fast: '${args.speed}'}}\n"
     plan = check_text(text, tmp_path, others={"legs.yaml": PART}).plan
-    (instance,) = (one for one in plan.instances if one.type == "go_to")
-    assert [one.most for one in instance.bounds["speed"]] == [0.55, 0.6]
+    (instance,) = (candidate for candidate in plan.instances if candidate.type == "go_to")
+    assert [bound.most for bound in instance.bounds["speed"]] == [0.55, 0.6]
     assert replace(instance.bounds["speed"][0], most=None).by == "the argument 'fast' of the part 'legs'"
 
 

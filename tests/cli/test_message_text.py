@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.bus.graph import WireType
-from rbxcompose.cli.bus.messages import message_from, message_type, shown, to_json, to_text, type_of
-from rbxcompose.cli.output.console import NotDoneError
+from rbxcompose.commands.console import NotDoneError
+from rbxcompose.commands.messages import message_from, message_type, shown, to_json, to_text, type_of
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.msgs.plain import to_plain

@@ -10,15 +10,14 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.cli import main as command
-from rbxcompose.cli.missions.live_view import lines_of
-from rbxcompose.executive.requests import CancelMission, LookAtAll
+from rbxcompose.base.requests import Request, as_data, from_data, to_data
+from rbxcompose.commands import main as command
+from rbxcompose.missions.execution.requests import CancelMission, LookAtAll
 from rbxcompose.missions.view.picture import picture_from_data
-from rbxcompose.requests import Request, as_data
 from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.sdk.bound import Outcome
 from rbxcompose.testing.golden import Golden
-from rbxcompose.typed_json import from_data, to_data
+from rbxcompose.tools.mission_view import lines_of
 from tests.executive.fake_robot import Robot
 from tests.inspection.pictures import undrawn
 
@@ -69,8 +68,8 @@ def robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Robot:
         there = made.mission.requests().from_data(json.loads(json.dumps(as_data(request))))
         return from_data(request.answer_type(), json.loads(json.dumps(to_data(made.mission.handle(there)))))
 
-    monkeypatch.setattr("rbxcompose.cli.robots.lookup.ask", ask)
-    monkeypatch.setattr("rbxcompose.cli.robots.lookup.all_folders", lambda: [RobotFolder(tmp_path / "bot")])
+    monkeypatch.setattr("rbxcompose.commands.lookup.ask", ask)
+    monkeypatch.setattr("rbxcompose.commands.lookup.all_folders", lambda: [RobotFolder(tmp_path / "bot")])
     return made
 
 
@@ -135,13 +134,17 @@ def test_watch_tells_programs_the_whole_and_then_what_changes(
         lambda: robot.mission.handle(CancelMission()),
     ]
     step = SimpleNamespace(sleep=lambda seconds: steps.pop(0)())
-    monkeypatch.setattr("rbxcompose.cli.missions.live_view.time", step)  # there alone: other threads sleep, too
+    monkeypatch.setattr("rbxcompose.tools.mission_view.time", step)  # there alone: other threads sleep, too
     lines = [json.loads(line) for line in told(capsys, "watch", "--json").splitlines()]
-    assert [(one["whole"], one["state"]) for one in lines] == [(True, "running"), (False, "running"), (False, "halted")]
+    assert [(line["whole"], line["state"]) for line in lines] == [
+        (True, "running"),
+        (False, "running"),
+        (False, "halted"),
+    ]
     assert len(lines[1]["statuses"]) < len(lines[0]["statuses"])
 
 
 def test_programs_are_answered_in_json(robot: Robot, capsys: pytest.CaptureFixture[str]) -> None:
-    assert [one["state"] for one in json.loads(told(capsys, "ls", "--json"))] == ["running", "idle"]
+    assert [entry["state"] for entry in json.loads(told(capsys, "ls", "--json"))] == ["running", "idle"]
     assert json.loads(told(capsys, "status", "--json"))["data"] == {"round": 2, "seen": []}
     assert json.loads(told(capsys, "pause", "--json"))["answer"] == "mission test paused"

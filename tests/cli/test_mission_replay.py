@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.cli import main as command
-from rbxcompose.cli.missions import files as replaying
-from rbxcompose.executive.requests import ReadLog
+from rbxcompose.commands import main as command
+from rbxcompose.missions.execution.requests import ReadLog
 from rbxcompose.testing import Bench, check_file
+from rbxcompose.tools import mission_files as replaying
 
 HEAD = "rbx: 1\nkind: Mission\nname: work\n"
 WORK = HEAD + "do:\n  - wait_for: $battery < 99 %\n  - log: low\n  - wait: 2 s\n  - say: done\n"
@@ -38,7 +38,7 @@ def log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     robot.advance(10.0)
     mission: Any = robot.component("mission")
     records = mission.handle(ReadLog()).records
-    Path("work.log").write_text("".join(f"{json.dumps(one)}\n" for one in records))
+    Path("work.log").write_text("".join(f"{json.dumps(record)}\n" for record in records))
     return Path("work.log")
 
 

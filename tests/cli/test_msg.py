@@ -8,12 +8,12 @@ from xml.etree import ElementTree
 
 import pytest
 
-from rbxcompose.cli.main import main
+from rbxcompose.commands.main import main
 from rbxcompose.msgs.definitions import parse
 from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.msgs.packages import all_names, package_files, parts_of, whole_text
 from rbxcompose.msgs.rbxcompose_msgs import Recharge, SetBatteryLevel
-from rbxcompose.recording.definitions import definition_of
+from rbxcompose.runtime.recording.topics import definition_of
 
 
 def test_a_type_is_shown_with_its_hash_and_its_parts(capsys: pytest.CaptureFixture[str]) -> None:

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.cli import main as command
-from rbxcompose.cli import needs
+from rbxcompose.commands import main as command
+from rbxcompose.tools.commands import needs
 from tests.conftest import ROOT
 
 MONITORED = "rbx: 1\nkind: Robot\nname: one\ncomponents:\n  cpu: {type: cpu_monitor}\n  disk: {type: disk_monitor}\n"
@@ -30,7 +30,7 @@ def test_a_robot_needs_what_its_components_import(
     path: str, extras: dict[str, list[str]], capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert command.main(["needs", str(ROOT / path), "--json"]) == 0
-    assert {one["extra"]: one["by"] for one in json.loads(capsys.readouterr().out)} == extras
+    assert {entry["extra"]: entry["by"] for entry in json.loads(capsys.readouterr().out)} == extras
 
 
 def test_a_system_needs_what_its_robots_need(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -75,5 +75,5 @@ def test_make_up_installs_just_what_the_robot_lacks(tmp_path: Path, extras: str)
     assert bool(installed) == bool(extras)
     if extras:
         versions = (tmp_path / "versions.txt").read_text().splitlines()
-        assert all(one.count("==") == 1 for one in versions)
-        assert any(one.startswith("ompl==") for one in versions)
+        assert all(version.count("==") == 1 for version in versions)
+        assert any(version.startswith("ompl==") for version in versions)

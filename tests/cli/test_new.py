@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.cli import main as command
+from rbxcompose.commands import main as command
 from rbxcompose.testing import check_file, run_robot
 
 CART = ["robots/cart/robot.yaml", "missions/cart.yaml", "tests/test_cart.py"]

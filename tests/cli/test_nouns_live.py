@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.bus.graph import find
-from rbxcompose.cli.bus.guest import Guest, HeardMessage
+from rbxcompose.commands.guest import Guest, HeardMessage
 from rbxcompose.msgs.cdr import decode
 from rbxcompose.msgs.geometry_msgs import Twist
 from tests.cli.live_robot import PATIENCE, Keyboard, Robot
@@ -36,7 +36,7 @@ def robot() -> Iterator[Robot]:
 
 
 def test_topics_are_listed_with_their_types(robot: Robot) -> None:
-    listed = {one["name"]: one for one in robot.told("topic", "ls")}
+    listed = {entry["name"]: entry for entry in robot.told("topic", "ls")}
     assert listed["/odom"]["types"] == ["nav_msgs/msg/Odometry"]
     assert listed["/cmd_vel/teleop"] == {
         "name": "/cmd_vel/teleop",
@@ -85,7 +85,7 @@ def test_what_is_published_arrives(robot: Robot) -> None:
         words = ("/cmd_vel/teleop", "geometry_msgs/Twist", "{angular: {z: 0.25}}", "--rate", "50Hz", "-n", "3")
         assert robot.told("topic", "pub", *words)["sent"] == 3
         assert guest.run(lambda: len(heard) == 3, PATIENCE)
-    assert {decode(Twist, one.arrival.payload).angular.z for one in heard} == {0.25}
+    assert {decode(Twist, message.arrival.payload).angular.z for message in heard} == {0.25}
 
 
 def test_who_publishes_to_nobody_is_told_so(robot: Robot) -> None:
@@ -98,7 +98,7 @@ def test_who_publishes_to_nobody_is_told_so(robot: Robot) -> None:
 
 
 def test_a_service_is_called(robot: Robot) -> None:
-    listed = {one["name"]: one["types"] for one in robot.told("service", "ls")}
+    listed = {entry["name"]: entry["types"] for entry in robot.told("service", "ls")}
     assert listed["/set_battery_level"] == ["rbxcompose_msgs/srv/SetBatteryLevel"]
     assert robot.told("service", "call", "set_battery_level", "{value: 55}") == {}
     assert 50.0 < robot.told("topic", "echo", "/battery_level", "--once")["data"] <= 55.0
@@ -107,7 +107,7 @@ def test_a_service_is_called(robot: Robot) -> None:
 
 
 def test_a_goal_is_sent_and_its_result_printed(robot: Robot) -> None:
-    assert [one["name"] for one in robot.told("action", "ls")] == ["/go_to", "/recharge"]
+    assert [entry["name"] for entry in robot.told("action", "ls")] == ["/go_to", "/recharge"]
     done = robot.do("action", "send", "go_to", NEAR, "--json")
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout.splitlines()[-1])["result"]["error_code"] == 0
@@ -125,7 +125,7 @@ def test_an_interrupt_cancels_the_goal(robot: Robot) -> None:
 
 
 def test_the_tree_of_frames_is_shown(robot: Robot) -> None:
-    links = {one["frame"]: one for one in robot.told("tf", "tree")}
+    links = {entry["frame"]: entry for entry in robot.told("tf", "tree")}
     assert (links["odom"]["parent"], links["odom"]["is_static"]) == ("map", True)
     assert (links["base_footprint"]["parent"], links["base_footprint"]["is_static"]) == ("odom", False)
     assert robot.do("tf", "tree").stdout.startswith("map\n  odom  (static: x 0 m")
@@ -162,7 +162,7 @@ def publishing(robot: Robot, *words: str) -> Iterator[None]:
 
 def test_a_static_frame_is_in_the_tree_while_it_is_published(robot: Robot) -> None:
     with publishing(robot, "base_footprint", "laser", "--z", "20cm", "--x", "-5mm", "--yaw", "-90deg"):
-        placed = next(one for one in robot.told("tf", "tree") if one["frame"] == "laser")
+        placed = next(entry for entry in robot.told("tf", "tree") if entry["frame"] == "laser")
         assert (placed["parent"], placed["is_static"]) == ("base_footprint", True)
         assert (placed["translation"], placed["yaw"]) == ([-0.005, 0.0, 0.2], -90.0)
         again = robot.do("tf", "static", "odom", "laser")

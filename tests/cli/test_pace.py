@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.cli.topic import PaceMeter, measured
+from rbxcompose.tools.commands.topic import PaceMeter, measured
 
 
 def test_even_arrivals_have_a_rate_and_no_jitter() -> None:

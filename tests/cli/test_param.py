@@ -15,8 +15,8 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.cli.parameters.changes import value_of
-from rbxcompose.params.values import from_message
+from rbxcompose.sdk.parameters import from_message
+from rbxcompose.tools.parameters.changes import value_of
 
 ROOT = Path(__file__).parents[2]
 PATIENCE = 20.0  # [s]
@@ -69,7 +69,7 @@ def do(base: Path) -> Iterator[Do]:
 
 def test_all_parameters_of_all_components_are_listed(do: Do) -> None:
     listed = json.loads(do("param", "ls", "--json").stdout)
-    found = {(one["node"], one["name"]): (one["value"], one["read_only"]) for one in listed}
+    found = {(item["node"], item["name"]): (item["value"], item["read_only"]) for item in listed}
     assert found["/left/battery", "runtime"] == (45.0, False)
     assert found["/left/battery", "initial"] == (1.0, True)
     assert found["/left/base", "max_speed"] == (0.5, False)
@@ -151,7 +151,7 @@ def test_the_history_tells_who_changed_what_and_undo_walks_back(do: Do) -> None:
     do("param", "set", "battery", "error", "10 %")
     do("param", "set", "battery", "error", "5 %")
     *_, first, second = json.loads(do("param", "history", "battery", "--json").stdout)
-    assert [(one["name"], one["before"], one["after"]) for one in (first, second)] == [
+    assert [(entry["name"], entry["before"], entry["after"]) for entry in (first, second)] == [
         ("error", 0.2, 0.1),
         ("error", 0.1, 0.05),
     ]

@@ -17,13 +17,12 @@ from pathlib import Path
 import pytest
 from mcap.reader import SeekingReader, make_reader
 
+from rbxcompose.bus.endpoints import tcp_endpoint
 from rbxcompose.bus.zenoh_session import open_router
-from rbxcompose.cli import main as command
-from rbxcompose.endpoints import tcp_endpoint
-from rbxcompose.recording.message import Recorded
-from rbxcompose.recording.reader import RecordingReader
-from rbxcompose.recording.topics import RecordedTopic
+from rbxcompose.commands import main as command
 from rbxcompose.runtime.processes import titled
+from rbxcompose.runtime.recording.reader import RecordingReader
+from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic
 from tests.recording.samples import some, written
 
 ROOT = Path(__file__).parents[2]
@@ -93,11 +92,11 @@ def robot(shell: Shell) -> Iterator[Shell]:
         yield shell
     finally:
         shell.do("down")
-        assert [one for one in titled(f"rbxcompose {NAME}: ") if one.is_running] == []
+        assert [process for process in titled(f"rbxcompose {NAME}: ") if process.is_running] == []
 
 
 def payloads(messages: list[Recorded], topic: RecordedTopic) -> list[bytes]:
-    return [one.payload for one in messages if one.topic == topic]
+    return [message.payload for message in messages if message.topic == topic]
 
 
 def test_what_is_replayed_on_a_bus_is_what_was_recorded(shell: Shell, router: str) -> None:
@@ -113,11 +112,13 @@ def test_what_is_replayed_on_a_bus_is_what_was_recorded(shell: Shell, router: st
     assert "recorded 21 messages to b.mcap" in output
     found, damage = shell.messages("b.mcap")
     assert damage == ""
-    for topic in {one.topic for one in MESSAGES}:  # each has a priority of its own, so that one may overtake another
+    for topic in {
+        message.topic for message in MESSAGES
+    }:  # each has a priority of its own, so that one may overtake another
         assert payloads(found, topic) == payloads(MESSAGES, topic)
     lasted = (found[-1].log_time - found[0].log_time) / 1e9
     assert lasted > 0.4  # of 0.91 s, twice as fast
-    assert all(one.publish_time <= one.log_time for one in found)
+    assert all(item.publish_time <= item.log_time for item in found)
 
 
 def test_a_loop_goes_on_until_it_is_interrupted_and_commands_are_left_out(shell: Shell, router: str) -> None:
@@ -133,8 +134,8 @@ def test_a_loop_goes_on_until_it_is_interrupted_and_commands_are_left_out(shell:
     recorder.send_signal(signal.SIGTERM)
     recorder.communicate(timeout=PATIENCE)
     found, _ = shell.messages("b.mcap")
-    assert len([one for one in found if one.topic.name == "/odom"]) > 10
-    assert {one.topic.name for one in found} == {"/odom", "/map"}
+    assert len([item for item in found if item.topic.name == "/odom"]) > 10
+    assert {item.topic.name for item in found} == {"/odom", "/map"}
 
 
 def test_without_a_robot_it_is_replayed_on_a_router_of_its_own_below_a_namespace(shell: Shell) -> None:
@@ -149,7 +150,7 @@ def test_without_a_robot_it_is_replayed_on_a_router_of_its_own_below_a_namespace
         player.communicate(timeout=PATIENCE)
     assert player.returncode == 0
     found, _ = shell.messages("b.mcap")
-    assert {one.topic.name for one in found} == {"/old/run/odom", "/old/run/map"}
+    assert {item.topic.name for item in found} == {"/old/run/odom", "/old/run/map"}
 
 
 @pytest.mark.parametrize(
@@ -194,8 +195,8 @@ def test_two_seconds_of_a_robot_and_a_recorder_that_is_killed(robot: Shell) -> N
     assert told["messages"]["/odom"] > 60  # of 100
     whole, damage = robot.messages("whole.mcap")
     assert damage == ""
-    assert {"/odom", "/tf_static"} <= {one.topic.name for one in whole}
-    assert len([one for one in whole if one.topic.name == "/odom"]) > 60  # of 100
+    assert {"/odom", "/tf_static"} <= {item.topic.name for item in whole}
+    assert len([item for item in whole if item.topic.name == "/odom"]) > 60  # of 100
 
     player = robot.start("replay", "whole.mcap", "--topics", "odom", "tf_static")
     output, _ = player.communicate(timeout=PATIENCE)
@@ -303,7 +304,7 @@ def test_wrong_options_are_wrong_usage(words: list[str], capsys: pytest.CaptureF
 
 def test_no_other_command_loads_what_recordings_need() -> None:
     script = (
-        "import sys; import rbxcompose.cli.main as m\n"
+        "import sys; import rbxcompose.commands.main as m\n"
         "[m.load(verb) for verb in m.verbs() if verb not in ('record', 'replay')]\n"
         "print(*sys.modules)\n"
     )

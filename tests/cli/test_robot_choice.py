@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.cli import main as command
-from rbxcompose.cli.output.console import NotDoneError
-from rbxcompose.cli.robots.targets import only_path
+from rbxcompose.commands import main as command
+from rbxcompose.commands.console import NotDoneError
+from rbxcompose.commands.targets import only_path
 from rbxcompose.runtime.folder import RobotFolder, RobotState
 from rbxcompose.runtime.processes import Process, boot_id
 from tests.conftest import ROOT

@@ -15,14 +15,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.cli.output.console import NotDoneError
-from rbxcompose.cli.parameters.files import LiveSettings, NewTexts, compiled_as_it_runs, files_with, write
-from rbxcompose.config import Config
-from rbxcompose.params.core import settings
-from rbxcompose.runtime.folder import RobotState
-from rbxcompose.runtime.options import NO_LAYERS, ChosenLayers
+from rbxcompose.base.config import Config
+from rbxcompose.commands.console import NotDoneError
+from rbxcompose.runtime.folder import NO_LAYERS, ChosenLayers, RobotState
 from rbxcompose.runtime.processes import Process
 from rbxcompose.sdk import Component, Live, component
+from rbxcompose.sdk.parameters import settings
+from rbxcompose.tools.parameters.files import LiveSettings, NewTexts, compiled_as_it_runs, files_with, write
 from tests.conftest import ROOT
 
 
@@ -121,7 +120,7 @@ def live(state: RobotState, **values: Any) -> LiveSettings:
     found = compiled_as_it_runs(state)
     assert found.robot is not None
     assert found.plan is not None, list(found.report)
-    now: dict[str, Config] = {name: one.config for name, one in found.robot.components.items()}
+    now: dict[str, Config] = {name: robot_component.config for name, robot_component in found.robot.components.items()}
     for path, value in values.items():
         name, _, field = path.partition("__")
         now[name] = now[name].model_copy(update={field: value})
@@ -187,7 +186,7 @@ def test_settings_in_groups_are_written_at_their_places(tmp_path: Path) -> None:
 def test_the_limit_of_an_argument_holds_for_a_setting_in_a_group(tmp_path: Path) -> None:
     project(tmp_path, GROUPED)
     arm = live(state_of(tmp_path, NO_LAYERS)).robot.components["arm"]
-    assert {name: one.most for name, (one,) in arm.bounds.items()} == {"left.p": 3.0}
+    assert {name: bound.most for name, (bound,) in arm.bounds.items()} == {"left.p": 3.0}
 
 
 @given(
@@ -233,7 +232,7 @@ REFUSED = [
 ]
 
 
-@pytest.mark.parametrize(("values", "sets", "reason"), REFUSED, ids=[one[2] for one in REFUSED])
+@pytest.mark.parametrize(("values", "sets", "reason"), REFUSED, ids=[row[2] for row in REFUSED])
 def test_what_no_file_can_say_alone_is_refused_and_nothing_is_written(
     tmp_path: Path, values: dict[str, float], sets: tuple[str, ...], reason: str
 ) -> None:
@@ -261,7 +260,7 @@ def test_every_live_setting_of_shipped_robots_is_saved_in_one_line_or_refused(ro
     state = state_of(tmp_path / "robots" / robot, ChosenLayers())
     start = live(state)
     for name, config in start.now.items():
-        for one in (one for one in settings(config).values() if one.is_live):
+        for one in (setting for setting in settings(config).values() if setting.is_live):
             value = one.value * 0.9375 + 0.001 if isinstance(one.value, float) else one.value
             now = {**start.now, name: config.model_copy(update={one.name: value})}
             assert lines_or_code(replace(start, now=now), state) in (2, 1, "RBX9044")

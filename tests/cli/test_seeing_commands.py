@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.cli import main as command
-from rbxcompose.inspection import layout
-from rbxcompose.plan.dump import load
+from rbxcompose.commands import layout
+from rbxcompose.commands import main as command
+from rbxcompose.compiler.plan.dump import load
 
 TURTLEBOT = "robots/turtlebot"
 BROKEN = "rbx: 1\nkind: Robot\nname: one\ncomponents:\n  base:\n    type: diff_drive_sim\n    max_sped: 1 m/s\n"

@@ -10,11 +10,11 @@ from types import SimpleNamespace
 
 import pytest
 
-from rbxcompose.cli.main import main
-from rbxcompose.clock import SteppedClock
-from rbxcompose.twins.servo_fake import FakeServo
-from rbxcompose.twins.servo_line import FakeLine
-from rbxcompose.twins.servo_port import FakePort
+from rbxcompose.base.clock import SteppedClock
+from rbxcompose.commands.main import main
+from rbxcompose.domains.servos.twins.servo_fake import FakeServo
+from rbxcompose.domains.servos.twins.servo_line import FakeLine
+from rbxcompose.domains.servos.twins.servo_port import FakePort
 
 AX, XL, SLOW = "AX-12", "XL430-W250", 57_600
 
@@ -92,7 +92,7 @@ def test_an_id_is_changed_only_if_one_servo_has_it_and_the_new_one_is_free(servo
     assert "no servo answers at id 2" in servos.told("set-id", "2", "8", code=1)
     servos.line.servos.append(FakeServo(XL, 7))
     assert "more than one servo answers at id 7" in servos.told("set-id", "7", "8", code=1)
-    assert [one.id for one in servos.line.servos] == [1, 7, 3, 7]
+    assert [servo.id for servo in servos.line.servos] == [1, 7, 3, 7]
 
 
 def test_torque_is_switched_on_where_servos_are_and_off_for_all(servos: Bench) -> None:
@@ -102,7 +102,7 @@ def test_torque_is_switched_on_where_servos_are_and_off_for_all(servos: Bench) -
     assert (servos.line[2].get("torque_enable"), servos.line[2].get("goal_position")) == (1, 3000)
     assert "name ids, or use --all" in servos.told("relax", code=1)
     servos.told("relax", "1", "2")
-    assert [servos.line[one].get("torque_enable") for one in (1, 2)] == [0, 0]
+    assert [servos.line[number].get("torque_enable") for number in (1, 2)] == [0, 0]
 
 
 def test_a_disabled_servo_ignores_goals_until_it_is_enabled(servos: Bench) -> None:
@@ -110,7 +110,7 @@ def test_a_disabled_servo_ignores_goals_until_it_is_enabled(servos: Bench) -> No
     told = servos.told("disable", "1", "2")
     assert "the AX-12 at id 1 ignores goals until 'servo enable'" in told
     assert "the XL430-W250 at id 2 is relaxed: no goal switches its torque on" in told
-    assert [servos.line[one].get("torque_enable") for one in (1, 2)] == [0, 0]
+    assert [servos.line[number].get("torque_enable") for number in (1, 2)] == [0, 0]
     before = servos.position(1)
     servos.told("write", "1", "goal_position=90 deg")
     assert servos.line[1].get("torque_enable") == 1  # by its firmware
@@ -149,7 +149,7 @@ def test_all_that_answer_are_relaxed(servos: Bench) -> None:
 def test_reboot_and_identify(servos: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[int] = []
     look = SimpleNamespace(sleep=lambda _: seen.append(servos.line[2].get("led")))
-    monkeypatch.setattr("rbxcompose.cli.servos.actions.time", look)  # there alone: other threads sleep, too
+    monkeypatch.setattr("rbxcompose.domains.servos.command_actions.time", look)  # there alone: other threads sleep, too
     servos.told("identify", "2")
     assert seen == [1, 0, 1, 0, 1, 0]
     servos.told("enable", "2")
@@ -166,12 +166,12 @@ def test_a_port_that_cannot_be_used_is_told(servos: Bench, capsys: pytest.Captur
 
 
 def test_a_slow_adapter_is_warned_of(servos: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rbxcompose.actuation.dynamixel_bus.latency_of", lambda _: 0.016)
+    monkeypatch.setattr("rbxcompose.domains.servos.dynamixel_bus.latency_of", lambda _: 0.016)
     assert "RBX2206" in servos.told("ping", "1")
 
 
 def test_servos_without_their_package_are_told_what_to_install(servos: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rbxcompose.cli.servo.find_spec", lambda _: None)
+    monkeypatch.setattr("rbxcompose.domains.servos.commands.servo.find_spec", lambda _: None)
     assert "pip install 'rbxcompose[servos]'" in servos.told("ping", "1", code=1)
 
 

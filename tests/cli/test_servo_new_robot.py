@@ -10,16 +10,16 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.cli.main import main
-from rbxcompose.clock import SteppedClock
-from rbxcompose.devices.serial_ports import SerialPort
+from rbxcompose.base.clock import SteppedClock
+from rbxcompose.commands.main import main
+from rbxcompose.domains.devices.serial_ports import SerialPort
+from rbxcompose.domains.servos.twins.servo_fake import FakeServo
+from rbxcompose.domains.servos.twins.servo_line import FakeLine
+from rbxcompose.domains.servos.twins.servo_port import FakePort
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.std_msgs import Float64
-from rbxcompose.qos import Qos
+from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench, Golden, check_file
-from rbxcompose.twins.servo_fake import FakeServo
-from rbxcompose.twins.servo_line import FakeLine
-from rbxcompose.twins.servo_port import FakePort
 
 AX, XL, SLOW = "AX-12", "XL430-W250", 57_600
 Making = Callable[..., tuple[int, str]]
@@ -60,7 +60,11 @@ def test_it_has_no_findings_and_moves_in_simulation(made: Making, tmp_path: Path
     at: dict[str, float] = {}
     bench = Bench(plan=check_file(robot / "robot.yaml").plan)
     bench.bus.subscribe(
-        "me", "/joint_states", JointState, Qos.STATE, lambda one: at.update(zip(one.name, one.position, strict=True))
+        "me",
+        "/joint_states",
+        JointState,
+        Qos.STATE,
+        lambda message: at.update(zip(message.name, message.position, strict=True)),
     )
     command = bench.bus.publisher("me", "/joint_3/command", Float64, Qos.COMMAND)
     bench.advance(0.5)
@@ -70,7 +74,7 @@ def test_it_has_no_findings_and_moves_in_simulation(made: Making, tmp_path: Path
 
 
 def test_its_port_has_the_name_that_stays(made: Making, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = "rbxcompose.cli.servos.actions.serial_ports"
+    path = "rbxcompose.domains.servos.command_actions.serial_ports"
     monkeypatch.setattr(
         path, lambda: [SerialPort(os.path.realpath(tmp_path / "servos"), ["/dev/serial/by-id/usb-FT4"])]
     )

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.body.urdf import read_body
-from rbxcompose.body.xml_reader import XmlElement, read_urdf
-from rbxcompose.cli.bodies.sliders import Slider, SliderPanel, bar, is_end, sliders_of, split_keys
-from rbxcompose.printable import columns
+from rbxcompose.base.printable import columns
+from rbxcompose.domains.body.live_pose import Slider, SliderPanel, bar, is_end, sliders_of, split_keys
+from rbxcompose.domains.body.urdf import read_body
+from rbxcompose.domains.body.xml_reader import XmlElement, read_urdf
 from rbxcompose.testing.golden import Golden
 
 JOINT = '<joint name="{name}" type="{kind}"><parent link="base"/><child link="{name}_link"/>{more}</joint>'
@@ -42,7 +42,7 @@ def panel() -> SliderPanel:
 
 
 def test_joints_that_move_by_themselves_have_sliders_over_their_range() -> None:
-    assert [(one.name, one.lower, one.upper) for one in sliders()] == [
+    assert [(slider.name, slider.lower, slider.upper) for slider in sliders()] == [
         ("head_pan_joint", -2.5, 2.5),
         ("wheel", -math.pi, math.pi),
         ("lift", 0.1, 0.4),
@@ -80,7 +80,7 @@ def test_whatever_is_pressed_no_joint_leaves_its_range(keys: list[str]) -> None:
     for key in keys:
         before = dict(shown.positions)
         assert shown.press(key) == (shown.positions != before)
-    assert all(one.lower <= shown.positions[one.name] <= one.upper for one in shown.sliders)
+    assert all(slider.lower <= shown.positions[slider.name] <= slider.upper for slider in shown.sliders)
 
 
 @given(st.lists(st.sampled_from(KEYS), max_size=10), st.integers(0, 30))
@@ -145,4 +145,6 @@ def test_a_wrong_position_is_told(text: str, why: str) -> None:
 
 def test_sliders_begin_where_the_joints_are_as_far_as_that_is_known() -> None:
     there = SliderPanel(sliders(), min, {sliders()[0].name: 0.2, "another": 3.0}).positions
-    assert there == {one.name: one.within(0.2) if index == 0 else one.rest for index, one in enumerate(sliders())}
+    assert there == {
+        slider.name: slider.within(0.2) if index == 0 else slider.rest for index, slider in enumerate(sliders())
+    }

@@ -1,8 +1,8 @@
 from __future__ import annotations
 
-from rbxcompose.cli.robots.story import StoryWriter, summary
-from rbxcompose.levels import Level
-from rbxcompose.runtime.records import Record
+from rbxcompose.base.levels import Level
+from rbxcompose.commands.story import StoryWriter, summary
+from rbxcompose.runtime.log import Record
 
 
 def test_a_record_is_time_source_and_text() -> None:

@@ -22,11 +22,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.cli.robots.picture import ComponentPicture, Load, RobotPicture, Tree, lines_of
-from rbxcompose.levels import Level
-from rbxcompose.printable import FORBIDDEN, columns
-from rbxcompose.runtime.records import Record
+from rbxcompose.base.levels import Level
+from rbxcompose.base.printable import FORBIDDEN, columns
+from rbxcompose.runtime.log import Record
 from rbxcompose.testing.golden import Golden
+from rbxcompose.tools.robot_picture import ComponentPicture, Load, RobotPicture, Tree, lines_of
 from tests.third_party.places import put
 
 ROOT = Path(__file__).parents[2]
@@ -63,7 +63,7 @@ def text_of(picture: RobotPicture, width: int, height: int) -> str:
         ("top_missions.txt", replace(PICTURE, components=COMPONENTS[:1], loads=PICTURE.loads[:1], warnings=())),
         (
             "top_many.txt",
-            replace(PICTURE, components=[replace(COMPONENTS[1], name=f"wheel_{one}") for one in range(40)]),
+            replace(PICTURE, components=[replace(COMPONENTS[1], name=f"wheel_{index}") for index in range(40)]),
         ),
         ("top_dead.txt", replace(PICTURE, is_supervised=False, router=None, mission="", batteries=(), health=())),
     ],
@@ -149,10 +149,16 @@ def test_without_a_terminal_one_picture_is_shown(robot: Robot) -> None:
     deadline = time.monotonic() + PATIENCE
     while len(shown["batteries"]) < 2 and time.monotonic() < deadline:  # right after the start they tell nothing yet
         shown = robot.seen()
-    components = {one["name"]: one for one in shown["components"]}
+    components = {component["name"]: component for component in shown["components"]}
     assert 20.0 < components["base"]["rate"] < 200.0  # twice 50 Hz: odom and tf
-    assert {one["process"] for one in shown["processes"]} >= {"supervisor", "parent", "router", "world", "robot"}
-    assert all(one["memory"] > 1e6 and one["cpu"] is not None for one in shown["processes"])
+    assert {process["process"] for process in shown["processes"]} >= {
+        "supervisor",
+        "parent",
+        "router",
+        "world",
+        "robot",
+    }
+    assert all(process["memory"] > 1e6 and process["cpu"] is not None for process in shown["processes"])
     assert shown["batteries"].keys() == {"battery", "cell"}
     assert shown["batteries"]["cell"] == "62.5 %"
     assert "topped: router tcp/127.0.0.1:" in robot.do("top", str(robot.file)).stdout
@@ -189,9 +195,9 @@ def test_the_doctor_looks_at_a_robot_that_is_up(robot: Robot) -> None:
     done = robot.do("doctor", "topped", "--json")
     assert done.returncode == 0, done.stdout + done.stderr
     told = json.loads(done.stdout)
-    fine = {one["examination"] for one in told if one["level"] == "ok"}
+    fine = {entry["examination"] for entry in told if entry["level"] == "ok"}
     assert {"ports", "clashes", "leftovers", "permissions", "limits"} <= fine
-    (alone,) = (one for one in told if one["examination"] == "wires" and one["level"] == "warning")
+    (alone,) = (entry for entry in told if entry["examination"] == "wires" and entry["level"] == "warning")
     assert alone["message"] == "/base of 'topped' subscribes to /cmd_vel, which has no publisher"
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.cli import main as command
+from rbxcompose.commands import main as command
 from rbxcompose.testing.golden import Golden
 from tests.executive.toy_gripper import Gripper
 
@@ -77,10 +77,10 @@ def test_they_are_listed_with_their_topic_arguments_and_an_example(
     folder: Path, capsys: pytest.CaptureFixture[str], golden: Golden, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert Gripper.type_name == "toy_gripper"
-    monkeypatch.setattr("rbxcompose.cli.missions.files.skill_names", lambda: ["say"])  # other tests have toys
+    monkeypatch.setattr("rbxcompose.tools.mission_files.skill_names", lambda: ["say"])  # other tests have toys
     golden.check("mission_skills.txt", told(capsys, "mission", "skills", str(folder)))
     listed = json.loads(told(capsys, "mission", "skills", str(folder), "--json"))
-    assert {one["name"]: one["way"] for one in listed if one["topic"]} == {
+    assert {item["name"]: item["way"] for item in listed if item["topic"]} == {
         "beep": "topic",
         "grip": "topic",
         "press": "topic",

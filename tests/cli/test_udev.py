@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.cli import main as command
+from rbxcompose.commands import main as command
 from rbxcompose.testing.golden import Golden
 from tests.devices.machine_tree import MachineTree
 
@@ -62,7 +62,7 @@ def test_a_machine_is_scanned_without_any_robot(
     monkeypatch.chdir(machine)
     run(machine, "scan --json", 0)
     found = json.loads(capsys.readouterr().out)
-    assert [one["devices"] for one in found] == [[]] * 7
+    assert [entry["devices"] for entry in found] == [[]] * 7
     assert found[0]["entry"] == {"vendor": "2341", "product": "0043", "serial": "Left #1"}
     assert found[2]["entry"] == {"vendor": "1a86", "product": "7523", "usb_port": "1-1.2"}
 
@@ -74,13 +74,13 @@ def test_the_entries_that_are_written_make_a_robot_that_knows_all(
     Path("robot.yaml").write_text(ROBOT.partition("devices")[0], encoding="utf-8")
     run(machine, "scan", 0)
     entries = capsys.readouterr().out.partition("devices:\n")[2].splitlines()
-    named = "\n".join(one.replace("NAME", f"it_{number}") for number, one in enumerate(entries))
+    named = "\n".join(entry.replace("NAME", f"it_{number}") for number, entry in enumerate(entries))
     Path("robot.yaml").write_text(f"{ROBOT.partition('devices')[0]}devices:\n{named}\n", encoding="utf-8")
     assert command.main(["check"]) == 0
     capsys.readouterr()
     run(machine, "scan --json", 0)
     found = json.loads(capsys.readouterr().out)
-    assert sorted(name for one in found for name in one["devices"]) == [f"it_{number}" for number in range(8)]
+    assert sorted(name for entry in found for name in entry["devices"]) == [f"it_{number}" for number in range(8)]
 
 
 def test_rules_are_written_when_they_differ_and_only_then(machine: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -98,7 +98,7 @@ def test_rules_are_written_when_they_differ_and_only_then(machine: Path, capsys:
     assert 'GROUP="uucp"' in (machine / RULES).read_text(encoding="utf-8")
     run(machine, "check --json", 1)
     told = json.loads(capsys.readouterr().out)
-    assert "RBX9414" in {one["code"] for one in told["findings"]}
+    assert "RBX9414" in {finding["code"] for finding in told["findings"]}
     assert told["fine"][0] == f"'arm' is {machine}/dev/ttyUSB0 (0403:6001 A700eUxA)"
 
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.cli import up
-from rbxcompose.runtime.options import RunOptions
+from rbxcompose.runtime.folder import RunOptions
+from rbxcompose.tools.commands import up
 
 
 def parse(*words: str) -> argparse.Namespace:

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.compiler import compile_robot
+from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.msgs.rbxcompose_msgs import LocateArm, MoveArm
 from rbxcompose.sdk.bound import Outcome
 from rbxcompose.testing import Bench
@@ -19,7 +19,7 @@ TYPES = ("arm", "scene", "servo_bus")
 def bench() -> Bench:
     plan = compile_robot(str(ROOT / "robots/pi_robot"), environment={}).plan
     assert plan
-    found = Bench(*(one for one in plan.instances if one.type in TYPES))
+    found = Bench(*(instance for instance in plan.instances if instance.type in TYPES))
     found.advance(0.5)
     return found
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.arm_servo import STATUS, STREAM, TIMEOUT, ArmServo
+from rbxcompose.domains.arms.servo_ports import STATUS, STREAM, TIMEOUT, ArmServo
 from rbxcompose.msgs.geometry_msgs import Point, Pose, PoseStamped, Quaternion, Twist, TwistStamped, Vector3
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header
@@ -47,17 +47,17 @@ def pose(x: float, w: float = 1.0) -> PoseStamped:
     ],
 )
 def test_a_command_that_is_none_is_refused_and_moves_nothing(message: TwistStamped | PoseStamped, told: str) -> None:
-    one, sent, _ = servo()
-    assert told in one.take(message, 0.0, NOW)
-    assert not one.is_wanted
-    assert not one.go_on(0.0, NOW, AT)
+    arm_servo, sent, _ = servo()
+    assert told in arm_servo.take(message, 0.0, NOW)
+    assert not arm_servo.is_wanted
+    assert not arm_servo.go_on(0.0, NOW, AT)
     assert sent == []
 
 
 def test_each_message_to_the_controller_ends_at_rest_and_the_last_command_counts_for_a_while() -> None:
-    one, sent, told = servo()
-    assert one.take(twist(0.02, frame="ground"), 0.0, NOW) == ""
-    steps = [one.go_on(step * 0.02, NOW + step * 20_000_000, AT) for step in range(60)]
+    arm_servo, sent, told = servo()
+    assert arm_servo.take(twist(0.02, frame="ground"), 0.0, NOW) == ""
+    steps = [arm_servo.go_on(step * 0.02, NOW + step * 20_000_000, AT) for step in range(60)]
     assert not any(message.points[-1].velocities.any() for message in sent)
     assert told[0] != "idle"
     assert told[-1] == "idle"
@@ -66,8 +66,8 @@ def test_each_message_to_the_controller_ends_at_rest_and_the_last_command_counts
 
 
 def test_a_pose_is_approached() -> None:
-    one, sent, _ = servo()
-    assert one.take(pose(HERE[0] - 0.05), 0.0, NOW) == ""
-    one.go_on(0.0, NOW, AT)
+    arm_servo, sent, _ = servo()
+    assert arm_servo.take(pose(HERE[0] - 0.05), 0.0, NOW) == ""
+    arm_servo.go_on(0.0, NOW, AT)
     there = KINEMATICS.tip_pose(sent[0].points[-1].positions).translation
     assert there[0] < HERE[0]

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rbxcompose.compiler import compile_robot
+from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.compiler.plan.model import Instance
 from rbxcompose.msgs.geometry_msgs import Point, PointStamped
 from rbxcompose.msgs.rbxcompose_msgs import FollowPoint, MoveArm
 from rbxcompose.msgs.std_msgs import Header
-from rbxcompose.plan.model import Instance
 from rbxcompose.sdk.bound import Outcome
 from rbxcompose.testing import Bench
 from tests.conftest import ROOT
@@ -28,7 +28,7 @@ Place = tuple[float, float, float]
 def parts_of(robot: str) -> list[Instance]:
     plan = compile_robot(str(ROOT / "robots" / robot), profiles=["tracking"], environment={}).plan
     assert plan
-    return [one for one in plan.instances if one.type in TYPES]
+    return [instance for instance in plan.instances if instance.type in TYPES]
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +64,7 @@ class Chased:
     def tip(self) -> Place:
         """Return where the tip is in the frame of the base of its arm [m]."""
         arm: Any = self.bench.component("right_arm")
-        poses = arm.works.kinematics.poses(np.array([arm.measured[one][0] for one in arm.works.space.names]))
+        poses = arm.works.kinematics.poses(np.array([arm.measured[name][0] for name in arm.works.space.names]))
         found: Place = poses[BASE].inverse().compose(poses["right_arm_tip"]).translation
         return found
 
@@ -111,7 +111,7 @@ def test_far_points_are_reached_for_and_very_far_ones_let_the_arm_rest_until_the
     assert chased.told[-1].state == "far"
     arm: Any = chased.bench.component("right_arm")
     resting = arm.config.poses["resting"]
-    assert max(abs(arm.measured[one][0] - resting[one]) for one in arm.works.space.names) < 0.03
+    assert max(abs(arm.measured[name][0] - resting[name]) for name in arm.works.space.names) < 0.03
     assert chased.ends == []
 
 

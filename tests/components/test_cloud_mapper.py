@@ -11,18 +11,18 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rbxcompose.body.model import Geometry
-from rbxcompose.compiler import compile_robot
-from rbxcompose.geometry import Transform3
-from rbxcompose.motion.octree_files import cells_of
-from rbxcompose.motion.scene import PlacedObject
-from rbxcompose.motion.scene_messages import object_message, placed_object
+from rbxcompose.base.geometry import Transform3
+from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.domains.arms.motion.octree_files import cells_of
+from rbxcompose.domains.arms.motion.scene import PlacedObject
+from rbxcompose.domains.arms.motion.scene_messages import object_message, placed_object
+from rbxcompose.domains.body.model import Geometry
 from rbxcompose.msgs.rbxcompose_msgs import MoveArm, SceneObjects
 from rbxcompose.msgs.sensor_msgs import JointState, PointCloud2, PointField
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header
-from rbxcompose.qos import Qos
 from rbxcompose.sdk.bound import Outcome
+from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench, instance
 from tests.conftest import ROOT
 from tests.motion.toy_arm import urdf
@@ -95,10 +95,10 @@ class Mapper:
     @property
     def cells(self) -> Array:
         """Return the middles of cells in the root's frame."""
-        (one,) = self.told[-1].objects
-        if not one.shapes:
+        (object_,) = self.told[-1].objects
+        if not object_.shapes:
             return np.empty((0, 3))
-        placed = placed_object(one)
+        placed = placed_object(object_)
         return np.array(placed.shape.points).reshape(-1, 3) + placed.pose.translation
 
     @property
@@ -235,13 +235,13 @@ def test_an_arm_goes_around_what_a_camera_sees(tmp_path: Path) -> None:
     assert moved(**{PAN: -0.6, **straight}).outcome is Outcome.SUCCEEDED
     bench.publish("/points", replace(cloud(surface(*between), frame=""), header=Header()), Qos.BULK)
     bench.advance(1.0)
-    assert [one.name for one in scenes[-1].objects] == ["camera"]
+    assert [object_.name for object_ in scenes[-1].objects] == ["camera"]
     before = len(states)
     end = moved(**{PAN: 0.6})
     assert end.outcome is Outcome.SUCCEEDED, end.result
     box = PlacedObject("box", Geometry("box", (0.1, 0.1, 0.1)), works.kinematics.body.root, Transform3(between))
     checker = works.checker([box])
-    places = [dict(zip(one.name, one.position.tolist(), strict=True)) for one in states[before:]]
+    places = [dict(zip(state.name, state.position.tolist(), strict=True)) for state in states[before:]]
     assert all(checker.is_free(np.array([at[name] for name in works.space.names])) for at in places)
     assert max(abs(at[LIFT] + math.pi / 2) for at in places) > 0.1  # not the straight way
     x, y, z = works.kinematics.body.poses(places[-1])["right_arm_tip"].translation

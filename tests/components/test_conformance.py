@@ -14,10 +14,10 @@ from unittest.mock import Mock
 
 import pytest
 
-from rbxcompose.compiler import compile_robot
-from rbxcompose.field_docs import field_docs
-from rbxcompose.plan.model import Instance
-from rbxcompose.rendering.text import render_text
+from rbxcompose.base.config import field_docs
+from rbxcompose.commands.formats.text import render_text
+from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.compiler.plan.model import Instance
 from rbxcompose.sdk.capabilities import require_declared, settings_of
 from rbxcompose.sdk.ports import In, Serves
 from rbxcompose.sdk.registry import component_names, component_type
@@ -84,22 +84,22 @@ def overrides_received(cls: type[Any]) -> bool:
 def test_its_capabilities_name_ports_and_fields_that_it_has_with_their_values(name: str) -> None:
     cls, config = component_type(name), instance_of(name).config
     declared = require_declared(name, cls.capabilities(config), cls.ports(config), type(config))
-    settings = [setting for one in declared for setting in settings_of(one) if setting.field]
+    settings = [setting for capability in declared for setting in settings_of(capability) if setting.field]
     assert [setting.value for setting in settings] == [attrgetter(setting.field)(config) for setting in settings]
 
 
 @all_types
 def test_its_lifecycle_runs_twice_and_leaves_nothing_on_the_bus(name: str) -> None:
     robot = Bench(instance_of(name))
-    one = next(iter(robot.host.hosted))
+    text = next(iter(robot.host.hosted))
     robot.advance(2.0)
     robot.host.shutdown()
     left = len(robot.bus)
     robot.host.is_braking = False
     robot.host.configure()
-    robot.host.activate([one])
+    robot.host.activate([text])
     robot.advance(2.0)
-    assert robot.host.states()[one] == ("active", 0), robot.texts()
+    assert robot.host.states()[text] == ("active", 0), robot.texts()
     robot.host.shutdown()
     assert len(robot.bus) == left
 

@@ -5,12 +5,11 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.diagnostics.requests import Acknowledge, ListChanges, ShowDiagnostics
-from rbxcompose.levels import Level
+from rbxcompose.base.levels import Level
+from rbxcompose.base.requests import Refused, to_data
+from rbxcompose.domains.diagnostics.requests import Acknowledge, ListChanges, ShowDiagnostics
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray, DiagnosticStatus
-from rbxcompose.requests import Refused
 from rbxcompose.testing import Bench, instance
-from rbxcompose.typed_json import to_data
 
 
 def bench() -> Bench:
@@ -53,7 +52,7 @@ def test_components_that_are_lost_are_stale_with_the_cause() -> None:
     reports = robot.collect("/diagnostics_agg", DiagnosticArray)
     robot.host.lost(("battery",), "its process was killed (signal 9)")
     robot.advance(0.0)
-    status = next(one for one in reports[-1].status if one.name == "/power/battery")
+    status = next(candidate for candidate in reports[-1].status if candidate.name == "/power/battery")
     assert (status.level, status.message) == (Level.STALE, "its process was killed (signal 9)")
 
 
@@ -94,7 +93,7 @@ def test_each_change_of_a_level_is_published_once_with_its_cause() -> None:
     told = robot.collect("/diagnostics_changes", DiagnosticArray)
     robot.publish("/diagnostics", DiagnosticArray(status=(DiagnosticStatus(1, "arm", "warm"),)))
     robot.advance(3.0)
-    assert [(one.name, one.level, one.message) for array in told for one in array.status] == [
+    assert [(status.name, status.level, status.message) for array in told for status in array.status] == [
         ("/arm/arm", 1, "warm"),
         ("/arm", 1, "arm: warm"),
     ]

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rbxcompose.compiler.plan.model import Instance
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.msgs.std_msgs import Bool, Float64
-from rbxcompose.plan.model import Instance
-from rbxcompose.robot_events import RobotHeld
+from rbxcompose.sdk.robot_events import RobotHeld
 from rbxcompose.testing import Bench, check_text, instance
 
 PRESSED = "'estop' is pressed"
@@ -45,7 +45,7 @@ class Cell:
     @property
     def told(self) -> list[str]:
         """What the supervisor was told."""
-        return [one.reason for one in self.robot.events if isinstance(one, RobotHeld)]
+        return [event.reason for event in self.robot.events if isinstance(event, RobotHeld)]
 
     def moves(self) -> bool:
         return not self.base.is_at_rest or abs(self.drive.measured.velocity) > 0.01
@@ -118,7 +118,7 @@ def test_the_supervisor_always_knows_the_reason(story: list[bool | None]) -> Non
         robot.advance(0.3)
         silent += 0.3
         reason = PRESSED if is_down else MISSING if silent >= 0.5 else ""
-        held = [one.reason for one in robot.events if isinstance(one, RobotHeld)]
+        held = [event.reason for event in robot.events if isinstance(event, RobotHeld)]
         assert (held or [""])[-1] == reason
         assert robot.host.is_stopped >= bool(reason)
 

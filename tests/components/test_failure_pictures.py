@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.arm_pictures import MOST, numbered, picture_of_failure
-from rbxcompose.compiler import compile_robot
-from rbxcompose.motion.reasons import GraspReason, MotionReason, StageFailure
+from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.domains.arms.hand import MOST, numbered, picture_of_failure
+from rbxcompose.domains.arms.reasons import GraspReason, MotionReason, StageFailure
 from rbxcompose.msgs.rbxcompose_msgs import PickObject
 from rbxcompose.sdk.bound import Outcome
 from rbxcompose.testing import Bench
@@ -34,7 +34,9 @@ def size_of(file: Path) -> tuple[int, int]:
 def test_the_text_of_a_failed_goal_names_its_picture(tmp_path: Path) -> None:
     plan = compile_robot(str(ROOT / "robots/pi_robot"), profiles=["table"], environment={}).plan
     assert plan
-    instances: dict[str, Any] = {one.type: one for one in plan.instances if one.type in ("arm", "servo_bus", "scene")}
+    instances: dict[str, Any] = {
+        instance.type: instance for instance in plan.instances if instance.type in ("arm", "servo_bus", "scene")
+    }
     config, folder = instances["arm"].config, tmp_path / "new" / "pictures"
     hand = config.hand.model_copy(update={"pictures": str(folder)})
     bench = Bench(
@@ -52,10 +54,10 @@ def test_the_text_of_a_failed_goal_names_its_picture(tmp_path: Path) -> None:
 
 
 def test_the_oldest_pictures_go_and_other_files_stay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rbxcompose.arm_pictures.draw_arm", lambda shown: b"png")
+    monkeypatch.setattr("rbxcompose.domains.arms.hand.draw_arm", lambda shown: b"png")
     others = [tmp_path / "notes.txt", tmp_path / "left_arm-0001-lift-path_in_collision.png"]
-    for one in others:
-        one.write_text("mine")
+    for other in others:
+        other.write_text("mine")
     for _ in range(MOST + 5):
         said = picture_of_failure(tmp_path, "right_arm", HandBench().works, {}, FAILURE)
         assert Path(said.removeprefix("picture: ")).read_bytes() == b"png"
@@ -81,7 +83,7 @@ def test_the_folder_is_relative_to_the_file_that_names_it(tmp_path: Path) -> Non
     )
     assert project.findings == []
     assert project.checked
-    found: list[Any] = [one.config for one in project.checked.plan.instances if one.type == "arm"]
+    found: list[Any] = [instance.config for instance in project.checked.plan.instances if instance.type == "arm"]
     [config] = found
     assert Path(config.hand.pictures).name == "failures"
     assert Path(config.hand.pictures).is_relative_to(tmp_path.resolve())

@@ -8,15 +8,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rbxcompose.base.config import Place
+from rbxcompose.base.geometry import Pose2, quaternion_from_yaw
 from rbxcompose.bus.services import ServedRequest
-from rbxcompose.config import Place
-from rbxcompose.geometry import Pose2, quaternion_from_yaw
 from rbxcompose.msgs.geometry_msgs import Point, Pose, PoseStamped, Quaternion
 from rbxcompose.msgs.nav2_msgs import NavigateToPose
 from rbxcompose.msgs.rbxcompose_msgs import Recharge, SetBatteryLevel
 from rbxcompose.msgs.std_msgs import Float32, Header
-from rbxcompose.qos import Qos
 from rbxcompose.sdk import Ended, Outcome, SentGoal
+from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench, instance
 
 DOCK = Place("dock", 0.5, 0.5, 0.0)

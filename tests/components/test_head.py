@@ -8,12 +8,12 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.compiler import compile_robot
-from rbxcompose.motion.gaze import past
+from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.compiler.plan.model import Instance
+from rbxcompose.domains.arms.motion.gaze import past
 from rbxcompose.msgs.geometry_msgs import Point, PointStamped
 from rbxcompose.msgs.rbxcompose_msgs import LookAtPoint
 from rbxcompose.msgs.std_msgs import Header
-from rbxcompose.plan.model import Instance
 from rbxcompose.sdk.bound import Outcome
 from rbxcompose.testing import Bench
 from tests.conftest import ROOT
@@ -25,12 +25,12 @@ TYPES = ("head", "servo_bus", "scene", "transforms")
 def parts() -> dict[str, Instance]:
     plan = compile_robot(str(ROOT / "robots/pi_robot"), profiles=["table"], environment={}).plan
     assert plan
-    return {one.type: one for one in plan.instances if one.type in TYPES}
+    return {instance.type: instance for instance in plan.instances if instance.type in TYPES}
 
 
 def robot(parts: dict[str, Instance], **changes: object) -> Bench:
     """Return a head whose configuration is changed; without a type that is changed to None."""
-    kept = {name: one for name, one in parts.items() if changes.get(name, one) is not None}
+    kept = {name: instance for name, instance in parts.items() if changes.get(name, instance) is not None}
     config = parts["head"].config.model_copy(update={name: to for name, to in changes.items() if name not in TYPES})
     bench = Bench(*(kept | {"head": replace(parts["head"], config=config)}).values())
     bench.advance(0.5)
@@ -126,7 +126,7 @@ def test_a_newer_goal_replaces_an_older_one_and_a_cancelled_one_lets_the_head_re
     bench.advance(0.4)
     second.cancel()
     bench.advance(1.0)
-    assert [one.outcome for one in ends] == [Outcome.ABORTED, Outcome.CANCELED]
+    assert [end.outcome for end in ends] == [Outcome.ABORTED, Outcome.CANCELED]
     head: Any = bench.component("head")
     at = dict(head.positions)
     bench.advance(1.0)

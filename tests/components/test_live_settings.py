@@ -17,7 +17,7 @@ def test_a_battery_drains_at_its_new_pace_from_where_it_is() -> None:
     bench.advance(10.0)
     bench.set_live("battery", runtime=10.0, warn=0.95)
     bench.advance(1.0)
-    assert [round(one.data) for one in levels][-2:] == [90, 80]
+    assert [round(level.data) for level in levels][-2:] == [90, 80]
     assert "battery: Medium battery: 90 %" in bench.texts()
 
 

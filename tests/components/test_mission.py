@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import pytest
 
-from rbxcompose.components.mission import Mission, MissionConfig
-from rbxcompose.executive.requests import PauseMission, ResumeMission
-from rbxcompose.expressions.values import NOT_ARRIVED
-from rbxcompose.geometry import Pose2
-from rbxcompose.requests import Command
-from rbxcompose.robot_events import MissionOver, MissionWaits
+from rbxcompose.base.expressions.values import NOT_ARRIVED
+from rbxcompose.base.geometry import Pose2
+from rbxcompose.base.requests import Command
+from rbxcompose.missions.components.mission import Mission, MissionConfig
+from rbxcompose.missions.execution.requests import PauseMission, ResumeMission
 from rbxcompose.sdk import Ended, Outcome, Refused
+from rbxcompose.sdk.robot_events import MissionOver, MissionWaits
 from tests.executive.fake_robot import Robot
 
 PATROL = """

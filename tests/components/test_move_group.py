@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rbxcompose.compiler import compile_robot
-from rbxcompose.geometry import Transform3
-from rbxcompose.motion.inverse_kinematics import PoseTarget
-from rbxcompose.motion.scene_messages import pose_message
+from rbxcompose.base.geometry import Transform3
+from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.compiler.plan.model import Plan
+from rbxcompose.domains.arms.motion.inverse_kinematics import PoseTarget
+from rbxcompose.domains.arms.motion.scene_messages import pose_message
 from rbxcompose.msgs.geometry_msgs import Quaternion
 from rbxcompose.msgs.moveit_msgs import (
     AttachedCollisionObject,
@@ -40,9 +41,8 @@ from rbxcompose.msgs.rbxcompose_msgs import MoveArm, ReachPose, SceneObjects
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.shape_msgs import SolidPrimitive
 from rbxcompose.msgs.std_msgs import Header
-from rbxcompose.plan.model import Plan
-from rbxcompose.qos import Qos
 from rbxcompose.sdk.bound import Outcome
+from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench
 from tests.conftest import ROOT
 
@@ -64,7 +64,7 @@ class Client:
     """A program for MoveIt, and the robot in stepped time."""
 
     def __init__(self, plan: Plan) -> None:
-        self.bench = Bench(*(one for one in plan.instances if one.type in TYPES))
+        self.bench = Bench(*(instance for instance in plan.instances if instance.type in TYPES))
         self.states = self.bench.collect("/joint_states", JointState, Qos.STATE)
         self.scenes = self.bench.collect("/scene", SceneObjects, Qos.LATCHED)
         self.feedback: list[str] = []
@@ -220,7 +220,7 @@ def test_a_plan_is_executed_later_unless_the_arm_has_moved_since_or_it_would_col
     assert again.outcome is Outcome.ABORTED
     assert again.result.error_code.val == MoveItErrorCodes.START_STATE_INVALID
     fast = client.move(joints(**{LIFT: 0.0}), options=options).result.planned_trajectory
-    hurried = [replace(one, velocities=one.velocities * 3) for one in fast.joint_trajectory.points]
+    hurried = [replace(point, velocities=point.velocities * 3) for point in fast.joint_trajectory.points]
     wrong = replace(fast, joint_trajectory=replace(fast.joint_trajectory, points=tuple(hurried)))
     refused = client.sent(ExecuteTrajectory, "/execute_trajectory", ExecuteTrajectory.Goal(trajectory=wrong))
     assert refused.result.error_code.val == MoveItErrorCodes.INVALID_MOTION_PLAN

@@ -5,7 +5,7 @@ import pytest
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticStatus
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.msgs.std_msgs import Empty
-from rbxcompose.qos import Qos
+from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench, instance
 
 SLOW, FAST, ZERO = Twist(linear=Vector3(x=0.1)), Twist(linear=Vector3(x=0.4)), Twist()
@@ -146,8 +146,8 @@ def test_its_status_has_no_time_that_the_next_message_or_none_would_make_wrong()
         robot.advance(0.1)
     robot.advance(3.0)
     assert told[-1].message == "no input"
-    assert "navigation holds" in {one.message for one in told}
-    assert not any(letter.isdigit() for one in told for letter in one.message)
+    assert "navigation holds" in {status.message for status in told}
+    assert not any(letter.isdigit() for status in told for letter in status.message)
 
 
 def test_its_status_tells_when_a_source_need_no_longer_come_to_rest() -> None:

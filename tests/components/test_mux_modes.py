@@ -7,10 +7,8 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.msgs.geometry_msgs import Twist, Vector3
-from rbxcompose.msgs.std_msgs import Bool, Float64, String
-from rbxcompose.msgs.topic_tools_interfaces import MuxAdd, MuxDelete, MuxList, MuxSelect
-from rbxcompose.mux.requests import (
+from rbxcompose.base.requests import Refused
+from rbxcompose.domains.muxes.requests import (
     NONE,
     AddMuxInput,
     DeleteMuxInput,
@@ -21,9 +19,11 @@ from rbxcompose.mux.requests import (
     SelectMuxInput,
     UnlockMuxInputs,
 )
-from rbxcompose.qos import Qos
-from rbxcompose.requests import Refused
-from rbxcompose.robot_events import ComponentNoted
+from rbxcompose.msgs.geometry_msgs import Twist, Vector3
+from rbxcompose.msgs.std_msgs import Bool, Float64, String
+from rbxcompose.msgs.topic_tools_interfaces import MuxAdd, MuxDelete, MuxList, MuxSelect
+from rbxcompose.sdk.ports import Qos
+from rbxcompose.sdk.robot_events import ComponentNoted
 from rbxcompose.testing import Bench, instance
 
 SLOW, FAST, ZERO = Twist(linear=Vector3(x=0.1)), Twist(linear=Vector3(x=0.4)), Twist()
@@ -60,7 +60,7 @@ def test_the_limits_of_a_hand_over_change_while_the_robot_runs() -> None:
     robot.set_live("cmd_vel", **{"handover.linear": "1 m/s^2"})
     robot.advance(0.1)
     robot.publish("/cmd_vel/teleop", FAST)
-    assert [one.linear.x for one in out] == pytest.approx([0.1, 0.1, 0.11, 0.21])
+    assert [item.linear.x for item in out] == pytest.approx([0.1, 0.1, 0.11, 0.21])
 
 
 def test_the_services_of_topic_tools_select_and_list_by_topic() -> None:
@@ -85,7 +85,7 @@ def test_what_topic_tools_refuses_fails_and_changes_nothing() -> None:
     assert not call(robot, MuxAdd, "add", topic=NONE).success
     assert not call(robot, MuxDelete, "delete", topic="three").success
     assert not call(robot, MuxDelete, "delete", topic="one").success  # it is selected
-    assert (look(robot).selected, [one.name for one in look(robot).inputs]) == ("one", ["one", "two"])
+    assert (look(robot).selected, [state.name for state in look(robot).inputs]) == ("one", ["one", "two"])
 
 
 def test_an_input_that_was_added_can_be_selected_and_deleted_again() -> None:
@@ -111,7 +111,7 @@ def test_who_holds_is_announced_and_latched(profile: str, word: str, told: list[
     for name in ("two", NONE):
         robot.host.ask("cmd_vel", SelectMuxInput("cmd_vel", name))
         robot.advance(0.0)
-    assert [one.data for one in heard] == told
+    assert [message.data for message in heard] == told
 
 
 def test_yocs_announces_idle() -> None:
@@ -119,14 +119,14 @@ def test_yocs_announces_idle() -> None:
     heard = robot.collect("/cmd_vel/active", String, Qos.LATCHED)
     robot.publish("/cmd_vel/teleop", FAST)
     robot.advance(1.0)
-    assert [one.data for one in heard] == ["idle", "teleop", "idle"]
+    assert [message.data for message in heard] == ["idle", "teleop", "idle"]
 
 
 def test_a_lazy_mux_subscribes_to_the_selected_input_alone() -> None:
     robot = selecting(lazy=True)
 
     def heard() -> set[str]:
-        return {one.route[0] for one in robot.bus.subscriptions if one.owner == "cmd_vel"}
+        return {subscription.route[0] for subscription in robot.bus.subscriptions if subscription.owner == "cmd_vel"}
 
     assert heard() == {"/cmd_vel/one"}
     out = robot.collect("/cmd_vel", Twist)
@@ -146,14 +146,14 @@ def test_who_holds_until_when_and_who_waits_for_what_is_told() -> None:
     told = look(robot)
     assert (told.why, told.holder) == ("teleop holds", "teleop")
     assert told.until == pytest.approx(0.7)
-    states = {one.name: (one.state, one.why) for one in told.inputs}
+    states = {input_state.name: (input_state.state, input_state.why) for input_state in told.inputs}
     assert states == {"teleop": ("holds", ""), "navigation": ("waits", "'teleop' has a higher priority")}
     assert told.inputs[1].silent_for == pytest.approx(0.2)
     robot.publish("/pause", Bool(data=True))
     assert look(robot).inputs[1].why == "pause is on"
-    assert [one.why for one in look(robot).locks] == ["pause is on"]
+    assert [lock.why for lock in look(robot).locks] == ["pause is on"]
     changes = robot.host.ask("cmd_vel", ReadMuxChanges("cmd_vel"))
-    assert [one.text for one in changes][:2] == ["navigation holds", "teleop holds"]
+    assert [change.text for change in changes][:2] == ["navigation holds", "teleop holds"]
     assert robot.host.ask("cmd_vel", ReadMuxChanges("cmd_vel", changes[-1].number)) == ()
 
 
@@ -226,7 +226,7 @@ def test_another_configuration_keeps_what_was_selected_locked_and_added() -> Non
     robot.host.activate(["cmd_vel"])
     robot.advance(0.0)
     told = look(robot)
-    assert [(one.name, one.state) for one in told.inputs] == [
+    assert [(input_state.name, input_state.state) for input_state in told.inputs] == [
         ("two", "locked"),
         ("four", "waits"),
         ("three", "holds"),
@@ -238,7 +238,7 @@ def test_numbers_that_are_none_never_get_through() -> None:
     out = robot.collect("/cmd_vel", Float64)
     for number in (math.nan, math.inf, 1.0):
         robot.publish("/cmd_vel/one", Float64(data=number))
-    assert [one.data for one in out] == [1.0]
+    assert [item.data for item in out] == [1.0]
 
 
 def test_flags_and_positions_are_forwarded_and_never_made_up() -> None:

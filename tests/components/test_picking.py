@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.compiler import compile_robot
+from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.msgs.rbxcompose_msgs import AttachObject, DetachObject, PickObject, PlaceObject
-from rbxcompose.plan.model import Plan
 from rbxcompose.sdk.bound import Outcome
 from rbxcompose.testing import Bench
 from tests.conftest import ROOT
@@ -28,7 +28,7 @@ def plan() -> Plan:
 
 def robot(plan: Plan, seed: int) -> Bench:
     """Return the arm, its servos and its scene."""
-    instances: dict[str, Any] = {one.type: one for one in plan.instances if one.type in TYPES}
+    instances: dict[str, Any] = {instance.type: instance for instance in plan.instances if instance.type in TYPES}
     config = instances["arm"].config
     seeded = config.model_copy(update={"planner": config.planner.model_copy(update={"seed": seed})})
     return Bench(*(instances | {"arm": replace(instances["arm"], config=seeded)}).values())
@@ -65,7 +65,7 @@ def test_it_picks_and_places_with_every_seed(plan: Plan, soak: Soak) -> None:
 
 
 def test_missions_attach_and_detach_objects_by_services(plan: Plan) -> None:
-    bench = Bench(*(one for one in plan.instances if one.type == "scene"))
+    bench = Bench(*(instance for instance in plan.instances if instance.type == "scene"))
     replies: list[Any] = []
 
     def told(service: Any, topic: str, request: Any) -> tuple[bool, str]:

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from rbxcompose.msgs.std_msgs import String
-from rbxcompose.qos import Qos
+from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench, instance
 
 URDF = '<robot name="cart"><link name="base"/></robot>'

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rbxcompose.body.virtual_joint import rooted_text
-from rbxcompose.geometry import Transform3
-from rbxcompose.motion.scene_messages import pose_message
+from rbxcompose.base.geometry import Transform3
+from rbxcompose.domains.arms.motion.scene_messages import pose_message
+from rbxcompose.domains.body.description import rooted_text
 from rbxcompose.msgs.builtin_interfaces import Time
 from rbxcompose.msgs.geometry_msgs import Quaternion, Transform, TransformStamped, Vector3
 from rbxcompose.msgs.moveit_msgs import (
@@ -35,8 +35,8 @@ from rbxcompose.msgs.std_msgs import ColorRGBA, Header
 from rbxcompose.msgs.tf2_msgs import TFMessage
 from rbxcompose.msgs.types import Message
 from rbxcompose.msgs.visualization_msgs import MarkerArray
-from rbxcompose.qos import Qos
 from rbxcompose.sdk.bound import Reply
+from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench, instance
 from tests.body.test_virtual_joint import WORLD
 from tests.motion.toy_arm import urdf
@@ -78,7 +78,7 @@ class Scene:
 
     @property
     def names(self) -> list[str]:
-        return [one.name for one in self.told[-1].objects]
+        return [object_.name for object_ in self.told[-1].objects]
 
     def refusal(self) -> str:
         return self.bench.texts()[-1]
@@ -99,9 +99,9 @@ def test_an_object_in_the_map_is_where_it_is_as_seen_from_the_body_which_drives(
     assert scene.told[-1].problem == "nothing tells where 'map' is, the frame of 'ball'"
     place_base(scene.bench, 0.4)
     assert scene.told[-1].problem == ""
-    (one,) = scene.told[-1].objects
-    assert one.link == "ground"
-    assert one.pose.position.x == pytest.approx(0.6)
+    (object_,) = scene.told[-1].objects
+    assert object_.link == "ground"
+    assert object_.pose.position.x == pytest.approx(0.6)
     count = len(scene.told)
     place_base(scene.bench, 0.4)
     assert len(scene.told) == count  # it has not moved
@@ -114,7 +114,7 @@ def test_objects_from_outside_are_added_extended_moved_and_removed() -> None:
     scene.box()
     scene.box("can", primitives=(CYLINDER, BOX), primitive_poses=(THERE, THERE))
     can = scene.told[-1].objects[1]
-    assert [one.kind for one in can.shapes] == ["cylinder", "box"]
+    assert [shape.kind for shape in can.shapes] == ["cylinder", "box"]
     assert can.shapes[0].size.tolist() == [0.05, 0.3]  # radius and length, the other way round in MoveIt
     there = pose_message(Transform3((0.0, 0.7, 0.0)))
     scene.box(operation=CollisionObject.APPEND, pose=there)
@@ -136,8 +136,8 @@ def test_a_link_that_never_moves_holds_nothing() -> None:
     scene.box("can", header=Header(frame_id="turret"))
     scene.box("can", CollisionObject.MOVE, header=Header(frame_id="ground"))
     scene.box("ball", planes=(Plane(coef=np.array((0.0, 0.0, 1.0, 0.0))),), primitives=(), plane_poses=(THERE,))
-    assert [(one.name, one.link) for one in scene.told[-1].objects] == [
-        (one, "world") for one in ("box", "can", "ball")
+    assert [(placed_object.name, placed_object.link) for placed_object in scene.told[-1].objects] == [
+        (text, "world") for text in ("box", "can", "ball")
     ]
     scene.box("", CollisionObject.REMOVE)
     assert scene.names == []
@@ -238,7 +238,7 @@ def test_a_planning_scene_is_applied_whole_or_not_at_all(wanted: PlanningScene, 
     assert not answer.success
     assert reason in scene.refusal()
     found = scene.ask("/get_planning_scene", GetPlanningScene, GetPlanningScene.Request()).scene
-    assert [one.id for one in found.world.collision_objects] == ["box"]
+    assert [collision_object.id for collision_object in found.world.collision_objects] == ["box"]
     assert [one.link_name for one in found.link_padding] == ["upper"]
 
 
@@ -246,9 +246,9 @@ def test_an_octomap_becomes_cells() -> None:
     tree = Octomap(binary=True, id="OcTree", resolution=0.1, data=np.array(octomap_of_one_cell(), dtype=np.int8))
     scene = Scene()
     scene.send(PlanningScene(is_diff=True, world=world(octomap=OctomapWithPose(octomap=tree))))
-    (one,) = scene.told[-1].objects
-    assert (one.name, one.shapes[0].kind) == ("<octomap>", "octree")
-    assert one.shapes[0].points.tolist() == pytest.approx([0.05, 0.05, 0.05])
+    (object_,) = scene.told[-1].objects
+    assert (object_.name, object_.shapes[0].kind) == ("<octomap>", "octree")
+    assert object_.shapes[0].points.tolist() == pytest.approx([0.05, 0.05, 0.05])
 
 
 def octomap_of_one_cell() -> list[int]:

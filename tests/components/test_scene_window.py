@@ -9,15 +9,15 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.cli.arms.scene_watch import WindowViews, line_of
-from rbxcompose.key_feed import KeyFeed, added, whole
+from rbxcompose.compiler.plan.model import Plan
+from rbxcompose.domains.arms.scene_view import goal_words
+from rbxcompose.domains.arms.scene_watch import WindowViews, line_of
 from rbxcompose.msgs.moveit_msgs import CollisionObject
 from rbxcompose.msgs.rbxcompose_msgs import MoveArm
 from rbxcompose.msgs.shape_msgs import SolidPrimitive
-from rbxcompose.plan.model import Plan
-from rbxcompose.qos import Qos
 from rbxcompose.runtime.process_group.host import Host
-from rbxcompose.scene_view import goal_words
+from rbxcompose.sdk.key_feed import KeyFeed, added, whole
+from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import instance
 from tests.bus.conftest import Network, network
 from tests.motion.toy_arm import urdf

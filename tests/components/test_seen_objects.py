@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.compiler import compile_robot
+from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.compiler.plan.model import Instance
 from rbxcompose.msgs.geometry_msgs import Point, Pose, Quaternion, Vector3
 from rbxcompose.msgs.rbxcompose_msgs import AttachObject, DetachObject, SceneObjects
 from rbxcompose.msgs.std_msgs import Header, String
@@ -17,7 +18,6 @@ from rbxcompose.msgs.vision_msgs import (
     ObjectHypothesis,
     ObjectHypothesisWithPose,
 )
-from rbxcompose.plan.model import Instance
 from rbxcompose.testing import Bench
 from tests.conftest import ROOT
 
@@ -29,7 +29,7 @@ TURNED = Quaternion(x=0.5, y=-0.5, z=0.5, w=0.5)  # upright, as the optical fram
 def parts() -> list[Instance]:
     plan = compile_robot(str(ROOT / "robots/pi_robot"), profiles=["seeing"], environment={}).plan
     assert plan
-    return [one for one in plan.instances if one.type in TYPES]
+    return [instance for instance in plan.instances if instance.type in TYPES]
 
 
 class Camera:
@@ -49,7 +49,10 @@ class Camera:
     def there(self) -> dict[str, tuple[float, ...]]:
         """Return where things other than the table are [m]."""
         found = {
-            one.name: one.pose.position for scene in self.scenes[-1:] for one in scene.objects if one.name != "table"
+            placed_object.name: placed_object.pose.position
+            for scene in self.scenes[-1:]
+            for placed_object in scene.objects
+            if placed_object.name != "table"
         }
         return {name: (round(at.x, 3), round(at.y, 3), round(at.z, 3)) for name, at in found.items()}
 
@@ -84,7 +87,7 @@ def test_what_is_held_stays_in_the_hand_and_is_known_where_it_was_put(parts: lis
     camera.sees(thing())
     camera.asks(AttachObject, "/scene/attach", AttachObject.Request(object="cup_1", link="right_gripper_link"))
     camera.sees(thing(0.0625))
-    [held] = [one for one in camera.scenes[-1].objects if one.name == "cup_1"]
+    [held] = [object_ for object_ in camera.scenes[-1].objects if object_.name == "cup_1"]
     assert held.link == "right_gripper_link"
     camera.bench.advance(40.0)
     assert "cup_1" in camera.there

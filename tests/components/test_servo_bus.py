@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rbxcompose.devices.port_errors import LostPortError
+from rbxcompose.domains.devices.serial_ports import LostPortError
+from rbxcompose.domains.servos.bus_config import ServoBusConfig
 from rbxcompose.msgs.builtin_interfaces import Duration
 from rbxcompose.msgs.control_msgs import FollowJointTrajectory
 from rbxcompose.msgs.rbxcompose_msgs import MoveJoints
@@ -16,9 +17,8 @@ from rbxcompose.msgs.stamps import to_duration
 from rbxcompose.msgs.std_msgs import Float64
 from rbxcompose.msgs.std_srvs import SetBool, Trigger
 from rbxcompose.msgs.trajectory_msgs import JointTrajectory, JointTrajectoryPoint
-from rbxcompose.qos import Qos
 from rbxcompose.sdk.bound import Ended, Outcome
-from rbxcompose.servo_bus_config import ServoBusConfig
+from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench, instance
 
 Follow = FollowJointTrajectory
@@ -204,7 +204,7 @@ def test_a_newer_goal_of_the_same_action_replaces_the_older_one_with_the_reason(
     head.robot.advance(1.0)
     head.move(1.0, pan=0.0)
     head.robot.advance(2.0)
-    assert [one.result and one.result.message for one in older] == ["replaced by a newer goal of 'move'"]
+    assert [item.result and item.result.message for item in older] == ["replaced by a newer goal of 'move'"]
     assert head.move_ended[0] == "succeeded"
 
 

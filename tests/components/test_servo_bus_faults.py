@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rbxcompose.components.servo_bus import ServoBusDriver
-from rbxcompose.control.joint_states import JointMode
+from rbxcompose.base.requests import Refused
+from rbxcompose.domains.servos.components.servo_bus import ServoBusDriver
+from rbxcompose.domains.servos.joint_states import JointMode
+from rbxcompose.domains.servos.twins.fault_script import InjectFault
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.std_msgs import Float64
-from rbxcompose.qos import Qos
-from rbxcompose.requests import Refused
+from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench, instance
-from rbxcompose.twins.fault_script import InjectFault
 
 LIMITS = {"lower": -2.0, "upper": 2.0, "velocity": 1.5, "acceleration": 8.0}
 CONFIG: dict[str, Any] = {

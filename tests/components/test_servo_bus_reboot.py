@@ -7,12 +7,12 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.components.servo_bus import ServoBusDriver
-from rbxcompose.control.joint_states import JointMode
+from rbxcompose.domains.servos.components.servo_bus import ServoBusDriver
+from rbxcompose.domains.servos.joint_states import JointMode
 from rbxcompose.msgs.std_msgs import Float64
 from rbxcompose.msgs.std_srvs import SetBool, Trigger
-from rbxcompose.qos import Qos
 from rbxcompose.sdk.bound import Reply
+from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench, check_text, instance, run_robot
 
 LIMITS = {"lower": -2.0, "upper": 2.0, "velocity": 1.5, "acceleration": 8.0}

@@ -58,11 +58,11 @@ def test_all_joints_are_relaxed_and_disabled_at_once(head: Head) -> None:
         head.commands[name](Float64(data=0.3))
     head.robot.advance(1.0)
     head.ask("/servos/relax_all", Trigger, Trigger.Request())
-    assert {str(one.mode) for one in driver.cycle.drives.values()} == {"relaxed"}
+    assert {str(drive.mode) for drive in driver.cycle.drives.values()} == {"relaxed"}
     head.ask("/servos/enable_all", SetBool, SetBool.Request(data=False))
     head.commands["pan"](Float64(data=0.0))
     head.robot.advance(1.0)
-    assert {str(one.mode) for one in driver.cycle.drives.values()} == {"disabled"}
+    assert {str(drive.mode) for drive in driver.cycle.drives.values()} == {"disabled"}
     assert head.at["pan"] == pytest.approx(0.3, abs=TICK)
 
 
@@ -74,7 +74,7 @@ def test_a_joint_that_holds_goes_on_holding_although_its_servo_tells_late_that_i
     driver.start_by("pan", "wait")  # it did not tell at the start
     servo.set("torque_enable", 1)  # by an earlier driver
     head.robot.advance(0.6)
-    assert [str(one.mode) for one in driver.cycle.drives.values()] == ["holding", "relaxed"]
+    assert [str(drive.mode) for drive in driver.cycle.drives.values()] == ["holding", "relaxed"]
     assert servo.get("torque_enable") == 1
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.levels import Level
+from rbxcompose.base.levels import Level
 from rbxcompose.msgs.geometry_msgs import Point, Pose, PoseStamped
 from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.testing.bench import Bench, instance

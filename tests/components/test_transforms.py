@@ -7,12 +7,12 @@ import math
 import numpy as np
 import pytest
 
-from rbxcompose.components.transforms import TransformsConfig, body_of
+from rbxcompose.domains.body.components.transforms import TransformsConfig, body_of
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.stamps import to_nanoseconds, to_time
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.msgs.tf2_msgs import TFMessage
-from rbxcompose.qos import Qos
+from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench, instance
 
 LIMITS = '<limit lower="-1" upper="1" effort="1" velocity="1"/>'
@@ -47,7 +47,7 @@ class Listener:
             self.moving[one.child_frame_id] = at.translation.x or 2 * math.atan2(at.rotation.z, at.rotation.w)
 
     def _fixed(self, message: TFMessage) -> None:
-        self.static |= {one.child_frame_id for one in message.transforms}
+        self.static |= {transform.child_frame_id for transform in message.transforms}
 
     def move(self, *, stamp: float = 0.0, **positions: float) -> None:
         """Report joints; a stamp of 0 is none."""
@@ -88,7 +88,7 @@ def test_a_stamp_of_another_clock_does_not_reach_the_tree(listener: Listener, st
     listener.stamps.clear()
     listener.move(bite=0.25, stamp=stamp)
     listener.robot.advance(1.0)
-    assert {now <= one <= now + 1.1 for _, one in listener.stamps} == {True}
+    assert {now <= value <= now + 1.1 for _, value in listener.stamps} == {True}
 
 
 def test_a_joint_that_falls_silent_is_published_again_by_the_clock_of_who_reported_it(listener: Listener) -> None:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.control.calibration import Calibration, Pair
+from rbxcompose.domains.servos.transmission import Calibration, Pair
 
 STEPS = st.lists(st.tuples(st.floats(0.01, 5.0), st.floats(0.01, 5.0)), min_size=2, max_size=9)
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.control.curves import (
+from rbxcompose.domains.servos.curves import (
     Curve,
     JointSample,
     braking,
@@ -33,7 +33,7 @@ def parts(knots: Knots) -> tuple[list[float], list[JointSample], list[float], li
     times = list(itertools.accumulate(gap for gap, _ in knots))
     times = [time - times[0] for time in times]
     samples = [sample for _, sample in knots]
-    return times, samples, [one.position for one in samples], [one.velocity for one in samples]
+    return times, samples, [sample.position for sample in samples], [sample.velocity for sample in samples]
 
 
 def curves(knots: Knots) -> list[Curve]:
@@ -96,9 +96,9 @@ def test_extent_and_speed_bound_every_sample_and_are_reached(knots: Knots) -> No
         low, high = curve.extent
         pieces = itertools.pairwise(curve.times)
         samples = [curve.sample(start + share * (end - start)) for start, end in pieces for share in shares]
-        fastest, highest = max(abs(one.velocity) for one in samples), max(one.position for one in samples)
+        fastest, highest = max(abs(sample.velocity) for sample in samples), max(sample.position for sample in samples)
         assert fastest - 1e-6 <= curve.speed <= 1.1 * fastest + 1e-6
-        assert low - 1e-6 <= min(one.position for one in samples)
+        assert low - 1e-6 <= min(sample.position for sample in samples)
         assert highest - 1e-6 <= high <= highest + 0.1 * (high - low) + 1e-6
 
 

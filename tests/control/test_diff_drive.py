@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.control.diff_drive import BaseLimits, TwistLimiter, WheelDrive, WheelGeometry, WheelSpeeds
-from rbxcompose.geometry import AT_REST, Velocity2
+from rbxcompose.base.geometry import AT_REST, Velocity2
+from rbxcompose.domains.bases.wheels import BaseLimits, TwistLimiter, WheelDrive, WheelGeometry, WheelSpeeds
 
 GEOMETRY = WheelGeometry.of_radius(0.04, 0.26)
 LIMITS = BaseLimits()

@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.control.calibration import Calibration
-from rbxcompose.control.gripper import (
+from rbxcompose.domains.servos.gripper import (
     CalibratedGripper,
     DualGripper,
     FingerGeometry,
@@ -21,6 +20,7 @@ from rbxcompose.control.gripper import (
     OneSidedGripper,
     ParallelGripper,
 )
+from rbxcompose.domains.servos.transmission import Calibration
 
 FINGERS = FingerGeometry(0.004, 0.065, 0.0, 0.09)
 TABLE = ((0.0, 0.6), (0.01, 0.45), (0.02, 0.2), (0.03, -0.1), (0.042, -0.5))

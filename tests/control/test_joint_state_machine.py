@@ -10,8 +10,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
-from rbxcompose.control.joint_state_machine import step_joint
-from rbxcompose.control.joint_states import (
+from rbxcompose.domains.servos.joint_states import (
     BringToRest,
     Enable,
     Hold,
@@ -29,6 +28,7 @@ from rbxcompose.control.joint_states import (
     TorqueOff,
     TorqueOn,
     WriteGoal,
+    step_joint,
 )
 
 POLICY = JointPolicy()
@@ -81,7 +81,7 @@ class Bench:
 
     def refusal(self, request: JointRequest) -> str:
         """Return why a request is refused; empty if it is not."""
-        return next((one.reason for one in self.step(request) if isinstance(one, Refuse)), "")
+        return next((action.reason for action in self.step(request) if isinstance(action, Refuse)), "")
 
 
 def active() -> Bench:
@@ -109,9 +109,9 @@ class AnyJoint(RuleBasedStateMachine):
         was_blocked = self.bench.state.is_blocked
         actions = self.bench.step(*requests, dt=0.0)
         if was_blocked and Enable(True) not in requests:
-            assert not [one for one in actions if isinstance(one, WriteGoal | TorqueOn | Pursue)]
-            refused = [one.request for one in actions if isinstance(one, Refuse)]
-            assert len(refused) == sum(isinstance(one, Hold | MoveTo) for one in requests)
+            assert not [action for action in actions if isinstance(action, WriteGoal | TorqueOn | Pursue)]
+            refused = [action.request for action in actions if isinstance(action, Refuse)]
+            assert len(refused) == sum(isinstance(request, Hold | MoveTo) for request in requests)
 
     @rule(position=st.sampled_from([None, 0.1, 0.2, math.nan]), is_silent=st.booleans())
     def measure(self, position: float | None, is_silent: bool) -> None:
@@ -125,7 +125,7 @@ class AnyJoint(RuleBasedStateMachine):
     def what_is_blocked_gets_neither_torque_nor_goals(self) -> None:
         if self.bench.mode() in BLOCKED:
             assert self.bench.torque is not True
-            last = [one for one in self.bench.actions if isinstance(one, TorqueOn | TorqueOff)][-1:]
+            last = [action for action in self.bench.actions if isinstance(action, TorqueOn | TorqueOff)][-1:]
             assert last in ([], [TorqueOff()])
 
     @invariant()

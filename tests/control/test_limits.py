@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.control.limits import Limiter, MotionLimits, tightened
+from rbxcompose.domains.servos.limits import Limiter, MotionLimits, tightened
 
 LIMITS = MotionLimits(-1.0, 2.0, 1.5, 3.0)
 POSITIVE = st.floats(0.01, 100.0)
@@ -162,10 +162,10 @@ def test_tightening_never_widens(outer: MotionLimits, inner: MotionLimits) -> No
     if tight is None:
         assert max(outer.least, inner.least) > min(outer.greatest, inner.greatest)
         return
-    for one in (outer, inner):
-        assert one.least <= tight.least <= tight.greatest <= one.greatest
-        assert tight.speed <= one.speed
-        assert acceleration(tight) <= acceleration(one)
+    for limits in (outer, inner):
+        assert limits.least <= tight.least <= tight.greatest <= limits.greatest
+        assert tight.speed <= limits.speed
+        assert acceleration(tight) <= acceleration(limits)
 
 
 def test_what_the_manifest_would_widen_is_said() -> None:

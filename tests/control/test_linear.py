@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.control.linear import LinearMove, LinearPolicy
+from rbxcompose.domains.servos.lift import LinearMove, LinearPolicy
 
 POLICY = LinearPolicy(0.05, 0.01)
 PLACES = st.floats(0.0, 0.4)
@@ -37,8 +37,8 @@ def test_it_arrives_at_most_as_fast_as_it_may_without_turning_back(
     if abs(wanted - position) > policy.dead_band:
         assert abs(at[-1] - wanted) <= 0.1 * 0.05 * dt + 1e-9  # it went on to where it should be
     steps = [new - old for old, new in itertools.pairwise(at)]
-    assert all(abs(one) <= 0.05 * dt + 1e-9 for one in steps)
-    assert all(one * (wanted - position) >= 0.0 for one in steps)
+    assert all(abs(step) <= 0.05 * dt + 1e-9 for step in steps)
+    assert all(step * (wanted - position) >= 0.0 for step in steps)
 
 
 def test_within_the_dead_band_it_does_not_move() -> None:

@@ -9,9 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.control.diff_drive import WheelGeometry
-from rbxcompose.control.odometry import OdometryPolicy, WheelOdometry
-from rbxcompose.geometry import Pose2, Velocity2, wrap_angle
+from rbxcompose.base.geometry import Pose2, Velocity2, wrap_angle
+from rbxcompose.domains.bases.wheels import OdometryPolicy, WheelGeometry, WheelOdometry
 
 GEOMETRY = WheelGeometry.of_radius(0.04, 0.26)
 POLICY = OdometryPolicy()

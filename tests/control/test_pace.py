@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.control.curves import JointSample
-from rbxcompose.control.limits import MotionLimits
-from rbxcompose.control.pace import SPARE, share_mistake
-from rbxcompose.control.trajectory import TrajectoryCode
+from rbxcompose.domains.servos.curves import JointSample
+from rbxcompose.domains.servos.limits import MotionLimits
+from rbxcompose.domains.servos.trajectory import TrajectoryCode
+from rbxcompose.domains.servos.trajectory_follower import SPARE, share_mistake
 from tests.control.test_trajectory_follower import DT, Arm
 from tests.control.trajectories import NAMES, goal
 
@@ -37,11 +37,11 @@ def test_the_joints_stay_on_their_path_and_brake_as_hard_as_they_may(changes: li
             desired = arm.step().desired
             if desired and not arm.steps[-1].outcome:
                 seen.append((desired[NAMES[0]], desired[NAMES[1]]))
-    outcomes = [one.outcome for one in arm.steps if one.outcome is not None]
-    assert [one.code for one in outcomes] == [TrajectoryCode.SUCCESSFUL]
+    outcomes = [step.outcome for step in arm.steps if step.outcome is not None]
+    assert [outcome.code for outcome in outcomes] == [TrajectoryCode.SUCCESSFUL]
     assert arm.measured[NAMES[0]].position == pytest.approx(1.0, abs=1e-3)
-    for one, other in seen:
-        assert other.position == pytest.approx(-0.5 * one.position, abs=1e-9)
+    for sample, other in seen:
+        assert other.position == pytest.approx(-0.5 * sample.position, abs=1e-9)
     for (before, _), (after, _) in pairwise(seen):
         assert after.position - before.position >= -1e-9
         assert abs(after.velocity - before.velocity) <= (1.0 + SPARE) * HARD * DT + 2e-3

@@ -9,16 +9,18 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from rbxcompose.control.curves import JointSample
-from rbxcompose.control.limits import MotionLimits
-from rbxcompose.control.trajectory import (
+from rbxcompose.domains.servos.curves import JointSample
+from rbxcompose.domains.servos.limits import MotionLimits
+from rbxcompose.domains.servos.trajectory import (
+    JointRules,
     TrajectoryCode,
     TrajectoryGoal,
+    TrajectoryPlan,
     TrajectoryPoint,
     TrajectoryPolicy,
     TrajectoryRefusal,
+    plan_trajectory,
 )
-from rbxcompose.control.trajectory_plan import JointRules, TrajectoryPlan, plan_trajectory
 from tests.control.trajectories import FREE, NAMES, SLOW, TIGHT, WIDE, ZERO, goal, goals, planned, points, rules
 
 POLICY = TrajectoryPolicy()
@@ -30,9 +32,9 @@ CODE = TrajectoryCode
 
 
 def refusal(
-    one: TrajectoryGoal, limits: MotionLimits = WIDE, policy: TrajectoryPolicy = POLICY, now: float = 0.0
+    trajectory_goal: TrajectoryGoal, limits: MotionLimits = WIDE, policy: TrajectoryPolicy = POLICY, now: float = 0.0
 ) -> TrajectoryRefusal:
-    answer = plan_trajectory(one, now, ZERO, rules(limits), policy)
+    answer = plan_trajectory(trajectory_goal, now, ZERO, rules(limits), policy)
     assert isinstance(answer, TrajectoryRefusal), answer
     return answer
 
@@ -83,8 +85,8 @@ WRONG: dict[str, tuple[TrajectoryGoal, TrajectoryCode, str]] = {
 
 @pytest.mark.parametrize("name", WRONG)
 def test_a_wrong_trajectory_is_refused_with_code_and_reason(name: str) -> None:
-    one, code, message = WRONG[name]
-    answer = refusal(one)
+    trajectory_goal, code, message = WRONG[name]
+    answer = refusal(trajectory_goal)
     assert (answer.code, answer.message) == (code, message)
 
 
@@ -151,11 +153,11 @@ def test_a_spline_of_ours_that_would_leave_the_limits_becomes_less_smooth_instea
 
 
 def test_velocities_of_the_user_that_leave_the_limits_are_refused_or_clamped() -> None:
-    one = TrajectoryGoal(
+    trajectory_goal = TrajectoryGoal(
         NAMES, (TrajectoryPoint(1.0, (0.0, 2.9), (0.0, 3.0)), TrajectoryPoint(2.0, (0.0, 2.9), (0.0, 0.0)))
     )
-    assert "outside its limits" in refusal(one).message
-    curve = planned(one, policy=CLAMP).curves["tilt"]
+    assert "outside its limits" in refusal(trajectory_goal).message
+    curve = planned(trajectory_goal, policy=CLAMP).curves["tilt"]
     assert max(curve.sample(i / 100).position for i in range(200)) == 3.0
 
 
@@ -205,8 +207,8 @@ def test_without_limits_a_point_at_zero_is_refused() -> None:
 @given(st.floats(-50.0, 50.0), st.floats(-3.0, 3.0))
 def test_a_joint_that_turns_without_end_takes_the_nearest_turn(start: float, target: float) -> None:
     joints = {"wheel": JointRules(MotionLimits(), is_continuous=True)}
-    one = TrajectoryGoal(("wheel",), points((1.0, (target,))))
-    plan = plan_trajectory(one, 0.0, {"wheel": JointSample(start)}, joints, POLICY)
+    trajectory_goal = TrajectoryGoal(("wheel",), points((1.0, (target,))))
+    plan = plan_trajectory(trajectory_goal, 0.0, {"wheel": JointSample(start)}, joints, POLICY)
     assert isinstance(plan, TrajectoryPlan)
     last = plan.curves["wheel"].last
     assert abs(last - start) <= math.pi + 1e-9

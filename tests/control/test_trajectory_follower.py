@@ -9,17 +9,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.control.curves import JointSample
-from rbxcompose.control.limits import Limiter, MotionLimits
-from rbxcompose.control.trajectory import (
+from rbxcompose.domains.servos.curves import JointSample
+from rbxcompose.domains.servos.limits import Limiter, MotionLimits
+from rbxcompose.domains.servos.trajectory import (
     TrajectoryCode,
     TrajectoryGoal,
+    TrajectoryPlan,
     TrajectoryPolicy,
     TrajectoryRefusal,
     TrajectoryTolerance,
 )
-from rbxcompose.control.trajectory_follower import FollowStep, TrajectoryFollower, TrajectoryOutcome
-from rbxcompose.control.trajectory_plan import TrajectoryPlan
+from rbxcompose.domains.servos.trajectory_follower import FollowStep, TrajectoryFollower, TrajectoryOutcome
 from tests.control.trajectories import FREE, NAMES, TIGHT, goal, goals, points, rules
 
 DT = 0.01
@@ -43,10 +43,10 @@ class Arm:
 
     @property
     def commanded(self) -> dict[str, JointSample]:
-        return {name: JointSample(one.position, one.velocity) for name, one in self.limiters.items()}
+        return {name: JointSample(limiter.position, limiter.velocity) for name, limiter in self.limiters.items()}
 
-    def send(self, one: TrajectoryGoal) -> TrajectoryPlan | TrajectoryRefusal:
-        return self.follower.accept(one, self.now, self.measured, self.commanded)
+    def send(self, trajectory_goal: TrajectoryGoal) -> TrajectoryPlan | TrajectoryRefusal:
+        return self.follower.accept(trajectory_goal, self.now, self.measured, self.commanded)
 
     def step(self) -> FollowStep:
         """Let a cycle pass."""

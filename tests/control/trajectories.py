@@ -6,10 +6,16 @@ from collections.abc import Sequence
 
 from hypothesis import strategies as st
 
-from rbxcompose.control.curves import JointSample
-from rbxcompose.control.limits import MotionLimits
-from rbxcompose.control.trajectory import TrajectoryGoal, TrajectoryPoint, TrajectoryPolicy
-from rbxcompose.control.trajectory_plan import JointRules, TrajectoryPlan, plan_trajectory
+from rbxcompose.domains.servos.curves import JointSample
+from rbxcompose.domains.servos.limits import MotionLimits
+from rbxcompose.domains.servos.trajectory import (
+    JointRules,
+    TrajectoryGoal,
+    TrajectoryPlan,
+    TrajectoryPoint,
+    TrajectoryPolicy,
+    plan_trajectory,
+)
 
 NAMES = ("pan", "tilt")
 FREE = MotionLimits(acceleration=8.0)
@@ -35,10 +41,13 @@ def goal(*rows: tuple[float, Sequence[float]], start: float = 0.0) -> Trajectory
 
 
 def planned(
-    one: TrajectoryGoal, limits: MotionLimits = WIDE, policy: TrajectoryPolicy | None = None, now: float = 0.0
+    trajectory_goal: TrajectoryGoal,
+    limits: MotionLimits = WIDE,
+    policy: TrajectoryPolicy | None = None,
+    now: float = 0.0,
 ) -> TrajectoryPlan:
     """Return the plan from rest at zero; it must not be refused."""
-    plan = plan_trajectory(one, now, ZERO, rules(limits), policy or TrajectoryPolicy())
+    plan = plan_trajectory(trajectory_goal, now, ZERO, rules(limits), policy or TrajectoryPolicy())
     assert isinstance(plan, TrajectoryPlan), plan
     return plan
 

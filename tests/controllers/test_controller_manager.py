@@ -9,11 +9,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.controller_manager import ControllerManager
-from rbxcompose.controller_requests import ControllerState, ListControllers, ScaleMotion, SwitchControllers
-from rbxcompose.controllers.joint_trajectory import JointTrajectoryConfig
+from rbxcompose.base.requests import Refused
+from rbxcompose.domains.servos.controller_manager import (
+    ControllerManager,
+    ControllerState,
+    ListControllers,
+    ScaleMotion,
+    SwitchControllers,
+)
+from rbxcompose.domains.servos.controllers.joint_trajectory import JointTrajectoryConfig
 from rbxcompose.msgs.rbxcompose_msgs import MoveJoints
-from rbxcompose.requests import Refused
 from rbxcompose.sdk.bound import Ended, Outcome
 from rbxcompose.testing import Bench, instance
 
@@ -47,15 +52,15 @@ names = st.lists(st.sampled_from([*JOINTS, "nobody"]), max_size=3)
 def test_no_joint_is_led_by_two_whatever_is_switched(wanted: list[tuple[list[str], list[str]]]) -> None:
     manager = managed()
     for on, off in wanted:
-        before = [one.name for one in manager.active]
+        before = [controller.name for controller in manager.active]
         if manager.objection(on, off):
-            assert [one.name for one in manager.active] == before
+            assert [controller.name for controller in manager.active] == before
             continue
         list(manager.switch(on, off, 0.0))
-        led = [joint for one in manager.active for joint in one.config.claimed]
+        led = [joint for controller in manager.active for joint in controller.config.claimed]
         assert len(led) == len(set(led))
-        assert set(on) <= {one.name for one in manager.active}
-        assert not set(off) & {one.name for one in manager.active}
+        assert set(on) <= {controller.name for controller in manager.active}
+        assert not set(off) & {controller.name for controller in manager.active}
 
 
 def test_what_gives_way_must_be_named() -> None:
@@ -100,7 +105,7 @@ def test_a_controller_is_held_and_goes_on_by_the_word_of_a_person() -> None:
     assert bus.handle(ListControllers("servos"))[0].note == "held: the speed is 0 %"
     assert bus.handle(ScaleMotion("servos", "head", 1.0)) == "'head' follows goals at 100% of the speed"
     robot.advance(3.0)
-    assert [one.outcome for one in ended] == [Outcome.SUCCEEDED]
+    assert [item.outcome for item in ended] == [Outcome.SUCCEEDED]
     for name, share, words in (("nobody", 1.0, "no controller 'nobody'"), ("head", 2.0, "from 0 % to 100 %")):
         with pytest.raises(Refused, match=words):
             bus.handle(ScaleMotion("servos", name, share))
@@ -115,7 +120,7 @@ def test_a_controller_that_is_switched_off_ends_its_goal_and_refuses_others() ->
     head(goal, ended.append)
     gaze(goal, ended.append)
     robot.advance(0.2)
-    assert [one.outcome for one in ended] == [Outcome.REJECTED]
+    assert [item.outcome for item in ended] == [Outcome.REJECTED]
     bus: Any = robot.component("servos")
     with pytest.raises(Refused, match="both lead joint 'pan'"):
         bus.handle(SwitchControllers("servos", ("gaze",)))

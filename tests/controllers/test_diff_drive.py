@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.controller_requests import SwitchControllers
-from rbxcompose.controllers.diff_drive import DiffDriveConfig, DiffDriveController
-from rbxcompose.geometry import Pose2, wrap_angle
+from rbxcompose.base.geometry import Pose2, wrap_angle
+from rbxcompose.domains.bases.controllers.diff_drive import DiffDriveConfig, DiffDriveController
+from rbxcompose.domains.servos.controller_manager import SwitchControllers
 from rbxcompose.msgs.std_srvs import SetBool, Trigger
 from rbxcompose.msgs.tf2_msgs import TFMessage
 from tests.controllers.wheels import DISTANCE, RADIUS, STEP, Rover
@@ -47,7 +47,7 @@ def test_after_a_quarter_turn_at_ten_cycles_per_second_it_knows_where_it_is(mode
     assert abs(wrap_angle(rover.pose.heading - rover.true.heading)) < 1e-3
     speeds = np.array(rover.speeds)
     every = round(0.1 / STEP)
-    ways = [tuple(one.sum(axis=0) * STEP) for one in np.split(speeds, range(every, len(speeds), every))]
+    ways = [tuple(part.sum(axis=0) * STEP) for part in np.split(speeds, range(every, len(speeds), every))]
     assert way_of_arbotix(ways).distance(rover.true) > 0.025
 
 
@@ -169,8 +169,8 @@ def test_from_rest_to_rest_the_wheels_keep_their_ratio(linear: float, angular: f
     half = angular * DISTANCE / 2
     left, right = linear - half, linear + half
     fastest = max(abs(left), abs(right), 1e-9)
-    for one, other in rover.speeds:
-        assert abs(one * right - other * left) <= 1.01 * UNIT * fastest
+    for value, other in rover.speeds:
+        assert abs(value * right - other * left) <= 1.01 * UNIT * fastest
 
 
 def test_a_command_that_is_no_number_is_refused_with_a_note() -> None:
@@ -181,7 +181,7 @@ def test_a_command_that_is_no_number_is_refused_with_a_note() -> None:
     assert rover.controller.note == "a command was refused: nan m/s and 0 rad/s is no velocity"
     rover.drive(0.6, 0.0, 1.2)
     assert rover.controller.note == "commands are cut to its limits"
-    assert any("cut to its limits" in one.message for one in rover.statuses)
+    assert any("cut to its limits" in status.message for status in rover.statuses)
     rover.command(0.1)
     rover.advance(0.1)
     assert rover.controller.note == ""

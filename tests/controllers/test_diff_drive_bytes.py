@@ -10,17 +10,16 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.actuation.dynamixel_bus import DynamixelBus
-from rbxcompose.actuation.preparation import prepare
-from rbxcompose.actuation.servo_cycle import ServoCycle
-from rbxcompose.actuation.servo_models import servo_models
-from rbxcompose.controllers.diff_drive import DiffDriveController
-from rbxcompose.geometry import Pose2, Velocity2, wrap_angle
+from rbxcompose.base.geometry import Pose2, Velocity2, wrap_angle
+from rbxcompose.domains.bases.controllers.diff_drive import DiffDriveController
+from rbxcompose.domains.servos.bus_config import ServoBusConfig, drives_of
+from rbxcompose.domains.servos.dynamixel_bus import DynamixelBus
+from rbxcompose.domains.servos.models import servo_models
+from rbxcompose.domains.servos.servo_cycle import ServoCycle, prepare
+from rbxcompose.domains.servos.twins.servo_fake import FakeServo
+from rbxcompose.domains.servos.twins.servo_line import FakeLine
+from rbxcompose.domains.servos.twins.servo_port import FakePort
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
-from rbxcompose.servo_bus_config import ServoBusConfig, drives_of
-from rbxcompose.twins.servo_fake import FakeServo
-from rbxcompose.twins.servo_line import FakeLine
-from rbxcompose.twins.servo_port import FakePort
 from tests.controllers.wheels import DISTANCE, RADIUS, wheels
 
 PERIOD = 0.01
@@ -68,7 +67,7 @@ def test_a_base_drives_by_bytes_and_knows_where_it_is(model: str, tmp_path: Path
     line = FakeLine([FakeServo(model, id_) for id_ in known], time.monotonic)
     line.servos[0].move_to(4000)  # so that it starts again at 0
     with FakePort(line, tmp_path / "servos") as port, DynamixelBus(str(port.path), known) as bus:
-        list(prepare(bus, [one.joint for one in drives.values()], 0.0))
+        list(prepare(bus, [drive.joint for drive in drives.values()], 0.0))
         cycle, site = ServoCycle(bus, drives), Site(drives)
         setup: Any = config.controllers["base"].config
         base = DiffDriveController("base", setup, site)
@@ -87,7 +86,7 @@ def test_a_base_drives_by_bytes_and_knows_where_it_is(model: str, tmp_path: Path
         true = [(line[1].motor.position - 2048) * tick * RADIUS, (2048 - line[2].motor.position) * tick * RADIUS]
     assert site.told == []
     turn = math.tau * RADIUS  # a servo of protocol 1.0 starts again at 0
-    left, right = (one + turn * round((other - one) / turn) for one, other in zip(true, told, strict=True))
+    left, right = (number + turn * round((other - number) / turn) for number, other in zip(true, told, strict=True))
     left -= (4000 - 2048) * tick * RADIUS
     true_pose = Pose2().moved(Velocity2((left + right) / 2, (right - left) / DISTANCE), 1.0)
     assert abs(wrap_angle(pose.heading - true_pose.heading)) < 1e-3

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.controllers.gpio import GpioConfig, GpioController
+from rbxcompose.domains.servos.controllers.gpio import GpioConfig, GpioController
 from rbxcompose.msgs.std_msgs import Bool, Float64
 from rbxcompose.msgs.std_srvs import SetBool
 from rbxcompose.testing import Bench, instance

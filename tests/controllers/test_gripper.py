@@ -10,15 +10,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.controllers.gripper import NEEDED, OPTIONAL, GripperConfig, GripperController, model_of
+from rbxcompose.domains.servos.bus_config import ControllerSetup
+from rbxcompose.domains.servos.controllers.gripper import NEEDED, OPTIONAL, GripperConfig, GripperController, model_of
 from rbxcompose.manifest.written import as_written
 from rbxcompose.msgs.control_msgs import GripperCommand, GripperCommandMessage
 from rbxcompose.msgs.rbxcompose_msgs import Grip
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.std_srvs import SetBool, Trigger
-from rbxcompose.qos import Qos
 from rbxcompose.sdk.bound import Outcome
-from rbxcompose.servo_bus_config import ControllerSetup
+from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench, instance
 from rbxcompose.testing.golden import Golden
 from rbxcompose.testing.manifests import Checked, check_text

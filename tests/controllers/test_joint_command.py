@@ -10,13 +10,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.controllers.joint_command import JointCommandConfig, JointCommandController
+from rbxcompose.domains.servos.controllers.joint_command import JointCommandConfig, JointCommandController
 from rbxcompose.msgs.rbxcompose_msgs import MoveJoints
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.std_msgs import Float64, Float64MultiArray
 from rbxcompose.msgs.std_srvs import SetBool
-from rbxcompose.qos import Qos
 from rbxcompose.sdk.bound import Ended, Outcome
+from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench, instance
 
 TICK = 0.00512  # [rad] of an AX-12
@@ -69,7 +69,7 @@ def test_a_command_that_makes_no_sense_is_refused_as_a_whole_with_a_note(wrong: 
     assert gaze.at == pytest.approx({"pan": 0.0, "tilt": 0.0}, abs=TICK)
     assert not gaze.controller.leads
     assert "a command" in gaze.controller.note
-    assert any("gaze: a command" in one.message for one in gaze.robot.statuses("servos") or _after(gaze))
+    assert any("gaze: a command" in status.message for status in gaze.robot.statuses("servos") or _after(gaze))
     gaze.command(0.1, 0.1, time=1.0)
     assert not gaze.controller.note
 

@@ -11,8 +11,8 @@ from rbxcompose.msgs.rbxcompose_msgs import MoveJoints
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.stamps import to_duration
 from rbxcompose.msgs.trajectory_msgs import JointTrajectory, JointTrajectoryPoint
-from rbxcompose.qos import Qos
 from rbxcompose.sdk.bound import Ended, Outcome
+from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench, instance
 
 LIMITS = {"lower": -2.0, "upper": 2.0, "velocity": 1.5, "acceleration": 8.0}
@@ -72,7 +72,7 @@ def test_it_ends_the_goal_that_leads() -> None:
     client(MoveJoints.Goal(joints=("pan",), positions=np.array([1.0]), duration=to_duration(2.0)), ends.append)
     head.robot.advance(0.5)
     head.send((0.0, 1.0), time=2.0)
-    assert [one.outcome for one in ends] == [Outcome.ABORTED]
+    assert [end.outcome for end in ends] == [Outcome.ABORTED]
     assert ends[0].result is not None
     assert "joint_trajectory" in ends[0].result.message
     assert head.at == pytest.approx(0.0, abs=0.01)

@@ -14,8 +14,8 @@ from rbxcompose.msgs.control_msgs import SingleJointPosition as Move
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.std_msgs import Float64
 from rbxcompose.msgs.std_srvs import SetBool, Trigger
-from rbxcompose.qos import Qos
 from rbxcompose.sdk.bound import Ended, Outcome
+from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench, instance
 
 TRAVEL = 0.04  # [m] for each turn
@@ -79,7 +79,7 @@ def test_it_goes_where_it_should(model: str, joint: dict[str, Any]) -> None:
         assert lift.outcome is Outcome.SUCCEEDED
         assert lift.at == pytest.approx(wanted, abs=0.001)
     if model == "XL430-W250" and not joint:
-        assert max(abs(one.velocity) for one in lift.fed) == pytest.approx(0.02, abs=2e-4)
+        assert max(abs(feedback.velocity) for feedback in lift.fed) == pytest.approx(0.02, abs=2e-4)
     assert lift.fed[-1].error == pytest.approx(0.0, abs=0.01)
 
 

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.compiler import compile_robot
-from rbxcompose.findings import Span
+from rbxcompose.base.findings import Span
+from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.msgs.sensor_msgs import JointState
-from rbxcompose.robot_events import MissionOver
+from rbxcompose.sdk.robot_events import MissionOver
 from rbxcompose.testing import Bench
 from rbxcompose.testing.manifests import Checked, check_text
 from tests.conftest import ROOT
@@ -88,7 +88,7 @@ def test_what_is_found_is_told_at_the_line_of_the_controller(name: str, tmp_path
     code, old, new, where = FOUND[name]
     text = NO_MISSION.replace(old, new, 1)
     assert text != NO_MISSION
-    found = [one for one in check(tmp_path, text).compilation.report if one.code == code]
+    found = [finding for finding in check(tmp_path, text).compilation.report if finding.code == code]
     assert found
     if where:
         assert line(text, found[0].span) == where
@@ -127,11 +127,11 @@ def test_its_mission_succeeds_and_the_lift_is_down_again() -> None:
     assert plan
     bench = Bench(plan=plan)
     states = bench.collect("/joint_states", JointState)
-    assert bench.run_until(lambda: any(isinstance(one, MissionOver) for one in bench.events), 120.0)
-    assert [one.outcome for one in bench.events if isinstance(one, MissionOver)] == ["success"]
-    heights = [float(one.position[list(one.name).index("lift_joint")]) for one in states]
+    assert bench.run_until(lambda: any(isinstance(event, MissionOver) for event in bench.events), 120.0)
+    assert [event.outcome for event in bench.events if isinstance(event, MissionOver)] == ["success"]
+    heights = [float(state.position[list(state.name).index("lift_joint")]) for state in states]
     assert max(heights) == pytest.approx(0.08, abs=2e-3)
     assert heights[-1] == pytest.approx(0.0, abs=2e-3)
     bench.host.stop()
     bench.advance(1.0)
-    assert all(abs(one) < 0.01 for one in states[-1].velocity)
+    assert all(abs(value) < 0.01 for value in states[-1].velocity)

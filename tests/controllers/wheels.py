@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from rbxcompose.geometry import Pose2, Transform3, Velocity2
+from rbxcompose.base.geometry import Pose2, Transform3, Velocity2
+from rbxcompose.domains.servos.twins.servo_fake import FakeServo
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.msgs.nav_msgs import Odometry
-from rbxcompose.qos import Qos
+from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench, instance
-from rbxcompose.twins.servo_fake import FakeServo
 
 RADIUS, DISTANCE = 0.04, 0.26  # [m]
 STEP = 0.01  # [s] between two looks at the wheels: a cycle, within which speeds do not change

@@ -38,8 +38,8 @@ class MachineTree:
         (own / "tty" / name if name.startswith("ttyACM") else own / name / "tty" / name).mkdir(parents=True)
         (own / "bInterfaceNumber").write_text(f"{interface:02x}\n", encoding="ascii")
         self._link(own / "driver", bus / f"usb-serial/drivers/{driver}")
-        for one in (folder, own):
-            self._link(devices / one.name, one)
+        for path in (folder, own):
+            self._link(devices / path.name, path)
         told = {"idVendor": vendor, "idProduct": product, "serial": serial, "manufacturer": about[0]}
         for key, text in {**told, "product": about[1]}.items():
             if text:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.devices.match import names_of, proposed, same_serials
-from rbxcompose.devices.serial_ports import SerialPort
-from rbxcompose.devices.usb import UsbDevice
+from rbxcompose.domains.devices.serial_ports import SerialPort
+from rbxcompose.domains.devices.udev import names_of, proposed, same_serials
+from rbxcompose.domains.devices.usb import UsbDevice
 
 PLACES = st.tuples(st.sampled_from(["1-1", "1-1.2", "2-1"]), st.integers(0, 2))
 KINDS = st.tuples(st.sampled_from(["0403", "1a86"]), st.sampled_from(["6001", "6014"]), st.sampled_from(["", "1", "2"]))
@@ -30,7 +30,7 @@ def test_an_entry_means_its_port_alone(ports: list[SerialPort]) -> None:
         keys = dict(proposed(port, ports))
         interface = int(keys.pop("interface")) if "interface" in keys else None
         wanted = UsbDevice(**keys, interface=interface, name="it")
-        assert [one for one in ports if names_of(one, [wanted])] == [port]
+        assert [serial_port for serial_port in ports if names_of(serial_port, [wanted])] == [port]
 
 
 def test_adapters_with_one_serial_number_are_found_and_several_ports_of_one_are_not() -> None:
@@ -40,7 +40,7 @@ def test_adapters_with_one_serial_number_are_found_and_several_ports_of_one_are_
             [("0001", "1-1", 0), ("0001", "1-2", 0), ("F4", "1-3", 0), ("F4", "1-3", 1), ("", "1-4", 0), ("", "1-5", 0)]
         )
     ]
-    assert [[one.path for one in group] for group in same_serials(ports)] == [["/dev/ttyUSB0", "/dev/ttyUSB1"]]
+    assert [[port.path for port in group] for group in same_serials(ports)] == [["/dev/ttyUSB0", "/dev/ttyUSB1"]]
 
 
 def test_a_port_without_a_device_is_meant_by_its_link() -> None:

@@ -7,9 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.devices.port_errors import DeviceNotUniqueError, NoDeviceError
-from rbxcompose.devices.serial_ports import SerialPort, latency_timers, port_path, serial_ports
-from rbxcompose.devices.usb import UsbDevice
+from rbxcompose.domains.devices.serial_ports import (
+    DeviceNotUniqueError,
+    NoDeviceError,
+    SerialPort,
+    latency_timers,
+    port_path,
+    serial_ports,
+)
+from rbxcompose.domains.devices.usb import UsbDevice
 from tests.devices.machine_tree import MachineTree
 
 
@@ -26,7 +32,7 @@ def test_ports_are_listed_with_their_devices_and_the_names_that_stay(tmp_path: P
         SerialPort(str(onboard)),
         SerialPort(str(first), [str(link)], UsbDevice("0403", "6014", "FT4", "1-1", 0), "ftdi_sio"),
     ]
-    assert [one.shown for one in serial_ports(tmp_path)] == [
+    assert [port.shown for port in serial_ports(tmp_path)] == [
         f"{second} (2341:0043 at USB port 1-2)",
         str(onboard),
         f"{link} ({first}, 0403:6014 FT4)",
@@ -86,8 +92,10 @@ def test_devices_without_serial_numbers_are_told_apart_by_their_sockets(tmp_path
 
 def test_the_ports_of_one_device_are_told_apart_by_their_interfaces(tmp_path: Path) -> None:
     tree = MachineTree(tmp_path)
-    ports = [tree.plug(f"ttyUSB{one}", "0403", "6011", serial="F4", usb_port="1-3", interface=one) for one in range(4)]
-    assert [port_path(f"usb#{one}:0403:6011:F4", tmp_path) for one in range(4)] == [str(one) for one in ports]
+    ports = [
+        tree.plug(f"ttyUSB{index}", "0403", "6011", serial="F4", usb_port="1-3", interface=index) for index in range(4)
+    ]
+    assert [port_path(f"usb#{index}:0403:6011:F4", tmp_path) for index in range(4)] == [str(port) for port in ports]
 
 
 def test_a_serial_number_may_be_written_as_udev_does(tmp_path: Path) -> None:
@@ -123,7 +131,7 @@ def test_what_is_no_regular_file_in_a_tree_is_not_read(tmp_path: Path) -> None:
     serial = tmp_path / "sys/bus/usb/devices/1-1/serial"
     serial.unlink()
     os.mkfifo(serial)
-    assert [one.device and one.device.serial for one in serial_ports(tmp_path)] == [""]
+    assert [port.device and port.device.serial for port in serial_ports(tmp_path)] == [""]
 
 
 DEVICES = [

@@ -6,10 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.diagnostics import admission
-from rbxcompose.diagnostics.conditions import matches
-from rbxcompose.diagnostics.core import Aggregator
-from rbxcompose.diagnostics.settings import AnalyzerModel, DiagnosticsModel
+from rbxcompose.domains.diagnostics import core as admission
+from rbxcompose.domains.diagnostics.core import Aggregator
+from rbxcompose.domains.diagnostics.settings import AnalyzerModel, DiagnosticsModel, matches
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticStatus, KeyValue
 from tests.diagnostics.trees import ERROR, OK, POWER, STALE, WARN, Groups, aggregator, fed, level, news, status, tree
 
@@ -244,4 +243,4 @@ def test_a_group_is_as_bad_as_the_worst_below_it_and_the_robot_as_the_worst_grou
     for path, found in levels.items():
         above = path.rpartition("/")[0]
         assert above not in levels or rank(levels[above]) >= rank(found) or path.startswith("/motion/wheels")
-    assert made.level()[0] is max((levels[one] for one in levels if one.count("/") == 1), key=rank, default=OK)
+    assert made.level()[0] is max((levels[text] for text in levels if text.count("/") == 1), key=rank, default=OK)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rbxcompose.levels import Level
+from rbxcompose.base.levels import Level
 from tests.diagnostics.trees import ERROR, OK, POWER, STALE, WARN, Groups, aggregator, fed, level, status, tree
 
 NESTED: Groups = {
@@ -147,7 +147,7 @@ def test_groups_that_silence_each_other_are_refused() -> None:
 def test_all_changes_of_levels_are_remembered_with_their_cause_up_to_a_limit() -> None:
     made = fed(status("battery", WARN, "half"), now=1.0)
     made.lost(2.0, ["battery"], "gone")
-    told = [(one.time, one.path, one.old, one.new, one.cause) for one in made.history.after(0)]
+    told = [(change.time, change.path, change.old, change.new, change.cause) for change in made.history.after(0)]
     assert told == [
         (1.0, "/power/battery", OK, WARN, "half"),
         (1.0, "/power", OK, WARN, "battery: half"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.levels import Level, level_of
+from rbxcompose.base.levels import Level, level_of
 
 
 @given(st.integers())

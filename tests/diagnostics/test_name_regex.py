@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rbxcompose.diagnostics.name_regex import fits_regex, trouble_of
+from rbxcompose.domains.diagnostics.settings import fits_regex, trouble_of
 
 
 @pytest.mark.parametrize(

@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.diagnostics.ros1 import Ros1Aggregator
-from rbxcompose.diagnostics.settings import DiagnosticsModel
-from rbxcompose.levels import Level
+from rbxcompose.base.levels import Level
+from rbxcompose.domains.diagnostics.ros1 import Ros1Aggregator
+from rbxcompose.domains.diagnostics.settings import DiagnosticsModel
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticStatus
 from tests.diagnostics.trees import ERROR, OK, STALE, WARN, Groups, fed, status, tree
 

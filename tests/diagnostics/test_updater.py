@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.diagnostics.updater import CompositeTask, FrequencyTask, StampTask, TaskStatus, heartbeat
-from rbxcompose.levels import Level
+from rbxcompose.base.levels import Level
+from rbxcompose.sdk.updater import CompositeTask, FrequencyTask, StampTask, TaskStatus, heartbeat
 
 RATES = st.floats(0.05, 200.0)
 
@@ -70,7 +70,7 @@ def test_stamps_are_compared_with_now(stamp: float, now: float, reason: str) -> 
 
 @given(st.lists(st.tuples(st.sampled_from(Level), st.text("ab", max_size=2)), max_size=4))
 def test_a_composite_has_the_worst_level_and_the_messages_of_what_is_wrong(parts: list[tuple[Level, str]]) -> None:
-    told = CompositeTask(*(lambda now, one=one: TaskStatus(*one) for one in parts)).status(0.0)
+    told = CompositeTask(*(lambda now, one=part: TaskStatus(*one) for part in parts)).status(0.0)
     worst = max((level for level, _ in parts), default=Level.OK)
     wrong = [text for level, text in parts if text and (worst is Level.OK or level is not Level.OK)]
     assert (told.level, told.message) == (worst, "; ".join(wrong))

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from rbxcompose.diagnostics.core import Aggregator
-from rbxcompose.diagnostics.settings import DiagnosticsModel
-from rbxcompose.levels import Level
+from rbxcompose.base.levels import Level
+from rbxcompose.domains.diagnostics.core import Aggregator
+from rbxcompose.domains.diagnostics.settings import DiagnosticsModel
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticStatus
 
 OK, WARN, ERROR, STALE = Level

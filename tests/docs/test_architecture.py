@@ -43,7 +43,7 @@ def test_imports_point_downwards_in_the_map(part: str) -> None:
 
 def test_every_stage_is_a_function_of_the_file_that_is_named() -> None:
     assert len(STAGES) == 8
-    assert [name for name, file in STAGES if name not in {one.name for one in functions(file)}] == []
+    assert [name for name, file in STAGES if name not in {function.name for function in functions(file)}] == []
 
 
 def test_the_compiler_calls_the_stages_in_this_order() -> None:

@@ -38,7 +38,7 @@ def proved() -> set[tuple[str, str, str]]:
     for path in (ROOT / "missions/tests").glob("*.test.yaml"):
         test = yaml.safe_load(path.read_text(encoding="utf-8"))
         if "mocks" not in test and test["expect"].get("outcome") == "success":
-            robots = [one.split("/")[-2] for one in (test["robot"], *test.get("also", []))]
+            robots = [text.split("/")[-2] for text in (test["robot"], *test.get("also", []))]
             found |= {(test["mission"], test.get("profile", ""), robot) for robot in robots}
     return found
 

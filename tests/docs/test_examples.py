@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.cli.verbs import load, parser_of, verbs
-from rbxcompose.findings import Severity
+from rbxcompose.base.findings import Severity
+from rbxcompose.commands.verbs import load, parser_of, verbs
 from rbxcompose.missions.program.registry import forget
 from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.sdk import registry

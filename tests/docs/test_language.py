@@ -7,17 +7,17 @@ import re
 import pytest
 
 from docs.generating.robot import models_below
-from rbxcompose.config import Config
-from rbxcompose.expressions.functions import FUNCTIONS
-from rbxcompose.expressions.types import TYPES
+from rbxcompose.base.config import Config
+from rbxcompose.base.expressions.functions import FUNCTIONS
+from rbxcompose.base.expressions.types import TYPES
+from rbxcompose.base.units import UNITS
 from rbxcompose.manifest.file_models import FILES, file_model
-from rbxcompose.manifest.options import ComponentOptions
 from rbxcompose.manifest.registry import sections
+from rbxcompose.manifest.section import ComponentOptions
 from rbxcompose.missions.language.header import INPUT_KEYS
 from rbxcompose.missions.language.reader import INTERRUPT_KEYS, KEYS
 from rbxcompose.missions.modifiers.registry import modifiers
 from rbxcompose.missions.program.program import AFTERWARDS
-from rbxcompose.units import UNITS
 from tests.docs.examples import ROOT
 
 PAGE = (ROOT / "docs/language.md").read_text(encoding="utf-8")
@@ -38,7 +38,7 @@ def test_it_has_every_unit_type_and_function() -> None:
     assert [name for name in FUNCTIONS if f"`{name}(" not in PAGE] == []
 
 
-MODELS = [*map(file_model, FILES), *(model for one in sections() for _, model in models_below(one.type, ""))]
+MODELS = [*map(file_model, FILES), *(model for section in sections() for _, model in models_below(section.type, ""))]
 
 
 @pytest.mark.parametrize("model", MODELS)

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.cli import main as command
+from rbxcompose.commands import main as command
 from rbxcompose.testing import check_file, run_robot
 from tests.docs.examples import ROOT, Block, blocks_of
 

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import pytest
 
-from rbxcompose.cli import main as command
+from rbxcompose.commands import main as command
 from tests.docs.examples import ROOT, Block, blocks_of
 
 PAGE = ROOT / "docs/inspection.md"
@@ -17,7 +17,9 @@ SKIPS = "..."
 
 def shown_in(blocks: Iterable[Block]) -> Iterator[tuple[Block, Block]]:
     """Yield each command with what the page shows below it."""
-    yield from ((one, other) for one, other in pairwise(blocks) if (one.language, other.language) == ("sh", "text"))
+    yield from (
+        (block, other) for block, other in pairwise(blocks) if (block.language, other.language) == ("sh", "text")
+    )
 
 
 SHOWN = list(shown_in(blocks_of(PAGE.read_text(encoding="utf-8"), PAGE.name)))

@@ -10,19 +10,31 @@ from pathlib import Path
 
 import pytest
 
+from rbxcompose.base.findings import Finding
 from rbxcompose.bus.graph import Graph, GraphEnd, GraphName, WireType
 from rbxcompose.bus.wire import RosQos
-from rbxcompose.compiler import compile_robot
-from rbxcompose.devices.serial_ports import SerialPort
-from rbxcompose.devices.usb import UsbDevice
-from rbxcompose.doctor import machine
-from rbxcompose.doctor.facts import BusFacts, Clocks, HostFacts, Listener, ResourceLimits, RunningRobot, Version
-from rbxcompose.doctor.registry import EXAMINATIONS, PLUGINS, ExaminationResult, examination, examine_all, has_errors
-from rbxcompose.findings import Finding
-from rbxcompose.model.robot import Robot
-from rbxcompose.runtime.clock_offset import ClockOffset
-from rbxcompose.runtime.folder import RobotFolder, RobotState
+from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.compiler.model.robot import Robot
+from rbxcompose.domains.devices.serial_ports import SerialPort
+from rbxcompose.domains.devices.usb import UsbDevice
+from rbxcompose.runtime.folder import ClockOffset, RobotFolder, RobotState
 from rbxcompose.runtime.processes import Process, boot_id
+from rbxcompose.tools import doctor as machine
+from rbxcompose.tools.doctor import (
+    EXAMINATIONS,
+    PLUGINS,
+    BusFacts,
+    Clocks,
+    ExaminationResult,
+    HostFacts,
+    Listener,
+    ResourceLimits,
+    RunningRobot,
+    Version,
+    examination,
+    examine_all,
+    has_errors,
+)
 
 HERE = Process.of(os.getpid())
 GONE = Process(HERE.pid, 1)
@@ -83,8 +95,11 @@ def on_bus(*topics: GraphName, ages: Mapping[str, float] | None = None) -> HostF
 
 def test_on_a_machine_that_is_well_nothing_is_wrong() -> None:
     answers = examine_all(FINE)
-    assert {one.level for one in answers} == {"ok"}
-    assert {one.examination for one in answers} == set(PLUGINS.names()) - {"clashes", "wires"}  # for these one must run
+    assert {result.level for result in answers} == {"ok"}
+    assert {result.examination for result in answers} == set(PLUGINS.names()) - {
+        "clashes",
+        "wires",
+    }  # for these one must run
     assert not has_errors(answers)
 
 
@@ -194,7 +209,7 @@ def test_a_router_listens_at_its_port_or_somebody_else_does() -> None:
     ],
 )
 def test_a_clock_that_is_wrong_or_jumps_is_told(clocks: Clocks, code: str) -> None:
-    assert [one for one, _ in told("clocks", replace(FINE, clocks=clocks))] == [code]
+    assert [text for text, _ in told("clocks", replace(FINE, clocks=clocks))] == [code]
 
 
 def test_a_node_whose_stamps_are_of_another_time_is_told() -> None:
@@ -304,7 +319,7 @@ def test_a_device_must_be_there_and_open(tmp_path: Path) -> None:
 
 
 def test_an_answer_is_plain_data() -> None:
-    fine, wrong = (ExaminationResult("ports", one) for one in ("fine", next(iter(_taken()))))
+    fine, wrong = (ExaminationResult("ports", text) for text in ("fine", next(iter(_taken()))))
     assert fine.to_data() == {"examination": "ports", "level": "ok", "message": "fine"}
     assert {key: wrong.to_data()[key] for key in ("level", "code")} == {"level": "warning", "code": "RBX9402"}
 
@@ -332,7 +347,7 @@ def test_the_machine_tells_who_listens_what_it_may_and_what_is_installed() -> No
     assert found.pid == os.getpid()
     assert "python" in found.title or "pytest" in found.title
     assert machine.limits().shared_memory is not None
-    versions = {one.name: one for one in machine.versions()}
+    versions = {version.name: version for version in machine.versions()}
     assert versions["pydantic"].installed
     assert versions["pydantic"].locked
     clocks = machine.ClockWatch().clocks()

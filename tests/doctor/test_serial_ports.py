@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.devices.serial_ports import SerialPort
-from rbxcompose.devices.usb import UsbDevice
-from rbxcompose.doctor.serial_ports import PortFile, look_at, port_findings
+from rbxcompose.domains.devices.openable import PortFile, look_at, port_findings
+from rbxcompose.domains.devices.serial_ports import SerialPort
+from rbxcompose.domains.devices.usb import UsbDevice
 from rbxcompose.testing import check_text
 from tests.checks import strangers
 
@@ -27,8 +27,8 @@ def told(folder: Path, name: str, file: PortFile, ports: tuple[SerialPort, ...] 
     robot = check_text(SCANNER.format(name), folder).compilation.robot
     assert robot is not None
     found = list(port_findings(robot, ports, lambda path: file))
-    assert {(one.span.line, one.span.column) for one in found if one.span} <= {(7, 13)}
-    return [(one.code, one.message, one.help) for one in found]
+    assert {(finding.span.line, finding.span.column) for finding in found if finding.span} <= {(7, 13)}
+    return [(finding.code, finding.message, finding.help) for finding in found]
 
 
 @pytest.mark.parametrize("name", ["/dev/ttyUSB0", "usb:0403:6014", "usb:0403:6014:FT4"])

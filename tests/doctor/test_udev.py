@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from rbxcompose.devices.serial_ports import SerialPort
-from rbxcompose.devices.usb import UsbDevice
-from rbxcompose.doctor.serial_ports import PortFile
-from rbxcompose.doctor.udev import Account, device_answers, group_answer, rules_answer
-from rbxcompose.findings import Finding, Span
+from rbxcompose.base.findings import Finding, Span
+from rbxcompose.domains.devices.openable import PortFile
+from rbxcompose.domains.devices.serial_ports import SerialPort
+from rbxcompose.domains.devices.udev import Account, device_answers, group_answer, rules_answer
+from rbxcompose.domains.devices.usb import UsbDevice
 
 ARM = UsbDevice("0403", "6014", "FT4", name="arm")
 PLACE = Span("robot.yaml", 5, 3, 5, 6)
@@ -19,8 +19,8 @@ OTHER = SerialPort("/dev/ttyUSB1", (), UsbDevice("0403", "6014", "FT5", "1-2", 0
 def told(*ports: SerialPort, file: PortFile | None = None, are_right: bool = True) -> list[tuple[str, str]]:
     found = file or PortFile()
     answers = list(device_answers({"arm": (ARM, PLACE)}, ports, lambda path: found, rules_are_right=are_right))
-    assert {one.span for one in answers if isinstance(one, Finding) and one.code != "RBX9415"} <= {PLACE}
-    return [("ok", one) if isinstance(one, str) else (one.code, one.message) for one in answers]
+    assert {answer.span for answer in answers if isinstance(answer, Finding) and answer.code != "RBX9415"} <= {PLACE}
+    return [("ok", answer) if isinstance(answer, str) else (answer.code, answer.message) for answer in answers]
 
 
 FINE = ("ok", "'arm' is /dev/ttyUSB0 (0403:6014 FT4)")

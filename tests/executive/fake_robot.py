@@ -7,30 +7,30 @@ import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
 
-from rbxcompose.clock import Clock, SteppedClock
-from rbxcompose.components.mission import Mission, MissionConfig
-from rbxcompose.diagnostics.updater import DiagnosticTask
-from rbxcompose.expressions.types import FLAG, TEXT, TYPES
-from rbxcompose.findings import Report
-from rbxcompose.geometry import Pose2, Transform3
-from rbxcompose.levels import Level
+from rbxcompose.base.clock import Clock, SteppedClock
+from rbxcompose.base.expressions.types import FLAG, TEXT, TYPES
+from rbxcompose.base.findings import Report
+from rbxcompose.base.geometry import Pose2, Transform3
+from rbxcompose.base.levels import Level
+from rbxcompose.base.requests import Command, Query
+from rbxcompose.compiler.model.skills import python_skills
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.missions.analysis.effects import sent_by
+from rbxcompose.missions.components.mission import Mission, MissionConfig
 from rbxcompose.missions.language.reader import read_program
 from rbxcompose.missions.program.goals import skill_of
 from rbxcompose.missions.program.program import Program, Skill
-from rbxcompose.missions.program.sources import SkillSource, SkillWay, TopicSource, ValueSource
-from rbxcompose.model.skills import python_skills
+from rbxcompose.missions.sources import SkillSource, SkillWay, TopicSource, ValueSource
 from rbxcompose.msgs.geometry_msgs import PoseStamped
 from rbxcompose.msgs.nav2_msgs import NavigateToPose
 from rbxcompose.msgs.rbxcompose_msgs import Recharge
 from rbxcompose.msgs.std_msgs import Float32
-from rbxcompose.requests import Command, Query
-from rbxcompose.robot_events import MissionOver, RobotEvent
 from rbxcompose.sdk import Activity, Ended, Outcome, Place, skill
 from rbxcompose.sdk.bound import Reply
 from rbxcompose.sdk.ports import In
+from rbxcompose.sdk.robot_events import MissionOver, RobotEvent
+from rbxcompose.sdk.updater import DiagnosticTask
 
 
 @skill("toy_count", outcomes={"nobody": "failure"})
@@ -198,7 +198,10 @@ class Robot:
                     "switch",
                     SkillWay.SERVICE,
                 ),
-                **{one.skill.name: one for one in python_skills(["say", "toy_count", "toy_raise", "toy_slow"])},
+                **{
+                    python_skill.skill.name: python_skill
+                    for python_skill in python_skills(["say", "toy_count", "toy_raise", "toy_slow"])
+                },
             },
             topics={name: topics[name] for name in published},
             services=dict.fromkeys(called, "std_srvs/srv/Trigger"),

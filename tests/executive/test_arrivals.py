@@ -1,10 +1,10 @@
 from __future__ import annotations
 
-from rbxcompose.executive.arrivals import Arrivals
-from rbxcompose.expressions.types import TYPES
-from rbxcompose.missions.program.sources import ValueSource
+from rbxcompose.base.expressions.types import TYPES
+from rbxcompose.base.units import RATIO, to_si
+from rbxcompose.missions.execution.world import Arrivals
+from rbxcompose.missions.sources import ValueSource
 from rbxcompose.msgs.std_msgs import Float32
-from rbxcompose.units import RATIO, to_si
 
 
 def test_a_whole_percentage_is_the_one_that_a_mission_writes_down() -> None:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from rbxcompose.executive.requests import CancelMission, ListMissions, LookAtAll, PauseMission, RunMission
-from rbxcompose.missions.view.mirror import joined
-from rbxcompose.missions.view.replica import Replica
-from rbxcompose.requests import Command, Refused
+from rbxcompose.base.requests import Command, Refused
+from rbxcompose.missions.execution.requests import CancelMission, ListMissions, LookAtAll, PauseMission, RunMission
+from rbxcompose.missions.view.replica import Replica, joined
 from tests.executive.fake_robot import FakeWindow, Robot
 
 COUNT = """
@@ -30,7 +29,9 @@ def watched(robot: Robot) -> FakeWindow:
 
 def test_nothing_is_put_together_while_nobody_watches(monkeypatch: pytest.MonkeyPatch) -> None:
     robot = Robot(COUNT)
-    monkeypatch.setattr("rbxcompose.executive.mission_run.Mirror.look", lambda *_: pytest.fail("looked for nobody"))
+    monkeypatch.setattr(
+        "rbxcompose.missions.execution.mission_run.Mirror.look", lambda *_: pytest.fail("looked for nobody")
+    )
     robot.start()
     robot.advance(10.0)
     assert robot.windows["missions/test"].news == []
@@ -42,9 +43,9 @@ def test_news_are_what_changed_and_add_up_to_what_is_there() -> None:
     robot.start()
     robot.advance(10.0)
     known = joined({}, window.news[0])
-    for one in window.news[1:]:
-        assert not one["whole"]
-        known = joined(known, one)
+    for entry in window.news[1:]:
+        assert not entry["whole"]
+        known = joined(known, entry)
     whole = robot.mission.handle(LookAtAll("test"))
     assert known["state"] == "success"
     own = ("picture", "whole", "version")
@@ -60,7 +61,7 @@ def test_who_comes_in_the_middle_hears_what_was_not_told_before() -> None:
     robot.advance(1.5)
     window = watched(robot)
     robot.advance(1.0)
-    assert [one["data"] for one in window.news] == [{"round": 3}]
+    assert [entry["data"] for entry in window.news] == [{"round": 3}]
 
 
 @pytest.mark.parametrize(("command", "state"), [(PauseMission(), "paused"), (CancelMission(), "halted")])

@@ -3,7 +3,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.executive.log_store import BLOCK, MOST_BLOCKS, LogStore
+from rbxcompose.missions.execution.mission_run import BLOCK, MOST_BLOCKS, LogStore
 
 
 def store_of(count: int) -> LogStore:
@@ -17,8 +17,8 @@ def store_of(count: int) -> LogStore:
 def test_what_was_written_since_comes_back_as_it_was(count: int, number: int) -> None:
     store = store_of(count)
     assert store.written == count
-    assert [one["number"] for one in store.since(number)] == list(range(number, count))
-    assert all(one["values"] == [0.1, "corner_1", None] for one in store.since(number))
+    assert [record["number"] for record in store.since(number)] == list(range(number, count))
+    assert all(record["values"] == [0.1, "corner_1", None] for record in store.since(number))
 
 
 def test_the_oldest_are_forgotten() -> None:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from rbxcompose.components.mission import Mission
-from rbxcompose.executive.requests import PauseMission, ResumeMission, RunMission
-from rbxcompose.model.wires import ends_of
+from rbxcompose.compiler.model.robot import ends_of
+from rbxcompose.compiler.plan.model import Instance, Wire
+from rbxcompose.missions.components.mission import Mission
+from rbxcompose.missions.execution.requests import PauseMission, ResumeMission, RunMission
 from rbxcompose.msgs.nav2_msgs import NavigateToPose
 from rbxcompose.msgs.rbxcompose_msgs import Recharge
-from rbxcompose.plan.model import Instance, Wire
-from rbxcompose.robot_events import MissionOver
 from rbxcompose.sdk import Component, Config, ServesAction, component
+from rbxcompose.sdk.robot_events import MissionOver
 from rbxcompose.testing import Bench
 from tests.executive.fake_robot import Robot
 
@@ -45,7 +45,7 @@ class Scanner(Component[Config]):
 
 
 def instance(name: str, cls: type[Component[Config]], config: Config) -> Instance:
-    wires = tuple(Wire(one.name, one.port.kind, one.topic, one.type_name) for one in ends_of(name, cls, config, "", {}))
+    wires = tuple(Wire(end.name, end.port.kind, end.topic, end.type_name) for end in ends_of(name, cls, config, "", {}))
     return Instance(name, cls.type_name, config, "robot", (), wires)
 
 
@@ -62,7 +62,7 @@ def goals(robot: Bench) -> int:
 
 
 def lines(robot: Bench) -> list[str]:
-    return [f"{one.time:g} {one.text}" for one in robot.records if one.source == "mission"]
+    return [f"{record.time:g} {record.text}" for record in robot.records if record.source == "mission"]
 
 
 def test_a_goal_that_can_be_held_is_held_and_goes_on_where_it_was() -> None:
@@ -82,7 +82,7 @@ def test_a_stop_ends_the_held_goal_and_the_resume_sends_it_again() -> None:
     robot.advance(1.0)
     robot.host.stop()
     robot.advance(5.0)
-    assert not [one for one in robot.events if isinstance(one, MissionOver)]
+    assert not [event for event in robot.events if isinstance(event, MissionOver)]
     robot.host.release()
     robot.host.ask("mission", ResumeMission())
     robot.advance(2.5)

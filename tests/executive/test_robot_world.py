@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from rbxcompose.executive.requests import CancelMission, PauseMission, ResumeMission
-from rbxcompose.levels import Level
+from rbxcompose.base.levels import Level
+from rbxcompose.missions.execution.requests import CancelMission, PauseMission, ResumeMission
 from rbxcompose.msgs.geometry_msgs import PoseStamped
 from rbxcompose.msgs.rbxcompose_msgs import Recharge
 from rbxcompose.msgs.std_msgs import Bool, Float32, String

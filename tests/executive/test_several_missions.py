@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from rbxcompose.executive.requests import (
+from rbxcompose.base.requests import Command, Query
+from rbxcompose.missions.execution.requests import (
     CancelMission,
     ListMissions,
     LookAtAll,
@@ -14,9 +15,8 @@ from rbxcompose.executive.requests import (
     RunMission,
     ShowPicture,
 )
-from rbxcompose.requests import Command, Query
-from rbxcompose.robot_events import MissionOver
 from rbxcompose.sdk import Outcome, Refused
+from rbxcompose.sdk.robot_events import MissionOver
 from tests.executive.fake_robot import Robot
 
 GO = "do:\n  go_to: dock"
@@ -144,14 +144,14 @@ def test_each_can_be_paused_by_its_name_and_a_stop_pauses_all() -> None:
     assert not robot.go_to.goals[0].is_cancelled
     robot.is_stopped = True
     robot.mission.stop()
-    assert [one.is_paused for one in robot.mission.missions] == [True, True]
+    assert [mission.is_paused for mission in robot.mission.missions] == [True, True]
     with pytest.raises(Refused, match="release it first"):
         robot.mission.handle(ResumeMission("look"))
     robot.is_stopped = False
     robot.mission.handle(ResumeMission("test"))
     robot.advance(0.0)
     assert len(robot.go_to.goals) == 2
-    assert [one.is_paused for one in robot.mission.missions] == [False, True]
+    assert [mission.is_paused for mission in robot.mission.missions] == [False, True]
 
 
 def test_only_the_end_of_the_start_mission_is_told_to_the_supervisor() -> None:
@@ -180,8 +180,8 @@ def test_ls_tells_how_each_stands_and_what_it_claims() -> None:
     robot.mission.handle(RunMission("look"))
     robot.advance(0.0)
     listed = {one.name: one for one in robot.mission.handle(ListMissions())}
-    assert {name: one.state for name, one in listed.items()} == {"test": "idle", "look": "running", "greet": "idle"}
-    assert {name: list(one.claims) for name, one in listed.items()} == {
+    assert {name: entry.state for name, entry in listed.items()} == {"test": "idle", "look": "running", "greet": "idle"}
+    assert {name: list(entry.claims) for name, entry in listed.items()} == {
         "test": ["base"],
         "look": ["head"],
         "greet": ["voice"],

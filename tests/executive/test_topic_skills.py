@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.executive.requests import CancelMission, PauseMission, ResumeMission
+from rbxcompose.missions.execution.requests import CancelMission, PauseMission, ResumeMission
 from rbxcompose.msgs.std_msgs import Float64
-from rbxcompose.robot_events import MissionOver
+from rbxcompose.sdk.robot_events import MissionOver
 from rbxcompose.testing import Bench, check_text
 from tests.executive.toy_gripper import GripEnd, Gripper
 
@@ -45,7 +45,7 @@ class Hand:
     @property
     def lines(self) -> list[str]:
         """Return what the executive logged, with the time."""
-        return [f"{one.time:.1f} {one.text}" for one in self.bench.records if one.source == "mission"]
+        return [f"{record.time:.1f} {record.text}" for record in self.bench.records if record.source == "mission"]
 
     @property
     def end(self) -> str:
@@ -105,7 +105,9 @@ def test_topics_follow_their_wires(make: Make) -> None:
     hand = make("do:\n  grip: 0.02\n  timeout: 0.5 s", ROBOT.replace("toy_gripper", f"toy_gripper, {wires}"))
     hand.bench.advance(2.0)
     assert hand.gripper.heard == ["0.0 grip 0.02", "0.5 halt"]
-    wired = {wire.topic for one in hand.bench.plan.instances for wire in one.wires if one.name == "mission"}
+    wired = {
+        wire.topic for instance in hand.bench.plan.instances for wire in instance.wires if instance.name == "mission"
+    }
     assert {"/left/grip", "/left/ended", "/left/halt"} <= wired
 
 

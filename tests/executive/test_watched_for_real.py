@@ -16,9 +16,9 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.cli.bus.guest import Guest
-from rbxcompose.cli.robots.lookup import BusPlace
-from rbxcompose.cli.robots.sampler import MissionsSeen
+from rbxcompose.commands.guest import Guest
+from rbxcompose.commands.lookup import BusPlace
+from rbxcompose.tools.sampler import MissionsSeen
 
 ROOT = Path(__file__).parents[2]
 PATIENCE = 20.0  # [s]
@@ -117,7 +117,10 @@ def test_a_viewer_follows_a_mission_also_over_the_death_of_its_process(robot: Ro
         assert "▶ repeat" in robot.do("mission", "show", "count")
         guest.run(lambda: False, 0.0)
         counted = watching.round
-        os.kill(next(one["pid"] for one in found["components"] if one["name"] == "mission"), signal.SIGKILL)
+        os.kill(
+            next(component["pid"] for component in found["components"] if component["name"] == "mission"),
+            signal.SIGKILL,
+        )
         watching.until(lambda: 0 < watching.round < counted)  # it was begun by a person, and starts again
         before = watching.round
         watching.until(lambda: watching.round >= before + 2)

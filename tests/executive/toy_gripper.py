@@ -7,8 +7,8 @@ from typing import ClassVar
 
 from rbxcompose.msgs.std_msgs import Empty, Float64, String
 from rbxcompose.msgs.types import Fields, Message
-from rbxcompose.qos import Qos
 from rbxcompose.sdk import Component, Config, In, Out, ServesTopic, component
+from rbxcompose.sdk.ports import Qos
 
 TAKES = 10  # steps of 0.1 s
 

@@ -12,14 +12,14 @@ from typing import Any
 import pytest
 import yaml
 
-from rbxcompose.cli.main import main
-from rbxcompose.exporting import compose, kubernetes, systemd
-from rbxcompose.exporting.exported_share import CERTIFICATES, CONFIGURATION, FILE, ExportedShare, shares
-from rbxcompose.runtime.service_manager import ALIVE, READY, ServiceManager
-from rbxcompose.systems.bundle import files_of
-from rbxcompose.systems.certificates import folder_of
-from rbxcompose.systems.reader import compile_system
+from rbxcompose.commands.main import main
+from rbxcompose.compiler.systems.bundle import files_of
+from rbxcompose.compiler.systems.certificates import folder_of
+from rbxcompose.compiler.systems.reader import compile_system
+from rbxcompose.runtime.supervision.supervisor import ALIVE, READY, ServiceManager
 from rbxcompose.testing.golden import Golden
+from rbxcompose.tools.exporting import compose, kubernetes, systemd
+from rbxcompose.tools.exporting.exported_share import CERTIFICATES, CONFIGURATION, FILE, ExportedShare, shares
 
 PATH = "systems/patrol_two_hosts.yaml"
 WITH_DEVICE = ExportedShare("lab", "arm", "bench", ("up", "{file}", "--host", "bench"), ("/dev/ttyUSB0",), 1.0)
@@ -99,7 +99,7 @@ def test_compose_accepts_the_file_and_would_refuse_a_key_that_it_does_not_know(
     assert done.returncode == 0, done.stderr
     services = yaml.safe_load(done.stdout)["services"]
     commands = {share.name: [f"/robot/{PATH}" if word == FILE else word for word in share.command] for share in given}
-    assert {name: one["command"] for name, one in services.items()} == commands
+    assert {name: service["command"] for name, service in services.items()} == commands
     assert "mem_limits" in read(text.replace("mem_limit", "mem_limits")).stderr
 
 
@@ -115,9 +115,9 @@ def test_what_a_pod_of_kubernetes_mounts_is_there_and_the_files_are_those_of_the
     data = made["files.yaml"]["data"]
     for share in (*found, WITH_DEVICE):
         pod: dict[str, Any] = made[f"{share.name}.yaml"]["spec"]["template"]["spec"]
-        volumes = {one["name"] for one in pod["volumes"]}
-        assert {one["name"] for one in pod["containers"][0]["volumeMounts"]} == volumes
-        items = {one["path"]: one["key"] for one in pod["volumes"][0]["configMap"]["items"]}
+        volumes = {volume["name"] for volume in pod["volumes"]}
+        assert {mount["name"] for mount in pod["containers"][0]["volumeMounts"]} == volumes
+        items = {item["path"]: item["key"] for item in pod["volumes"][0]["configMap"]["items"]}
         assert PATH in items
         assert set(items.values()) == set(data)
         assert pod["nodeSelector"] == {"rbxcompose/host": share.host}
@@ -130,7 +130,7 @@ def test_kustomize_accepts_the_manifests(found: list[ExportedShare], tmp_path: P
         (tmp_path / name).write_text(text, encoding="utf-8")
     done = subprocess.run([kubectl, "kustomize", tmp_path], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    kinds = [one["kind"] for one in yaml.safe_load_all(done.stdout)]
+    kinds = [entry["kind"] for entry in yaml.safe_load_all(done.stdout)]
     assert sorted(kinds) == ["ConfigMap", "Deployment", "Deployment"]
 
 
@@ -143,7 +143,7 @@ def test_each_robot_of_a_fleet_is_an_overlay(found: list[ExportedShare], tmp_pat
     (tmp_path / "second/kustomization.yaml").write_text(OVERLAY, encoding="utf-8")
     done = subprocess.run([kubectl, "kustomize", tmp_path / "second"], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    made = {one["metadata"]["name"]: one for one in yaml.safe_load_all(done.stdout)}
+    made = {entry["metadata"]["name"]: entry for entry in yaml.safe_load_all(done.stdout)}
     pod = made["second-turtlebot-robot"]["spec"]["template"]["spec"]
     assert pod["nodeSelector"] == {"rbxcompose/host": "robot", "fleet": "second"}
     assert pod["volumes"][0]["configMap"]["name"] in made
@@ -163,14 +163,14 @@ def test_secrets_are_named_and_never_written_down() -> None:
     container = (pod := yaml.safe_load(text)["spec"]["template"]["spec"])["containers"][0]
     assert "# kubectl create secret generic arm-bench-api-key --from-file=value=secrets/api_key" in text
     assert container["env"][-1]["valueFrom"] == {"secretKeyRef": {"name": "arm-bench-api-key", "key": "value"}}
-    certificates = {one["name"]: one for one in pod["volumes"]}["certificates"]
+    certificates = {volume["name"]: volume for volume in pod["volumes"]}["certificates"]
     assert certificates["secret"]["secretName"] == "arm-bench-certificates"
     composed = yaml.safe_load(compose.compose_file([SECRET], system="lab", file=PATH))
     service = composed["services"]["arm-bench"]
     assert service["environment"] == ["RBX_SECRET_API_KEY"]
-    assert {one["source"] for one in service["secrets"]} == composed["secrets"].keys()
+    assert {secret["source"] for secret in service["secrets"]} == composed["secrets"].keys()
     folder = folder_of("lab", {"XDG_CONFIG_HOME": CONFIGURATION}) / "bench"
-    assert [one["target"] for one in service["secrets"]] == [str(folder / name) for name in CERTIFICATES]
+    assert [secret["target"] for secret in service["secrets"]] == [str(folder / name) for name in CERTIFICATES]
 
 
 def test_files_go_to_a_new_folder_only(repository: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

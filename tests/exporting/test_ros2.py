@@ -10,17 +10,17 @@ import pytest
 import yaml
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from rbxcompose.cli.main import main
-from rbxcompose.exporting.ros2 import packages
+from rbxcompose.commands.main import main
+from rbxcompose.compiler.systems.reader import compile_system
 from rbxcompose.msgs.packages import OWN
-from rbxcompose.systems.reader import compile_system
+from rbxcompose.tools.exporting.ros2 import packages
 
 PATH = "systems/patrol_two_hosts.yaml"
 
 
 @pytest.fixture
 def files(repository: Path) -> dict[str, str]:
-    return packages([one.plan for one in compile_system(PATH, environment={}).robots.values()], "1.2.3")
+    return packages([robot.plan for robot in compile_system(PATH, environment={}).robots.values()], "1.2.3")
 
 
 def test_another_reader_of_messages_understands_ours(files: dict[str, str]) -> None:
@@ -71,7 +71,9 @@ def test_the_launch_file_starts_a_viewer_of_our_topics_at_our_router(
 def test_rviz_shows_each_topic_that_it_can_in_the_frame_that_has_no_parent(files: dict[str, str]) -> None:
     manager = yaml.safe_load(files["turtlebot_view/rviz/turtlebot.rviz"])["Visualization Manager"]
     assert manager["Global Options"]["Fixed Frame"] == "map"
-    topics = [one.get("Topic", one.get("Description Topic", {})).get("Value") for one in manager["Displays"]]
+    topics = [
+        display.get("Topic", display.get("Description Topic", {})).get("Value") for display in manager["Displays"]
+    ]
     assert topics == [None, None, "/odom", "/robot_description"]
     description = manager["Displays"][-1]["Description Topic"]
     assert description["Durability Policy"] == "Transient Local", "it is sent once"

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.exporting.exported_share import shares
-from rbxcompose.exporting.systemd import WATCHDOG, unit, unit_name
-from rbxcompose.systems.reader import compile_system
+from rbxcompose.compiler.systems.reader import compile_system
+from rbxcompose.tools.exporting.exported_share import shares
+from rbxcompose.tools.exporting.systemd import WATCHDOG, unit, unit_name
 from tests.conftest import ROOT
 from tests.exporting.own_systemd import FILES, TREE, OwnSystemd
 from tests.soak import Soak

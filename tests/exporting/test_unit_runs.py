@@ -15,10 +15,10 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.exporting.exported_share import shares
-from rbxcompose.exporting.systemd import WATCHDOG, unit
-from rbxcompose.runtime.service_manager import ALIVE, READY
-from rbxcompose.systems.reader import compile_system
+from rbxcompose.compiler.systems.reader import compile_system
+from rbxcompose.runtime.supervision.supervisor import ALIVE, READY
+from rbxcompose.tools.exporting.exported_share import shares
+from rbxcompose.tools.exporting.systemd import WATCHDOG, unit
 from tests.conftest import ROOT
 from tests.systems.sshd import wrapper
 

@@ -32,7 +32,7 @@ class Listener:
 
 def listeners(pids: Iterable[int]) -> list[Listener]:
     """Return what these processes listen on."""
-    return [one for pid in pids for one in (*_internet(pid, _inodes(pid)), *_unix(pid, _inodes(pid)))]
+    return [listener for pid in pids for listener in (*_internet(pid, _inodes(pid)), *_unix(pid, _inodes(pid)))]
 
 
 def _inodes(pid: int) -> set[str]:

@@ -28,10 +28,10 @@ def robot() -> Iterator[Robot]:
 
 
 def test_it_has_no_port_and_its_sockets_lie_in_a_private_folder(robot: Robot) -> None:
-    found = listeners(one.pid for one in robot.processes())
-    assert {one.protocol for one in found} == {"unix"}
+    found = listeners(process.pid for process in robot.processes())
+    assert {listener.protocol for listener in found} == {"unix"}
     sockets = robot.folder.sockets
-    places = {Path(one.place) for one in found}
+    places = {Path(listener.place) for listener in found}
     assert {path.name for path in places if path.parent != sockets} == {SOCKET}
     assert len(places) == 1 + 3  # control; router and two process groups
     assert sockets.stat().st_mode & 0o077 == 0
@@ -45,11 +45,11 @@ def test_a_killed_process_and_a_killed_router_come_back(robot: Robot) -> None:
     before = robot.ps()
     endpoint = before["router"]["endpoint"]
     for name in ("other", "router"):
-        killed = next(one for one in robot.processes() if one.is_titled(f"rbxcompose {robot.name}: {name}"))
+        killed = next(process for process in robot.processes() if process.is_titled(f"rbxcompose {robot.name}: {name}"))
         killed.send_signal(signal.SIGKILL)
         assert not wait_until_ended([killed], 5.0)
         eventually(lambda: answers(endpoint, robot.name))
-    eventually(lambda: {one["state"] for one in robot.ps()["components"]} == {"active"})
+    eventually(lambda: {component["state"] for component in robot.ps()["components"]} == {"active"})
     assert robot.ps()["router"]["endpoint"] == endpoint
 
 

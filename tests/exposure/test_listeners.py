@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.bus.probe import probe_key
+from rbxcompose.bus.liveness import probe_key
 from rbxcompose.bus.transport import TransportReply
 from rbxcompose.bus.zenoh_session import open_client
 from rbxcompose.bus.zenoh_transport import ZenohTransport
@@ -69,11 +69,11 @@ def refused(soak: Soak) -> Iterator[list[str]]:
 
 
 def found(robot: Robot) -> list[Listener]:
-    return listeners(one.pid for one in robot.processes())
+    return listeners(process.pid for process in robot.processes())
 
 
 def alive(robot: Robot) -> list[int]:
-    return sorted(one.pid for one in robot.processes())
+    return sorted(process.pid for process in robot.processes())
 
 
 def steps(robot: Robot) -> int:
@@ -81,24 +81,24 @@ def steps(robot: Robot) -> int:
 
 
 def test_a_robot_listens_on_the_loopback_interface_only(robot: Robot) -> None:
-    tcp = [one for one in found(robot) if one.protocol != "unix"]
+    tcp = [listener for listener in found(robot) if listener.protocol != "unix"]
     assert tcp
-    assert all(one.is_loopback for one in tcp), tcp
-    assert {one.protocol for one in tcp} == {"tcp"}
+    assert all(listener.is_loopback for listener in tcp), tcp
+    assert {listener.protocol for listener in tcp} == {"tcp"}
 
 
 def test_each_process_has_one_port_at_most_and_the_supervisor_none(robot: Robot) -> None:
-    tcp = [one.pid for one in found(robot) if one.protocol == "tcp"]
+    tcp = [listener.pid for listener in found(robot) if listener.protocol == "tcp"]
     assert len(tcp) == len(set(tcp))
     shown = robot.ps()
     assert shown["supervisor"]["pid"] not in tcp
-    assert shown["router"]["endpoint"].rpartition(":")[2] in {one.place for one in found(robot)}
+    assert shown["router"]["endpoint"].rpartition(":")[2] in {listener.place for listener in found(robot)}
 
 
 def test_the_only_unix_socket_is_that_of_the_supervisor_in_a_folder_of_its_own(robot: Robot) -> None:
-    unix = [one for one in found(robot) if one.protocol == "unix"]
-    assert [one.pid for one in unix] == [robot.ps()["supervisor"]["pid"]]
-    assert not any(one.place.startswith("@") for one in unix)
+    unix = [listener for listener in found(robot) if listener.protocol == "unix"]
+    assert [listener.pid for listener in unix] == [robot.ps()["supervisor"]["pid"]]
+    assert not any(listener.place.startswith("@") for listener in unix)
     folder = robot.folder.path
     assert [stat.S_IMODE(path.stat().st_mode) for path in (folder, folder.parent)] == [0o700, 0o700]
     assert stat.S_ISSOCK((folder / SOCKET).stat().st_mode)
@@ -150,7 +150,7 @@ def test_an_attack_on_the_router_is_refused(robot: Robot, refused: list[str], na
 def assert_goes_on(robot: Robot, before: list[int]) -> None:
     """Require that the supervisor answers, the components make their steps, and no process was replaced."""
     status = ask(robot.folder, RobotStatus(), timeout=QUICK_ANSWER)
-    assert {one.state for one in status.components} == {"active"}
+    assert {component.state for component in status.components} == {"active"}
     count = steps(robot)
     eventually(lambda: steps(robot) > count)
     assert alive(robot) == before
@@ -165,10 +165,10 @@ def answers(endpoint: str, name: str) -> bool:
         return False
     transport.ask(probe_key(name), b"", b"", heard.append)
     deadline = time.monotonic() + 0.5
-    while not any(not one.error for one in heard) and time.monotonic() < deadline:
+    while not any(not reply.error for reply in heard) and time.monotonic() < deadline:
         os.sched_yield()
     transport.close()
-    return any(not one.error for one in heard)
+    return any(not reply.error for reply in heard)
 
 
 @pytest.mark.skipif(os.getuid() != 0, reason="only root can become somebody else")

@@ -6,11 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose import units
-from rbxcompose.expressions.check import ExpressionProblem, check, check_condition, check_value
-from rbxcompose.expressions.parser import parse
-from rbxcompose.expressions.tree import ExpressionError
-from rbxcompose.expressions.types import (
+from rbxcompose.base import units
+from rbxcompose.base.expressions.check import ExpressionProblem, check, check_condition, check_value
+from rbxcompose.base.expressions.parser import parse
+from rbxcompose.base.expressions.tree import ExpressionError
+from rbxcompose.base.expressions.types import (
     COUNT,
     FLAG,
     PLACE,

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.expressions.evaluate import evaluate, holds
-from rbxcompose.expressions.parser import parse
-from rbxcompose.expressions.tree import ExpressionError
-from rbxcompose.expressions.values import NOT_ARRIVED, EvaluationError, NotArrived, NotArrivedError, Value
+from rbxcompose.base.expressions.evaluate import evaluate, holds
+from rbxcompose.base.expressions.parser import parse
+from rbxcompose.base.expressions.tree import ExpressionError
+from rbxcompose.base.expressions.values import NOT_ARRIVED, EvaluationError, NotArrived, NotArrivedError, Value
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose import units
-from rbxcompose.expressions.parser import LEVELS, LONGEST, STEPS, parse, parse_fill
-from rbxcompose.expressions.tree import (
+from rbxcompose.base import units
+from rbxcompose.base.expressions.parser import LEVELS, LONGEST, STEPS, parse, parse_fill
+from rbxcompose.base.expressions.tree import (
     Arithmetic,
     Comparison,
     ExpressionError,

@@ -4,9 +4,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.expressions.text import fill, parse_template, show_value
-from rbxcompose.expressions.tree import ExpressionError
-from rbxcompose.expressions.values import NOT_ARRIVED, EvaluationError, NotArrived, NotArrivedError, Value
+from rbxcompose.base.expressions.text import fill, parse_template, show_value
+from rbxcompose.base.expressions.tree import ExpressionError
+from rbxcompose.base.expressions.values import NOT_ARRIVED, EvaluationError, NotArrived, NotArrivedError, Value
 
 
 class Place:

@@ -11,12 +11,10 @@ from collections import deque
 from functools import partial
 from typing import Any
 
-from rbxcompose.bus.attachment import Attachment
-from rbxcompose.bus.classes import ros_qos
-from rbxcompose.bus.names import ActionNames, data_key, dds_type
+from rbxcompose.bus.names import ActionNames, Attachment, data_key, dds_type
 from rbxcompose.bus.tokens import EntityKind, NodeToken
 from rbxcompose.bus.transport import Closable, TransportReply
-from rbxcompose.bus.wire import WIRE_PROFILES
+from rbxcompose.bus.wire import WIRE_PROFILES, ros_qos
 from rbxcompose.bus.zenoh_session import open_peer
 from rbxcompose.bus.zenoh_transport import ZenohTransport
 from rbxcompose.msgs.cdr import encode
@@ -26,7 +24,7 @@ from rbxcompose.msgs.rbxcompose_msgs import SetBatteryLevel
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.msgs.types import Message, Service
 from rbxcompose.msgs.unique_identifier_msgs import UUID
-from rbxcompose.qos import Qos
+from rbxcompose.sdk.ports import Qos
 
 OPEN = 1000
 GID = bytes(range(16))

@@ -12,7 +12,7 @@ from rbxcompose.bus.names import data_key
 from rbxcompose.bus.zenoh_session import open_peer
 from rbxcompose.bus.zenoh_transport import ZenohTransport
 from rbxcompose.msgs.geometry_msgs import Twist
-from rbxcompose.qos import Qos
+from rbxcompose.sdk.ports import Qos
 
 BATCH = 0.005  # [s] between two looks at the clock
 NOTHING = b"\xff" * 48  # as long as a command, with numbers that are none

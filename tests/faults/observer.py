@@ -14,8 +14,8 @@ from rbxcompose.msgs.cdr import decode
 from rbxcompose.msgs.geometry_msgs import Twist
 from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.msgs.types import Message
-from rbxcompose.qos import Qos
-from rbxcompose.testing.invariants import PlanarVelocity, SentVelocity
+from rbxcompose.sdk.ports import Qos
+from rbxcompose.testing.safety import PlanarVelocity, SentVelocity
 
 COMMAND, MOTION = "cmd_vel", "odom"
 PATIENCE = 20.0  # [s]
@@ -53,7 +53,7 @@ class Observer:
 
     def last(self, topic: str) -> SentVelocity | None:
         """Return what came last on a topic."""
-        return next((one for one in reversed(self.story) if one.topic == topic), None)
+        return next((velocity for velocity in reversed(self.story) if velocity.topic == topic), None)
 
     @property
     def is_moving(self) -> bool:
@@ -74,8 +74,18 @@ class Observer:
     def time_to_rest(self, since: float) -> float | None:
         """Return the time from the last command to rest [s], if none has come after `since` [s] until then."""
         story = list(self.story)
-        rest = next((one.time for one in story if one.topic == MOTION and one.time > since and one.is_rest), None)
-        last = max((one.time for one in story if one.topic == COMMAND and one.time < (rest or 0.0)), default=None)
+        rest = next(
+            (
+                velocity.time
+                for velocity in story
+                if velocity.topic == MOTION and velocity.time > since and velocity.is_rest
+            ),
+            None,
+        )
+        last = max(
+            (velocity.time for velocity in story if velocity.topic == COMMAND and velocity.time < (rest or 0.0)),
+            default=None,
+        )
         if rest is None or last is None or last > since + ON_ITS_WAY:
             return None
         return rest - last

@@ -19,7 +19,7 @@ from typing import Self
 from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.runtime.log import NAME as LOG
 from rbxcompose.runtime.processes import Process, titled, wait_until_ended
-from rbxcompose.testing.invariants import Base, Laws, violations
+from rbxcompose.testing.safety import Base, Laws, violations
 from tests.conftest import ROOT
 from tests.faults.observer import COMMAND, LOOK, MOTION, PATIENCE, Observer
 
@@ -68,7 +68,9 @@ class Patrol:
         with socket.create_server(("127.0.0.1", 0)) as listener:
             port = listener.getsockname()[1]  # of its own: another robot may take the next one that is free
         settings = {**SETTINGS, "missions.patrol.with.rounds": times, "bus.port": port, **more}
-        self.process = self.start("up", "robots/robot.yaml", *(f"--set={key}={one}" for key, one in settings.items()))
+        self.process = self.start(
+            "up", "robots/robot.yaml", *(f"--set={key}={setting}" for key, setting in settings.items())
+        )
         self.observer = Observer(self._router(), hears_commands=hears_commands)
 
     def __enter__(self) -> Self:
@@ -79,8 +81,8 @@ class Patrol:
         if self.process.poll() is None:
             self.process.send_signal(signal.SIGINT)
         self._wait()
-        for one in self.running():
-            one.send_signal(signal.SIGKILL)
+        for process in self.running():
+            process.send_signal(signal.SIGKILL)
 
     def start(self, *words: str) -> subprocess.Popen[str]:
         """Start a command on it."""
@@ -107,12 +109,12 @@ class Patrol:
 
     def running(self) -> list[Process]:
         """Return all of its processes."""
-        return [one for one in titled(f"rbxcompose {NAME}: ") if one.is_running]
+        return [process for process in titled(f"rbxcompose {NAME}: ") if process.is_running]
 
     def named(self, name: str) -> Process | None:
         """Return the process of this name, if it is there."""
         found = titled(f"rbxcompose {NAME}: {name}")
-        return next((one for one in found if one.is_running), None)
+        return next((process for process in found if process.is_running), None)
 
     def wait_for(self, holds: Callable[[], bool]) -> bool:
         """Wait until something holds, as long as the run goes on; tell whether it does."""
@@ -139,21 +141,24 @@ class Patrol:
 
     def left_behind(self) -> list[str]:
         """Return what is left once it is over: processes, ports, files."""
-        left = [f"process {one.pid}" for one in self.running()]
+        left = [f"process {process.pid}" for process in self.running()]
         port = int(self.observer.router.rpartition(":")[2])
         try:
             socket.create_server(("127.0.0.1", port)).close()
         except OSError:
             left.append(f"port {port}")
         files = [*self.state.path.glob("*"), *(self._folder / "temporary").rglob("*"), *map(Path, self._shared)]
-        return left + [str(one) for one in files if one.exists() and not one.name.startswith(LOG)]
+        return left + [str(file) for file in files if file.exists() and not file.name.startswith(LOG)]
 
     def unsafe(self) -> list[str]:
         """Return in words where it moved without a live command, as seen from outside since the first one."""
-        story = dropwhile(lambda one: one.topic != COMMAND, list(self.observer.story))
-        sent = [replace(one, time=one.time - MEETING) if one.topic == COMMAND else one for one in story]
+        story = dropwhile(lambda velocity: velocity.topic != COMMAND, list(self.observer.story))
+        sent = [
+            replace(velocity, time=velocity.time - MEETING) if velocity.topic == COMMAND else velocity
+            for velocity in story
+        ]
         laws = Laws(bases=[BASE], slack=MEETING + LATE)
-        return [str(one) for one in violations(laws, sorted(sent, key=lambda one: one.time))]
+        return [str(violation) for violation in violations(laws, sorted(sent, key=lambda velocity: velocity.time))]
 
     def _wait(self) -> None:
         if not self.process.stdout or self.process.stdout.closed:
@@ -169,7 +174,11 @@ class Patrol:
 
         def is_told() -> bool:
             state = self.state.read_state()
-            if state is not None and state.router and all(one.state == "active" for one in state.components):
+            if (
+                state is not None
+                and state.router
+                and all(component.state == "active" for component in state.components)
+            ):
                 found.append(state.router)
             return bool(found)
 

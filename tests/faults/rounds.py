@@ -103,7 +103,7 @@ def run(patrol: Patrol, faults: Sequence[Fault], findings: Findings) -> list[Fau
         patrol.note_shared_memory()
         findings.rounds += 1
         wrong = _fatal(patrol, fault, findings) if fault.ends_the_robot else _survived(patrol, fault, findings)
-        findings.wrong += [f"{fault}: {one}" for one in wrong]
+        findings.wrong += [f"{fault}: {text}" for text in wrong]
     if not fault.ends_the_robot and (patrol.end() != 0 or "mission patrol: success" not in patrol.output):
         findings.wrong.append(f"{fault}: the mission did not succeed: {patrol.output}")
     patrol.end()
@@ -112,8 +112,8 @@ def run(patrol: Patrol, faults: Sequence[Fault], findings: Findings) -> list[Fau
     last = patrol.observer.last(MOTION)
     if fault.process != WORLD and not (last and last.is_rest):
         findings.wrong.append(f"{fault}: the base was last seen in motion: {last}")
-    findings.wrong += [f"{fault}: unsafe: {one}" for one in patrol.unsafe()]
-    findings.wrong += [f"{fault}: left behind: {one}" for one in patrol.left_behind()]
+    findings.wrong += [f"{fault}: unsafe: {text}" for text in patrol.unsafe()]
+    findings.wrong += [f"{fault}: left behind: {text}" for text in patrol.left_behind()]
     return left
 
 

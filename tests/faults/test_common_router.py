@@ -13,11 +13,11 @@ from pathlib import Path
 
 import pytest
 
+from rbxcompose.bus.endpoints import tcp_endpoint
 from rbxcompose.bus.zenoh_session import open_client
-from rbxcompose.endpoints import tcp_endpoint
 from rbxcompose.msgs.nav_msgs import Odometry
-from rbxcompose.qos import Qos
 from rbxcompose.runtime.log import NAME as LOG
+from rbxcompose.sdk.ports import Qos
 from tests.faults.observer import MOTION
 from tests.faults.patrol import LATE, LONGEST_STOP, SPEED, Patrol
 from tests.systems.test_links import free_port
@@ -66,11 +66,11 @@ def test_without_the_router_the_base_stands_and_with_it_the_patrol_goes_on(tmp_p
             back = time.monotonic()
             with router(endpoint):
                 assert patrol.wait_for(lambda: places[-1][0] > back)
-                _, *left = next(one for one in places[::-1] if one[0] < back)
-                _, *found = next(one for one in places if one[0] > back)
+                _, *left = next(place for place in places[::-1] if place[0] < back)
+                _, *found = next(place for place in places if place[0] > back)
                 assert math.dist(left, found) < FARTHEST
                 assert patrol.observer.wait_until_it_moves(back, lambda: patrol.is_up)
                 assert set(patrol.running()) == set(before)
                 log = [json.loads(line) for line in (patrol.state.path / LOG).read_text(encoding="utf-8").splitlines()]
-                assert [one["text"] for one in log if one["level"] == "ERROR"] == []
-                assert "go_to: sent again" in [one["text"] for one in log]
+                assert [entry["text"] for entry in log if entry["level"] == "ERROR"] == []
+                assert "go_to: sent again" in [entry["text"] for entry in log]

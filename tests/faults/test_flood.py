@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray
-from rbxcompose.qos import Qos
 from rbxcompose.runtime.log import NAME as LOG
+from rbxcompose.sdk.ports import Qos
 from tests.conftest import ROOT
 from tests.faults.observer import COMMAND, MOTION, Observer
 from tests.faults.patrol import Patrol
@@ -60,10 +60,12 @@ def test_a_flood_is_refused_and_told_while_the_patrol_goes_on(soak: Soak, tmp_pa
             began = time.monotonic()
             sent = int(flooder.stdout.readline())
             ended = time.monotonic()
-        motion = [one for one in list(observer.story) if one.topic == MOTION and began < one.time < ended]
+        motion = [
+            velocity for velocity in list(observer.story) if velocity.topic == MOTION and began < velocity.time < ended
+        ]
         assert patrol.wait_for(lambda: bool(health.refused) and health.refused[-1][0] > ended)
         assert set(patrol.running()) == before
-    moving = sum(not one.is_rest for one in motion) / len(motion)
+    moving = sum(not velocity.is_rest for velocity in motion) / len(motion)
     gap = max(after.time - before.time for before, after in pairwise(motion))
     told = {number for at, number in health.refused if began < at}
     refused = max(told)
@@ -95,10 +97,12 @@ def test_a_flood_of_questions_is_refused_while_the_patrol_goes_on(what: str, soa
             asked = int(asker.stdout.readline())
             ended = time.monotonic()
             asker.communicate()
-        motion = [one for one in list(observer.story) if one.topic == MOTION and began < one.time < ended]
+        motion = [
+            velocity for velocity in list(observer.story) if velocity.topic == MOTION and began < velocity.time < ended
+        ]
         assert set(patrol.running()) == before
         lines = (patrol.state.path / LOG).read_text(encoding="utf-8").count("\n")
-    moving = sum(not one.is_rest for one in motion) / len(motion)
+    moving = sum(not velocity.is_rest for velocity in motion) / len(motion)
     gap = max(after.time - before.time for before, after in pairwise(motion))
     text = f"{asked / seconds:,.0f} {what} a second; it moved for {moving:.0%} of the time, gaps of {gap:.2f} s at most"
     soak.tell(f"flood of {what}", asked, 0, text)

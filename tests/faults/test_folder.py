@@ -7,7 +7,7 @@ import signal
 
 import pytest
 
-from rbxcompose.atomic_files import TEMPORARY
+from rbxcompose.base.files import TEMPORARY
 from rbxcompose.runtime.folder import STATE
 from rbxcompose.runtime.processes import titled
 from tests.runtime.conftest import robot
@@ -21,7 +21,7 @@ CALLERS = 4
 @pytest.mark.timeout(40)
 def test_of_many_that_start_it_at_once_one_does(robot: Robot) -> None:
     started = [robot.up("-d") for _ in range(CALLERS)]
-    ends = [(one.communicate(timeout=PATIENCE)[0], one.returncode) for one in started]
+    ends = [(process.communicate(timeout=PATIENCE)[0], process.returncode) for process in started]
     refused = [output for output, code in ends if code == 1]
     assert sorted(code for _, code in ends) == [0] + [1] * (CALLERS - 1)
     assert all("error[RBX9001]" in output and "is already up" in output for output in refused)
@@ -72,8 +72,8 @@ def test_a_state_that_cannot_be_written_is_told_and_the_robot_goes_on(robot: Rob
     assert robot.has_logged("the state file cannot be written")
     eventually(lambda: not list(robot.folder.path.glob(f"*{TEMPORARY}")))
     state.rmdir()
-    again = next(one for one in titled(f"rbxcompose {robot.name}: robot") if one.is_running)
+    again = next(process for process in titled(f"rbxcompose {robot.name}: robot") if process.is_running)
     again.send_signal(signal.SIGKILL)
     eventually(lambda: robot.texts("first").count("started") == 3)
-    assert [one["restarts"] for one in robot.ps()["components"]] == [2, 0]
+    assert [component["restarts"] for component in robot.ps()["components"]] == [2, 0]
     assert robot.do("down").returncode == 0

@@ -24,7 +24,11 @@ def test_after_a_stop_and_its_release_the_patrol_moves_only_when_it_is_told_to(t
 
         def told_after(since: float) -> list[bool]:
             """Return whether the base was at rest, for each odometry since then."""
-            return [one.is_rest for one in list(observer.story) if one.topic == MOTION and one.time > since]
+            return [
+                velocity.is_rest
+                for velocity in list(observer.story)
+                if velocity.topic == MOTION and velocity.time > since
+            ]
 
         assert observer.wait_until_it_moves(time.monotonic(), lambda: patrol.is_up)
         patrol.do("stop")
@@ -44,13 +48,15 @@ def test_a_machine_that_slept_brakes_and_goes_on(tmp_path: Path) -> None:
         observer = patrol.observer
         assert observer.wait_until_it_moves(time.monotonic(), lambda: patrol.is_up)
         processes = patrol.running()
-        for one in processes:
-            one.send_signal(signal.SIGSTOP)
+        for process in processes:
+            process.send_signal(signal.SIGSTOP)
         time.sleep(STANDSTILL)
         slept = time.monotonic()
-        for one in processes:
-            one.send_signal(signal.SIGCONT)
-        assert patrol.wait_for(lambda: any(one.is_rest and one.time > slept for one in list(observer.story)))
+        for process in processes:
+            process.send_signal(signal.SIGCONT)
+        assert patrol.wait_for(
+            lambda: any(velocity.is_rest and velocity.time > slept for velocity in list(observer.story))
+        )
         assert observer.wait_until_it_moves(time.monotonic(), lambda: patrol.is_up)
         assert set(patrol.running()) == set(processes)
         assert "time stood still for 3." in (patrol.state.path / LOG).read_text(encoding="utf-8")

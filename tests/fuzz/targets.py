@@ -5,16 +5,16 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable
 
-from rbxcompose.bus.attachment import AttachmentError, decode_attachment
+from rbxcompose.base.findings import Report
+from rbxcompose.base.formats import renderer
+from rbxcompose.bus.names import AttachmentError, decode_attachment
 from rbxcompose.bus.tokens import parse_token
-from rbxcompose.findings import Report
-from rbxcompose.formats import renderer
+from rbxcompose.compiler.plan.dump import PlanTextError, dump, load
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.msgs.cdr import HEADER, CdrError, decode
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray
 from rbxcompose.msgs.geometry_msgs import Twist
 from rbxcompose.msgs.nav_msgs import Odometry
-from rbxcompose.plan.dump import PlanTextError, dump, load
 from tests.properties.random_expressions import Trap, attempt
 
 FILE = "robot.yaml"

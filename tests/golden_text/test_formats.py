@@ -8,8 +8,19 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.findings import KINDS, Edit, Finding, FindingKind, Fix, Related, Report, Severity, Span, replacement
-from rbxcompose.formats import PLUGINS, format_names, renderer
+from rbxcompose.base.findings import (
+    KINDS,
+    Edit,
+    Finding,
+    FindingKind,
+    Fix,
+    Related,
+    Report,
+    Severity,
+    Span,
+    replacement,
+)
+from rbxcompose.base.formats import PLUGINS, format_names, renderer
 
 KIND = FindingKind("RBX0001", Severity.WARNING, doc="A title of {braces}.\n\nThe first part.\n\nBad: this\n")
 SOURCES = {"robots/a b/robot.yaml": 'name: "on"\n', "--set": "a.b=1"}
@@ -69,11 +80,11 @@ def test_sarif_has_what_the_specification_demands() -> None:
     assert driver["name"] == "rbxcompose"
     assert run["columnKind"] == "unicodeCodePoints"
     assert [rule["id"] for rule in driver["rules"]] == ["RBX0001", "RBX0002", "RBX0003", "RBX0004"]
-    for one in run["results"]:
-        assert driver["rules"][one["ruleIndex"]]["id"] == one["ruleId"]
-        assert one["level"] in ("error", "warning", "note", "none")
-        assert one["message"]["text"]
-        for place in [*one["locations"], *one.get("relatedLocations", [])]:
+    for entry in run["results"]:
+        assert driver["rules"][entry["ruleIndex"]]["id"] == entry["ruleId"]
+        assert entry["level"] in ("error", "warning", "note", "none")
+        assert entry["message"]["text"]
+        for place in [*entry["locations"], *entry.get("relatedLocations", [])]:
             region = place["physicalLocation"].get("region", {})
             assert place["physicalLocation"]["artifactLocation"]["uri"]
             assert all(isinstance(number, int) and number >= 1 for number in region.values())

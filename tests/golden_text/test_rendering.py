@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.composition.robot_file import load_robot
-from rbxcompose.findings import Finding, Related, Report, Severity, Span, replacement
+from rbxcompose.base.findings import Finding, Related, Report, Severity, Span, replacement
+from rbxcompose.commands.formats.json_ import render_json
+from rbxcompose.commands.formats.text import render_text
+from rbxcompose.compiler.composition.robot_file import load_robot
 from rbxcompose.manifest.reader import read_text
-from rbxcompose.rendering.json_ import render_json
-from rbxcompose.rendering.text import render_text
 from rbxcompose.testing.golden import Golden
 
 ROOT = Path(__file__).parents[2]

@@ -14,8 +14,8 @@ import sys
 import time
 from pathlib import Path
 
-from rbxcompose.compiler import compile_robot
-from rbxcompose.formats import renderer
+from rbxcompose.base.formats import renderer
+from rbxcompose.compiler.compile import compile_robot
 
 MEMORY = 200_000_000  # bytes of address space beyond what the process has at its start
 PATIENCE = 20  # [s] of processor time after which it is ended

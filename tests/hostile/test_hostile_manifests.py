@@ -12,15 +12,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.composition.overlay import compose
-from rbxcompose.composition.robot_file import load_robot
-from rbxcompose.composition.set_options import read_sets
-from rbxcompose.findings import Report
+from rbxcompose.base.findings import Report
+from rbxcompose.commands.formats.json_ import render_json
+from rbxcompose.commands.formats.text import render_text
+from rbxcompose.compiler.composition.layers import read_sets
+from rbxcompose.compiler.composition.overlay import compose
+from rbxcompose.compiler.composition.robot_file import load_robot
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.manifest.validate import to_plain
-from rbxcompose.rendering.json_ import render_json
-from rbxcompose.rendering.text import render_text
 
 ROOT = Path(__file__).parents[2]
 TURTLEBOT = (ROOT / "robots/turtlebot/robot.yaml").read_text()

@@ -9,11 +9,11 @@ from typing import Any
 
 import yaml
 
-from rbxcompose.findings import Report
-from rbxcompose.importing.foreign_files import read_files
-from rbxcompose.importing.importer import imported
+from rbxcompose.base.findings import Report
+from rbxcompose.commands.formats.text import render_text
+from rbxcompose.commands.importing.foreign_files import read_files
+from rbxcompose.commands.importing.importer import imported
 from rbxcompose.manifest.reader import read_text
-from rbxcompose.rendering.text import render_text
 
 EXAMPLES = Path(__file__).parent
 FILES = EXAMPLES / "arbotix"
@@ -31,7 +31,7 @@ class Imported:
     @property
     def told(self) -> list[tuple[str, int]]:
         """The codes of the findings with their lines, by place."""
-        return [(one.code, one.span.line if one.span else 0) for one in self.report]
+        return [(finding.code, finding.span.line if finding.span else 0) for finding in self.report]
 
     @property
     def words(self) -> str:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.controllers.gripper import GripperConfig, GripperController, model_of
+from rbxcompose.domains.servos.controllers.gripper import GripperConfig, GripperController, model_of
 from rbxcompose.testing import check_text
 from rbxcompose.testing.golden import Golden
 from tests.importing.imports import FILES, import_files, import_texts
@@ -27,17 +27,17 @@ WITH_JOINT = "joints: {pan: {id: 1}}\n"
 
 @pytest.mark.parametrize("name", GOLDEN)
 def test_what_is_written_and_what_is_told(name: str, repository: Path, golden: Golden) -> None:
-    found = import_files([FILES / f"{one}.yaml" for one in GOLDEN[name]], name)
+    found = import_files([FILES / f"{text}.yaml" for text in GOLDEN[name]], name)
     golden.check(f"{name}.yaml", found.text)
     golden.check(f"{name}.txt", found.words)
-    assert import_files([FILES / f"{one}.yaml" for one in GOLDEN[name]], name).text == found.text
+    assert import_files([FILES / f"{text}.yaml" for text in GOLDEN[name]], name).text == found.text
 
 
 @pytest.mark.parametrize("name", GOLDEN)
 def test_with_a_body_the_robot_has_no_mistake(name: str, repository: Path, tmp_path: Path) -> None:
     found = import_files([FILES / f"{one}.yaml" for one in GOLDEN[name]], name)
     text = found.text.replace("# body:", "body:")
-    joints = "\n".join(JOINT.format(name=one) for one in found.data.get("joints", {}))
+    joints = "\n".join(JOINT.format(name=joint) for joint in found.data.get("joints", {}))
     checked = check_text(text, tmp_path, others={"robot.urdf": URDF.format(joints=joints)})
     assert checked.plan.robot == name
 
@@ -48,8 +48,8 @@ def test_files_for_different_ports_make_two_buses(tmp_path: Path) -> None:
         tmp_path, left, "port: /dev/right\njoints: {right: {id: 1}}\n", "joints: {also_left: {id: 2}}\n"
     )
     buses = found.data["buses"]
-    assert [(one["port"], one.get("baud")) for one in buses.values()] == [("/dev/left", 57600), ("/dev/right", None)]
-    servos = {name: one["bus"] for name, one in found.data["actuators"].items()}
+    assert [(bus["port"], bus.get("baud")) for bus in buses.values()] == [("/dev/left", 57600), ("/dev/right", None)]
+    servos = {name: actuator["bus"] for name, actuator in found.data["actuators"].items()}
     assert servos == {"left_servo": "servos", "right_servo": "servos_2", "also_left_servo": "servos"}
 
 

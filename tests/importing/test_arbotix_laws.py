@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.actuation.servo_joint import JointServo
-from rbxcompose.actuation.servo_models import model_named
-from rbxcompose.units import ANGLE, ANGULAR_SPEED, to_si
+from rbxcompose.base.units import ANGLE, ANGULAR_SPEED, to_si
+from rbxcompose.domains.servos.joint_drive import JointServo
+from rbxcompose.domains.servos.models import model_named
 from tests.importing.imports import import_texts
 
 RANGES = {1024: (None, 300.0), 4096: (None, 360.0, 250.92)}  # [deg]; None is what the driver takes then

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.cli import main as command
-from rbxcompose.compiler import compile_robot
-from rbxcompose.importing.arm_proposals import proposed_arms
+from rbxcompose.commands import main as command
+from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.domains.arms.drafts import proposed_arms
 from tests.body.kinematics import description_of
 from tests.conftest import ROOT
 from tests.importing.imports import EXAMPLES
@@ -35,11 +35,11 @@ def pi_robot() -> str:
 )
 def test_a_row_of_joints_is_an_arm_and_fingers_are_not_of_it(text: object, arms: dict[str, tuple[str, ...]]) -> None:
     assert callable(text)
-    assert {one.name: one.joints for one in proposed_arms(description_of(text()).body)} == arms
+    assert {arm.name: arm.joints for arm in proposed_arms(description_of(text()).body)} == arms
 
 
 def test_a_head_an_arm_and_its_gripper_are_told_apart() -> None:
-    found = {one.name: one for one in proposed_arms(description_of(pi_robot()).body)}
+    found = {arm.name: arm for arm in proposed_arms(description_of(pi_robot()).body)}
     assert set(found) == {"head", "right_arm"}
     assert len(found["right_arm"].joints) == 6
     assert found["right_arm"].gripper is not None
@@ -52,7 +52,7 @@ def test_what_is_proposed_passes_check(text: object, tmp_path: Path, capsys: pyt
     (tmp_path / "arm.urdf").write_text(text())
     words = ["arm", "setup", str(tmp_path / "arm.urdf"), "--propose", "--out", str(tmp_path / "robot.yaml")]
     assert command.main(words) == 0
-    errors = [one for one in compile_robot(str(tmp_path), environment={}).report if one.severity == "error"]
+    errors = [finding for finding in compile_robot(str(tmp_path), environment={}).report if finding.severity == "error"]
     assert errors == []
     assert command.main(words) == 1
     assert "already exists" in capsys.readouterr().err

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.findings import Severity
+from rbxcompose.base.findings import Severity
 from tests.body.test_ros1_xacro import FOLDER
 from tests.importing.imports import import_files
 from tests.soak import Soak
@@ -21,7 +21,7 @@ def test_the_driver_files_of_a_ros_1_package_become_robots(soak: Soak) -> None:
     joints = 0
     for file in files:
         found = import_files([file])
-        assert [one for one in found.report if one.severity is Severity.ERROR] == [], found.words
+        assert [finding for finding in found.report if finding.severity is Severity.ERROR] == [], found.words
         joints += len(found.data.get("joints", {}))
     soak.tell("driver files of ArbotiX", len(files), 0, f"all become robots, with {joints} joints")
     assert joints

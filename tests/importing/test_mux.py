@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rbxcompose.compiler.plan.model import Instance
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.msgs.std_msgs import Bool
-from rbxcompose.plan.model import Instance
 from rbxcompose.testing import Bench, check_text
 from rbxcompose.testing.golden import Golden
 from tests.importing.imports import EXAMPLES, Imported, import_files, import_texts
@@ -26,7 +26,7 @@ def mux(folder: Path, *texts: str) -> Imported:
 
 
 def files(name: str) -> Imported:
-    return import_files([EXAMPLES / f"mux/{one}.yaml" for one in GOLDEN[name]], name, "mux")
+    return import_files([EXAMPLES / f"mux/{text}.yaml" for text in GOLDEN[name]], name, "mux")
 
 
 @pytest.mark.parametrize("name", GOLDEN)
@@ -45,20 +45,24 @@ class TwistMux:
         self.heard: dict[str, float] = {}
         self.flags: dict[str, bool] = {}
 
-    def is_over(self, one: Mapping[str, Any], now: float) -> bool:
-        timeout = float(one["timeout"])
-        return timeout > 0 and now - self.heard.get(one["topic"], -math.inf) > timeout
+    def is_over(self, entry: Mapping[str, Any], now: float) -> bool:
+        timeout = float(entry["timeout"])
+        return timeout > 0 and now - self.heard.get(entry["topic"], -math.inf) > timeout
 
     def passes(self, topic: str, now: float) -> bool:
         locked = [
-            one["priority"]
-            for one in self.locks.values()
-            if self.is_over(one, now) or self.flags.get(one["topic"], False)
+            lock["priority"]
+            for lock in self.locks.values()
+            if self.is_over(lock, now) or self.flags.get(lock["topic"], False)
         ]
         best, who = 0, ""
-        for one in self.topics.values():
-            if not self.is_over(one, now) and one["priority"] >= max(locked, default=0) and best < one["priority"]:
-                best, who = one["priority"], one["topic"]
+        for entry in self.topics.values():
+            if (
+                not self.is_over(entry, now)
+                and entry["priority"] >= max(locked, default=0)
+                and best < entry["priority"]
+            ):
+                best, who = entry["priority"], entry["topic"]
         return who == topic
 
 
@@ -73,19 +77,19 @@ LOCKS = {
     "pause": {"topic": "pause", "timeout": 0.0, "priority": 50},
     "stop": {"topic": "stop", "timeout": 0.3, "priority": 255},
 }
-SENDERS = [one["topic"] for one in (*TOPICS.values(), *LOCKS.values())]
+SENDERS = [topic["topic"] for topic in (*TOPICS.values(), *LOCKS.values())]
 
 
 @pytest.fixture(scope="module")
 def imported_mux(tmp_path_factory: pytest.TempPathFactory) -> Instance:
     folder = tmp_path_factory.mktemp("mux")
     found = mux(folder, *(_listed(key, ones) for key, ones in (("topics", TOPICS), ("locks", LOCKS))))
-    [made] = [one for one in check_text(found.text, folder).plan.instances if one.type == "mux"]
+    [made] = [instance for instance in check_text(found.text, folder).plan.instances if instance.type == "mux"]
     return made
 
 
 def _listed(key: str, ones: Mapping[str, Any]) -> str:
-    return f"{key}:\n" + "".join(f"- {{name: {name}, {str(one)[1:-1]}}}\n" for name, one in ones.items())
+    return f"{key}:\n" + "".join(f"- {{name: {name}, {str(entry)[1:-1]}}}\n" for name, entry in ones.items())
 
 
 STORY = st.lists(st.tuples(st.sampled_from(SENDERS), st.integers(0, 5), st.booleans()), max_size=30)
@@ -111,8 +115,8 @@ def test_what_passes_is_what_passed_before(imported_mux: Instance, story: list[t
 
 
 def test_topics_and_locks_in_two_files_are_one_mux_and_two_nodes_are_two(tmp_path: Path) -> None:
-    one = "topics: [{name: a, topic: a, timeout: 1, priority: 1}]\n"
-    assert list(mux(tmp_path, one, "locks: [{name: b, topic: b, timeout: 1, priority: 2}]\n").data["muxes"]) == [
+    text = "topics: [{name: a, topic: a, timeout: 1, priority: 1}]\n"
+    assert list(mux(tmp_path, text, "locks: [{name: b, topic: b, timeout: 1, priority: 2}]\n").data["muxes"]) == [
         "cmd_vel"
     ]
     two = "front: {ros__parameters: {topics: {a: {topic: a, timeout: 1, priority: 1}}}}\n"

@@ -22,7 +22,7 @@ def params(folder: Path, *texts: str) -> Imported:
 
 
 def defaults(found: Imported) -> dict[str, Any]:
-    return {name: one["default"] for name, one in found.data.get("args", {}).items()}
+    return {name: entry["default"] for name, entry in found.data.get("args", {}).items()}
 
 
 @pytest.mark.parametrize("name", ["nodes", "battery"])
@@ -131,6 +131,6 @@ def test_whatever_a_file_says_what_is_written_is_a_robot(
     tmp_path_factory: pytest.TempPathFactory, nodes: dict[str, Any]
 ) -> None:
     folder = tmp_path_factory.mktemp("any")
-    found = params(folder, yaml.safe_dump({name: {"ros__parameters": one} for name, one in nodes.items()}))
+    found = params(folder, yaml.safe_dump({name: {"ros__parameters": node} for name, node in nodes.items()}))
     if found.text:
         assert set(check_text(found.text, folder).codes) <= {"RBX1209"}  # what is not used yet is told

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.body.link_pairs import digest_of
-from rbxcompose.body.srdf import Semantics
-from rbxcompose.compiler import Compilation, compile_robot
-from rbxcompose.exporting.srdf import exported, semantics_of
+from rbxcompose.compiler.compile import Compilation, compile_robot
+from rbxcompose.domains.body.link_pairs import digest_of
+from rbxcompose.domains.body.srdf import Semantics
 from rbxcompose.testing.golden import Golden
+from rbxcompose.tools.exporting.srdf import exported, semantics_of
 from tests.conftest import ROOT
 from tests.importing.imports import EXAMPLES, Imported, import_files
 
@@ -40,7 +40,7 @@ def test_what_is_written_and_what_is_told(repository: Path, golden: Golden, tmp_
     golden.check("srdf_lifter.txt", found.words)
     golden.check("srdf_lifter.collisions.yaml", found.beside["lifter.collisions.yaml"])
     compilation = compiled(tmp_path, found, LIFTER[1])
-    assert [one.code for one in compilation.report if one.severity == "error"] == []
+    assert [finding.code for finding in compilation.report if finding.severity == "error"] == []
     assert compilation.robot is not None
     body = compilation.robot.manifest.body
     assert body is not None
@@ -89,7 +89,7 @@ def test_the_virtual_joint_is_the_one_that_moveit_takes(
     found = import_files([tmp_path / "lifter.srdf", LIFTER[1]], "lifter", "srdf")
     line = 1 + said[: said.index("<virtual_joint")].count("\n")
     assert found.told.count(("RBX2353", line)) == bool(words)
-    assert [one for one in words if one not in found.words] == []
+    assert [word for word in words if word not in found.words] == []
     name, kind, frame = taken if isinstance(taken, tuple) else ("world_joint", "fixed", taken)
     wanted = {"name": name, "type": kind, "frame": frame} if frame is not None else None
     assert found.data["body"].get("virtual_joint") == wanted
@@ -115,10 +115,10 @@ def test_without_its_urdf_an_srdf_means_nothing() -> None:
 def test_files_of_others_are_read(name: str) -> None:
     """Each is read as far as it goes, and nothing fails."""
     try:
-        there = [Path(str(one.locate())) for one in files("example-robot-data") or []]
+        there = [Path(str(file.locate())) for file in files("example-robot-data") or []]
     except PackageNotFoundError:
         pytest.skip("example-robot-data is not installed")
-    found = {one.name: one for one in there if one.suffix in (".srdf", ".urdf")}
+    found = {path.name: path for path in there if path.suffix in (".srdf", ".urdf")}
     pair = [found[f"{name}.srdf"], found.get(f"{name}.urdf") or found[f"{name}_robot.urdf"]]
     made = import_files(pair, name, "srdf")
     assert made.text or made.report.has_errors

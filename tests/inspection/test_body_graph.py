@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.body.model import Body, BodyJoint, BodyLink
-from rbxcompose.body.urdf import read_body
-from rbxcompose.body.xml_reader import XmlElement, read_urdf
-from rbxcompose.findings import Span
-from rbxcompose.geometry import Transform3
-from rbxcompose.inspection.body_graph import axis_words, body_dot, draw_graph
+from rbxcompose.base.findings import Span
+from rbxcompose.base.geometry import Transform3
+from rbxcompose.domains.body.model import Body, BodyJoint, BodyLink
+from rbxcompose.domains.body.text import axis_words, body_dot, draw_graph
+from rbxcompose.domains.body.urdf import read_body
+from rbxcompose.domains.body.xml_reader import XmlElement, read_urdf
 from rbxcompose.testing.golden import Golden
 
 URDF = """<robot name="r"><link name="base"/><link name="arm"/><link name="tip"/><link name="rope"/>

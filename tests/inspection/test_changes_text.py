@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from rbxcompose.inspection.changes_text import changes_text, with_places
-from rbxcompose.runtime.plan_requests import PlanComparison
+from rbxcompose.base.requests import to_data
+from rbxcompose.runtime.requests import PlanComparison
 from rbxcompose.runtime.supervision.changes import changes
 from rbxcompose.testing import Golden
-from rbxcompose.typed_json import to_data
+from rbxcompose.tools.inspection.plan_text import changes_text, with_places
 from tests.conftest import ROOT
 from tests.manifests import checked, turtlebot
 

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.inspection.plan_text import plan_text
-from rbxcompose.plan.diff import Difference, difference
-from rbxcompose.plan.dump import dump, load
-from rbxcompose.plan.model import Plan
+from rbxcompose.compiler.plan.diff import Difference, difference
+from rbxcompose.compiler.plan.dump import dump, load
+from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.testing import Golden, check_file, check_text
+from rbxcompose.tools.inspection.plan_text import plan_text
 from tests.conftest import ROOT
 
 
@@ -53,9 +53,9 @@ def test_locks_that_come_or_go_are_told_by_what_is_in_them(tmp_path: Path) -> No
     plans = [check_text(text, tmp_path).plan for text in (locked, without)]
     gone = [line.strip() for line in difference(*plans).text().splitlines() if "locks" in line]
     words = ["locks.door.priority: 2", "locks.door.timeout: 1 s", "locks.door.topic: nothing"]
-    assert sorted(gone) == [f"{one} (gone)" for one in words]
+    assert sorted(gone) == [f"{word} (gone)" for word in words]
     new = [line.strip() for line in difference(*reversed(plans)).text().splitlines() if "locks" in line]
-    assert sorted(new) == [f"{one} (new)" for one in words]
+    assert sorted(new) == [f"{word} (new)" for word in words]
 
 
 def test_a_component_that_moves_concerns_both_processes() -> None:
@@ -87,8 +87,12 @@ def test_what_one_way_adds_the_other_way_removes() -> None:
     there, back = difference(plan(), plan(name="twins")), difference(plan(name="twins"), plan())
     assert [one.name for one in there.added] == [one.name for one in back.removed]
     assert [one.name for one in there.removed] == [one.name for one in back.added]
-    assert {name: {(one.key, one.before, one.after) for one in changes} for name, changes in there.changed.items()} == {
-        name: {(one.key, one.after, one.before) for one in changes} for name, changes in back.changed.items()
+    assert {
+        name: {(change.key, change.before, change.after) for change in changes}
+        for name, changes in there.changed.items()
+    } == {
+        name: {(change.key, change.after, change.before) for change in changes}
+        for name, changes in back.changed.items()
     }
     assert there.data()["removed"] == ["battery", "base", "go_to", "charger", "robot_description"]
 

@@ -10,13 +10,13 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.compiler import compile_robot
-from rbxcompose.inspection.expand import expand, expand_data, leaves
-from rbxcompose.model.robot import Robot
-from rbxcompose.plan.diff import difference
-from rbxcompose.plan.model import Plan
-from rbxcompose.printable import FORBIDDEN
+from rbxcompose.base.printable import FORBIDDEN
+from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.compiler.model.robot import Robot
+from rbxcompose.compiler.plan.diff import difference
+from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.testing import Checked, Golden, check_file, check_text
+from rbxcompose.tools.inspection.expand import expand, expand_data, leaves
 from tests.conftest import ROOT
 
 TURTLEBOT, TWINS = "robots/turtlebot/robot.yaml", "robots/twins/robot.yaml"
@@ -51,7 +51,7 @@ def test_each_value_has_its_origin_behind_it(repository: Path, golden: Golden) -
 
 def without_arguments(plan: Plan) -> Plan:
     """Return a plan without the limits of arguments, which are filled in."""
-    return replace(plan, instances=tuple(replace(one, bounds={}) for one in plan.instances))
+    return replace(plan, instances=tuple(replace(instance, bounds={}) for instance in plan.instances))
 
 
 @pytest.mark.parametrize("file", [TURTLEBOT, TWINS])
@@ -65,7 +65,7 @@ def test_what_it_writes_is_the_same_robot(
     second = again(text, tmp_path)
     assert second.codes == [], second.text
     assert difference(without_arguments(first.plan), second.plan).is_empty
-    assert [one.name for one in first.plan.instances] == [one.name for one in second.plan.instances]
+    assert [instance.name for instance in first.plan.instances] == [instance.name for instance in second.plan.instances]
 
 
 @settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -73,7 +73,7 @@ def test_what_it_writes_is_the_same_robot(
 def test_to_expand_what_was_expanded_changes_nothing(
     sets: list[str], profiles: tuple[str, ...], repository: Path, tmp_path: Path
 ) -> None:
-    sets = list({one.partition("=")[0]: one for one in sets}.values())
+    sets = list({set_.partition("=")[0]: set_ for set_ in sets}.values())
     first = robot_of(check_file(Path(TURTLEBOT), profiles=profiles, sets=sets)).manifest
     text = expand(first, has_origins=False)
     assert expand(robot_of(again(text, tmp_path)).manifest, has_origins=False) == text

@@ -10,15 +10,13 @@ from xml.etree import ElementTree
 import pygraphviz
 import pytest
 
-from rbxcompose.compiler import compile_robot
-from rbxcompose.inspection.diagram import BoxShape, Diagram, WireContent, diagram_of
-from rbxcompose.inspection.graph_dot import dot
-from rbxcompose.inspection.graph_html import html
-from rbxcompose.inspection.graph_mermaid import mermaid
+from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.msgs.nav2_msgs import NavigateToPose
 from rbxcompose.msgs.std_srvs import SetBool
 from rbxcompose.sdk import Component, Config, Serves, ServesAction, component
 from rbxcompose.testing import Golden, check_text
+from rbxcompose.tools.inspection.diagram import BoxShape, Diagram, WireContent, diagram_of, dot, mermaid
+from rbxcompose.tools.inspection.graph_html import html
 from tests.conftest import ROOT
 
 ROBOTS = ("turtlebot", "twins")

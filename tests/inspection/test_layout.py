@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.inspection import layout as module
-from rbxcompose.inspection.layout import Edge, Layout, LayoutItem, NotDrawnError, Rect, lay_out
+from rbxcompose.commands import layout as module
+from rbxcompose.commands.layout import Edge, Layout, LayoutItem, NotDrawnError, Rect, lay_out
 
 GRAPHS = st.integers(1, 14).flatmap(
     lambda count: st.tuples(
@@ -24,13 +24,13 @@ def laid_out(groups: list[str], links: list[tuple[int, int]]) -> tuple[Layout, l
     items = [
         LayoutItem(f"{index}:i", 40.0 + 7 * index, 20.0 + 5 * (index % 4), group) for index, group in enumerate(groups)
     ]
-    edges = list(dict.fromkeys((f"{one}:i", f"{other}:i") for one, other in links if one != other))
+    edges = list(dict.fromkeys((f"{number}:i", f"{other}:i") for number, other in links if number != other))
     return lay_out(items, edges), edges
 
 
-def is_apart(one: Rect, other: Rect) -> bool:
-    across = one.x + one.width <= other.x + NEAR or other.x + other.width <= one.x + NEAR
-    return across or one.y + one.height <= other.y + NEAR or other.y + other.height <= one.y + NEAR
+def is_apart(rect: Rect, other: Rect) -> bool:
+    across = rect.x + rect.width <= other.x + NEAR or other.x + other.width <= rect.x + NEAR
+    return across or rect.y + rect.height <= other.y + NEAR or other.y + other.height <= rect.y + NEAR
 
 
 def is_at(x: float, y: float, rect: Rect) -> bool:
@@ -45,12 +45,12 @@ def test_boxes_and_groups_never_overlap_and_lie_in_the_picture(graph: tuple[list
     assert len(layout.places) == len(graph[0])
     assert layout.groups.keys() == {group for group in graph[0] if group}
     for rects in (list(layout.places.values()), list(layout.groups.values())):
-        for index, one in enumerate(rects):
-            assert all(is_apart(one, other) for other in rects[index + 1 :])
-            assert one.x >= 0
-            assert one.y >= 0
-            assert one.x + one.width <= layout.width
-            assert one.y + one.height <= layout.height
+        for index, rect in enumerate(rects):
+            assert all(is_apart(rect, other) for other in rects[index + 1 :])
+            assert rect.x >= 0
+            assert rect.y >= 0
+            assert rect.x + rect.width <= layout.width
+            assert rect.y + rect.height <= layout.height
 
 
 @settings(max_examples=25, deadline=None)

@@ -7,14 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.compiler import compile_robot
-from rbxcompose.findings import Finding
-from rbxcompose.inspection.answer import PathAnswer
-from rbxcompose.inspection.expand import leaves
-from rbxcompose.inspection.paths import short
-from rbxcompose.inspection.why import why
-from rbxcompose.model.robot import Robot
+from rbxcompose.base.findings import Finding
+from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.testing import Golden, check_text
+from rbxcompose.tools.inspection.expand import leaves
+from rbxcompose.tools.inspection.paths import short
+from rbxcompose.tools.inspection.why import PathAnswer, why
 
 ASKED = {
     "turtlebot": (

@@ -118,7 +118,7 @@ class Peer:
             return ZEROS.get(about[0], 0) if given is None else given
         (inner, of), count = about
         values = [None] * (count if kind is Nodetype.ARRAY else 0) if given is None else given
-        found = [self._value(inner, of, one) for one in values]
+        found = [self._value(inner, of, value) for value in values]
         return found if inner is Nodetype.NAME or of[0] == "string" else numpy.array(found, of[0])
 
 
@@ -142,7 +142,7 @@ def plain(value: Any) -> Any:
         names = (field.name for field in dataclasses.fields(value))
         return {name: plain(getattr(value, name)) for name in names if name.islower() and name[0] != "_"}
     if isinstance(value, list):
-        return [plain(one) for one in value]
+        return [plain(item) for item in value]
     return value.tolist() if hasattr(value, "tolist") else value
 
 

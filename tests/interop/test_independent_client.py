@@ -19,8 +19,8 @@ from rbxcompose.msgs.example_interfaces import AddTwoInts
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.msgs.rbxcompose_msgs import Recharge
 from rbxcompose.msgs.std_msgs import String
-from rbxcompose.qos import Qos
 from rbxcompose.sdk.bound import Reply
+from rbxcompose.sdk.ports import Qos
 from tests.bus.conftest import Connected, Network, network
 
 __all__ = ["network"]
@@ -156,7 +156,7 @@ def test_their_client_has_our_action_done(network: Network, ours: Connected, the
     server.current.succeeded()
     result = theirs.ask("call", "/recharge/_action/get_result", {"goal_id": goal_id})
     assert result["status"] == 4
-    statuses = [one["status_list"][-1]["status"] for one in theirs.ask("heard", "/recharge/_action/status")]
+    statuses = [entry["status_list"][-1]["status"] for entry in theirs.ask("heard", "/recharge/_action/status")]
     assert statuses[-1] == 4
 
 

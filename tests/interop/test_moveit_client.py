@@ -9,11 +9,11 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.compiler import compile_robot
+from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.msgs.moveit_msgs import MoveGroup, MoveItErrorCodes
 from rbxcompose.msgs.sensor_msgs import JointState
-from rbxcompose.qos import Qos
 from rbxcompose.runtime.process_group.host import Host
+from rbxcompose.sdk.ports import Qos
 from tests.bus.conftest import Connected, Network, network
 from tests.conftest import ROOT
 from tests.interop.test_independent_client import Sdk
@@ -41,10 +41,10 @@ def robot(network: Network) -> Iterator[Connected]:
     assert plan
     plan = plan.in_one_process()
     ours = network.process()
-    chosen = tuple(one for one in plan.instances if one.type in TYPES)
+    chosen = tuple(instance for instance in plan.instances if instance.type in TYPES)
     host = Host(plan, chosen, ours.scheduler, ours.clock, ours.bus, lambda record: None, lambda event: None)
     host.configure()
-    host.activate([one.name for one in chosen])
+    host.activate([instance.name for instance in chosen])
     host.start()
     yield ours
     host.shutdown()

@@ -6,8 +6,8 @@ import re
 
 import pytest
 
-from rbxcompose.compiler import compile_robot
-from rbxcompose.plan.model import Plan
+from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.compiler.plan.model import Plan
 from tests.interop.run_ros2 import NEEDS, ROBOT, ROOT, STEPS, main, missing
 
 
@@ -25,15 +25,17 @@ def plan() -> Plan:
 
 
 def test_each_name_in_the_steps_is_one_of_the_robot(plan: Plan) -> None:
-    known = {f"/{one.name}" for one in plan.instances} | {wire.topic for one in plan.instances for wire in one.wires}
-    known |= {f"/{one.name}/{verb}_parameters" for one in plan.instances for verb in ("get", "set")}
+    known = {f"/{one.name}" for one in plan.instances} | {
+        wire.topic for instance in plan.instances for wire in instance.wires
+    }
+    known |= {f"/{instance.name}/{verb}_parameters" for instance in plan.instances for verb in ("get", "set")}
     known |= {"/rosout"}
     said = {word.split(" ")[0] for step in STEPS for word in (*step.words, *step.expected) if word.startswith("/")}
     assert said - known == set()
 
 
 def test_each_type_in_the_steps_is_one_of_the_robot(plan: Plan) -> None:
-    known = {wire.type for one in plan.instances for wire in one.wires}
+    known = {wire.type for instance in plan.instances for wire in instance.wires}
     said = {word for step in STEPS for word in step.words if re.fullmatch(r"\w+/(msg|srv|action)/\w+", word)}
     assert said
     assert said - known == set()

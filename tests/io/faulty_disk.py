@@ -51,7 +51,9 @@ class FaultyDisk:
             return real(descriptor, bytes(data)[: max(1, len(data) // 2)])
         if name == "close":
             real(*arguments)  # as Linux has it: the descriptor is gone whatever is returned
-        raise OSError(code, os.strerror(code), *(str(one) for one in arguments[:1] if not isinstance(one, int)))
+        raise OSError(
+            code, os.strerror(code), *(str(argument) for argument in arguments[:1] if not isinstance(argument, int))
+        )
 
     @contextmanager
     def spun(self) -> Iterator[FaultyDisk]:

@@ -13,26 +13,23 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from rbxcompose.atomic_files import replace_file
-from rbxcompose.cli import main as command
-from rbxcompose.cli.check import fix
-from rbxcompose.clock import SteppedClock
-from rbxcompose.compiler import compile_robot
-from rbxcompose.levels import Level
-from rbxcompose.plan.model import Plan
-from rbxcompose.qos import Qos
-from rbxcompose.recording.files import recover_all
-from rbxcompose.recording.message import Recorded
-from rbxcompose.recording.reader import RecordingReader
-from rbxcompose.recording.topics import RecordedTopic
+from rbxcompose.base.clock import SteppedClock
+from rbxcompose.base.files import replace_file
+from rbxcompose.base.levels import Level
+from rbxcompose.commands import main as command
+from rbxcompose.commands.new_files import write_new
+from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.runtime.folder import ComponentState, RobotFolder, RobotState
-from rbxcompose.runtime.follow import read_log
-from rbxcompose.runtime.log import NAME, PREVIOUS, LogFile, start_new
-from rbxcompose.runtime.process_group.run_recorder import Taping
+from rbxcompose.runtime.log import NAME, PREVIOUS, LogFile, Record, read_log, start_new
+from rbxcompose.runtime.process_group.group import Taping
 from rbxcompose.runtime.processes import Process, boot_id
-from rbxcompose.runtime.records import Record
+from rbxcompose.runtime.recording.files import recover_all
+from rbxcompose.runtime.recording.reader import RecordingReader
+from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic
 from rbxcompose.runtime.supervision.supervisor import Supervisor
-from rbxcompose.scaffold.new_files import write_new
+from rbxcompose.sdk.ports import Qos
+from rbxcompose.tools.commands.check import fix
 
 OLD, NEW = b"old: 1\n" * 3000, b"new: 2\n" * 4000
 MESSAGES = 40
@@ -119,8 +116,8 @@ def _prepare_graph(run: Run) -> None:
 
 def _state(robot: str) -> RobotState:
     process = Process.of(os.getpid())
-    one = ComponentState("base", "toy", "active", "robot", process.pid, 0)
-    return RobotState(robot, "/robot.yaml", process, {"robot": process}, (one,), "tcp/x", boot_id())
+    state = ComponentState("base", "toy", "active", "robot", process.pid, 0)
+    return RobotState(robot, "/robot.yaml", process, {"robot": process}, (state,), "tcp/x", boot_id())
 
 
 def _prepare_state(run: Run) -> None:
@@ -252,7 +249,7 @@ def _judge_recording(run: Run, failed: str) -> None:
     assert run.told or path.exists()
     if path.exists():
         with path.open("rb") as file:
-            numbers = [one.sequence for one in RecordingReader(file).messages()]
+            numbers = [message.sequence for message in RecordingReader(file).messages()]
         assert numbers == list(range(len(numbers)))
         assert run.told or len(numbers) == MESSAGES
     assert run.names <= {"run.mcap", "run.mcap.part"}

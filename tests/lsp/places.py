@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rbxcompose.lsp.completion import CompletionItem, complete
-from rbxcompose.lsp.definition import define
-from rbxcompose.lsp.document import Document
-from rbxcompose.lsp.hover import describe
-from rbxcompose.lsp.project import Project
+from rbxcompose.tools.lsp.answers import define, describe
+from rbxcompose.tools.lsp.completion import CompletionItem, complete
+from rbxcompose.tools.lsp.document import Document
+from rbxcompose.tools.lsp.project import Project
 from tests.conftest import ROOT
 
 ROBOT = ROOT / "robots/turtlebot/robot.yaml"

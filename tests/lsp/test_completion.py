@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.lsp.completion import complete
-from rbxcompose.lsp.document import Document
 from rbxcompose.missions.modifiers.registry import modifier_keys
+from rbxcompose.tools.lsp.completion import complete
+from rbxcompose.tools.lsp.document import Document
 from tests.lsp.places import BATTERY, LOOK, PATROL, ROBOT, TWINS, Editor
 
 PLACES = ["dock", "corner_1", "corner_2", "corner_3", "corner_4"]
@@ -94,7 +94,11 @@ def test_a_unit_stands_behind_a_space(editor: Editor) -> None:
     close = editor.complete(ROBOT, "runtime: 45 s", "runtime: 45")[0]
     apart = editor.complete(ROBOT, "runtime: 45 s", "runtime: 45 ")[0]
     begun = editor.complete(ROBOT, "runtime: 45 s", "runtime: 45 m")[0]
-    assert [(one.text, one.replaces) for one in (close, apart, begun)] == [(" s", 0), ("s", 0), ("s", 1)]
+    assert [(completion_item.text, completion_item.replaces) for completion_item in (close, apart, begun)] == [
+        (" s", 0),
+        ("s", 0),
+        ("s", 1),
+    ]
 
 
 def test_an_empty_file_gets_the_first_keys() -> None:

@@ -6,9 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.lsp.completion import complete
-from rbxcompose.lsp.cursor import MARK, Cursor, locate
-from rbxcompose.lsp.document import Document
+from rbxcompose.tools.lsp.completion import complete
+from rbxcompose.tools.lsp.document import MARK, Cursor, Document, locate
 from tests.lsp.places import PATROL, ROBOT
 
 TEXTS = {path: path.read_text(encoding="utf-8") for path in (ROBOT, PATROL)}

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.lsp.completion import complete
-from rbxcompose.lsp.definition import define
-from rbxcompose.lsp.document import Document
+from rbxcompose.tools.lsp.answers import define
+from rbxcompose.tools.lsp.completion import complete
+from rbxcompose.tools.lsp.document import Document
 from tests.conftest import ROOT
 from tests.lsp.places import BATTERY, PATROL, ROBOT, TWINS, Editor, line_of
 
@@ -58,7 +58,9 @@ def test_the_device_of_a_port_is_proposed_and_led_to(tmp_path: Path) -> None:
     lines += ["buses:", "  servos:", "    type: dynamixel", "    port: dev:adapter"]
     document = Document(tmp_path / "robot.yaml", "\n".join(lines))
     for column, typed in ((10, 0), (16, 6)):
-        assert [(one.text, one.replaces) for one in complete(document, 8, column)] == [("dev:adapter", typed)]
+        assert [
+            (completion_item.text, completion_item.replaces) for completion_item in complete(document, 8, column)
+        ] == [("dev:adapter", typed)]
     assert str(define(document, 8, 16)).endswith("robot.yaml:5:3")
 
 

@@ -10,10 +10,9 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.compiler import compile_robot
-from rbxcompose.findings import Finding
-from rbxcompose.lsp.newest import Newest
-from rbxcompose.lsp.project import FoundByFile, OutdatedError, Project
+from rbxcompose.base.findings import Finding
+from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.tools.lsp.project import FoundByFile, Newest, OutdatedError, Project
 
 TEXT = "rbx: 1\nkind: Robot\nname: one\ncomponents:\n  battery:\n    type: battery_sim\n    runtime: 45 s\n"
 WRONG = TEXT + "    wran: 50 %\n"
@@ -38,7 +37,7 @@ class Editor:
             assert self.leave.acquire(timeout=10.0)
             return compile_robot(*args, unsaved=unsaved, **options)
 
-        monkeypatch.setattr("rbxcompose.lsp.project.compile_robot", waits)
+        monkeypatch.setattr("rbxcompose.tools.lsp.project.compile_robot", waits)
 
     def tell(self, found: FoundByFile) -> None:
         self.told.append(found[self.path])
@@ -84,7 +83,7 @@ def test_what_was_compiled_last_answers_while_the_next_is_being_compiled(editor:
         assert newest.is_compiled(editor.path, WRONG)
 
     editor.run(session)
-    assert [[one.code for one in found] for found in editor.told] == [[], ["RBX1001"]]
+    assert [[finding.code for finding in found] for found in editor.told] == [[], ["RBX1001"]]
 
 
 def test_a_text_that_is_outdated_when_it_is_compiled_is_never_told_of(editor: Editor) -> None:

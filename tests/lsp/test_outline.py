@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.lsp.outline import OutlineEntry, outline
+from rbxcompose.tools.lsp.answers import OutlineEntry, outline
 from tests.conftest import ROOT
 from tests.lsp.places import PATROL, ROBOT
 
@@ -14,8 +14,8 @@ from tests.lsp.places import PATROL, ROBOT
 def shown(entries: tuple[OutlineEntry, ...], level: int = 0) -> list[str]:
     return [
         line
-        for one in entries
-        for line in (f"{'  ' * level}{one.name} {one.detail}".rstrip(), *shown(one.below, level + 1))
+        for entry in entries
+        for line in (f"{'  ' * level}{entry.name} {entry.detail}".rstrip(), *shown(entry.below, level + 1))
     ]
 
 
@@ -49,9 +49,9 @@ def test_a_mission_is_shown_by_its_steps() -> None:
 def test_each_name_lies_within_its_entry(path: Path) -> None:
     def check(entry: OutlineEntry) -> None:
         assert entry.span.contains(entry.key)
-        for one in entry.below:
-            assert entry.span.contains(one.span)
-            check(one)
+        for outline_entry in entry.below:
+            assert entry.span.contains(outline_entry.span)
+            check(outline_entry)
 
     for entry in outline(path.read_text(encoding="utf-8")):
         check(entry)

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.lsp.fixes import actions, change_of
-from rbxcompose.lsp.project import Project
+from rbxcompose.tools.lsp.project import Project
+from rbxcompose.tools.lsp.rename import actions, change_of
 from tests.conftest import ROOT
 
 OVERLAY = "rbx: 1\nkind: Overlay\nname: slow\ncomponents:\n  base:\n    max_speed: 0.1 m/s\n"
@@ -94,7 +94,7 @@ def test_the_fix_of_a_finding_is_the_smallest_change(folder: Path) -> None:
     project, path = Project({}), folder / "robots/turtlebot/robot.yaml"
     text = path.read_text(encoding="utf-8").replace("max_speed", "max_sped")
     project.change(path, text)
-    finding = next(one for one in project.findings(path) if one.fix is not None)
+    finding = next(candidate for candidate in project.findings(path) if candidate.fix is not None)
     assert finding.span is not None
     (action,) = actions(project, [finding], finding.span.line - 1, finding.span.line - 1)
     change = action.changes[path]

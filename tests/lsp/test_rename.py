@@ -11,15 +11,18 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.compiler import Compilation, compile_robot
-from rbxcompose.lsp.manifest_mentions import ManifestMentions
-from rbxcompose.lsp.mission_mentions import MissionMentions
-from rbxcompose.lsp.project_files import ROBOT, ProjectFiles
-from rbxcompose.lsp.rename import CannotRenameError, Renamed, compiler, prepare, rename
-from rbxcompose.lsp.symbol_index import SymbolIndex, references
-from rbxcompose.lsp.symbols import Mention, Symbol
-from rbxcompose.lsp.trial_mentions import TrialMentions
-from rbxcompose.plan.dump import dump
+from rbxcompose.compiler.compile import Compilation, compile_robot
+from rbxcompose.compiler.plan.dump import dump
+from rbxcompose.tools.lsp.mentions import (
+    ManifestMentions,
+    MissionMentions,
+    SymbolIndex,
+    TrialMentions,
+    symbol_index_references,
+)
+from rbxcompose.tools.lsp.project_files import ROBOT, ProjectFiles
+from rbxcompose.tools.lsp.rename import CannotRenameError, Renamed, compiler, prepare, rename
+from rbxcompose.tools.lsp.symbols import Mention, Symbol
 from tests.conftest import ROOT
 from tests.soak import Soak
 
@@ -32,8 +35,8 @@ class Names:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self.before = {one: compile_robot(str(one), environment={}) for one in self._files().of_kind(ROBOT)}
-        self.plans = {one: dump(made.plan) for one, made in self.before.items() if made.plan}
+        self.before = {path: compile_robot(str(path), environment={}) for path in self._files().of_kind(ROBOT)}
+        self.plans = {path: dump(made.plan) for path, made in self.before.items() if made.plan}
         self.after: dict[tuple[Path, int], Compilation] = {}
         self.index = SymbolIndex(self._files(), lambda path: self.before[path].robot)
 
@@ -70,7 +73,7 @@ class Names:
         found = {}
         for path, changes in made.changes.items():
             lines = made.texts[path].split("\n")
-            numbers = sorted({one.start[0] for one in changes})
+            numbers = sorted({change.start[0] for change in changes})
             found[path.relative_to(self.folder).as_posix()] = [lines[number].strip() for number in numbers]
         return found
 
@@ -88,11 +91,15 @@ def project(tmp_path: Path) -> Path:
 
 
 def test_the_names_of_a_part_are_found_behind_the_names_of_its_instances(shipped: Names) -> None:
-    found = references(shipped.index, *shipped.at("parts/battery.yaml", "values:\n  |level:"), with_definitions=True)
-    places = [f"{one.file.relative_to(ROOT).as_posix()}:{one.start}" for one in found]
+    found = symbol_index_references(
+        shipped.index, *shipped.at("parts/battery.yaml", "values:\n  |level:"), with_definitions=True
+    )
+    places = [f"{reference.file.relative_to(ROOT).as_posix()}:{reference.start}" for reference in found]
     assert sum(place.startswith("missions/haul.yaml") for place in places) == 2  # $drive_level and $lift_level
     assert sum(place.startswith("parts/battery.yaml") for place in places) == 2
-    others = references(shipped.index, *shipped.at("parts/battery.yaml", "values:\n  |level:"), with_definitions=False)
+    others = symbol_index_references(
+        shipped.index, *shipped.at("parts/battery.yaml", "values:\n  |level:"), with_definitions=False
+    )
     assert len(others) == len(found) - 1
 
 
@@ -226,7 +233,9 @@ def fresh(names: Names, old: str) -> str:
 def check_renaming(names: Names, symbol: Symbol) -> None:
     """Check that a rename changes nothing but a name, and that renaming back restores each byte."""
     files, new = names.index.files, fresh(names, symbol.name)
-    mention = next((one for one in names.index.of(symbol) if one.is_definition), names.index.of(symbol)[0])
+    mention = next(
+        (candidate for candidate in names.index.of(symbol) if candidate.is_definition), names.index.of(symbol)[0]
+    )
     place = files.places(mention.file).position(mention.start)
     try:
         prepare(names.index, mention.file, *place)
@@ -242,7 +251,7 @@ def check_renaming(names: Names, symbol: Symbol) -> None:
         concerned |= {mission for one in tuple(concerned) for _, mission in files.missions(one)}
         if not concerned.isdisjoint(made.texts):
             after = names.compiled(robot, made.texts)
-            assert [one.code for one in after.report] == [one.code for one in before.report]
+            assert [finding.code for finding in after.report] == [finding.code for finding in before.report]
             assert after.plan is not None
             text = dump(after.plan).replace(new, symbol.name)
             assert sorted(_WORD.findall(text)) == sorted(_WORD.findall(names.plans[robot]))  # some order is theirs
@@ -274,10 +283,12 @@ def test_texts_that_are_being_typed_make_no_trouble(data: st.DataObject) -> None
     text = path.read_text(encoding="utf-8")
     cut, end = sorted((data.draw(st.integers(60, len(text))), data.draw(st.integers(60, len(text)))))
     typed = text[:cut] + data.draw(st.text("ab:-{}[]\"'$ \n#|>&*!?%@", max_size=4)) + text[end:]
-    files_typed = ProjectFiles(path, lambda one: typed if one == path else one.read_text(encoding="utf-8"))
+    files_typed = ProjectFiles(
+        path, lambda candidate: typed if candidate == path else candidate.read_text(encoding="utf-8")
+    )
     made = MENTIONS.get(files_typed.kind(path))
     mentions = made(files_typed, path) if made else ()
-    assert all(typed[one.start : one.end] == one.symbol.name for one in mentions if one.start >= 0)
+    assert all(typed[mention.start : mention.end] == mention.symbol.name for mention in mentions if mention.start >= 0)
 
 
 MENTIONS: dict[str, Callable[[ProjectFiles, Path], Iterable[Mention]]] = {

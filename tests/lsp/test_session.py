@@ -60,7 +60,7 @@ def test_an_editor_opens_a_robot_types_completes_jumps_hovers_and_leaves(project
         lines = typed.split("\n")
         line, start, end = (
             edit["range"]["start"]["line"],
-            *(edit["range"][one]["character"] for one in ("start", "end")),
+            *(edit["range"][name]["character"] for name in ("start", "end")),
         )
         lines[line] = lines[line][:start] + edit["newText"] + lines[line][end:]
         assert "\n".join(lines) == text
@@ -102,8 +102,8 @@ def test_a_name_is_found_and_renamed_in_the_texts_of_the_editor_and_in_files_tha
         assert args["children"][0]["selectionRange"]["start"] == place(text, "speed:")
 
         found = client.ask("textDocument/references", **spot, context={"includeDeclaration": True})
-        assert [one["uri"] for one in found].count(mission.as_uri()) == 1
-        assert [one["range"]["start"] for one in found if one["uri"] == path.as_uri()] == [
+        assert [entry["uri"] for entry in found].count(mission.as_uri()) == 1
+        assert [entry["range"]["start"] for entry in found if entry["uri"] == path.as_uri()] == [
             place(text, "dock: {x"),
             place(text, "dock: dock", 6),
         ]
@@ -112,7 +112,7 @@ def test_a_name_is_found_and_renamed_in_the_texts_of_the_editor_and_in_files_tha
         assert asked["range"] == {"start": place(text, "dock: {x"), "end": place(text, "dock: {x", 4)}
 
         made = client.ask("textDocument/rename", **spot, newName="home")
-        assert [one["newText"] for one in made["changes"][path.as_uri()]] == ["home", "home"]
+        assert [entry["newText"] for entry in made["changes"][path.as_uri()]] == ["home", "home"]
         assert mission.as_uri() in made["changes"]
 
         assert "taken" in client.refusal("textDocument/rename", **spot, newName="corner_1")
@@ -159,10 +159,10 @@ def test_while_one_types_each_question_is_answered_and_at_rest_the_findings_are_
             shown = client.ask("textDocument/hover", textDocument=document, position=place(typed, "max_speed: 0.5", 2))
             assert "Largest speed" in shown["contents"]["value"]
         wanted = place(typed, "runtme")
-        while not any(one["range"]["start"] == wanted for one in client.diagnostics(path.as_uri())):
+        while not any(entry["range"]["start"] == wanted for entry in client.diagnostics(path.as_uri())):
             pass  # a slow machine may have come to compile an older one
         assert client.ask("textDocument/hover", textDocument=document, position=place(typed, "name: turtle", 2))
-        told = [one["params"] for one in client.told if one["method"] == "textDocument/publishDiagnostics"]
-        assert [one for one in told if one["uri"] == path.as_uri()] == []
+        told = [entry["params"] for entry in client.told if entry["method"] == "textDocument/publishDiagnostics"]
+        assert [entry for entry in told if entry["uri"] == path.as_uri()] == []
     assert client.process.returncode == 0
     assert client.errors == b""

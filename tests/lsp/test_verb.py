@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from rbxcompose.cli import lsp
-from rbxcompose.cli.main import main as command
+from rbxcompose.commands.main import main as command
+from rbxcompose.tools.commands import lsp
 
 
 def test_without_its_package_the_command_says_how_to_install_it(

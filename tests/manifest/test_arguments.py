@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from rbxcompose.findings import Finding, Report
+from rbxcompose.base.findings import Finding, Report
+from rbxcompose.base.units import SPEED, Quantity
 from rbxcompose.manifest.arguments import read_argument
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import BROKEN, MappingNode
 from rbxcompose.manifest.validate import to_plain
-from rbxcompose.units import SPEED, Quantity
 
 
 def read(declaration: str) -> tuple[object, list[Finding]]:

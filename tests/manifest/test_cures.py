@@ -145,7 +145,7 @@ CURES = [
 ]
 
 
-@pytest.mark.parametrize(("right", "wrong", "cure"), CURES, ids=lambda one: one.strip().splitlines()[-1][:40])
+@pytest.mark.parametrize(("right", "wrong", "cure"), CURES, ids=lambda cure: cure.strip().splitlines()[-1][:40])
 def test_the_first_finding_about_a_mistake_tells_the_cure(right: str, wrong: str, cure: str, tmp_path: Path) -> None:
     assert right in ROBOT
     others = {"mission.yaml": MISSION, "secrets/token": "x"}

@@ -7,9 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.findings import Finding, Span
+from rbxcompose.base.findings import Finding, Span, one_compile
 from rbxcompose.manifest.files import find, project_of, resolve, shown_name
-from rbxcompose.per_compile import one_compile
 
 HERE = Span("robot.yaml", 1, 1, 1, 2)
 

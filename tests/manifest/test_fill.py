@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from rbxcompose.expressions.types import PLACE, TEXT, TYPES, UNKNOWN
-from rbxcompose.findings import Finding, Report
-from rbxcompose.manifest.fill import fill
-from rbxcompose.manifest.fill_names import Names, Typed, names_of, with_arguments
+from rbxcompose.base.expressions.types import PLACE, TEXT, TYPES, UNKNOWN
+from rbxcompose.base.findings import Finding, Report
+from rbxcompose.base.units import LENGTH, SPEED, Quantity
+from rbxcompose.manifest.fill import Names, Typed, fill, names_of, with_arguments
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import BROKEN, MappingNode, ScalarNode
 from rbxcompose.manifest.validate import to_plain
-from rbxcompose.units import LENGTH, SPEED, Quantity
 
 
 def read(text: str) -> MappingNode:

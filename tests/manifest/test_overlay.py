@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.composition.history import History, HistoryStep
-from rbxcompose.composition.overlay import compose, settled
-from rbxcompose.composition.set_options import read_sets
-from rbxcompose.findings import Report, Span
+from rbxcompose.base.findings import Report, Span
+from rbxcompose.compiler.composition.layers import read_sets
+from rbxcompose.compiler.composition.overlay import compose, settled
+from rbxcompose.compiler.composition.robot_manifest import History, HistoryStep
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import BROKEN, Entry, KeyPath, MappingNode, ScalarNode, TreeNode, at, children, value_span
 from rbxcompose.manifest.validate import to_plain

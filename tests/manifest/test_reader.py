@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.findings import Finding, Span
+from rbxcompose.base.findings import Finding, Span
 from rbxcompose.manifest.reader import read_file, read_text
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode, at, key_span, value_span
 

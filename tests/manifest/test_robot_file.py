@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.components.battery_sim import BatterySimConfig
-from rbxcompose.composition.robot_file import load_robot, read_mission
-from rbxcompose.composition.robot_manifest import RobotManifest
-from rbxcompose.findings import Report
+from rbxcompose.base.findings import Report
+from rbxcompose.compiler.composition.robot_file import load_robot, read_mission
+from rbxcompose.compiler.composition.robot_manifest import RobotManifest
+from rbxcompose.domains.power.components.battery_sim import BatterySimConfig
 from rbxcompose.manifest.tree import at
 
 ROOT = Path(__file__).parents[2]

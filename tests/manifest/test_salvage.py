@@ -6,12 +6,12 @@ from typing import TypeVar
 
 import pytest
 
-from rbxcompose.components.battery_sim import BatterySimConfig
-from rbxcompose.diagnostics.settings import AnalyzerModel
-from rbxcompose.manifest.options import ComponentOptions
+from rbxcompose.domains.diagnostics.settings import AnalyzerModel
+from rbxcompose.domains.muxes.sections.muxes import MuxModel
+from rbxcompose.domains.power.components.battery_sim import BatterySimConfig
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.salvage import salvaged
-from rbxcompose.sections.muxes import MuxModel
+from rbxcompose.manifest.section import ComponentOptions
 
 M = TypeVar("M")
 
@@ -38,7 +38,7 @@ def test_what_must_be_there_gets_a_stand_in(text: str) -> None:
 def test_an_input_of_a_mux_keeps_its_name_and_its_source() -> None:
     read = left(MuxModel, "{inputs: {a: {from: go_to, priority: high}, b: {priority: 1, timeout: 1 s}}, locks: 5}")
     assert read is not None
-    assert {name: one.source for name, one in read.inputs.items()} == {"a": "go_to", "b": None}
+    assert {name: mux_input.source for name, mux_input in read.inputs.items()} == {"a": "go_to", "b": None}
 
 
 def test_the_items_of_a_list_keep_their_places() -> None:

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.findings import Span
+from rbxcompose.base.findings import Span
 from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.tree import ScalarNode
 

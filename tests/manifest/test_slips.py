@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.config import Config, Length
-from rbxcompose.edits import apply, safe_fixes
-from rbxcompose.findings import Finding, Report
+from rbxcompose.base.config import Config, Length
+from rbxcompose.base.findings import Finding, Report
+from rbxcompose.base.fixes import apply, safe_fixes
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.manifest.validate import validate
@@ -135,7 +135,7 @@ def test_the_first_line_is_written_where_it_is_missing(above: str, tmp_path: Pat
 
 def test_the_first_line_has_no_place_within_brackets(tmp_path: Path) -> None:
     report = check_text("{kind: Robot, name: one}\n", tmp_path).compilation.report
-    assert [one.fix for one in report if "'rbx'" in one.message] == [None]
+    assert [finding.fix for finding in report if "'rbx'" in finding.message] == [None]
 
 
 MANY = 60_000

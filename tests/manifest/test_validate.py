@@ -7,12 +7,11 @@ from typing import Literal
 import pytest
 from pydantic import Field
 
-from rbxcompose.config import Angle, Config, Length, Name, Place, PlaceName, Ratio, Speed
-from rbxcompose.findings import Finding, Report
+from rbxcompose.base.config import PLACE, Angle, Config, Length, Name, Place, PlaceName, Ratio, Speed
+from rbxcompose.base.findings import Finding, Report
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import BROKEN, MappingNode
 from rbxcompose.manifest.validate import validate
-from rbxcompose.references import PLACE
 
 
 class Inner(Config):

@@ -18,9 +18,9 @@ from pathlib import Path
 
 import yaml
 
-from rbxcompose.compiler import compile_robot
-from rbxcompose.finding_pages import all_kinds, title_of
-from rbxcompose.findings import Finding
+from rbxcompose.base.findings import Finding
+from rbxcompose.commands.finding_pages import all_kinds, title_of
+from rbxcompose.compiler.compile import compile_robot
 
 HERE = Path(__file__).parent
 EXPECT = re.compile(r"# expect(-next)?: ([A-Z0-9, ]+)$")
@@ -201,17 +201,17 @@ class Figures:
 def figures(found: Iterable[Outcome] | None = None) -> Figures:
     """Count; a kind is caught if each of its cases is, at the right line."""
     found = outcomes() if found is None else tuple(found)
-    wrong = [one for one in found if one.case.kind]
-    right = [one for one in found if not one.case.kind]
-    named = {one.case.kind for one in wrong}
+    wrong = [outcome for outcome in found if outcome.case.kind]
+    right = [outcome for outcome in found if not outcome.case.kind]
+    named = {outcome.case.kind for outcome in wrong}
     return Figures(
         kinds=len(named),
-        kinds_caught=len(named - {one.case.kind for one in wrong if not one.is_caught}),
+        kinds_caught=len(named - {outcome.case.kind for outcome in wrong if not outcome.is_caught}),
         wrong=len(wrong),
-        caught=sum(one.is_caught for one in wrong),
-        elsewhere=sum(one.is_elsewhere for one in wrong),
-        missed=sum(not one.found for one in wrong),
-        noise=sum(len(one.noise) for one in wrong),
+        caught=sum(outcome.is_caught for outcome in wrong),
+        elsewhere=sum(outcome.is_elsewhere for outcome in wrong),
+        missed=sum(not outcome.found for outcome in wrong),
+        noise=sum(len(outcome.noise) for outcome in wrong),
         right=len(right),
-        false_alarms=sum(bool(one.found) for one in right),
+        false_alarms=sum(bool(outcome.found) for outcome in right),
     )

@@ -23,9 +23,12 @@ CANNOT = (
 def page() -> str:
     """Return the page as it should be."""
     found = outcomes()
-    rows = [_row(kind, about, [one for one in found if one.case.kind == kind]) for kind, about in kinds().items()]
-    missed = [f"- `{one.case.name}`: {one.case.misses}" for one in found if one.case.misses]
-    otherwise = [f"- `{one.case.name}`" for one in found if one.is_elsewhere and one.case.kind]
+    rows = [
+        _row(kind, about, [outcome for outcome in found if outcome.case.kind == kind])
+        for kind, about in kinds().items()
+    ]
+    missed = [f"- `{outcome.case.name}`: {outcome.case.misses}" for outcome in found if outcome.case.misses]
+    otherwise = [f"- `{outcome.case.name}`" for outcome in found if outcome.is_elsewhere and outcome.case.kind]
     sections = {
         "Figures": _figures(figures()),
         "Kinds": [*HEADER, *rows],
@@ -53,8 +56,8 @@ def _figures(count: Figures) -> list[str]:
 
 
 def _row(kind: str, about: str, found: list[Outcome]) -> str:
-    codes = sorted({code for one in found for _, _, code in one.case.expected})
+    codes = sorted({code for outcome in found for _, _, code in outcome.case.expected})
     links = " ".join(f"[{code}](findings/{code}.md)" for code in codes)
-    caught = sum(one.is_caught for one in found)
+    caught = sum(outcome.is_caught for outcome in found)
     told = "all" if caught == len(found) else f"{caught} of {len(found)}"
     return f"| `{kind}` | {about} | {len(found)} | {links} | {told} |"

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.check_runner import all_checks
-from rbxcompose.findings import KINDS
+from rbxcompose.base.findings import KINDS
+from rbxcompose.compiler.check_runner import all_checks
 from rbxcompose.missions.analysis.check_runner import mission_checks
 from tests.misconfig.corpus import Case, Outcome, cases, described, figures, kinds, outcomes
 from tests.misconfig.page import page

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.compiler import compile_robot
-from rbxcompose.findings import Severity
+from rbxcompose.base.findings import Severity
+from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode, children
 
@@ -66,14 +66,14 @@ def _values(node: TreeNode, path: KeyPath, starts: list[int]) -> Iterator[Value]
 def told(name: str, wrong: tuple[Value, ...]) -> Told:
     """Return what is told of a file in which these values are wrong."""
     text = text_of(name)
-    for one in sorted(wrong, key=lambda each: -each.start):
-        text = text[: one.start] + WRONG + text[one.end :]
+    for value in sorted(wrong, key=lambda each: -each.start):
+        text = text[: value.start] + WRONG + text[value.end :]
     robot, file = ROOT / FILES[ROBOTS[name]], ROOT / FILES[name]
     found = compile_robot(str(robot), environment={}, unsaved={file.resolve(): text}).report
     return frozenset(
-        (one.code, one.span.line if one.span and one.span.file.endswith(FILES[name]) else 0)
-        for one in found
-        if one.severity is Severity.ERROR or len(wrong) == 1
+        (finding.code, finding.span.line if finding.span and finding.span.file.endswith(FILES[name]) else 0)
+        for finding in found
+        if finding.severity is Severity.ERROR or len(wrong) == 1
     )
 
 
@@ -85,7 +85,8 @@ def told_alone(name: str, wrong: Value) -> Told:
 @pytest.mark.parametrize("name", FILES)
 def test_a_wrong_value_is_told_at_its_line_and_nothing_else_is(name: str) -> None:
     elsewhere = {
-        one.path: [(code, line) for code, line in told_alone(name, one) if line != one.line] for one in values(name)
+        value.path: [(code, line) for code, line in told_alone(name, value) if line != value.line]
+        for value in values(name)
     }
     assert {path: found for path, found in elsewhere.items() if found} == {}
 
@@ -94,8 +95,10 @@ def test_a_wrong_value_is_told_at_its_line_and_nothing_else_is(name: str) -> Non
 def test_a_wrong_value_hides_no_other_one(name: str) -> None:
     there = values(name)
     lacking = {}
-    for index, one in enumerate(there):
+    for index, value in enumerate(there):
         other = there[(7 * index + len(there) // 2) % len(there)]
-        if one.path[:2] != other.path[:2]:
-            lacking[one.path, other.path] = (told_alone(name, one) | told_alone(name, other)) - told(name, (one, other))
+        if value.path[:2] != other.path[:2]:
+            lacking[value.path, other.path] = (told_alone(name, value) | told_alone(name, other)) - told(
+                name, (value, other)
+            )
     assert {paths: found for paths, found in lacking.items() if found} == {}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rbxcompose.mission_tests import stage
+from rbxcompose.tools.mission_tests import runner as stage
 from tests.mission_tests.trying import Trying
 
 OPEN = "events:\n  - at: 2 s\n    set:\n      door: false\n"

@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from rbxcompose.cli.main import main as command
+from rbxcompose.commands.main import main as command
 from tests.conftest import ROOT
 from tests.mission_tests.trying import Trying
 
@@ -79,7 +79,7 @@ def test_a_mistake_of_a_robot_is_told_once_for_all_of_its_tests(
     assert "has errors, so 3 tests cannot run" in told
     assert command(["test", str(folder), "--json"]) == 1
     tests = json.loads(capsys.readouterr().out)["tests"]
-    assert [len(one["problems"]) for one in tests] == [1, 1, 1]  # each test has its own reason
+    assert [len(test["problems"]) for test in tests] == [1, 1, 1]  # each test has its own reason
 
 
 def test_a_mission_with_a_mistake_keeps_only_its_own_tests_from_running(
@@ -99,7 +99,7 @@ def test_a_mission_with_a_mistake_keeps_only_its_own_tests_from_running(
         (tmp_path / f"{name}.yaml").write_text(f"rbx: 1\n{text}")
     assert command(["test", str(tmp_path), "--json"]) == 1
     captured = capsys.readouterr()
-    passed = {one["file"].rpartition("/")[2]: one["passed"] for one in json.loads(captured.out)["tests"]}
+    passed = {test["file"].rpartition("/")[2]: test["passed"] for test in json.loads(captured.out)["tests"]}
     assert passed == {"good.test.yaml": True, "bad.test.yaml": False, "both.test.yaml": False}
     assert "wiat" in captured.err
 
@@ -190,11 +190,11 @@ def test_one_file_may_test_several_robots(tmp_path: Path, capsys: pytest.Capture
     file.write_text(f"{head}also: [second.yaml]\n{test}")
     command(["test", "--json", str(file)])
     told = json.loads(capsys.readouterr().out)["tests"]
-    assert [one["name"] for one in told] == ["opens", "opens (second)"]
-    assert len({one["passed"] for one in told}) == 1
+    assert [entry["name"] for entry in told] == ["opens", "opens (second)"]
+    assert len({entry["passed"] for entry in told}) == 1
     file.write_text(f"{head}also: [second.yaml, third/robot.yaml]\n{test}")
     assert command(["test", "--json", str(file)]) == 1
-    assert [one["name"] for one in json.loads(capsys.readouterr().out)["tests"]][2] == "opens (third)"
+    assert [entry["name"] for entry in json.loads(capsys.readouterr().out)["tests"]][2] == "opens (third)"
     assert trying.reading.read(file)[1].has_errors
     file.write_text(f"{head}also: second.yaml\n{test}")
-    assert [one.message for one in trying.reading.read(file)[1]] == ["'also' must be a list of robots"]
+    assert [finding.message for finding in trying.reading.read(file)[1]] == ["'also' must be a list of robots"]

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from rbxcompose.expressions.values import Value
+from rbxcompose.base.expressions.values import Value
 from rbxcompose.manifest.tree import NOWHERE
-from rbxcompose.mission_tests.judge import is_it
-from rbxcompose.mission_tests.model import ExpectedStep
-from rbxcompose.mission_tests.record import Done
-from rbxcompose.mission_tests.scope import agrees
+from rbxcompose.tools.mission_tests.judge import is_it
+from rbxcompose.tools.mission_tests.model import ExpectedStep
+from rbxcompose.tools.mission_tests.record import Done
+from rbxcompose.tools.mission_tests.scope import agrees
 from tests.mission_tests.trying import Trying
 
 SETTING = """

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import time
 
-from rbxcompose.mission_tests.explorer import ExplorationLimits, Explored, explore, text_of
 from rbxcompose.testing.golden import Golden
+from rbxcompose.tools.mission_tests.explorer import ExplorationLimits, Explored, explore, text_of
 from tests.missions.simulated import ROBOT, program_of
 
 ALL = ExplorationLimits()
@@ -53,7 +53,10 @@ do:
 def explored(text: str, limits: ExplorationLimits = ALL) -> Explored:
     program = program_of(HEAD + text)
     return explore(
-        program, ROBOT, {name: one.default.value for name, one in program.inputs.items() if one.default}, limits
+        program,
+        ROBOT,
+        {name: input_.default.value for name, input_ in program.inputs.items() if input_.default},
+        limits,
     )
 
 

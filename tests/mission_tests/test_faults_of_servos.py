@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.mission_tests.reader import TrialReader
-from rbxcompose.mission_tests.runner import run_trial
-from rbxcompose.rendering.text import render_text
+from rbxcompose.commands.formats.text import render_text
 from rbxcompose.testing.golden import Golden
+from rbxcompose.tools.mission_tests.reader import TrialReader
+from rbxcompose.tools.mission_tests.runner import run_trial
 
 ROBOT = """
 buses:
@@ -85,7 +85,7 @@ class Watched:
         trial, report = self.reader.read(self.written(text))
         assert trial is not None, render_text(report, self.reader.sources)
         verdict = run_trial(trial)
-        return [one.message for one in verdict.problems]
+        return [problem.message for problem in verdict.problems]
 
     def findings(self, text: str) -> str:
         return render_text(self.reader.read(self.written(text))[1], self.reader.sources)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from rbxcompose.findings import Span
-from rbxcompose.mission_tests import judge as judging
-from rbxcompose.mission_tests.judge import MOST_MISSING, judge
-from rbxcompose.mission_tests.model import Expectations, ExpectedStep
-from rbxcompose.mission_tests.record import Done, TrialRecord
-from rbxcompose.mission_tests.scope import agrees
+from rbxcompose.base.findings import Span
+from rbxcompose.tools.mission_tests import judge as judging
+from rbxcompose.tools.mission_tests.judge import MOST_MISSING, judge
+from rbxcompose.tools.mission_tests.model import Expectations, ExpectedStep
+from rbxcompose.tools.mission_tests.record import Done, TrialRecord
+from rbxcompose.tools.mission_tests.scope import agrees
 
 SPAN = Span("a.test.yaml", 1, 1, 1, 2)
 

@@ -8,10 +8,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rbxcompose.manifest.tree import NOWHERE
-from rbxcompose.mission_tests.judge import judge
-from rbxcompose.mission_tests.model import Expectations, ExpectedStep, Trial
-from rbxcompose.mission_tests.record import Done, TrialRecord
-from rbxcompose.mission_tests.runner import run_trial
+from rbxcompose.tools.mission_tests.judge import judge
+from rbxcompose.tools.mission_tests.model import Expectations, ExpectedStep, Trial
+from rbxcompose.tools.mission_tests.record import Done, TrialRecord
+from rbxcompose.tools.mission_tests.runner import run_trial
 from tests.mission_tests.trying import Trying
 
 MANY = settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -55,7 +55,7 @@ def expecting(trial: Trial, record: TrialRecord) -> Trial:
     """Return a test that expects just what happened."""
     span = trial.span
     steps = tuple(
-        ExpectedStep(one.name, span, dict(one.arguments), one.ended, one.began, one.text) for one in record.steps
+        ExpectedStep(step.name, span, dict(step.arguments), step.ended, step.began, step.text) for step in record.steps
     )
     return replace(trial, expect=Expectations(record.outcome, span, trial.expect.until, steps))
 
@@ -102,7 +102,7 @@ def test_steps_are_found_just_when_they_are_a_subsequence(
 ) -> None:
     steps = tuple(ExpectedStep(name, NOWHERE, ended=ended) for name, ended in wanted)
     rest = iter(done)
-    is_there = all(one in rest for one in wanted)
+    is_there = all(pair in rest for pair in wanted)
     assert (judge(Expectations(steps=steps), recorded(done), {}) == []) == is_there
 
 

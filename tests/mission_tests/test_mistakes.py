@@ -6,10 +6,10 @@ import re
 
 import pytest
 
-from rbxcompose.finding_pages import body_of
-from rbxcompose.findings import FindingKind
-from rbxcompose.mission_tests import codes
+from rbxcompose.base.findings import FindingKind
+from rbxcompose.commands.finding_pages import body_of
 from rbxcompose.testing.golden import Golden
+from rbxcompose.tools.mission_tests import codes
 from tests.mission_tests.trying import Trying
 
 FINE = "mocks:\n  go_to:\n  recharge:\nexpect:\n  outcome: success\n"

@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.manifest.tree import NOWHERE
-from rbxcompose.mission_tests.mocked import Mocked
-from rbxcompose.mission_tests.model import Mock
-from rbxcompose.mission_tests.scope import agrees
+from rbxcompose.tools.mission_tests.model import Mock
+from rbxcompose.tools.mission_tests.runner import Mocked
+from rbxcompose.tools.mission_tests.scope import agrees
 
 TIMES = st.floats(0, 100)
 LOAD = Mock("load", NOWHERE, 2.0, outcome_at={1: "empty"}, fails_at=frozenset({3}), outcomes={"empty": "failure"})
@@ -36,7 +36,12 @@ def test_outcomes_go_by_the_number_of_the_call_and_count_as_declared() -> None:
     for time in range(4):
         mocked.start(1, "load", {}, float(time * 10))
         results += [result for _, result in mocked.ended(time * 10 + 2.0)]
-    assert [(one.success, one.outcome) for one in results] == [(False, "empty"), (True, ""), (False, ""), (True, "")]
+    assert [(result.success, result.outcome) for result in results] == [
+        (False, "empty"),
+        (True, ""),
+        (False, ""),
+        (True, ""),
+    ]
 
 
 def test_a_call_that_was_halted_never_ends_and_is_not_counted() -> None:

@@ -104,8 +104,8 @@ def test_a_pose_has_no_age_and_no_messages(trying: Trying) -> None:
 
 
 def test_two_runs_of_a_robot_leave_the_same_trace(trying: Trying) -> None:
-    one, other = trying.verdict(SHADOWED), trying.verdict(SHADOWED)
-    assert one.record.lines == other.record.lines
+    verdict, other = trying.verdict(SHADOWED), trying.verdict(SHADOWED)
+    assert verdict.record.lines == other.record.lines
 
 
 def test_a_message_comes_from_outside(trying: Trying) -> None:

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.config import Config
+from rbxcompose.base.config import Config
+from rbxcompose.commands.formats.text import render_text
+from rbxcompose.compiler.schema.documents import files
 from rbxcompose.manifest.test_file import EventModel, ExpectModel, MockModel, TrialFile
-from rbxcompose.mission_tests.reader import TrialReader
-from rbxcompose.mission_tests.runner import run_trial
-from rbxcompose.rendering.text import render_text
-from rbxcompose.schema.documents import files
+from rbxcompose.tools.mission_tests.reader import TrialReader
+from rbxcompose.tools.mission_tests.runner import run_trial
 from tests.docs.examples import ROOT, Block, page_blocks
 
 PAGE = (ROOT / "docs/language.md").read_text(encoding="utf-8").partition("### Tests of missions")[2]

@@ -7,11 +7,10 @@ from xml.etree import ElementTree
 
 import pytest
 
-from rbxcompose.mission_tests.coverage import Coverage
-from rbxcompose.mission_tests.junit import junit
-from rbxcompose.mission_tests.report import MOST_LINES, FileOutcome, Teller, as_json, coverage_text
-from rbxcompose.mission_tests.runner import Verdict
 from rbxcompose.testing.golden import Golden
+from rbxcompose.tools.mission_tests.coverage import Coverage
+from rbxcompose.tools.mission_tests.report import MOST_LINES, FileOutcome, Teller, as_json, coverage_text, junit
+from rbxcompose.tools.mission_tests.runner import Verdict
 from tests.mission_tests.trying import Trying
 
 WRONG = """
@@ -63,9 +62,11 @@ def covered(*verdicts: Verdict) -> Coverage:
 def test_a_failed_test_shows_its_trace_with_what_is_missing(trying: Trying, golden: Golden) -> None:
     verdict = trying.verdict(WRONG)
     assert not verdict.passed
-    one = outcome(verdict, trying)
+    file_outcome = outcome(verdict, trying)
     teller = Teller()
-    text = "\n".join([teller.line(one), teller.trace(verdict), teller.summary([one], covered(verdict)), ""])
+    text = "\n".join(
+        [teller.line(file_outcome), teller.trace(verdict), teller.summary([file_outcome], covered(verdict)), ""]
+    )
     golden.check("failed.txt", text.replace(f"{trying.folder}/", ""))
 
 
@@ -88,11 +89,11 @@ def test_coverage_names_the_ways_that_no_test_took(trying: Trying, golden: Golde
 
 
 def test_a_second_test_adds_to_what_is_covered(trying: Trying) -> None:
-    one, two = (
+    verdict, two = (
         trying.verdict(f"mocks:\n  go_to: {word}\nexpect:\n  for: 9 s\n", "states") for word in ("failure", "success")
     )
-    assert covered(one).taken | covered(two).taken == covered(one, two).taken
-    assert len(covered(one, two).taken) > max(len(covered(one).taken), len(covered(two).taken))
+    assert covered(verdict).taken | covered(two).taken == covered(verdict, two).taken
+    assert len(covered(verdict, two).taken) > max(len(covered(verdict).taken), len(covered(two).taken))
 
 
 def test_junit_tells_passed_failed_and_broken_apart(trying: Trying) -> None:

@@ -6,10 +6,10 @@ import textwrap
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from rbxcompose.mission_tests.model import Trial
-from rbxcompose.mission_tests.reader import TrialReader
-from rbxcompose.mission_tests.runner import Verdict, run_trial
-from rbxcompose.rendering.text import render_text
+from rbxcompose.commands.formats.text import render_text
+from rbxcompose.tools.mission_tests.model import Trial
+from rbxcompose.tools.mission_tests.reader import TrialReader
+from rbxcompose.tools.mission_tests.runner import Verdict, run_trial
 from tests.conftest import ROOT
 
 MISSIONS = {

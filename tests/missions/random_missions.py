@@ -9,7 +9,7 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from rbxcompose.findings import Report
+from rbxcompose.base.findings import Report
 from rbxcompose.missions.engine.world import PLAIN, Settings
 from rbxcompose.missions.language.reader import read_program
 from rbxcompose.missions.program.program import Program, RobotNames

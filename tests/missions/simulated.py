@@ -6,9 +6,10 @@ import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from rbxcompose.config import Place
-from rbxcompose.expressions.types import FLAG, POSE, TEXT, TYPES, quantity_of
-from rbxcompose.expressions.values import NOT_ARRIVED, NotArrived, Value
+from rbxcompose.base.config import Place
+from rbxcompose.base.expressions.types import FLAG, POSE, TEXT, TYPES, quantity_of
+from rbxcompose.base.expressions.values import NOT_ARRIVED, NotArrived, Value
+from rbxcompose.base.units import LENGTH
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.missions.engine.engine import Engine
@@ -16,10 +17,8 @@ from rbxcompose.missions.engine.events import MissionEnded, MissionEvent
 from rbxcompose.missions.engine.story import MissionStory
 from rbxcompose.missions.engine.world import PLAIN, Settings
 from rbxcompose.missions.program.program import Program, RobotNames, Skill
-from rbxcompose.missions.program.results import Result
-from rbxcompose.missions.program.statuses import IDLE, NAMES, RUNNING
+from rbxcompose.missions.program.statuses import IDLE, NAMES, RUNNING, Result
 from rbxcompose.testing import compile_mission
-from rbxcompose.units import LENGTH
 
 PLACES = {name: Place(name, float(x), 0.0, 0.0) for x, name in enumerate(("dock", "kitchen", "corner_1", "corner_2"))}
 GO_TO = Skill("go_to", {"pose": POSE, "tolerance": quantity_of(LENGTH)}, "pose", frozenset({"pose"}), "base")
@@ -87,7 +86,7 @@ class Simulated:
         self.told: list[str] = []
         self.story = MissionStory("test", SKILLS)
         self.changes: list[tuple[float, Callable[[], None]]] = []
-        defaults = {name: one.default.value for name, one in self.program.inputs.items() if one.default}
+        defaults = {name: input_.default.value for name, input_ in self.program.inputs.items() if input_.default}
         self.engine = Engine(self.program, self.robot, {**defaults, **self.inputs}, self, self.settings)
 
     def at(self, time: float, change: Callable[[], None]) -> None:
@@ -197,6 +196,6 @@ def simulate(text: str, used: Mapping[str, str] | None = None, /, **settings: ob
 def robot_with(used: Mapping[str, str]) -> RobotNames:
     """Return the names of a robot with missions of these texts; each may use those before it."""
     robot = ROBOT
-    for name, one in used.items():
-        robot = replace(robot, missions={**robot.missions, name: program_of(one, robot)})
+    for name, text in used.items():
+        robot = replace(robot, missions={**robot.missions, name: program_of(text, robot)})
     return robot

@@ -6,8 +6,8 @@ import re
 
 import pytest
 
+from rbxcompose.commands.formats.text import render_text
 from rbxcompose.missions.slips.values import NUMBERS
-from rbxcompose.rendering.text import render_text
 from rbxcompose.testing.golden import Golden
 from tests.missions.test_slips import FILE, cured, report_of
 

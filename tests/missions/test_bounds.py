@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.expressions.evaluate import holds
-from rbxcompose.expressions.parser import parse
+from rbxcompose.base.expressions.evaluate import holds
+from rbxcompose.base.expressions.parser import parse
 from rbxcompose.missions.analysis.bounds import Bounds, truth
 
 KNOWN = {"a": Bounds(0.0, 1.0), "b": Bounds(-3.0, 3.0)}

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from rbxcompose.expressions.types import choice_of
+from rbxcompose.base.expressions.types import choice_of
 from rbxcompose.missions.engine.events import SkillStarted
 from rbxcompose.missions.engine.story import MissionStory
 from rbxcompose.missions.program.program import Skill

@@ -106,6 +106,8 @@ def test_every_finding_about_a_mission_tells_the_cure(text: str, cures: list[str
 
 def test_what_was_saved_is_a_map_so_it_is_no_number(tmp_path: Path) -> None:
     text = f"{HEAD}do:\n  - {{recharge: {{}}, save: got}}\n  - check: $got > 1\n  - check: $got.level > 1\n"
-    (finding,) = (one for one in check_text(ROBOT, tmp_path, others={"mission.yaml": text}).compilation.report)
+    (finding,) = (
+        candidate for candidate in check_text(ROBOT, tmp_path, others={"mission.yaml": text}).compilation.report
+    )
     assert (finding.code, finding.message) == ("RBX4106", "this must be a number; it is a map")
     assert finding.help == "read an entry of it: '$got.NAME'"

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from rbxcompose.expressions.values import Value
-from rbxcompose.missions.engine.data_edits import _removed
-from rbxcompose.missions.program.results import NodeFailed
+from rbxcompose.base.expressions.values import Value
+from rbxcompose.missions.engine.instant_actions import _removed
+from rbxcompose.missions.program.statuses import NodeFailed
 
 LISTS: Value = [["a", "b"], ["c"]]
 

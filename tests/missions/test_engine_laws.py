@@ -148,7 +148,7 @@ def test_the_order_of_branches_never_changes_the_result(
 ) -> None:
     found = set()
     for order in itertools.permutations(branches):
-        steps = "".join(f"    - {one}\n" for one in order)
+        steps = "".join(f"    - {item}\n" for item in order)
         text = f"do:\n  parallel:\n{steps}  succeed_when: {succeed_when}\n  fail_when: {fail_when}\n"
         simulated = simulate(text, takes={"b": 2.0, "c": 0.5}, fails={"b": failing, "c": failing})
         found.add((simulated.advance(20), simulated.now, tuple(sorted(skills(simulated)))))

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from rbxcompose.expressions.types import FLAG, TYPES
+from rbxcompose.base.expressions.types import FLAG, TYPES
 from tests.missions.simulated import ROBOT, Simulated, program_of
 from tests.missions.test_composites import skills
 

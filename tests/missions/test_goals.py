@@ -6,9 +6,9 @@ import math
 
 import pytest
 
-from rbxcompose.config import Place
-from rbxcompose.expressions.types import POSE, TEXT, TYPES
-from rbxcompose.geometry import Pose2
+from rbxcompose.base.config import Place
+from rbxcompose.base.expressions.types import POSE, TEXT, TYPES
+from rbxcompose.base.geometry import Pose2
 from rbxcompose.missions.program.goals import goal_of, message_of, skill_of, values_of
 from rbxcompose.msgs.nav2_msgs import NavigateToPose, Wait
 from rbxcompose.msgs.rbxcompose_msgs import Recharge

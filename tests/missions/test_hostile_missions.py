@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.findings import Report, Span
+from rbxcompose.base.findings import Report, Span
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions.analysis.check_runner import check_program
 from rbxcompose.missions.language.reader import KEYS, read_program

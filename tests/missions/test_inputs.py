@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from rbxcompose.expressions.values import Value
-from rbxcompose.findings import Finding
+from rbxcompose.base.expressions.values import Value
+from rbxcompose.base.findings import Finding
 from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.missions.engine.inputs import bind_inputs
 from tests.missions.simulated import PLACES, program_of, tree

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from rbxcompose.expressions.parser import parse
-from rbxcompose.missions.engine.condition_watches import Watched
-from rbxcompose.missions.engine.world import Settings
+from rbxcompose.base.expressions.parser import parse
+from rbxcompose.missions.engine.world import Settings, Watched
 from tests.missions.simulated import PLACES, simulate
 from tests.missions.test_composites import fails, skills
 
@@ -82,7 +81,7 @@ def test_a_random_order_is_drawn_again_at_each_start_and_is_the_same_for_the_sam
     first = orders[0]
     assert orders[1] == first != orders[2]
     rounds = ["".join(first[start : start + 3]) for start in range(0, 18, 3)]
-    assert {"".join(sorted(one)) for one in rounds} == {"abc"}
+    assert {"".join(sorted(round_)) for round_ in rounds} == {"abc"}
     assert len(set(rounds)) > 1
 
 

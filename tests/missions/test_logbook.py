@@ -12,9 +12,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.executive.requests import PauseMission, ResumeMission
 from rbxcompose.missions.engine.log_replay import ReplayBudget, ReplayError, replay
 from rbxcompose.missions.engine.logbook import INPUTS
+from rbxcompose.missions.execution.requests import PauseMission, ResumeMission
 from rbxcompose.msgs.rbxcompose_msgs import Recharge
 from rbxcompose.sdk import Outcome
 from tests.executive.fake_robot import Robot
@@ -73,24 +73,24 @@ def recorded() -> tuple[Robot, list[dict[str, Any]]]:
     robot.go_to.end(Outcome.ABORTED, "stuck")
     robot.advance(20.0)
     assert robot.mission.missions.runs["test"].is_over, robot.lines
-    return robot, [json.loads(json.dumps(one)) for one in robot.mission.missions.since(0).records]
+    return robot, [json.loads(json.dumps(record)) for record in robot.mission.missions.since(0).records]
 
 
 def told(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    return [{key: value for key, value in one.items() if key not in ("mission", "run")} for one in records]
+    return [{key: value for key, value in record.items() if key not in ("mission", "run")} for record in records]
 
 
 def test_a_replay_of_a_log_tells_the_same() -> None:
     robot, records = recorded()
-    before = [one for one in records if one["event"] not in INPUTS]
+    before = [record for record in records if record["event"] not in INPUTS]
     again = replay(records, robot.mission.config.programs["test"], robot.mission.config.names)
     assert told(again) == told(before)
-    assert {"interrupt_started", "reported", "published", "mission_ended"} <= {one["event"] for one in again}
+    assert {"interrupt_started", "reported", "published", "mission_ended"} <= {record["event"] for record in again}
 
 
 def test_what_came_in_is_not_published_but_what_was_done_is() -> None:
     robot, records = recorded()
-    assert robot.published == [one for one in records if one["event"] not in INPUTS]
+    assert robot.published == [record for record in records if record["event"] not in INPUTS]
 
 
 def test_a_log_without_its_beginning_cannot_be_replayed() -> None:
@@ -130,7 +130,9 @@ def test_a_log_with_anything_changed_is_replayed_or_refused(data: st.DataObject)
 
 def change(records: list[Any], data: st.DataObject) -> None:
     """Replace, remove or double something: a record that matters, or anything within one."""
-    inputs = [at for at, one in enumerate(records) if isinstance(one, dict) and one.get("event") in list(INPUTS)]
+    inputs = [
+        at for at, record in enumerate(records) if isinstance(record, dict) and record.get("event") in list(INPUTS)
+    ]
     place: Any = records
     key: Any = data.draw(st.sampled_from(inputs or [0]))
     while isinstance(place[key], dict | list) and place[key] and data.draw(st.booleans() | st.just(True)):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from rbxcompose.findings import Report
-from rbxcompose.geometry import Pose2
+from rbxcompose.base.findings import Report
+from rbxcompose.base.geometry import Pose2
 from rbxcompose.missions.analysis.check_runner import check_program
 from rbxcompose.missions.engine.world import Settings
 from rbxcompose.missions.language.reader import read_program

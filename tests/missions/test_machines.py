@@ -34,7 +34,7 @@ machine:
 def ways(simulated: Simulated) -> list[str]:
     """Return the transitions that were made."""
     events = (event for _, event in simulated.events)
-    return [f"{one.state}-{one.outcome}-{one.to}" for one in events if isinstance(one, Transition)]
+    return [f"{event.state}-{event.outcome}-{event.to}" for event in events if isinstance(event, Transition)]
 
 
 def logged(simulated: Simulated) -> list[str]:

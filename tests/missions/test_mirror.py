@@ -8,7 +8,7 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.missions.view.mirror import Mirror, joined, status_list
+from rbxcompose.missions.view.replica import Mirror, joined, status_list
 
 NOTHING: dict[str, Any] = {"statuses": {}, "data": {}}
 

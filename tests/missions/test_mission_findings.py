@@ -6,15 +6,15 @@ import re
 
 import pytest
 
-from rbxcompose.finding_pages import body_of
-from rbxcompose.findings import KINDS, Finding, FindingKind, Report
+from rbxcompose.base.findings import KINDS, Finding, FindingKind, Report
+from rbxcompose.commands.finding_pages import body_of
+from rbxcompose.commands.formats.text import render_text
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.missions import codes
 from rbxcompose.missions.analysis.check_runner import check_program
 from rbxcompose.missions.language.reader import read_program
 from rbxcompose.missions.program.registry import kinds
-from rbxcompose.rendering.text import render_text
 from rbxcompose.testing.golden import Golden
 from tests.missions.simulated import ROBOT, tree
 

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import pytest
 
-from rbxcompose.findings import Report, Span
+from rbxcompose.base.findings import Report, Span
 from rbxcompose.manifest.tree import ScalarNode
-from rbxcompose.missions.analysis import claims
+from rbxcompose.missions.analysis import examined as claims
 from rbxcompose.missions.analysis.check_runner import check_program
-from rbxcompose.missions.analysis.endings import Ending
+from rbxcompose.missions.analysis.examined import Ending
 from rbxcompose.missions.analysis.facts import Constants, constants_of
 from rbxcompose.missions.analysis.uses import TOO_MUCH
 from rbxcompose.missions.language import reader
-from rbxcompose.missions.language.budget import MOST_HELD, MOST_WRITTEN, Budget, operators
-from rbxcompose.missions.language.reader import read_program
+from rbxcompose.missions.language.reader import MOST_HELD, MOST_WRITTEN, Budget, operators, read_program
 from rbxcompose.missions.program.outcomes import ALWAYS_FAILS, Outcomes
 from rbxcompose.missions.program.program import Program, RobotNames
 from tests.missions.simulated import PLACES, SKILLS, VALUES, program_of, tree
@@ -78,7 +77,7 @@ def test_what_never_changes_is_found_once_for_all_loops(monkeypatch: pytest.Monk
         found.append(one)
         return constants_of(one, inputs)
 
-    monkeypatch.setattr("rbxcompose.missions.analysis.endings.constants_of", counted)
+    monkeypatch.setattr("rbxcompose.missions.analysis.examined.constants_of", counted)
     check_program(program, RobotNames(VALUES, PLACES, SKILLS))
     assert len(found) == 1
 
@@ -88,7 +87,7 @@ def test_interrupts_that_restart_the_same_share_what_they_restart() -> None:
     rows = "".join(f"  i{n}: {{when: $battery < {n} %, afterwards: {{restart: at}}}}\n" for n in range(3))
     first, *others = program_of(f"do:\n{loops}interrupts:\n{rows}").interrupts
     assert [target.is_round for target in first.targets] == [True, True, True]
-    assert all(one.targets is first.targets for one in others)
+    assert all(other.targets is first.targets for other in others)
 
 
 def test_the_nodes_that_each_run_may_get_are_limited_and_told_once(monkeypatch: pytest.MonkeyPatch) -> None:

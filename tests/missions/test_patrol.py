@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.config import Place
+from rbxcompose.base.config import Place
 from tests.missions.simulated import PLACES, Simulated, program_of
 from tests.missions.test_composites import skills
 

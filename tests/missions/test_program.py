@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rbxcompose.expressions.types import TYPES
+from rbxcompose.base.expressions.types import TYPES
 from tests.missions.simulated import program_of
 
 PATROL = Path(__file__).parents[2] / "missions" / "patrol.yaml"
@@ -20,7 +20,9 @@ def test_the_patrol_is_a_flat_tuple_of_nodes_in_the_order_of_the_text() -> None:
         (4, "interrupts.battery_low.sequence.go_to.0", (), 5),
         (5, "interrupts.battery_low.sequence.recharge.1", (), 6),
     ]
-    assert {name: (one.type, one.default and one.default.value) for name, one in program.inputs.items()} == {
+    assert {
+        name: (input_.type, input_.default and input_.default.value) for name, input_ in program.inputs.items()
+    } == {
         "rounds": (TYPES["count"], 2.0),
         "low": (TYPES["ratio"], 0.5),
     }

@@ -9,8 +9,7 @@ from typing import Any
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.missions.view.mirror import Mirror
-from rbxcompose.missions.view.replica import MOST_WAITING, Replica
+from rbxcompose.missions.view.replica import MOST_WAITING, Mirror, Replica
 
 
 class Sender:
@@ -70,7 +69,7 @@ def test_it_ends_up_with_what_is_there(steps: list[tuple[str, int, int]]) -> Non
         replica.answered(whole)
     while replica.heard(sender.news()):
         replica.answered(sender.whole())
-    assert [replica.seen["statuses"][one] for one in range(4)] == sender.statuses
+    assert [replica.seen["statuses"][index] for index in range(4)] == sender.statuses
     assert replica.seen["data"] == sender.data
     assert replica.seen["picture"] == "p"
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from rbxcompose.config import Place
-from rbxcompose.expressions.types import TYPES
-from rbxcompose.expressions.values import Value
+from rbxcompose.base.config import Place
+from rbxcompose.base.expressions.types import TYPES
+from rbxcompose.base.expressions.values import Value
 from rbxcompose.missions.engine.value_text import show, show_briefly
 
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import pytest
 
-from rbxcompose.edits import apply, safe_fixes
-from rbxcompose.findings import Report
+from rbxcompose.base.findings import Report
+from rbxcompose.base.fixes import apply, safe_fixes
+from rbxcompose.commands.formats.text import render_text
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.missions.analysis.check_runner import check_program
 from rbxcompose.missions.language.reader import read_program
 from rbxcompose.missions.slips.settings import FOREIGN, STEPS
 from rbxcompose.missions.slips.values import ENDLESS, FLAGS
-from rbxcompose.rendering.text import render_text
 from rbxcompose.testing.golden import Golden
 from tests.missions.simulated import ROBOT
 
@@ -104,17 +104,17 @@ def test_what_may_mean_several_things_is_left_alone(unclear: str) -> None:
 
 def test_a_skill_of_the_robot_is_a_step_whatever_its_value_looks_like() -> None:
     text = "do:\n  - go_to: dock\n    {}: 5 s\n"
-    assert [one.code for one in report_of(text.format("gentle"))] == ["RBX4101"]
-    assert [one.code for one in report_of(text.format("say"))] == ["RBX4108"]
+    assert [finding.code for finding in report_of(text.format("gentle"))] == ["RBX4101"]
+    assert [finding.code for finding in report_of(text.format("say"))] == ["RBX4108"]
 
 
 def test_words_of_others_are_none_of_ours_and_stand_for_one_of_ours() -> None:
     settings = {"then", "else", *ROBOT.skills, *STEPS}
     for word, ours in FOREIGN.items():
         text = f"do:\n  - if: $door\n    then: a\n    {word}: $door\n"
-        helps = [one.help for one in report_of(text) if one.code == "RBX4101"]
+        helps = [finding.help for finding in report_of(text) if finding.code == "RBX4101"]
         assert word not in settings
-        assert any(ours in one for one in helps) or word == "if", word
+        assert any(ours in help_ for help_ in helps) or word == "if", word
     assert set(FLAGS.values()) == {"true", "false"}
     assert set(ENDLESS.values()) == {"forever"}
 

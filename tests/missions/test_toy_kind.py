@@ -6,11 +6,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from rbxcompose.findings import Report
-from rbxcompose.inspection.mission_html import mission_html
-from rbxcompose.inspection.mission_text import mission_text
-from rbxcompose.mission_tests.coverage import Coverage, SeenWays
-from rbxcompose.mission_tests.explorer import ExplorationLimits, explore
+from rbxcompose.base.findings import Report
+from rbxcompose.compiler.schema.mission import schemas_of_keys
 from rbxcompose.missions.analysis.check_runner import check_program
 from rbxcompose.missions.engine.snapshot import restore, save
 from rbxcompose.missions.engine.world import Settings
@@ -45,7 +42,10 @@ from rbxcompose.missions.sdk import (
     started,
 )
 from rbxcompose.missions.view.picture import picture_of
-from rbxcompose.schema.mission import schemas_of_keys
+from rbxcompose.tools.inspection.mission_html import mission_html
+from rbxcompose.tools.inspection.mission_text import mission_text
+from rbxcompose.tools.mission_tests.coverage import Coverage, SeenWays
+from rbxcompose.tools.mission_tests.explorer import ExplorationLimits, explore
 from tests.missions.simulated import ROBOT, Simulated, program_of, tree
 
 TEXT = "do: {persist: 2, gap: 1 s, do: {go_to: dock}, timeout: 1 min}"
@@ -187,7 +187,7 @@ def test_it_has_a_schema() -> None:
 
 
 def test_its_keys_are_data() -> None:
-    told = [(key, one.takes, one.is_required, one.least) for key, one in kinds()["persist"].fields.items()]
+    told = [(key, field.takes, field.is_required, field.least) for key, field in kinds()["persist"].fields.items()]
     assert told == [("persist", "count", True, 1), ("do", "step", True, None), ("gap", "duration", True, 0)]
 
 

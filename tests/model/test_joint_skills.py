@@ -8,12 +8,12 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.cli import main as command
-from rbxcompose.expressions.types import TYPES
-from rbxcompose.lsp.document import Document
-from rbxcompose.lsp.hover import describe
-from rbxcompose.missions.program.sources import SkillWay
+from rbxcompose.base.expressions.types import TYPES
+from rbxcompose.commands import main as command
+from rbxcompose.missions.sources import SkillWay
 from rbxcompose.testing.manifests import Checked, check_text
+from rbxcompose.tools.lsp.answers import describe
+from rbxcompose.tools.lsp.document import Document
 
 LIMIT = '<limit lower="-1" upper="1" effort="1" velocity="2"/>'
 BODY = f"""<robot name="head">
@@ -93,8 +93,10 @@ def test_a_part_may_promise_one(skill: str, codes: list[str], tmp_path: Path) ->
 
 def test_it_is_listed_with_an_example(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     checked(tmp_path, "{lift: 3 cm}")
-    [head] = [one for one in told(capsys, "mission", "skills", str(tmp_path), "--json") if one["name"] == "head"]
-    assert [(one["name"], one["type"], one["needed"], one["main"]) for one in head["arguments"]] == [
+    [head] = [entry for entry in told(capsys, "mission", "skills", str(tmp_path), "--json") if entry["name"] == "head"]
+    assert [
+        (argument["name"], argument["type"], argument["needed"], argument["main"]) for argument in head["arguments"]
+    ] == [
         ("lift", "a length", False, False),
         ("pan", "an angle", False, False),
         ("duration", "a time", False, False),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rbxcompose.compiler import Compilation, compile_robot
+from rbxcompose.compiler.compile import Compilation, compile_robot
 
 ROBOT = """
 rbx: 1
@@ -38,7 +38,7 @@ def compiled(folder: Path, **missions: str) -> Compilation:
 
 
 def told(out: Compilation, code: str) -> list[str]:
-    return [one.message for one in out.report if one.code == code]
+    return [finding.message for finding in out.report if finding.code == code]
 
 
 def test_missions_can_use_each_other_whatever_their_order(tmp_path: Path) -> None:
@@ -56,7 +56,7 @@ def test_a_circle_is_told_once_with_each_of_its_steps(tmp_path: Path) -> None:
         d="do:\n  use: a\n",
     )
     assert told(out, "RBX4146") == ["missions use each other in a circle: a -> b -> c -> a"]
-    [finding] = [one for one in out.report if one.code == "RBX4146"]
+    [finding] = [candidate for candidate in out.report if candidate.code == "RBX4146"]
     assert [one.message for one in finding.related] == ["'b' uses 'c'", "'c' uses 'a'"]
     assert [one.code for one in out.report if one.severity.name == "ERROR"] == ["RBX4146"]
 
@@ -87,7 +87,7 @@ def test_topics_and_services_of_the_robot_can_be_used(tmp_path: Path) -> None:
     text = "do:\n  - publish: /diagnostics\n  - call: set_battery_level\n"
     out = compiled(tmp_path, a=text)
     assert out.plan is not None, list(out.report)
-    ports = {wire.port for one in out.plan.instances if one.name == "mission" for wire in one.wires}
+    ports = {wire.port for instance in out.plan.instances if instance.name == "mission" for wire in instance.wires}
     assert {"publishes_diagnostics", "calls_set_battery_level"} <= ports
 
 

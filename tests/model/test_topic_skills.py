@@ -7,20 +7,20 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.inspection.diagram import diagram_of
-from rbxcompose.inspection.port import why_port
-from rbxcompose.lsp.definition import define
-from rbxcompose.lsp.document import Document
+from rbxcompose.compiler.model.robot import Robot
+from rbxcompose.compiler.schema.mission import skills_of
 from rbxcompose.missions.program.goals import topic_skill
-from rbxcompose.missions.program.sources import Orders, OrderTopic, SkillWay
-from rbxcompose.model.robot import Robot
+from rbxcompose.missions.sources import Orders, OrderTopic, SkillWay
 from rbxcompose.msgs.geometry_msgs import PoseStamped, Twist
 from rbxcompose.msgs.std_msgs import Bool, Empty, Float64, String
 from rbxcompose.msgs.std_srvs import SetBool
-from rbxcompose.qos import Qos
-from rbxcompose.schema.mission import skills_of
 from rbxcompose.sdk import Component, Config, In, Out, ServesTopic, component
+from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import check_text
+from rbxcompose.tools.inspection.diagram import diagram_of
+from rbxcompose.tools.inspection.why import why_port
+from rbxcompose.tools.lsp.answers import define
+from rbxcompose.tools.lsp.document import Document
 from tests.executive.toy_gripper import GripEnd, Gripper, GripperConfig
 
 ROBOT = """
@@ -184,5 +184,5 @@ def test_two_of_one_name_are_told(tmp_path: Path) -> None:
 
 def test_two_that_take_the_same_orders_are_told_if_they_tell_ends(tmp_path: Path) -> None:
     text = ROBOT.partition("missions")[0] + "  spare: {type: toy_gripper}\n"
-    found = [one.message for one in check_text(text, tmp_path).compilation.report if one.code == "RBX3008"]
+    found = [finding.message for finding in check_text(text, tmp_path).compilation.report if finding.code == "RBX3008"]
     assert found == [f"'spare' and 'gripper' both serve '/{name}'" for name in ("grip", "press")]  # not `beep`

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.compiler import compile_robot
-from rbxcompose.model.wires import PortEnd
+from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.compiler.model.robot import PortEnd
 
 HEAD = "rbx: 1\nkind: Robot\nname: many\ncomponents:\n  base: {type: diff_drive_sim}\nmuxes:\n"
 MUX = "  m{}: {{inputs: {{a: {{priority: 1, timeout: 1 s}}}}}}\n"

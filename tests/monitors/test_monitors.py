@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.components.network_monitor import NetworkMonitor, Traffic
-from rbxcompose.levels import Level
-from rbxcompose.monitors.usage import Usage
+from rbxcompose.base.levels import Level
+from rbxcompose.domains.diagnostics.components.network_monitor import NetworkMonitor, Traffic
+from rbxcompose.domains.diagnostics.monitors import Usage
 from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.testing.bench import Bench, instance
 
@@ -65,7 +65,7 @@ def test_an_interface_is_told_that_is_absent_or_that_loses_packets() -> None:
     bench.advance(0.9)
     monitor.judge(Traffic(2**20, 2**21, 105), 1.0, 100)
     bench.advance(0.05)
-    told = {(one.level, one.message) for one in found}
+    told = {(status.level, status.message) for status in found}
     assert (Level.WARN, "100 faulty packets a second") in told
     real = measuring("network_monitor", interface="lo")
     loopback = real.statuses("one")

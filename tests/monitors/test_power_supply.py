@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.monitors.power_supply import Supply, batteries
+from rbxcompose.domains.diagnostics.monitors import Supply, batteries
 
 
 def made(folder: Path, name: str, **properties: str) -> None:

@@ -6,17 +6,17 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
-from rbxcompose.arm_config import ArmConfig, ArmWorks
-from rbxcompose.arm_goals import goal_of
-from rbxcompose.arm_hand import hand_task
-from rbxcompose.compiler import compile_robot
-from rbxcompose.geometry import Quaternion, Transform3
-from rbxcompose.motion.arm_task import ArmTask
-from rbxcompose.motion.hand_task import Gripped, HandTask
-from rbxcompose.motion.parametrisation import Trajectory
-from rbxcompose.motion.scene import PlacedObject, PlanningScene
+from rbxcompose.base.geometry import Quaternion, Transform3
+from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.domains.arms.arm_config import ArmConfig, ArmWorks
+from rbxcompose.domains.arms.goals import goal_of
+from rbxcompose.domains.arms.hand import hand_task
+from rbxcompose.domains.arms.motion.arm_task import ArmTask
+from rbxcompose.domains.arms.motion.hand_task import Gripped, HandTask
+from rbxcompose.domains.arms.motion.parametrisation import Trajectory
+from rbxcompose.domains.arms.motion.scene import PlacedObject, PlanningScene
+from rbxcompose.domains.arms.sections.scene import scene
 from rbxcompose.msgs.rbxcompose_msgs import MoveArm, PickObject, PlaceObject
-from rbxcompose.sections.scene import scene
 from tests.conftest import ROOT
 
 FINGER = "right_gripper_finger_joint"
@@ -30,7 +30,7 @@ def made() -> tuple[ArmConfig, tuple[PlacedObject, ...], ArmWorks]:
     assert compiled.robot
     description = compiled.robot.manifest.body
     assert description
-    configs: dict[str, Any] = {one.type: one.config for one in compiled.plan.instances}
+    configs: dict[str, Any] = {instance.type: instance.config for instance in compiled.plan.instances}
     objects = compiled.robot.manifest.contents.of(scene).on(description.body)
     return configs["arm"], objects, ArmWorks(configs["arm"], lambda: 0.0)
 
@@ -41,7 +41,8 @@ class HandBench:
     def __init__(self, *further: PlacedObject, without: tuple[str, ...] = ()) -> None:
         self.config, objects, self.works = made()
         self.scene = PlanningScene(
-            self.works.kinematics.body, [*(one for one in objects if one.name not in without), *further]
+            self.works.kinematics.body,
+            [*(placed_object for placed_object in objects if placed_object.name not in without), *further],
         )
         self.now, self.problem, self.is_ready, self.poses = 0.0, "", True, self.config.poses
         self.measured = dict.fromkeys((*self.config.joints, FINGER), (0.0, 0.0))
@@ -119,5 +120,5 @@ class HandBench:
 
     def place_of(self, name: str) -> tuple[float, float, float]:
         """Return where an object is in the root's frame [m]."""
-        one = self.scene.objects[name]
-        return self._links()[one.link].compose(one.pose).translation
+        placed_object = self.scene.objects[name]
+        return self._links()[placed_object.link].compose(placed_object.pose).translation

@@ -6,9 +6,9 @@ import math
 
 from hypothesis import strategies as st
 
-from rbxcompose.body.model import Geometry
-from rbxcompose.geometry import Transform3, quaternion_from_rpy
-from rbxcompose.motion.scene import PlacedObject, ScenePiece
+from rbxcompose.base.geometry import Transform3, quaternion_from_rpy
+from rbxcompose.domains.arms.motion.scene import PlacedObject, ScenePiece
+from rbxcompose.domains.body.model import Geometry
 
 TETRAHEDRON = (0.0, 0.0, 0.0, 0.2, 0.0, 0.0, 0.0, 0.2, 0.0, 0.0, 0.0, 0.2)
 FACES = (0, 2, 1, 0, 1, 3, 1, 2, 3, 0, 3, 2)

@@ -9,18 +9,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rbxcompose.body.model import Geometry
-from rbxcompose.geometry import Transform3
-from rbxcompose.motion.arm_goal import ArmGoal
-from rbxcompose.motion.arm_task import SETTLING, ArmTask
-from rbxcompose.motion.collisions import MeshChecker, adjacent_pairs
-from rbxcompose.motion.inverse_kinematics import PoseTarget, SolverSettings
-from rbxcompose.motion.kept import Keep
-from rbxcompose.motion.parametrisation import Trajectory
-from rbxcompose.motion.reasons import MotionReason
-from rbxcompose.motion.scene import PlacedObject
-from rbxcompose.motion.tip_path import WayPoint
-from rbxcompose.motion.trace_planner import TraceWish
+from rbxcompose.base.geometry import Transform3
+from rbxcompose.domains.arms.motion.arm_task import SETTLING, ArmGoal, ArmTask
+from rbxcompose.domains.arms.motion.collisions import MeshChecker, adjacent_pairs
+from rbxcompose.domains.arms.motion.inverse_kinematics import PoseTarget, SolverSettings
+from rbxcompose.domains.arms.motion.kept import Keep
+from rbxcompose.domains.arms.motion.parametrisation import Trajectory
+from rbxcompose.domains.arms.motion.scene import PlacedObject
+from rbxcompose.domains.arms.motion.trace_planner import TraceWish, WayPoint
+from rbxcompose.domains.arms.reasons import MotionReason
+from rbxcompose.domains.body.model import Geometry
 from tests.motion.toy_arm import kinematics, planner
 
 KINEMATICS, PLANNER = kinematics(), planner()
@@ -210,8 +208,8 @@ def test_a_motion_stops_for_an_object_that_comes_into_its_way() -> None:
     at_end = KINEMATICS.tip_pose(site.sent[0][0].positions[-1])
     block = PlacedObject("block", Geometry("box", (0.1, 0.1, 0.1)), "ground", at_end)
     far = replace(block, pose=Transform3((-1.0, 0.0, 1.0)))
-    for one, stops in ((far, 0), (block, 1), (block, 1)):
-        used.checker = MeshChecker(KINEMATICS, {}, adjacent_pairs(KINEMATICS.body), [one])
+    for placed_object, stops in ((far, 0), (block, 1), (block, 1)):
+        used.checker = MeshChecker(KINEMATICS, {}, adjacent_pairs(KINEMATICS.body), [placed_object])
         task.look_again()
         assert site.stops == stops
     site.sent[0][1]("its trajectory was canceled", True)
@@ -269,6 +267,6 @@ def test_a_way_of_the_tip_is_planned_and_followed_and_tells_its_share() -> None:
     site = Site()
     way = TraceWish((WayPoint(Transform3((-0.1, 0.0, 0.0))),), relative=True, any_orientation=True)
     task = begun(site, ArmGoal(trace=way))
-    before, after = (np.array(KINEMATICS.tip_pose(site.sent[0][0].positions[one]).translation) for one in (0, -1))
+    before, after = (np.array(KINEMATICS.tip_pose(site.sent[0][0].positions[number]).translation) for number in (0, -1))
     assert np.allclose(after - before, (-0.1, 0.0, 0.0), atol=1e-3)
     assert task.share == 1.0

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rbxcompose.body.model import Geometry
-from rbxcompose.motion.coal_shapes import coal_shape
-from rbxcompose.motion.second_checker import SecondChecker
-from rbxcompose.motion.sphere_model import triangles_of
+from rbxcompose.domains.arms.motion.collisions import coal_shape
+from rbxcompose.domains.arms.motion.second_checker import SecondChecker
+from rbxcompose.domains.arms.motion.sphere_model import triangles_of
+from rbxcompose.domains.body.model import Geometry
 from tests.body.kinematics import description_of
 
 Array = NDArray[np.float64]
@@ -51,7 +51,7 @@ def test_a_mesh_of_several_materials_has_the_triangles_of_its_file(name: str, tm
     (tmp_path / name).write_text(text)
     found = triangles_of(coal_shape(Geometry("mesh", (2.0, 1.0, 1.0), name), {name: tmp_path / name}))
     wanted = np.array(CORNERS)[np.array(PIECES)] * (2.0 * unit, unit, unit)
-    assert {_key(one) for one in found} == {_key(one) for one in wanted}
+    assert {_key(triangle) for triangle in found} == {_key(item) for item in wanted}
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -61,7 +61,7 @@ def test_the_second_examination_has_them_too(name: str, tmp_path: Path) -> None:
     checker = SecondChecker(replace(description_of(ROBOT.format(name)), meshes={name: tmp_path / name}), ("j",), ())
     heights = np.array([-6.0, -5.0, -2.5, 0.0, 1.0]) * unit
     away = np.min(np.abs(heights[:, None] + np.array([0.0, 5.0]) * unit), axis=1)
-    assert [checker.is_free(np.array([one])) for one in heights] == (away > 0.1).tolist()
+    assert [checker.is_free(np.array([height])) for height in heights] == (away > 0.1).tolist()
 
 
 def test_a_mesh_without_a_place_is_refused_by_name(tmp_path: Path) -> None:
@@ -79,6 +79,8 @@ def test_a_binary_mesh_without_a_place_is_refused_by_name_too(tmp_path: Path) ->
     numbers[:, 3:] = np.eye(3).flatten()
     numbers[1, 5] = np.nan
     path = tmp_path / "far.stl"
-    path.write_bytes(bytes(80) + (2).to_bytes(4, "little") + b"".join(one.tobytes() + bytes(2) for one in numbers))
+    path.write_bytes(
+        bytes(80) + (2).to_bytes(4, "little") + b"".join(number.tobytes() + bytes(2) for number in numbers)
+    )
     with pytest.raises(ValueError, match=r"far\.stl' cannot be read: a corner of it is no finite point"):
         coal_shape(Geometry("mesh", file=str(path)), {})

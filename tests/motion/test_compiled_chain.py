@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.motion.compiled_chain import chain_of, link_frames
-from rbxcompose.motion.numba_cache import cache_folder
+from rbxcompose.domains.arms.motion.compiled_collisions import chain_of, link_frames
+from rbxcompose.domains.arms.motion.numba_cache import cache_folder
 from tests.body.kinematics import matrix
 from tests.motion.test_inverse_kinematics import ARM, DESCRIPTION, GROUP, SPACE
 

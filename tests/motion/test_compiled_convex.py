@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from rbxcompose.body.model import Geometry
-from rbxcompose.motion.coal_shapes import coal_shape
-from rbxcompose.motion.compiled_convex import BOX, CYLINDER, HALF_SPACE, TREE, hull_gap, hull_work
-from rbxcompose.motion.numba_cache import compiled
+from rbxcompose.domains.arms.motion.collisions import coal_shape
+from rbxcompose.domains.arms.motion.compiled_collisions import BOX, CYLINDER, HALF_SPACE, TREE, hull_gap, hull_work
+from rbxcompose.domains.arms.motion.numba_cache import compiled
+from rbxcompose.domains.body.model import Geometry
 
 Array = NDArray[np.float64]
 SEEDS = st.integers(0, 2**31)
@@ -38,8 +38,8 @@ def hull(points: Array) -> Any:
 
 def coal_points(points: Array) -> Any:
     made = coal.StdVec_Vec3s()
-    for one in points:
-        made.append(one)
+    for point in points:
+        made.append(point)
     return made
 
 
@@ -53,7 +53,7 @@ def test_the_gap_is_never_more_than_the_distance_and_there_where_that_is(
     size = np.array((*rng.uniform(0.05, 0.5, 3), 0.0))
     if kind == HALF_SPACE:
         size = np.array((*(size[:3] / np.linalg.norm(size[:3])), 0.1))
-        found = min(float(size[:3] @ (between[:, :3] @ one + between[:, 3]) + 0.1) for one in points)
+        found = min(float(size[:3] @ (between[:, :3] @ point + between[:, 3]) + 0.1) for point in points)
     else:
         geometry = {BOX: Geometry("box", tuple(2 * size[:3])), CYLINDER: Geometry("cylinder", (size[0], 2 * size[1]))}
         other = hull(others) if kind == TREE else coal_shape(geometry[kind], {})

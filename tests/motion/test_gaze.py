@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.body.model import Body
-from rbxcompose.compiler import compile_robot
-from rbxcompose.control.limits import MotionLimits
-from rbxcompose.motion.gaze import ENOUGH, Gaze
+from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.domains.arms.motion.gaze import ENOUGH, Gaze
+from rbxcompose.domains.body.model import Body
+from rbxcompose.domains.servos.limits import MotionLimits
 from tests.conftest import ROOT
 
 PAN, TILT, CAMERA = "head_pan_joint", "head_tilt_joint", "camera_depth_frame"

@@ -9,14 +9,13 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.body.model import Geometry
-from rbxcompose.geometry import Transform3, quaternion_from_rpy
-from rbxcompose.hand_config import GraspModel
-from rbxcompose.motion import contacts
-from rbxcompose.motion.collisions import MeshChecker
-from rbxcompose.motion.hand_task import HandTask
-from rbxcompose.motion.scene import PlacedObject
-from rbxcompose.motion.straight_line import LineEnd, line_steps
+from rbxcompose.base.geometry import Transform3, quaternion_from_rpy
+from rbxcompose.domains.arms.manifest_model import GraspModel
+from rbxcompose.domains.arms.motion import hand_task as contacts
+from rbxcompose.domains.arms.motion.collisions import MeshChecker
+from rbxcompose.domains.arms.motion.hand_task import HandTask, LineEnd, line_steps
+from rbxcompose.domains.arms.motion.scene import PlacedObject
+from rbxcompose.domains.body.model import Geometry
 from rbxcompose.msgs.rbxcompose_msgs import MoveArm, PickObject, PlaceObject
 from tests.motion.pi_hand import HandBench
 
@@ -76,8 +75,8 @@ def test_it_stands_upright_again_wherever_the_arm_was_meanwhile() -> None:
 @pytest.mark.parametrize("shape", [Geometry("cylinder", (0.02, 0.12)), Geometry("sphere", (0.03,))])
 def test_round_things_are_grasped_from_their_shape(shape: Geometry) -> None:
     height = 0.705 + (0.06 if shape.kind == "cylinder" else 0.03)
-    one = PlacedObject("target", shape, ROOT, Transform3((0.24, 0.0, height)))
-    bench = HandBench(one, without=("target",))
+    placed_object = PlacedObject("target", shape, ROOT, Transform3((0.24, 0.0, height)))
+    bench = HandBench(placed_object, without=("target",))
     assert bench.carried_out(PICK).failure is None
 
 
@@ -133,9 +132,9 @@ def test_lines_are_not_followed_behind_what_they_hit(monkeypatch: pytest.MonkeyP
 
     def counted(*given: Any) -> Any:
         whole.extend(line_steps(*given))
-        for one in line_steps(*given):
-            followed.append(one)
-            yield one
+        for step in line_steps(*given):
+            followed.append(step)
+            yield step
         return LineEnd(0.0, "it is out of reach")
 
     monkeypatch.setattr(contacts, "line_steps", counted)

@@ -9,12 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.control.limits import MotionLimits
-from rbxcompose.geometry import Transform3
-from rbxcompose.motion.arm_kinematics import ArmKinematics
-from rbxcompose.motion.groups import chain
-from rbxcompose.motion.inverse_kinematics import EDGE, PoseSolutions, PoseTarget, descended, solved
-from rbxcompose.motion.joint_space import ArmJoint, JointSpace
+from rbxcompose.base.geometry import Transform3
+from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
+from rbxcompose.domains.arms.motion.groups import ArmJoint, JointSpace, chain
+from rbxcompose.domains.arms.motion.inverse_kinematics import EDGE, PoseSolutions, PoseTarget, descended, solved
+from rbxcompose.domains.servos.limits import MotionLimits
 from tests.body.kinematics import Three, description_of, matrix
 from tests.motion.toy_arm import ended
 
@@ -100,8 +99,8 @@ def test_the_jacobian_is_what_small_steps_do(seed: int) -> None:
 def test_the_same_seed_finds_the_same_and_the_nearest_comes_first(arm: ArmKinematics) -> None:
     target = PoseTarget(ARM.tip_pose(np.array([0.4, -0.7, 1.0, 0.3, -0.6, 0.2])))
     first, second = solve(arm, target), solve(arm, target)
-    assert [one.tolist() for one in first.free] == [one.tolist() for one in second.free]
-    ways = [float(np.max(np.abs(one))) for one in first.free]
+    assert [array.tolist() for array in first.free] == [array.tolist() for array in second.free]
+    ways = [float(np.max(np.abs(array))) for array in first.free]
     assert ways == sorted(ways)
 
 
@@ -128,13 +127,13 @@ def test_plain_and_compiled_code_take_the_same_way(seed: int, any_orientation: b
     fast.hasten()
     goal, first = SPACE.samples(2, seed)
     target = PoseTarget(ARM.tip_pose(goal), any_orientation)
-    (one, away), (other, missed) = (descended(each, SPACE, target, first) for each in (ARM, fast))
+    (array, away), (other, missed) = (descended(each, SPACE, target, first) for each in (ARM, fast))
     assert np.allclose(away, missed, atol=1e-6)
-    assert np.allclose(one, other, atol=1e-5)
+    assert np.allclose(array, other, atol=1e-5)
 
 
 def test_nothing_is_compiled_anew_while_an_arm_works() -> None:
-    from rbxcompose.motion.compiled_descent import _descents
+    from rbxcompose.domains.arms.motion.compiled_descent import _descents
 
     assert GROUP is not None
     fast = ArmKinematics(DESCRIPTION, GROUP)

@@ -8,10 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from rbxcompose.control.limits import MotionLimits
-from rbxcompose.motion.jerk_limits import PathTiming, jerks_between, jerks_of
-from rbxcompose.motion.joint_space import ArmJoint, JointSpace
-from rbxcompose.motion.parametrisation import Trajectory, timed
+from rbxcompose.domains.arms.motion.groups import ArmJoint, JointSpace
+from rbxcompose.domains.arms.motion.parametrisation import PathTiming, Trajectory, jerks_between, jerks_of, timed
+from rbxcompose.domains.servos.limits import MotionLimits
 
 Array = NDArray[np.float64]
 SEEDS = st.integers(0, 2**31)
@@ -44,8 +43,8 @@ def test_the_path_is_the_one_without_a_limit_of_jerk(seed: int, count: int, jerk
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1))])
     spline = toppra.SplineInterpolator(along, way, bc_type="natural")
     curve = spline(np.linspace(0.0, along[-1], 20_000))
-    for one in found.positions[::5]:
-        assert np.linalg.norm(curve - one, axis=1).min() < 4e-3
+    for position in found.positions[::5]:
+        assert np.linalg.norm(curve - position, axis=1).min() < 4e-3
 
 
 @settings(max_examples=15, deadline=None)

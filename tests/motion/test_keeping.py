@@ -9,13 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.geometry import Transform3
-from rbxcompose.motion.inverse_kinematics import PoseSolutions, PoseTarget
-from rbxcompose.motion.kept import Keep, KeptTip
-from rbxcompose.motion.kept_goals import kept_solutions
-from rbxcompose.motion.planner import MotionPlan, MotionPlanner, MotionRequest, PlannerSettings
-from rbxcompose.motion.posture import Posture
-from rbxcompose.motion.reasons import MotionFailure, MotionReason
+from rbxcompose.base.geometry import Transform3
+from rbxcompose.domains.arms.motion.inverse_kinematics import PoseSolutions, PoseTarget
+from rbxcompose.domains.arms.motion.kept import Keep, KeptTip
+from rbxcompose.domains.arms.motion.planner import MotionPlan, MotionPlanner, MotionRequest, PlannerSettings
+from rbxcompose.domains.arms.motion.pose_search import Posture, kept_solutions
+from rbxcompose.domains.arms.reasons import MotionFailure, MotionReason
 from tests.motion.test_inverse_kinematics import ARM, SPACE
 from tests.motion.test_planner import sampled
 from tests.motion.test_tracing import OTHERS, READY, SIX, Free
@@ -35,9 +34,9 @@ def request(goal: Array, keep: Keep) -> MotionRequest:
     return MotionRequest(READY, goal, space=keep.narrowed(SPACE), kept=kept)
 
 
-def tilt(one: Array, other: Array) -> float:
+def tilt(array: Array, other: Array) -> float:
     """Return by how much what was up in one frame is tilted in the other [rad]."""
-    up = one[:3, :3].T @ (0.0, 0.0, 1.0)
+    up = array[:3, :3].T @ (0.0, 0.0, 1.0)
     return math.acos(min(1.0, float((other[:3, :3] @ up)[2])))
 
 
@@ -46,7 +45,7 @@ def tilt(one: Array, other: Array) -> float:
 def test_the_tip_is_kept_upright_on_the_very_curves(seed: int) -> None:
     kept = KeptTip(ARM, UPRIGHT, READY)
     nearby = (kept.projected(one, SPACE) for one in SPACE.clamped(READY + 0.8 * (SPACE.samples(40, seed) / 2.6)))
-    goal = next(one for one in nearby if one is not None)
+    goal = next(array for array in nearby if array is not None)
     assert tilt(frame_of(READY), frame_of(goal)) < math.sqrt(2) * TILT
     found = ended(SIX.plan(request(goal, UPRIGHT)))
     assert isinstance(found, MotionPlan), found
@@ -74,12 +73,12 @@ def test_the_tip_stays_in_a_box_and_joints_in_their_ranges() -> None:
     z = float(frame_of(READY)[2, 3])
     keep = Keep(inside=(None, None, (z - 0.03, z + 0.03)), joints={"j1": (-0.5, 0.5), "j4": (0.0, 1.0)})
     kept, space = KeptTip(ARM, keep, READY), keep.narrowed(SPACE)
-    goal = next(one for each in space.samples(60, 3) if (one := kept.projected(each, space)) is not None)
+    goal = next(array for each in space.samples(60, 3) if (array := kept.projected(each, space)) is not None)
     found = ended(SIX.plan(request(goal, keep)))
     assert isinstance(found, MotionPlan), found
     assert found.trajectory is not None
     points = np.array(sampled(found.trajectory, 0.02))
-    assert max(abs(frame_of(one)[2, 3] - z) for one in points) <= 0.03 + 1e-6
+    assert max(abs(frame_of(point)[2, 3] - z) for point in points) <= 0.03 + 1e-6
     assert np.abs(points[:, 0]).max() <= 0.5 + 1e-6
     assert points[:, 3].min() >= -1e-6
 
@@ -90,9 +89,9 @@ def test_positions_that_bring_the_tip_to_a_point_keep_it_upright() -> None:
     target = PoseTarget(wanted, any_orientation=True)
     found = ended(kept_solutions(ARM, SPACE, target, UPRIGHT, READY, READY, Free(), seed=1))
     assert found.free
-    for one in found.free:
-        assert np.allclose(frame_of(one)[:3, 3], wanted.translation, atol=1e-3)
-        assert tilt(start, frame_of(one)) < math.sqrt(2) * TILT
+    for array in found.free:
+        assert np.allclose(frame_of(array)[:3, 3], wanted.translation, atol=1e-3)
+        assert tilt(start, frame_of(array)) < math.sqrt(2) * TILT
     far = PoseTarget(Transform3((9.0, 0.0, 0.0)), any_orientation=True)
     none = ended(kept_solutions(ARM, SPACE, far, UPRIGHT, READY, READY, Free(), seed=1))
     assert not none.free
@@ -144,7 +143,7 @@ def test_what_is_kept_leaves_room_for_a_posture() -> None:
         return ended(kept_solutions(ARM, space, target, keep, READY, READY, Free(), seed=1, posture=liked))
 
     without, preferred = found(None).free, found(posture).free
-    ways = [posture.distance(SPACE, one) for one in preferred]
+    ways = [posture.distance(SPACE, array) for array in preferred]
     assert ways == sorted(ways)
-    assert ways[0] <= min(posture.distance(SPACE, one) for one in without)
-    assert all(KeptTip(ARM, keep, READY).is_kept(one) for one in preferred)
+    assert ways[0] <= min(posture.distance(SPACE, array) for array in without)
+    assert all(KeptTip(ARM, keep, READY).is_kept(array) for array in preferred)

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rbxcompose.geometry import Transform3
-from rbxcompose.motion.collisions import MeshChecker, adjacent_pairs
-from rbxcompose.motion.moveit_kinematics import KinematicsQuery
-from rbxcompose.motion.scene_messages import pose_message, pose_of
+from rbxcompose.base.geometry import Transform3
+from rbxcompose.domains.arms.motion.collisions import MeshChecker, adjacent_pairs
+from rbxcompose.domains.arms.motion.moveit import KinematicsQuery
+from rbxcompose.domains.arms.motion.scene_messages import pose_message, pose_of
 from rbxcompose.msgs.geometry_msgs import PoseStamped
 from rbxcompose.msgs.moveit_msgs import (
     Constraints,
@@ -53,7 +53,7 @@ def tip(frame: str = "") -> GetPositionFK.Response:
 
 def asked(**fields: Any) -> GetPositionIK.Response:
     fields = {"pose_stamped": tip().pose_stamped[0], **fields}
-    return next(one for one in QUERY.inverse(PositionIKRequest(**fields), 1) if one is not None)
+    return next(response for response in QUERY.inverse(PositionIKRequest(**fields), 1) if response is not None)
 
 
 @pytest.mark.parametrize("frame", ["", "ground", "turret"])
@@ -64,7 +64,7 @@ def test_the_inverse_of_the_forward_kinematics_brings_the_tip_to_the_same_place(
     assert answer.error_code.val == MoveItErrorCodes.SUCCESS, answer.error_code.message
     found = answer.solution.joint_state
     again = QUERY.forward(GetPositionFK.Request(robot_state=RobotState(joint_state=found)))
-    before, after = (pose_of(one.pose_stamped[0].pose).translation for one in (tip(), again))
+    before, after = (pose_of(response.pose_stamped[0].pose).translation for response in (tip(), again))
     assert after == pytest.approx(before, abs=2e-3)
 
 

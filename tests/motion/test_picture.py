@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rbxcompose.body import picture
-from rbxcompose.body.model import Geometry
-from rbxcompose.geometry import Transform3
-from rbxcompose.motion.picture import ArmPicture, draw_arm
-from rbxcompose.motion.scene import PlacedObject
+from rbxcompose.base.geometry import Transform3
+from rbxcompose.domains.arms.motion.picture import ArmPicture, draw_arm
+from rbxcompose.domains.arms.motion.scene import PlacedObject
+from rbxcompose.domains.body import picture
+from rbxcompose.domains.body.model import Geometry
 from tests.motion.scenes import FLOOR, MESH, OCTREE
 from tests.motion.toy_arm import kinematics
 
@@ -47,5 +47,5 @@ def test_what_collides_is_red_the_goal_green_and_the_way_blue() -> None:
 
 @pytest.mark.parametrize("shape", [FLOOR, MESH, OCTREE, Geometry("cone", (0.1, 0.2))], ids=lambda shape: shape.kind)
 def test_things_of_all_shapes_are_seen_in_their_colour(shape: Geometry) -> None:
-    one = replace(BALL, shape=shape, colour=(0.1, 0.2, 0.9, 1.0))
-    assert share(replace(SHOWN, objects=(one,)), 2) > 0.0005
+    placed_object = replace(BALL, shape=shape, colour=(0.1, 0.2, 0.9, 1.0))
+    assert share(replace(SHOWN, objects=(placed_object,)), 2) > 0.0005

@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.control.curves import cubic
-from rbxcompose.motion.collisions import TOUCH
-from rbxcompose.motion.parametrisation import Trajectory
-from rbxcompose.motion.planner import MotionPlan, MotionRequest
-from rbxcompose.motion.planner_types import OMPL
-from rbxcompose.motion.reasons import MotionFailure, MotionReason
-from rbxcompose.motion.search import searched
+from rbxcompose.domains.arms.manifest_model import OMPL
+from rbxcompose.domains.arms.motion.collisions import TOUCH
+from rbxcompose.domains.arms.motion.parametrisation import Trajectory
+from rbxcompose.domains.arms.motion.planner import MotionPlan, MotionRequest
+from rbxcompose.domains.arms.motion.search import searched
+from rbxcompose.domains.arms.reasons import MotionFailure, MotionReason
+from rbxcompose.domains.servos.curves import cubic
 from tests.body.kinematics import description_of
 from tests.motion.toy_arm import FENCE, Array, ended, gap, planner, urdf
 
@@ -32,7 +32,7 @@ def plan(start: Array, goal: Array, speed: float = 1.0, **changed: object) -> Mo
 def sampled(trajectory: Trajectory, step: float) -> list[Array]:
     """Return positions at most `step` apart on the curves that the controller makes of a trajectory."""
     columns = zip(trajectory.positions.T.tolist(), trajectory.velocities.T.tolist(), strict=True)
-    curves = [cubic(trajectory.times.tolist(), *one) for one in columns]
+    curves = [cubic(trajectory.times.tolist(), *column) for column in columns]
     count = math.ceil(trajectory.duration * max(curve.speed for curve in curves) / step)
     times = np.linspace(0.0, trajectory.duration, count + 1).tolist()
     return [np.array([curve.sample(time).position for curve in curves]) for time in times]
@@ -42,15 +42,15 @@ def sampled(trajectory: Trajectory, step: float) -> list[Array]:
 @given(st.integers(0, 2**31))
 def test_a_plan_is_free_and_within_all_limits_by_other_code(seed: int) -> None:
     samples = PLANNER.space.samples(60, seed)
-    start, goal = [one for one in samples if gap(BODY, one) > 0.01][:2]
+    start, goal = [sample for sample in samples if gap(BODY, sample) > 0.01][:2]
     found = plan(start, goal)
     assert isinstance(found, MotionPlan), found
     assert found.trajectory is not None
     points = sampled(found.trajectory, 0.005)
     assert np.allclose(points[0], start)
     assert np.allclose(points[-1], goal)
-    assert min(gap(BODY, one) for one in points) >= -TOUCH
-    assert all(not PLANNER.space.outside(one, 1e-6) for one in points)
+    assert min(gap(BODY, point) for point in points) >= -TOUCH
+    assert all(not PLANNER.space.outside(point, 1e-6) for point in points)
     assert found.trajectory.excess(np.full(3, 2.0), np.full(3, 4.0)) <= 1.0 + 1e-9
 
 

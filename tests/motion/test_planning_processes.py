@@ -12,12 +12,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from rbxcompose.arm_processes import PlanningProcess, planning_processes
-from rbxcompose.clock import MonotonicClock, SteppedClock
-from rbxcompose.motion import ways_ahead
-from rbxcompose.motion.planner import MotionPlan, MotionRequest
-from rbxcompose.motion.reasons import MotionFailure
-from rbxcompose.motion.ways_ahead import PlanJob, Planned
+from rbxcompose.base.clock import MonotonicClock, SteppedClock
+from rbxcompose.domains.arms.motion import hand_task as ways_ahead
+from rbxcompose.domains.arms.motion.hand_task import PlanJob, Planned
+from rbxcompose.domains.arms.motion.planner import MotionPlan, MotionRequest
+from rbxcompose.domains.arms.planning_processes import PlanningProcess, planning_processes
+from rbxcompose.domains.arms.reasons import MotionFailure
 from rbxcompose.runtime.processes import Process, wait_until_ended
 from tests.motion.pi_hand import made
 from tests.motion.test_ways_ahead import CONFINED, cluttered, outcome, planning
@@ -44,9 +44,9 @@ def started(warned: list[str], time: float = TIME) -> PlanningProcess:
     return PlanningProcess(short, warned.append, TIMELESS)
 
 
-def wait_for(one: PlanningProcess) -> None:
+def wait_for(process: PlanningProcess) -> None:
     """Wait until it can begin a job."""
-    while not one.is_idle:
+    while not process.is_idle:
         os.sched_yield()
 
 
@@ -79,7 +79,7 @@ def test_what_a_process_plans_is_what_is_planned_here(pair: list[PlanningProcess
     for seed in SCENES:
         bench = cluttered(seed)
         works = bench.works
-        free = [one for one in works.space.samples(400, seed) if works.planner.checker.is_free(one)]
+        free = [sample for sample in works.space.samples(400, seed) if works.planner.checker.is_free(sample)]
         with planning(bench, (), TIME):
             for start, goal in pairwise(free[:4]):
                 job = PlanJob(MotionRequest(start, goal), {}, works.objects, works.paddings)
@@ -100,9 +100,9 @@ def content(planned: Planned) -> object:
     return times, others, planned.waypoints.tolist(), planned.attempts, planned.examined, planned.found_by
 
 
-def answer(one: PlanningProcess, job: PlanJob) -> Planned:
+def answer(process: PlanningProcess, job: PlanJob) -> Planned:
     """Return what was planned, once it is."""
-    while (found := one.answer(job)) is None:
+    while (found := process.answer(job)) is None:
         os.sched_yield()
     return found
 
@@ -125,7 +125,7 @@ def test_what_is_abandoned_is_not_planned_to_the_end(warned: list[str]) -> None:
     wait_for(endless)
     works, measured = cluttered(CONFINED).works, cluttered(CONFINED).measured
     start = np.array([measured[name][0] for name in works.space.names])
-    there = next(one for one in works.space.samples(400, 1) if works.planner.checker.is_free(one))
+    there = next(sample for sample in works.space.samples(400, 1) if works.planner.checker.is_free(sample))
     job = PlanJob(MotionRequest(start, there), {}, works.objects, works.paddings)
     endless.begin(job)
     assert not endless.is_idle

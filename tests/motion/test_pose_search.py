@@ -10,11 +10,10 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.geometry import Transform3
-from rbxcompose.motion.arm_kinematics import ArmKinematics
-from rbxcompose.motion.inverse_kinematics import EDGE, PoseSolutions, PoseTarget, descended, solved
-from rbxcompose.motion.pose_search import searched
-from rbxcompose.motion.posture import Posture
+from rbxcompose.base.geometry import Transform3
+from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
+from rbxcompose.domains.arms.motion.inverse_kinematics import EDGE, PoseSolutions, PoseTarget, descended, solved
+from rbxcompose.domains.arms.motion.pose_search import Posture, searched
 from tests.body.kinematics import Three, matrix
 from tests.motion.test_inverse_kinematics import ARM, DESCRIPTION, GROUP, SPACE
 from tests.motion.toy_arm import Array, ended
@@ -70,9 +69,9 @@ def test_a_tip_whose_position_does_not_count_is_turned_as_is_wanted_by_other_lib
 def test_plain_and_compiled_code_turn_the_tip_in_the_same_steps(seed: int) -> None:
     target = PoseTarget(elsewhere(seed), any_position=True)
     first = SPACE.samples(1, seed + 1)[0]
-    (one, away), (other, missed) = (descended(each, SPACE, target, first) for each in (ARM, fast()))
+    (array, away), (other, missed) = (descended(each, SPACE, target, first) for each in (ARM, fast()))
     assert np.allclose(away, missed, atol=1e-6)
-    assert np.allclose(one, other, atol=1e-5)
+    assert np.allclose(array, other, atol=1e-5)
 
 
 @settings(max_examples=10, deadline=None)
@@ -81,9 +80,9 @@ def test_what_will_do_approximately_is_met_exactly_where_it_can_be(
     arm: ArmKinematics, seed: int, kind: dict[str, bool]
 ) -> None:
     pose = ARM.tip_pose(SPACE.samples(1, seed)[0])
-    exact, found = (search(arm, PoseTarget(pose, **kind, is_approximate=one)) for one in (False, True))
+    exact, found = (search(arm, PoseTarget(pose, **kind, is_approximate=flag)) for flag in (False, True))
     assert not found.is_approximate
-    assert [one.tolist() for one in found.free] == [one.tolist() for one in exact.free]
+    assert [array.tolist() for array in found.free] == [array.tolist() for array in exact.free]
 
 
 @settings(max_examples=8, deadline=None)
@@ -98,7 +97,7 @@ def test_no_small_step_gets_nearer_than_what_is_approximate_and_the_start_is_not
     steps = np.random.default_rng(seed).uniform(-0.05, 0.05, (200, 6))
     for moved in np.clip(found.free[0] + steps, SPACE.lower + EDGE, SPACE.upper - EDGE):
         assert target.excess(ARM.tip_pose(moved)) >= best - max(1.0, 1e-3 * best)
-    order = [target.excess(ARM.tip_pose(one)) for one in found.free]
+    order = [target.excess(ARM.tip_pose(array)) for array in found.free]
     assert order == sorted(order)
 
 
@@ -140,8 +139,8 @@ def test_a_preferred_posture_is_never_farther_than_without_and_keeps_the_pose(
     posture = Posture(SPACE.samples(1, other)[0])
     without, found = (search(arm, target, one, LEFT) for one in (None, posture))
     assume(without.free)
-    nearest = min(posture.distance(SPACE, one) for one in without.free)
-    ways = [posture.distance(SPACE, one) for one in found.free]
+    nearest = min(posture.distance(SPACE, array) for array in without.free)
+    ways = [posture.distance(SPACE, array) for array in found.free]
     assert ways[0] <= nearest + 1e-9
     assert ways == sorted(ways)
     for values in found.free:
@@ -194,7 +193,7 @@ def test_a_preferred_posture_is_left_only_as_far_as_something_is_in_the_way() ->
 def test_solutions_that_slide_together_count_once() -> None:
     target, liked = PoseTarget(Transform3((0.7, 0.2, 0.4)), any_orientation=True), Posture.of(SPACE.names, {"j3": 0.5})
     found = search(ARM, target, liked).free
-    for number, one in enumerate(found):
-        assert all(float(np.abs(one - other).max()) > 0.01 for other in found[:number])
+    for number, array in enumerate(found):
+        assert all(float(np.abs(array - other).max()) > 0.01 for other in found[:number])
     plain = ended(solved(ARM, SPACE, target, np.zeros(6), lambda values: True, seed=1))
     assert len(found) <= len(plain.free) + 1

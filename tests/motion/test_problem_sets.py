@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.body.model import Geometry
-from rbxcompose.motion.problem_sets import ProblemError, problem_files, read_problem
+from rbxcompose.domains.arms.motion.figures import ProblemError, problem_files, read_problem
+from rbxcompose.domains.body.model import Geometry
 
 SCENE = """
 world:
@@ -45,10 +45,10 @@ def test_obstacles_start_and_goal_are_those_of_the_files(tmp_path: Path) -> None
     assert problem.goal == {"a": 1.0}
     can, shelf = problem.objects
     assert can.shape == Geometry("cylinder", (0.03, 0.14))
-    assert [one.pose.translation for one in can.all_pieces] == [(0.5, 0.1, 0.2)]
-    assert [one.shape.kind for one in shelf.all_pieces] == ["box", "sphere"]
-    assert [one.pose.translation for one in shelf.all_pieces] == [(1.0, 0.0, 0.0), (1.0, 0.0, 1.0)]
-    assert {one.link for one in problem.objects} == {"base"}
+    assert [piece.pose.translation for piece in can.all_pieces] == [(0.5, 0.1, 0.2)]
+    assert [piece.shape.kind for piece in shelf.all_pieces] == ["box", "sphere"]
+    assert [piece.pose.translation for piece in shelf.all_pieces] == [(1.0, 0.0, 0.0), (1.0, 0.0, 1.0)]
+    assert {placed_object.link for placed_object in problem.objects} == {"base"}
 
 
 def test_at_most_so_many_of_each_scenario_are_taken_and_those_without_a_request_are_not(tmp_path: Path) -> None:
@@ -56,7 +56,7 @@ def test_at_most_so_many_of_each_scenario_are_taken_and_those_without_a_request_
         for name in ("box", "cage"):
             written(tmp_path / name, number=number)
     (tmp_path / "box/request0001.yaml").unlink()
-    found = [f"{one.parent.name}/{one.name}" for one, _ in problem_files(tmp_path, 2)]
+    found = [f"{path.parent.name}/{path.name}" for path, _ in problem_files(tmp_path, 2)]
     assert found == ["box/scene0002.yaml", "box/scene0003.yaml", "cage/scene0001.yaml", "cage/scene0002.yaml"]
 
 

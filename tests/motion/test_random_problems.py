@@ -10,17 +10,17 @@ from random import Random
 import numpy as np
 import pytest
 
-from rbxcompose.arm_config import ArmConfig, ArmPlannerConfig, ArmWorks
-from rbxcompose.body.model import Geometry
-from rbxcompose.compiler import compile_robot
-from rbxcompose.dataclass import dataclass
-from rbxcompose.geometry import Transform3, quaternion_from_rpy
-from rbxcompose.motion.arm_figures import ended
-from rbxcompose.motion.parametrisation import Trajectory
-from rbxcompose.motion.planner import MotionPlan, MotionRequest
-from rbxcompose.motion.reasons import MotionFailure, MotionReason
-from rbxcompose.motion.scene import PlacedObject
-from rbxcompose.motion.second_checker import sampled
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.geometry import Transform3, quaternion_from_rpy
+from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.domains.arms.arm_config import ArmConfig, ArmPlannerConfig, ArmWorks
+from rbxcompose.domains.arms.motion.figures import ended
+from rbxcompose.domains.arms.motion.parametrisation import Trajectory
+from rbxcompose.domains.arms.motion.planner import MotionPlan, MotionRequest
+from rbxcompose.domains.arms.motion.scene import PlacedObject
+from rbxcompose.domains.arms.motion.second_checker import sampled
+from rbxcompose.domains.arms.reasons import MotionFailure, MotionReason
+from rbxcompose.domains.body.model import Geometry
 from tests.conftest import ROOT
 from tests.motion.toy_arm import Array
 from tests.soak import Soak
@@ -54,7 +54,7 @@ class Problem:
 def works_of(robot: str, is_fast: bool) -> ArmWorks:
     plan = compile_robot(str(ROOT / "robots" / robot), environment={}).plan
     assert plan
-    [config] = (one.config for one in plan.instances if one.type == "arm")
+    [config] = (instance.config for instance in plan.instances if instance.type == "arm")
     assert isinstance(config, ArmConfig)
     return ArmWorks(config.model_copy(update={"planner": ArmPlannerConfig(time=TIME)}), lambda: 0.0, is_fast=is_fast)
 
@@ -83,7 +83,7 @@ def problem(works: ArmWorks, seed: int) -> Problem:
         )
     works.place_objects(objects)
     samples = works.space.samples(60, seed)
-    free = [one for one in samples if works.planner.checker.is_free(one)]
+    free = [sample for sample in samples if works.planner.checker.is_free(sample)]
     start, goal = free[:2] if chance.random() < 0.8 and len(free) > 1 else samples[:2]
     if chance.random() < 0.05:
         goal = goal + chance.choice((-1.0, 1.0)) * 4.0
@@ -92,15 +92,15 @@ def problem(works: ArmWorks, seed: int) -> Problem:
 
 def wrong_with(works: ArmWorks, asked: Problem, trajectory: Trajectory) -> str:
     """Return what is wrong with a trajectory, nothing if it may be followed."""
-    limits, kinematics = [one.limits for one in works.space.joints], works.kinematics
+    limits, kinematics = [joint.limits for joint in works.space.joints], works.kinematics
     velocity, acceleration = (
-        np.array([math.inf if (most := getattr(one, name)) is None else most for one in limits])
+        np.array([math.inf if (most := getattr(limit, name)) is None else most for limit in limits])
         for name in ("velocity", "acceleration")
     )
     points = sampled(trajectory, FINE)
     if not works.second_checker(asked.objects).is_free_along(trajectory, FINE):
         return "it collides"
-    if any(works.space.outside(one, 1e-6) for one in points):
+    if any(works.space.outside(point, 1e-6) for point in points):
         return "it leaves the limits of the joints"
     if trajectory.excess(velocity * asked.speed, acceleration) > 1.0 + 1e-6:
         return "it is too fast"

@@ -9,11 +9,21 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.body import picture
-from rbxcompose.motion.inverse_kinematics import PoseTarget, solved
-from rbxcompose.motion.picture import ArmPicture
-from rbxcompose.motion.reach import DIRECTIONS, Cut, ReachMap, directions, manipulability, reached
-from rbxcompose.motion.reach_picture import SCALE, ReachPicture, colours_of, draw_reach
+from rbxcompose.domains.arms.motion.inverse_kinematics import PoseTarget, solved
+from rbxcompose.domains.arms.motion.picture import ArmPicture
+from rbxcompose.domains.arms.motion.reach import (
+    DIRECTIONS,
+    SCALE,
+    Cut,
+    ReachMap,
+    ReachPicture,
+    colours_of,
+    directions,
+    draw_reach,
+    manipulability,
+    reached,
+)
+from rbxcompose.domains.body import picture
 from tests.motion.test_inverse_kinematics import ARM, SPACE
 from tests.motion.toy_arm import Array, ended, gap, kinematics, planner
 
@@ -31,14 +41,16 @@ def found(seed: int, samples: int = 3_000, cut: Cut | None = None) -> ReachMap:
 def test_inverse_kinematics_reaches_each_cell_that_is_told_as_reached(seed: int) -> None:
     there = found(seed)
     assert len(there.cells) > 50
-    for cell, one in list(there.cells.items())[::10]:
-        assert np.abs(np.array(TOY.tip_pose(one.values).translation) / SIDE - cell).max() <= 0.5
-        assert gap(TOY.body, one.values) > -1e-3
-        assert not PLANNER.space.outside(one.values)
-        target = PoseTarget(TOY.tip_pose(one.values), any_orientation=True)
-        answer = ended(solved(TOY, PLANNER.space, target, one.values, PLANNER.checker.is_free, seed=1, enough=1))
+    for cell, reached_cell in list(there.cells.items())[::10]:
+        assert np.abs(np.array(TOY.tip_pose(reached_cell.values).translation) / SIDE - cell).max() <= 0.5
+        assert gap(TOY.body, reached_cell.values) > -1e-3
+        assert not PLANNER.space.outside(reached_cell.values)
+        target = PoseTarget(TOY.tip_pose(reached_cell.values), any_orientation=True)
+        answer = ended(
+            solved(TOY, PLANNER.space, target, reached_cell.values, PLANNER.checker.is_free, seed=1, enough=1)
+        )
         assert answer.free
-        assert there.cell_of(np.array(TOY.tip_pose(one.values).translation)) == cell
+        assert there.cell_of(np.array(TOY.tip_pose(reached_cell.values).translation)) == cell
 
 
 @settings(max_examples=20, deadline=None)
@@ -57,8 +69,8 @@ def test_manipulability_is_the_product_of_how_far_the_tip_moves_along_its_main_a
 def test_a_layer_has_the_cells_of_the_whole_that_are_in_it() -> None:
     whole, layer = found(3), found(3, cut=Cut(2, 0.55))
     number = round(0.55 / SIDE)
-    assert {cell: one.directions for cell, one in layer.cells.items()} == {
-        cell: one.directions for cell, one in whole.cells.items() if cell[2] == number
+    assert {cell: reached_cell.directions for cell, reached_cell in layer.cells.items()} == {
+        cell: reached_cell.directions for cell, reached_cell in whole.cells.items() if cell[2] == number
     }
     assert found(3, 2_500).tried == 2_500
 
@@ -77,9 +89,12 @@ def test_a_picture_shows_the_cells_in_the_colours_of_its_legend(monkeypatch: pyt
     robot = ArmPicture(TOY.body, {}, {"turn": 0.8}, told="two cells")
     cells = {(4, 4, 14): 10.0, (4, -4, 14): 1.0}
     shown = [ReachPicture(robot, each, SIDE, 10.0, "directions", is_layer=True) for each in (cells, {})]
-    pictures = [np.asarray(Image.open(io.BytesIO(draw_reach(one))).convert("RGB")).astype(int) for one in shown]
+    pictures = [
+        np.asarray(Image.open(io.BytesIO(draw_reach(reach_picture))).convert("RGB")).astype(int)
+        for reach_picture in shown
+    ]
     above = [one[:140] for one in pictures]  # without the legend
-    blue, red = (int(np.sum(above[0][..., one] > above[0][..., 2 - one] + 60)) for one in (2, 0))
+    blue, red = (int(np.sum(above[0][..., number] > above[0][..., 2 - number] + 60)) for number in (2, 0))
     assert min(blue, red) > 20
     assert np.abs(above[1] - above[1].mean(2, keepdims=True)).max() < 30  # grey alone
     assert np.allclose(colours_of([0.0, 10.0], 10.0), SCALE[[0, -1]])

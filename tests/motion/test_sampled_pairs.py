@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from rbxcompose.body.link_pairs import CollisionMatrix
-from rbxcompose.motion.collisions import TOUCH
-from rbxcompose.motion.planner import MotionPlan, MotionRequest
-from rbxcompose.motion.sampled_pairs import sampled_matrix, whole_space
+from rbxcompose.domains.arms.motion.collisions import TOUCH
+from rbxcompose.domains.arms.motion.planner import MotionPlan, MotionRequest
+from rbxcompose.domains.arms.motion.sampled_pairs import sampled_matrix, whole_space
+from rbxcompose.domains.body.link_pairs import CollisionMatrix
 from tests.body.kinematics import description_of
 from tests.motion.test_planner import LEFT, RIGHT, sampled
 from tests.motion.toy_arm import WALL, ended, gap, planner, urdf
@@ -19,7 +19,7 @@ def matrix_of(wall: tuple[float, float, float], samples: int = 300) -> Collision
 
 def test_a_pair_is_never_or_at_rest_in_collision_as_other_code_finds() -> None:
     body = description_of(urdf()).body
-    gaps = [gap(body, one) for one in whole_space(body).samples(300, 1)]
+    gaps = [gap(body, sample) for sample in whole_space(body).samples(300, 1)]
     assert min(gaps) < 0 < max(gaps)
     assert gap(body, np.zeros(3)) < 0
     assert matrix_of(WALL).pairs == {

@@ -12,10 +12,10 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.body.model import Geometry
-from rbxcompose.geometry import Transform3, quaternion_from_rpy
-from rbxcompose.motion.collisions import MeshChecker, adjacent_pairs
-from rbxcompose.motion.scene import MOST_SHAPES, PlacedObject, PlanningScene, SceneError, ScenePiece
+from rbxcompose.base.geometry import Transform3, quaternion_from_rpy
+from rbxcompose.domains.arms.motion.collisions import MeshChecker, adjacent_pairs
+from rbxcompose.domains.arms.motion.scene import MOST_SHAPES, PlacedObject, PlanningScene, SceneError, ScenePiece
+from rbxcompose.domains.body.model import Geometry
 from tests.motion.scenes import FLOOR, MESH, OCTREE, objects, poses, solids
 from tests.motion.toy_arm import kinematics, planner
 
@@ -41,8 +41,8 @@ def frames(values: np.ndarray) -> Mapping[str, Transform3]:
 
 
 def where(scene: PlanningScene, name: str, links: Mapping[str, Transform3]) -> Transform3:
-    one = scene.objects[name]
-    return links[one.link].compose(one.pose)
+    placed_object = scene.objects[name]
+    return links[placed_object.link].compose(placed_object.pose)
 
 
 @settings(max_examples=15, deadline=None)
@@ -131,8 +131,8 @@ def test_there_is_an_end_to_the_number_of_objects() -> None:
 
 def test_an_object_in_a_frame_outside_of_the_body_stays_there_while_the_body_moves() -> None:
     scene = PlanningScene(BODY, [replace(BALL, link="map")], ["map"])
-    (one,) = scene.on_body({"map": Transform3((1.0, 0.0, 0.0))})
-    assert (one.link, one.pose.translation) == ("ground", (1.2, 0.4, 0.3))
+    (placed_object,) = scene.on_body({"map": Transform3((1.0, 0.0, 0.0))})
+    assert (placed_object.link, placed_object.pose.translation) == ("ground", (1.2, 0.4, 0.3))
     with pytest.raises(SceneError, match="nothing tells where 'map' is, the frame of 'ball'"):
         scene.on_body({})
     scene.attach("ball", "fore", (), {**frames(np.zeros(3)), "map": Transform3()})
@@ -207,7 +207,7 @@ def test_distances_are_told_of_the_pairs_that_are_asked_for() -> None:
     others = [replace(BALL, name=f"ball {number}") for number in range(3)]
     checker = MeshChecker(ARM, {}, adjacent_pairs(BODY), others)
     values = np.array([0.8, 0.0, 0.2])
-    assert {(one.first, one.second) for one in checker.pairs(values, ("ball 1", "fore"))} == {("ball 1", "fore")}
+    assert {(pair.first, pair.second) for pair in checker.pairs(values, ("ball 1", "fore"))} == {("ball 1", "fore")}
     assert len(checker.pairs(values, ("fore",))) == 4  # the ground, too
     assert checker.pairs(values, ("ball 1", "ball 2")) == ()
     assert checker.watched == {"ball 0", "ball 1", "ball 2", "fore", "ground", "upper"}

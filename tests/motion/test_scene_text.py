@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.findings import Finding
-from rbxcompose.motion.scene import PlacedObject
-from rbxcompose.motion.scene_text import SceneFile, read_scene, written_scene
+from rbxcompose.base.findings import Finding
+from rbxcompose.domains.arms.motion.scene import PlacedObject
+from rbxcompose.domains.arms.motion.scene_text import SceneFile, read_scene, written_scene
 from tests.motion.scenes import FACES, MESH, names, objects
 
 OLDER = """(noname)
@@ -68,10 +68,12 @@ def test_what_is_written_is_read_as_it_was(data: st.DataObject, chosen: list[str
 
 def test_both_variants_say_the_same() -> None:
     older, newer = read(OLDER), read(NEWER)
-    assert [next(one.all_pieces) for one in (older.objects[0], newer.objects[0])] == [*newer.objects[0].all_pieces] * 2
+    assert [next(placed_object.all_pieces) for placed_object in (older.objects[0], newer.objects[0])] == [
+        *newer.objects[0].all_pieces
+    ] * 2
     assert newer.objects[0].pose.translation == (0.5, 0.0, 0.4)
     assert older.objects[0].colour == (0.8, 0.4, 0.0, 1.0)
-    assert [one.name for one in older.objects] == ["table", "two balls"]
+    assert [placed_object.name for placed_object in older.objects] == ["table", "two balls"]
     assert older.objects[1].pieces[0].pose.translation == (0.0, 0.0, 0.2)
 
 

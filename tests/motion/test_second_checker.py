@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.body.model import Geometry
-from rbxcompose.geometry import Transform3
-from rbxcompose.motion.arm_figures import NO_TRIES, Tries, motion_tries
-from rbxcompose.motion.collisions import adjacent_pairs
-from rbxcompose.motion.parametrisation import Trajectory
-from rbxcompose.motion.scene import PlacedObject
-from rbxcompose.motion.second_checker import SecondChecker, sampled
+from rbxcompose.base.geometry import Transform3
+from rbxcompose.domains.arms.motion.collisions import adjacent_pairs
+from rbxcompose.domains.arms.motion.figures import NO_TRIES, Tries, motion_tries
+from rbxcompose.domains.arms.motion.parametrisation import Trajectory
+from rbxcompose.domains.arms.motion.scene import PlacedObject
+from rbxcompose.domains.arms.motion.second_checker import SecondChecker, sampled
+from rbxcompose.domains.body.model import Geometry
 from tests.body.kinematics import description_of
 from tests.motion.toy_arm import gap, planner, urdf
 

@@ -9,14 +9,13 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.body.model import Geometry
-from rbxcompose.geometry import Transform3
-from rbxcompose.motion.collisions import MeshChecker, adjacent_pairs
-from rbxcompose.motion.kept import Keep, KeptTip
-from rbxcompose.motion.planner import MotionPlan, MotionPlanner, MotionRequest, PlannerSettings
-from rbxcompose.motion.reasons import MotionFailure, MotionReason
-from rbxcompose.motion.scene import PlacedObject
-from rbxcompose.motion.sight import KeptSight, SightLine
+from rbxcompose.base.geometry import Transform3
+from rbxcompose.domains.arms.motion.collisions import MeshChecker, adjacent_pairs
+from rbxcompose.domains.arms.motion.kept import Keep, KeptSight, KeptTip, SightLine
+from rbxcompose.domains.arms.motion.planner import MotionPlan, MotionPlanner, MotionRequest, PlannerSettings
+from rbxcompose.domains.arms.motion.scene import PlacedObject
+from rbxcompose.domains.arms.reasons import MotionFailure, MotionReason
+from rbxcompose.domains.body.model import Geometry
 from tests.motion.test_planner import sampled
 from tests.motion.toy_arm import Array, ended, kinematics, planner
 

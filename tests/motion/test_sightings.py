@@ -5,8 +5,8 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.geometry import Transform3, quaternion_from_yaw
-from rbxcompose.motion.sightings import MOST_OBJECTS, Sighting, Sightings
+from rbxcompose.base.geometry import Transform3, quaternion_from_yaw
+from rbxcompose.domains.arms.motion.sightings import MOST_OBJECTS, Sighting, Sightings
 
 SIZE = (0.02, 0.02, 0.1)
 POINTS = st.tuples(*[st.floats(-1, 1)] * 3)
@@ -22,63 +22,63 @@ def core() -> Sightings:
 
 
 def names(core: Sightings, now: float, *found: Sighting, held: tuple[str, ...] = ()) -> list[str]:
-    return [one.name for one in core.take(now, found, held)]
+    return [seen_object.name for seen_object in core.take(now, found, held)]
 
 
 @given(st.lists(st.tuples(st.integers(-9, 9), st.sampled_from(["cup", "box", ""])), unique=True), st.lists(NOISE))
 def test_things_that_stand_are_told_once_however_often_and_noisily_they_are_seen(
     things: list[tuple[int, str]], noise: list[tuple[float, float, float]]
 ) -> None:
-    one = core()
-    told = names(one, 0.0, *(seen(0.2 * at, label) for at, label in things))
+    sightings = core()
+    told = names(sightings, 0.0, *(seen(0.2 * at, label) for at, label in things))
     assert len(set(told)) == len(things)
     for step, (x, y, z) in enumerate(noise):
         again = [seen(0.2 * at + x, label, y=y, z=z) for at, label in reversed(things)]
-        assert names(one, 0.1 * step, *again) == []
+        assert names(sightings, 0.1 * step, *again) == []
 
 
 def test_what_moves_a_little_keeps_its_name_and_what_appears_far_away_is_another() -> None:
-    one = core()
-    assert names(one, 0.0, seen(0.0)) == ["cup_1"]
-    assert names(one, 0.1, seen(0.05)) == ["cup_1"]
-    assert names(one, 0.2, seen(0.05, yaw=0.3)) == ["cup_1"]
-    assert names(one, 0.3, seen(0.05, yaw=0.3), seen(0.5)) == ["cup_2"]
-    assert names(one, 0.4, seen(0.9, id="mug")) == ["mug"]
-    assert names(one, 0.5, seen(0.1, id="mug")) == ["mug"]  # a tracker knows better
+    sightings = core()
+    assert names(sightings, 0.0, seen(0.0)) == ["cup_1"]
+    assert names(sightings, 0.1, seen(0.05)) == ["cup_1"]
+    assert names(sightings, 0.2, seen(0.05, yaw=0.3)) == ["cup_1"]
+    assert names(sightings, 0.3, seen(0.05, yaw=0.3), seen(0.5)) == ["cup_2"]
+    assert names(sightings, 0.4, seen(0.9, id="mug")) == ["mug"]
+    assert names(sightings, 0.5, seen(0.1, id="mug")) == ["mug"]  # a tracker knows better
 
 
 def test_what_is_not_seen_is_forgotten_and_what_is_held_is_not_nor_is_it_moved() -> None:
-    one = core()
-    names(one, 0.0, seen(0.0), seen(0.5))
-    assert names(one, 4.0, seen(0.04), held=("cup_1",)) == ["cup_3"]  # not what the hand holds
-    assert one.forgotten(4.9, ("cup_1",)) == []
-    assert one.forgotten(5.1, ("cup_1",)) == ["cup_2"]
-    assert one.forgotten(9.2, ("cup_1",)) == ["cup_3"]
-    assert list(one.objects) == ["cup_1"]
+    sightings = core()
+    names(sightings, 0.0, seen(0.0), seen(0.5))
+    assert names(sightings, 4.0, seen(0.04), held=("cup_1",)) == ["cup_3"]  # not what the hand holds
+    assert sightings.forgotten(4.9, ("cup_1",)) == []
+    assert sightings.forgotten(5.1, ("cup_1",)) == ["cup_2"]
+    assert sightings.forgotten(9.2, ("cup_1",)) == ["cup_3"]
+    assert list(sightings.objects) == ["cup_1"]
 
 
 def test_what_somebody_has_put_elsewhere_is_seen_there_under_its_name() -> None:
-    one = core()
-    names(one, 0.0, seen(0.0))
-    one.put("cup_1", Transform3((0.5, 0.0, 0.0)))
-    assert names(one, 1.0, seen(0.501)) == []
-    one.put("cup_1", None)
-    assert names(one, 2.0, seen(0.9)) == ["cup_1"]
-    one.put("nothing", None)
+    sightings = core()
+    names(sightings, 0.0, seen(0.0))
+    sightings.put("cup_1", Transform3((0.5, 0.0, 0.0)))
+    assert names(sightings, 1.0, seen(0.501)) == []
+    sightings.put("cup_1", None)
+    assert names(sightings, 2.0, seen(0.9)) == ["cup_1"]
+    sightings.put("nothing", None)
 
 
 @given(st.lists(POINTS, min_size=1), POINTS)
 def test_the_nearest_and_the_newest_are_among_what_is_there(
     points: list[tuple[float, float, float]], here: tuple[float, float, float]
 ) -> None:
-    one = core()
+    sightings = core()
     for step, (x, y, z) in enumerate(points):
-        names(one, float(step), seen(x, y=y, z=z))
-    assert one.nearest(here, ()) in one.objects
-    assert one.objects[one.newest(())].at == len(points) - 1
-    assert one.nearest(here, tuple(one.objects)) == one.newest(tuple(one.objects)) == ""
+        names(sightings, float(step), seen(x, y=y, z=z))
+    assert sightings.nearest(here, ()) in sightings.objects
+    assert sightings.objects[sightings.newest(())].at == len(points) - 1
+    assert sightings.nearest(here, tuple(sightings.objects)) == sightings.newest(tuple(sightings.objects)) == ""
 
 
 def test_noise_does_not_fill_the_scene() -> None:
-    one = core()
-    assert len(names(one, 0.0, *(seen(float(at)) for at in range(2 * MOST_OBJECTS)))) == MOST_OBJECTS
+    sightings = core()
+    assert len(names(sightings, 0.0, *(seen(float(at)) for at in range(2 * MOST_OBJECTS)))) == MOST_OBJECTS

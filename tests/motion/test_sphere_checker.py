@@ -10,20 +10,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.body.model import Geometry
-from rbxcompose.control.limits import MotionLimits
-from rbxcompose.geometry import Transform3
-from rbxcompose.motion.arm_kinematics import ArmKinematics
-from rbxcompose.motion.collisions import TOUCH, MeshChecker, adjacent_pairs
-from rbxcompose.motion.groups import ArmGroup
-from rbxcompose.motion.joint_space import ArmJoint, JointSpace, interpolated
-from rbxcompose.motion.planner import LINE, MotionPlan, MotionRequest
-from rbxcompose.motion.planner_types import FAST
-from rbxcompose.motion.reasons import MotionFailure, MotionReason
-from rbxcompose.motion.recheck import first_bad
-from rbxcompose.motion.scene import PlacedObject
-from rbxcompose.motion.sphere_checker import SphereChecker
-from rbxcompose.motion.sphere_model import Trees
+from rbxcompose.base.geometry import Transform3
+from rbxcompose.domains.arms.manifest_model import FAST
+from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
+from rbxcompose.domains.arms.motion.collisions import TOUCH, MeshChecker, adjacent_pairs
+from rbxcompose.domains.arms.motion.groups import ArmGroup, ArmJoint, JointSpace, interpolated
+from rbxcompose.domains.arms.motion.planner import LINE, MotionPlan, MotionRequest, first_bad
+from rbxcompose.domains.arms.motion.scene import PlacedObject
+from rbxcompose.domains.arms.motion.sphere_checker import SphereChecker
+from rbxcompose.domains.arms.motion.sphere_model import Trees
+from rbxcompose.domains.arms.reasons import MotionFailure, MotionReason
+from rbxcompose.domains.body.model import Geometry
+from rbxcompose.domains.servos.limits import MotionLimits
 from tests.body.kinematics import description_of
 from tests.motion.scenes import FLOOR, OCTREE, objects, poses, shapes, solids
 from tests.motion.test_planner import LEFT, RIGHT, sampled
@@ -47,14 +45,14 @@ def both(mesh: MeshChecker, points: Array) -> tuple[int | None, int | None]:
 def test_the_first_bad_position_of_many_is_that_of_coal(
     things: list[PlacedObject], held: list[tuple[Geometry, Transform3]], padding: float, seed: int
 ) -> None:
-    there = [replace(one, padding=padding) for one in things]
+    there = [replace(placed_object, padding=padding) for placed_object in things]
     there += [PlacedObject("held", shape, "fore", pose, ("fore", "tip", "upper")) for shape, pose in held]
     mesh = MeshChecker(ARM, {}, ADJACENT, there, {"fore": 0.01})
     points = SPACE.samples(40, seed)
-    for one in (points, interpolated(points[:2], 0.005), interpolated(points[2:4], 0.05)):
-        mine, theirs = both(mesh, one)
+    for array in (points, interpolated(points[:2], 0.005), interpolated(points[2:4], 0.05)):
+        mine, theirs = both(mesh, array)
         assert mine == theirs
-        assert mine is None or mesh.colliding(one[mine])
+        assert mine is None or mesh.colliding(array[mine])
 
 
 def test_the_answers_follow_what_moves_beside_the_arm() -> None:
@@ -74,7 +72,7 @@ def test_the_answers_follow_what_moves_beside_the_arm() -> None:
 def test_a_fast_plan_is_free_and_within_all_limits_by_other_code(seed: int) -> None:
     used = fast_planner()
     body = description_of(urdf()).body
-    start, goal = [one for one in SPACE.samples(60, seed) if gap(body, one) > 0.01][:2]
+    start, goal = [sample for sample in SPACE.samples(60, seed) if gap(body, sample) > 0.01][:2]
     found = ended(used.plan(MotionRequest(start, goal)))
     assert isinstance(found, MotionPlan), found
     assert found.trajectory is not None
@@ -82,7 +80,7 @@ def test_a_fast_plan_is_free_and_within_all_limits_by_other_code(seed: int) -> N
     points = sampled(found.trajectory, 0.005)
     assert np.allclose(points[0], start)
     assert np.allclose(points[-1], goal)
-    assert min(gap(body, one) for one in points) >= -TOUCH
+    assert min(gap(body, point) for point in points) >= -TOUCH
     assert found.trajectory.excess(np.full(3, 2.0), np.full(3, 4.0)) <= 1.0 + 1e-9
 
 
@@ -90,7 +88,7 @@ def test_a_fast_plan_is_free_and_within_all_limits_by_other_code(seed: int) -> N
 @given(objects("thing", solids), SEEDS)
 def test_what_the_fast_path_plans_coal_alone_finds_free(thing: PlacedObject, seed: int) -> None:
     used, mesh = fast_planner(things=[thing]), MeshChecker(ARM, {}, ADJACENT, [thing])
-    free = [one for one in SPACE.samples(60, seed) if mesh.is_free(one)][:2]
+    free = [sample for sample in SPACE.samples(60, seed) if mesh.is_free(sample)][:2]
     if len(free) < 2:
         return
     found = ended(used.plan(MotionRequest(free[0], free[1])))
@@ -103,7 +101,7 @@ def test_what_the_fast_path_plans_coal_alone_finds_free(thing: PlacedObject, see
 
 def test_a_seed_gives_the_same_fast_way_again_and_another_one_another() -> None:
     found = [ended(fast_planner(seed=seed).plan(MotionRequest(LEFT, RIGHT))) for seed in (3, 3, 4)]
-    ways = [one.waypoints.tobytes() for one in found if isinstance(one, MotionPlan) and one.found_by == FAST]
+    ways = [plan.waypoints.tobytes() for plan in found if isinstance(plan, MotionPlan) and plan.found_by == FAST]
     assert len(ways) == 3
     assert ways[0] == ways[1] != ways[2]
 
@@ -160,7 +158,9 @@ def test_a_goal_behind_a_fence_is_given_up_in_time_on_both_paths() -> None:
     ],
 )
 def test_what_cannot_be_has_the_same_reason_on_both_paths(start: Array, goal: Array, reason: MotionReason) -> None:
-    slow, quick = (ended(one.plan(MotionRequest(start, goal))) for one in (planner(), fast_planner()))
+    slow, quick = (
+        ended(motion_planner.plan(MotionRequest(start, goal))) for motion_planner in (planner(), fast_planner())
+    )
     assert isinstance(quick, MotionFailure)
     assert quick.reason is reason
     assert quick == slow
@@ -184,9 +184,9 @@ def test_joints_that_slide_and_joints_that_mimic_move_their_spheres() -> None:
     space = JointSpace((ArmJoint("up", MotionLimits(0.0, 0.6), slides=True),))
     mesh = MeshChecker(arm, {}, ())
     points = np.sort(space.samples(300, 1), axis=0)
-    verdicts = [mesh.is_free(one) for one in points]
+    verdicts = [mesh.is_free(point) for point in points]
     assert 10 < sum(verdicts) < 290
     used = SphereChecker(mesh, Trees())
-    assert [used.first_bad(one[None]) is None for one in points] == verdicts
+    assert [used.first_bad(point[None]) is None for point in points] == verdicts
     for begin in range(0, 300, 20):
         assert used.first_bad(points[begin:]) == first_bad(mesh, points[begin:])

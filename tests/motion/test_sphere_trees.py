@@ -12,12 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from rbxcompose.body.model import Geometry
-from rbxcompose.motion import kept_trees
-from rbxcompose.motion.coal_shapes import coal_shape
-from rbxcompose.motion.kept_trees import kept_mesh_tree
-from rbxcompose.motion.sphere_model import triangles_of
-from rbxcompose.motion.sphere_trees import (
+from rbxcompose.domains.arms.motion import sphere_trees as kept_trees
+from rbxcompose.domains.arms.motion.collisions import coal_shape
+from rbxcompose.domains.arms.motion.sphere_model import triangles_of
+from rbxcompose.domains.arms.motion.sphere_trees import (
     FINEST,
     LEAVES,
     SphereTree,
@@ -25,8 +23,10 @@ from rbxcompose.motion.sphere_trees import (
     box_tree,
     cells_tree,
     cylinder_tree,
+    kept_mesh_tree,
     mesh_tree,
 )
+from rbxcompose.domains.body.model import Geometry
 
 Array = NDArray[np.float64]
 LENGTHS = st.floats(1e-3, 2.0)
@@ -190,4 +190,4 @@ def panda(kind: str) -> list[Path]:
     except PackageNotFoundError:
         return []
     wanted = f"panda_description/meshes/{kind}/"
-    return [Path(str(one.locate())) for one in there if wanted in str(one) and str(one).endswith((".stl", ".dae"))]
+    return [Path(str(file.locate())) for file in there if wanted in str(file) and str(file).endswith((".stl", ".dae"))]

@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from rbxcompose.geometry import Transform3
-from rbxcompose.motion.inverse_kinematics import TOLERANCE
-from rbxcompose.motion.joint_space import interpolated
-from rbxcompose.motion.straight_line import JUMP, STEP, LineEnd, line_steps
+from rbxcompose.base.geometry import Transform3
+from rbxcompose.domains.arms.motion.groups import interpolated
+from rbxcompose.domains.arms.motion.hand_task import JUMP, STEP, LineEnd, line_steps
+from rbxcompose.domains.arms.motion.inverse_kinematics import TOLERANCE
 from tests.motion.pi_hand import made
 
 Array = NDArray[np.float64]

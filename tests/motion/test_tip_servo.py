@@ -8,11 +8,11 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.body.model import Geometry
-from rbxcompose.motion.collisions import TOUCH, MeshChecker, adjacent_pairs
-from rbxcompose.motion.planner import MotionPlanner
-from rbxcompose.motion.scene import PlacedObject
-from rbxcompose.motion.tip_servo import CRUISE, LEAD, ServoMotion, TipServo, Wish
+from rbxcompose.domains.arms.motion.collisions import TOUCH, MeshChecker, adjacent_pairs
+from rbxcompose.domains.arms.motion.planner import MotionPlanner
+from rbxcompose.domains.arms.motion.scene import PlacedObject
+from rbxcompose.domains.arms.motion.tip_servo import CRUISE, LEAD, ServoMotion, TipServo, Wish
+from rbxcompose.domains.body.model import Geometry
 from tests.motion.test_inverse_kinematics import ARM
 from tests.motion.test_tracing import READY, SIX
 from tests.motion.toy_arm import Array, gap, kinematics, planner
@@ -75,7 +75,7 @@ def test_whatever_is_commanded_it_keeps_its_limits_and_hits_nothing(
     assert np.all(np.abs(velocities) <= FAST)
     assert np.abs(np.diff(positions, axis=0)).max() <= 2.0 * PERIOD / 4 + 1e-9  # no jumps
     assert np.abs(np.diff(velocities, axis=0)).max() <= 4.0 * PERIOD / 4 + 1e-9
-    assert min(gap(TOY.body, one) for one in positions) >= -TOUCH
+    assert min(gap(TOY.body, position) for position in positions) >= -TOUCH
 
 
 def test_it_slows_down_and_stops_before_a_wall_and_leaves_it_again() -> None:
@@ -120,7 +120,7 @@ def test_without_commands_it_rests_as_soon_as_its_joints_can_and_without_this_pr
             arm.rest()
         else:
             arm.been += [arm.motion.state(arm.now + after) for after in np.arange(0.0, 1.0, 0.005).tolist()]
-        still = next(index for index, one in enumerate(arm.been) if index > 100 and not one[1].any())
+        still = next(index for index, pair in enumerate(arm.been) if index > 100 and not pair[1].any())
         took = still * PERIOD / 4 - begin
         assert took <= speed / (4.0 * 0.95) + LEAD + PERIOD + (0.0 if is_alive else CRUISE)
 
@@ -132,7 +132,7 @@ def test_a_singularity_ahead_slows_it_down() -> None:
     for _ in range(200):
         arm.step(twist(*outwards))
         states.add(arm.servo.state)
-    assert any("singularity" in one for one in states)
+    assert any("singularity" in state for state in states)
     assert np.abs(np.array([velocity for _, velocity in arm.been])).max() <= 2.0
     for _ in range(50):
         arm.step(twist(*(-outwards)))
@@ -160,5 +160,5 @@ def test_an_arm_that_does_not_follow_is_not_led_on() -> None:
     sent = [servo.next(step * PERIOD, START, twist(0.0, 0.4, 0.0)) for step in range(60)]
     assert sent[0] is not None
     assert None in sent
-    reached = max(float(np.max(np.abs(one.way.positions[-1] - START))) for one in sent if one is not None)
+    reached = max(float(np.max(np.abs(motion.way.positions[-1] - START))) for motion in sent if motion is not None)
     assert reached < 0.6

@@ -10,15 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.body.link_pairs import LinkPair
-from rbxcompose.body.model import Geometry
-from rbxcompose.geometry import Transform3, quaternion_from_rpy
-from rbxcompose.motion.arm_kinematics import ArmKinematics
-from rbxcompose.motion.parametrisation import Trajectory
-from rbxcompose.motion.planner import MotionPlan, MotionPlanner, PlannerSettings
-from rbxcompose.motion.reasons import MotionFailure, MotionReason
-from rbxcompose.motion.tip_path import WayPoint
-from rbxcompose.motion.trace_planner import TraceWish, planned_trace
+from rbxcompose.base.geometry import Transform3, quaternion_from_rpy
+from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
+from rbxcompose.domains.arms.motion.parametrisation import Trajectory
+from rbxcompose.domains.arms.motion.planner import MotionPlan, MotionPlanner, PlannerSettings
+from rbxcompose.domains.arms.motion.trace_planner import TraceWish, WayPoint, planned_trace
+from rbxcompose.domains.arms.reasons import MotionFailure, MotionReason
+from rbxcompose.domains.body.link_pairs import LinkPair
+from rbxcompose.domains.body.model import Geometry
 from tests.body.kinematics import Three
 from tests.motion.test_inverse_kinematics import ARM, DESCRIPTION, SPACE
 from tests.motion.test_planner import sampled
@@ -76,8 +75,8 @@ def tips(trajectory: Trajectory, step: float = 0.02) -> Array:
     )
 
 
-def angle_between(one: Array, other: Array) -> float:
-    return math.acos(min(1.0, max(-1.0, (float(np.trace(one[:3, :3].T @ other[:3, :3])) - 1.0) / 2.0)))
+def angle_between(array: Array, other: Array) -> float:
+    return math.acos(min(1.0, max(-1.0, (float(np.trace(array[:3, :3].T @ other[:3, :3])) - 1.0) / 2.0)))
 
 
 def away_from_line(points: Array, first: Array, last: Array) -> float:
@@ -101,16 +100,16 @@ def test_the_tip_keeps_to_its_line_and_turns_evenly_or_tells_how_far_it_gets(see
     first, last, whole = frames[0][:3, 3], frames[-1][:3, 3], angle_between(frames[0], frames[-1])
     assert np.allclose(last - first, (x, y, z), atol=1e-3)
     assert away_from_line(frames[:, :3, 3], first, last) < 1e-3
-    for one in frames:
-        share = float(np.linalg.norm(one[:3, 3] - first) / np.linalg.norm(last - first))
-        assert angle_between(frames[0], one) == pytest.approx(share * whole, abs=math.radians(0.6))
-        assert angle_between(frames[0], one) + angle_between(one, frames[-1]) < whole + math.radians(0.5)
+    for frame in frames:
+        share = float(np.linalg.norm(frame[:3, 3] - first) / np.linalg.norm(last - first))
+        assert angle_between(frames[0], frame) == pytest.approx(share * whole, abs=math.radians(0.6))
+        assert angle_between(frames[0], frame) + angle_between(frame, frames[-1]) < whole + math.radians(0.5)
     assert np.abs(np.diff(sampled(trajectory_of(found), 0.02), axis=0)).max() <= 0.02 + 1e-9  # no joint jumps
 
 
 def test_the_tip_is_as_fast_as_was_asked_for_between_rest_and_rest() -> None:
     made = trajectory_of(trace(TraceWish((point(0.1),), relative=True, speed=0.05)))
-    positions = [ARM.tip_pose(one).translation for one in made.positions]
+    positions = [ARM.tip_pose(position).translation for position in made.positions]
     speeds = np.linalg.norm(np.diff(positions, axis=0), axis=1) / np.diff(made.times)
     assert speeds.max() < 0.0505
     assert np.median(speeds) == pytest.approx(0.05, rel=0.02)

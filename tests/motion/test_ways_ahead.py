@@ -13,15 +13,14 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.body.model import Geometry
-from rbxcompose.geometry import Transform3
-from rbxcompose.motion import fast_search, search, ways_ahead
-from rbxcompose.motion.contacts import ContactSearch
-from rbxcompose.motion.hand_task import HandTask
-from rbxcompose.motion.planner import MotionPlanner, MotionRequest, Planning
-from rbxcompose.motion.reasons import MotionFailure, MotionReason
-from rbxcompose.motion.scene import PlacedObject
-from rbxcompose.motion.ways_ahead import ATTEMPTS, PlanJob, Planned, PlanningHelper
+from rbxcompose.base.geometry import Transform3
+from rbxcompose.domains.arms.motion import fast_search, search
+from rbxcompose.domains.arms.motion import hand_task as ways_ahead
+from rbxcompose.domains.arms.motion.hand_task import ATTEMPTS, ContactSearch, HandTask, PlanJob, Planned, PlanningHelper
+from rbxcompose.domains.arms.motion.planner import MotionPlanner, MotionRequest, Planning
+from rbxcompose.domains.arms.motion.scene import PlacedObject
+from rbxcompose.domains.arms.reasons import MotionFailure, MotionReason
+from rbxcompose.domains.body.model import Geometry
 from rbxcompose.msgs.rbxcompose_msgs import PickObject
 from tests.motion.pi_hand import HandBench
 
@@ -38,7 +37,7 @@ def cluttered(seed: int) -> HandBench:
     boxes = [_box(f"b{index}", chance) for index in range(chance.randint(4, 14))]
     bench = HandBench(*boxes)
     space, checker = bench.works.space, bench.works.planner.checker
-    start = next((one for one in space.samples(60, seed) if checker.is_free(one)), np.zeros(len(space.joints)))
+    start = next((sample for sample in space.samples(60, seed) if checker.is_free(sample)), np.zeros(len(space.joints)))
     bench.measured.update({name: (at, 0.0) for name, at in zip(space.names, start.tolist(), strict=True)})
     return bench
 
@@ -128,9 +127,9 @@ def test_a_goal_ends_with_helpers_as_it_does_without(
 ) -> None:
     known.clear()
     alone = outcome(seed, ())
-    helpers = [Recalling(dict(known), one) for one in waits]
+    helpers = [Recalling(dict(known), numbers) for numbers in waits]
     assert outcome(seed, helpers) == alone
-    assert all(one.is_idle for one in helpers)
+    assert all(helper.is_idle for helper in helpers)
 
 
 def test_helpers_plan_to_all_ways_but_the_first_and_never_twice_to_the_same(known: dict[bytes, Planned]) -> None:
@@ -141,7 +140,7 @@ def test_helpers_plan_to_all_ways_but_the_first_and_never_twice_to_the_same(know
     known.clear()
     assert outcome(CONFINED, helpers) == alone
     assert len(known) == 1  # was planned here
-    given = [job.request.goal.tobytes() for one in helpers for job in one.given]
+    given = [job.request.goal.tobytes() for helper in helpers for job in helper.given]
     assert sorted(given) == sorted(before.keys() - known.keys())
 
 
@@ -175,7 +174,7 @@ def test_a_goal_that_is_cancelled_lets_all_helpers_go(known: dict[bytes, Planned
     assert helpers[0].given
     assert task.failure is not None
     assert task.failure.reason is MotionReason.INTERRUPTED
-    assert all(one.is_idle for one in helpers)
+    assert all(helper.is_idle for helper in helpers)
 
 
 @pytest.mark.timeout(100)

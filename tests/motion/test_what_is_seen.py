@@ -13,30 +13,29 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from rbxcompose.arm_config import ArmConfig, ArmWorks
-from rbxcompose.body.model import Geometry, Shape
-from rbxcompose.body.pieces import to_xml
-from rbxcompose.body.urdf import read_body
-from rbxcompose.body.visual_cover import covering
-from rbxcompose.body.xml_reader import XmlElement, read_urdf
-from rbxcompose.geometry import Transform3
-from rbxcompose.motion.arm_figures import ended
-from rbxcompose.motion.arm_kinematics import ArmKinematics
-from rbxcompose.motion.collisions import MeshChecker
-from rbxcompose.motion.groups import ArmGroup
-from rbxcompose.motion.planner import MotionPlan, MotionRequest
-from rbxcompose.motion.planner_types import FAST
-from rbxcompose.motion.scene import PlacedObject
-from rbxcompose.motion.second_checker import sampled
-from rbxcompose.motion.sphere_model import Trees, compiled_model
+from rbxcompose.base.geometry import Transform3
+from rbxcompose.domains.arms.arm_config import ArmConfig, ArmWorks
+from rbxcompose.domains.arms.manifest_model import FAST
+from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
+from rbxcompose.domains.arms.motion.collisions import MeshChecker
+from rbxcompose.domains.arms.motion.figures import ended
+from rbxcompose.domains.arms.motion.groups import ArmGroup
+from rbxcompose.domains.arms.motion.planner import MotionPlan, MotionRequest
+from rbxcompose.domains.arms.motion.scene import PlacedObject
+from rbxcompose.domains.arms.motion.second_checker import sampled
+from rbxcompose.domains.arms.motion.sphere_model import Trees, compiled_model
+from rbxcompose.domains.body.description import covering, to_xml
+from rbxcompose.domains.body.model import Geometry, Shape
+from rbxcompose.domains.body.urdf import read_body
+from rbxcompose.domains.body.xml_reader import XmlElement, read_urdf
 from tests.body.kinematics import description_of
 from tests.motion.test_coal_shapes import OBJ
 from tests.motion.test_sphere_trees import on_surface
 from tests.parts.project import Project
 
 Array = NDArray[np.float64]
-NUMBERS = st.floats(-1.0, 1.0).map(lambda one: round(one, 3))
-SIZES = st.floats(0.01, 1.0).map(lambda one: round(one, 3))
+NUMBERS = st.floats(-1.0, 1.0).map(lambda value: round(value, 3))
+SIZES = st.floats(0.01, 1.0).map(lambda value: round(value, 3))
 SHAPES = st.one_of(
     st.builds('<box size="{} {} {}"/>'.format, SIZES, SIZES, SIZES),
     st.builds('<sphere radius="{}"/>'.format, SIZES),
@@ -130,8 +129,8 @@ def _is_seen_clear_of_a_pole(cover: str, planner: str, folder: Path) -> bool:
             "pole", 0, pinocchio.SE3(np.eye(3), np.array(there.translation)), coal.Cylinder(*pole.size)
         )
     )
-    for one in range(len(seen.geometryObjects) - 1):
-        seen.addCollisionPair(pinocchio.CollisionPair(one, len(seen.geometryObjects) - 1))
+    for index in range(len(seen.geometryObjects) - 1):
+        seen.addCollisionPair(pinocchio.CollisionPair(index, len(seen.geometryObjects) - 1))
     data, found = model.createData(), seen.createData()
     columns = [model.joints[model.getJointId(name)].idx_q for name in works.space.names]
     for values in sampled(plan.trajectory, 0.005):

@@ -8,15 +8,14 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from rbxcompose.body.model import Body
-from rbxcompose.control.limits import MotionLimits
-from rbxcompose.geometry import Transform3
-from rbxcompose.motion.arm_kinematics import ArmKinematics
-from rbxcompose.motion.collisions import MeshChecker, adjacent_pairs
-from rbxcompose.motion.groups import chain
-from rbxcompose.motion.joint_space import ArmJoint, JointSpace
-from rbxcompose.motion.planner import MotionPlanner, PlannerSettings
-from rbxcompose.motion.scene import PlacedObject
+from rbxcompose.base.geometry import Transform3
+from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
+from rbxcompose.domains.arms.motion.collisions import MeshChecker, adjacent_pairs
+from rbxcompose.domains.arms.motion.groups import ArmJoint, JointSpace, chain
+from rbxcompose.domains.arms.motion.planner import MotionPlanner, PlannerSettings
+from rbxcompose.domains.arms.motion.scene import PlacedObject
+from rbxcompose.domains.body.model import Body
+from rbxcompose.domains.servos.limits import MotionLimits
 from tests.body.kinematics import description_of
 
 Array = NDArray[np.float64]
@@ -43,7 +42,7 @@ def _joint(name: str, parent: str, child: str, axis: str, at: str, limits: str) 
 
 def urdf(wall: tuple[float, float, float] = WALL) -> str:
     """Return the arm: it turns about z, and lifts and bends about y."""
-    size = " ".join(str(2 * one) for one in wall)
+    size = " ".join(str(2 * value) for value in wall)
     return f"""<robot name="toy">
   <link name="ground"><collision><origin xyz="0.45 0 {wall[2]}"/><geometry><box size="{size}"/></geometry></collision>
   </link>
@@ -75,8 +74,8 @@ def fast_planner(
     wall: tuple[float, float, float] = WALL, things: Iterable[PlacedObject] = (), **settings: object
 ) -> MotionPlanner:
     """Return the same on the fast path."""
-    from rbxcompose.motion.sphere_checker import SphereChecker  # which imports numba
-    from rbxcompose.motion.sphere_model import Trees
+    from rbxcompose.domains.arms.motion.sphere_checker import SphereChecker  # which imports numba
+    from rbxcompose.domains.arms.motion.sphere_model import Trees
 
     made = planner(wall, **settings)
     arm = kinematics(wall)

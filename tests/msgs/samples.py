@@ -83,16 +83,16 @@ def any_message() -> st.SearchStrategy[Any]:
 
 
 def _values(type_: FieldType) -> st.SearchStrategy[Any]:
-    one = _one(type_)
+    strategy = _one(type_)
     if type_.shape is FieldShape.SINGLE:
-        return one
+        return strategy
     least = type_.length if type_.shape is FieldShape.ARRAY else 0
     most = 4 if type_.shape is FieldShape.UNBOUNDED else type_.length
     if holds_numbers(type_):
-        return st.lists(one, min_size=least, max_size=most).map(lambda values: np.array(values, type_.base))
+        return st.lists(strategy, min_size=least, max_size=most).map(lambda values: np.array(values, type_.base))
     if type_.base in OCTETS:
         return st.binary(min_size=least, max_size=most)
-    return st.lists(one, min_size=least, max_size=most).map(tuple)
+    return st.lists(strategy, min_size=least, max_size=most).map(tuple)
 
 
 def _one(type_: FieldType) -> st.SearchStrategy[Any]:
@@ -109,10 +109,10 @@ def _one(type_: FieldType) -> st.SearchStrategy[Any]:
 
 
 def description(type_: FieldType) -> Any:
-    one = (Nodetype.NAME, type_.base) if type_.is_message else (Nodetype.BASE, (type_.base, type_.text_limit))
+    pair = (Nodetype.NAME, type_.base) if type_.is_message else (Nodetype.BASE, (type_.base, type_.text_limit))
     if type_.shape is FieldShape.SINGLE:
-        return one
-    return (Nodetype.ARRAY if type_.shape is FieldShape.ARRAY else Nodetype.SEQUENCE, (one, type_.length))
+        return pair
+    return (Nodetype.ARRAY if type_.shape is FieldShape.ARRAY else Nodetype.SEQUENCE, (pair, type_.length))
 
 
 def _oracle() -> Typestore:

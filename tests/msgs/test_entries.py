@@ -6,16 +6,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.expressions.types import TYPES
+from rbxcompose.base.expressions.types import TYPES
+from rbxcompose.base.units import ANGLE, LENGTH
 from rbxcompose.missions.program.goals import filled, goal_of, skill_of, topic_skill
 from rbxcompose.msgs.builtin_interfaces import Duration
 from rbxcompose.msgs.control_msgs import FollowJointTrajectory
-from rbxcompose.msgs.entries import ArrayEntries
+from rbxcompose.msgs.fields import ArrayEntries
 from rbxcompose.msgs.rbxcompose_msgs import MoveJoints
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.stamps import to_duration
 from rbxcompose.sdk import ServesAction, ServesTopic
-from rbxcompose.units import ANGLE, LENGTH
 
 NAMES = st.text(st.characters(codec="utf-8", exclude_categories=["C"]), min_size=1, max_size=8)
 NUMBERS = st.floats(allow_nan=False, allow_infinity=False)

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.msgs.finite import NotFiniteError, is_finite, require_finite
+from rbxcompose.msgs.fields import NotFiniteError, is_finite, require_finite
 from rbxcompose.msgs.geometry_msgs import PoseWithCovariance, Transform, TransformStamped, Twist, Vector3
 from rbxcompose.msgs.std_msgs import Float32, Int32, String
 from rbxcompose.msgs.tf2_msgs import TFMessage

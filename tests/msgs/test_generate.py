@@ -123,12 +123,12 @@ def test_messages_without_arrays_can_be_keys() -> None:
 
 
 def test_array_messages_compare_their_arrays() -> None:
-    one = PoseWithCovariance(covariance=np.eye(6))
-    assert one == PoseWithCovariance(covariance=np.eye(6).reshape(-1))
-    assert one != PoseWithCovariance()
-    assert one != PoseWithCovariance(pose=Pose(orientation=Quaternion(w=0.0)), covariance=np.eye(6))
-    assert Odometry(pose=one) == Odometry(pose=PoseWithCovariance(covariance=one.covariance))
-    assert one != Pose()
+    odometry = PoseWithCovariance(covariance=np.eye(6))
+    assert odometry == PoseWithCovariance(covariance=np.eye(6).reshape(-1))
+    assert odometry != PoseWithCovariance()
+    assert odometry != PoseWithCovariance(pose=Pose(orientation=Quaternion(w=0.0)), covariance=np.eye(6))
+    assert Odometry(pose=odometry) == Odometry(pose=PoseWithCovariance(covariance=odometry.covariance))
+    assert odometry != Pose()
 
 
 def test_an_array_is_copied_unless_nobody_can_write_to_it() -> None:

@@ -2,9 +2,8 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.msgs.definitions import parse, parts, read
+from rbxcompose.msgs.definitions import parse, parts, read, type_hash
 from rbxcompose.msgs.generate import all_structures
-from rbxcompose.msgs.hashes import type_hash
 from tests.msgs.samples import JAZZY, MESSAGES, ORACLE, STRUCTURES
 
 FIBONACCI = "example_interfaces/action/Fibonacci"

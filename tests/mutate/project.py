@@ -10,10 +10,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from rbxcompose.compiler import Compilation, compile_robot
-from rbxcompose.findings import Severity, Span
-from rbxcompose.formats import format_names, renderer
-from rbxcompose.plan.dump import dump, load
+from rbxcompose.base.findings import Severity, Span
+from rbxcompose.base.formats import format_names, renderer
+from rbxcompose.compiler.compile import Compilation, compile_robot
+from rbxcompose.compiler.plan.dump import dump, load
 from tests.conftest import ROOT
 from tests.mutate.mutants import Mutant, mutant, originals
 
@@ -107,7 +107,7 @@ class Project:
                 found.failures.setdefault(where, (one, traceback.format_exc()))
                 continue
             found.refused += any(out.report.has_errors for out in outs)
-            errors = (one.code for out in outs for one in out.report if one.severity is Severity.ERROR)
+            errors = (finding.code for out in outs for finding in out.report if finding.severity is Severity.ERROR)
             found.codes.update(set(errors))
         return found
 

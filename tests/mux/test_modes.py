@@ -9,11 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rbxcompose.domains.muxes.account import state_of, why
+from rbxcompose.domains.muxes.core import StampedTwistRamp, grown, is_zeroed, rest_of, zeroed
 from rbxcompose.msgs.geometry_msgs import Twist, TwistStamped, Vector3
 from rbxcompose.msgs.std_msgs import Float64, Float64MultiArray, Header
-from rbxcompose.mux.account import state_of, why
-from rbxcompose.mux.handover import StampedTwistRamp, grown
-from rbxcompose.mux.rest import is_zeroed, rest_of, zeroed
 from tests.mux.velocities import Driven, Input, twist
 
 HIGH: Input = {"priority": 100, "timeout": 0.5}

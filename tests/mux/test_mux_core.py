@@ -10,9 +10,8 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from rbxcompose.mux.account import why
-from rbxcompose.mux.core import MuxCore
-from rbxcompose.mux.sources import LockSource, MuxSource
+from rbxcompose.domains.muxes.account import why
+from rbxcompose.domains.muxes.core import LockSource, MuxCore, MuxSource
 
 INPUTS = {"safety": MuxSource(200, 0.2), "teleop": MuxSource(100, 0.5), "navigation": MuxSource(10, 0.5)}
 LOCKS = {"door": LockSource(150, 0.3)}

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from rbxcompose.domains.muxes.config import MuxConfig, core_of
+from rbxcompose.domains.muxes.core import MuxCore
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
-from rbxcompose.mux.config import MuxConfig, core_of
-from rbxcompose.mux.core import MuxCore
 
 Input = dict[str, Any]
 

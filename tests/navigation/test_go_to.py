@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.geometry import AT_REST, Pose2, wrap_angle
-from rbxcompose.navigation.go_to import GoToCore, GoToSettings
-from rbxcompose.sim.diff_drive import DiffDriveCore, DiffDriveSettings
+from rbxcompose.base.geometry import AT_REST, Pose2, wrap_angle
+from rbxcompose.domains.bases.driving import GoToCore, GoToSettings
+from rbxcompose.domains.bases.twins import DiffDriveCore, DiffDriveSettings
 
 SETTINGS = GoToSettings()
 LENGTHS = st.one_of(st.floats(-0.1, 0.1), st.floats(-3, 3))

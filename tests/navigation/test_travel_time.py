@@ -7,9 +7,9 @@ import math
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.geometry import Pose2, wrap_angle
-from rbxcompose.navigation.travel_time import least_time
-from rbxcompose.sim.diff_drive import DiffDriveSettings
+from rbxcompose.base.geometry import Pose2, wrap_angle
+from rbxcompose.domains.bases.driving import least_time
+from rbxcompose.domains.bases.twins import DiffDriveSettings
 from tests.navigation.test_go_to import SETTINGS, drive
 
 ANGLES = st.floats(-math.pi, math.pi)

@@ -10,14 +10,14 @@ from random import Random
 
 import pytest
 
-from rbxcompose.bus.probe import MISSES, ProbeResult, probe_key
+from rbxcompose.bus.endpoints import tcp_endpoint
+from rbxcompose.bus.liveness import MISSES, ProbeResult, probe_key
 from rbxcompose.bus.zenoh_session import open_router
 from rbxcompose.bus.zenoh_transport import ZenohTransport
-from rbxcompose.endpoints import tcp_endpoint
 from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.msgs.std_srvs import Trigger
-from rbxcompose.qos import Qos
-from rbxcompose.runtime.process_group.lifeline import answer
+from rbxcompose.runtime.process_group.connection import answer
+from rbxcompose.sdk.ports import Qos
 from tests.net.proxy import Proxy
 from tests.runtime.test_lifeline import ROBOT, Probed, Visitor, until
 from tests.soak import Soak
@@ -72,7 +72,7 @@ class Stage:
             if time.monotonic() - spoken > 0.02:
                 spoken = time.monotonic()
                 self.tell(Float32(data=spoken))
-            return any(one > began for one in self.heard[first:])
+            return any(value > began for value in self.heard[first:])
 
         self.until(heard)
         return time.monotonic() - began

@@ -5,13 +5,7 @@ from __future__ import annotations
 import pytest
 
 from rbxcompose.msgs.rcl_interfaces import Parameter, ParameterValue
-from rbxcompose.params.history import (
-    ChangeCause,
-    NothingToUndoError,
-    ParameterHistory,
-    identity,
-    to_undo,
-)
+from rbxcompose.runtime.settings_history import ChangeCause, NothingToUndoError, ParameterHistory, identity, to_undo
 
 
 class Robot:
@@ -32,12 +26,14 @@ class Robot:
 
     def undo(self, wanted: str = "") -> list[str]:
         """Take back a change; return what was taken back."""
-        found = to_undo([one for each in self.histories.values() for one in each.changes], wanted)
-        for component in {one.component for one in found}:  # a component is sent one request for all of its changes
-            own = [one for one in found if one.component == component]
+        found = to_undo([change for each in self.histories.values() for change in each.changes], wanted)
+        for component in {
+            change.component for change in found
+        }:  # a component is sent one request for all of its changes
+            own = [change for change in found if change.component == component]
             cause = ChangeCause("me", "", own[0].number)
-            self.set(cause, **{f"{component}_{one.name}": one.before.integer_value for one in own})
-        return [identity(one) for one in found]
+            self.set(cause, **{f"{component}_{change.name}": change.before.integer_value for change in own})
+        return [identity(change) for change in found]
 
 
 def parameter(name: str, value: int) -> Parameter:

@@ -12,19 +12,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import Field, model_validator
 
-from rbxcompose.config import Angle, Bound, Config, Live, Place, PlaceName, Ratio, Secret, Speed, Time
+from rbxcompose.base.config import Angle, Bound, Config, Live, Place, PlaceName, Ratio, Secret, Speed, Time
 from rbxcompose.msgs.rcl_interfaces import Parameter, ParameterType, ParameterValue
-from rbxcompose.params.core import (
+from rbxcompose.sdk.parameters import (
     UnsettableError,
     changed,
     differences,
+    from_message,
     listed,
     settings,
     shown,
+    to_message,
     told_dimension,
     values_of,
 )
-from rbxcompose.params.values import from_message, to_message
 
 
 class Input(Config):
@@ -91,7 +92,7 @@ def test_fields_and_what_lies_below_them_are_parameters_but_no_secret_and_no_pla
 
 def test_what_is_unknown_has_no_value() -> None:
     values = values_of(settings(SAMPLE), ["count", "no", "nothing"])
-    assert [(one.type, from_message(one)) for one in values] == [
+    assert [(value.type, from_message(value)) for value in values] == [
         (ParameterType.PARAMETER_INTEGER, 3),
         (0, None),
         (0, None),
@@ -129,7 +130,7 @@ def test_a_descriptor_tells_unit_range_and_whether_it_may_change() -> None:
 def test_a_change_takes_si_and_text_with_units(name: str, value: object, expected: object) -> None:
     new = set_to(name, value)
     assert getattr(new, name) == pytest.approx(expected) if name != "mode" else getattr(new, name) == expected
-    assert [one.name for one in differences(SAMPLE, new)] == [name]
+    assert [difference.name for difference in differences(SAMPLE, new)] == [name]
 
 
 @pytest.mark.parametrize(
@@ -207,7 +208,9 @@ def test_a_bound_beside_the_field_holds_and_is_told() -> None:
 
 def test_values_are_shown_in_the_unit_that_their_description_tells() -> None:
     known = settings(SAMPLE)
-    found = {name: shown(one.value, told_dimension(one.descriptor.description)) for name, one in known.items()}
+    found = {
+        name: shown(setting.value, told_dimension(setting.descriptor.description)) for name, setting in known.items()
+    }
     assert found["heading"] == "0.5 rad"
     assert (found["speed"], found["low"], found["count"], found["mode"]) == ("0.3 m/s", "20 %", "3", "calm")
     assert (found["inputs.door.timeout"], found["nothing"], found["turns"]) == ("0.5 s", "-", "[]")
@@ -237,7 +240,7 @@ class Lamp(Config):
 
 
 def test_the_wire_has_steps_and_no_bound_that_a_value_may_not_have() -> None:
-    power, blinks, shade = (one.descriptor for one in settings(Lamp()).values())
+    power, blinks, shade = (setting.descriptor for setting in settings(Lamp()).values())
     ((low, high, step),) = [(one.from_value, one.to_value, one.step) for one in power.floating_point_range]
     assert (low, high, step) == (math.nextafter(0.0, 1.0), math.nextafter(1.0, 0.0), 0.25)
     assert [(one.from_value, one.to_value, one.step) for one in blinks.integer_range] == [(1, 9, 2)]

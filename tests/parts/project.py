@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from textwrap import dedent
 
-from rbxcompose.composition.robot_manifest import RobotManifest
-from rbxcompose.findings import Finding
+from rbxcompose.base.findings import Finding
+from rbxcompose.compiler.composition.robot_manifest import RobotManifest
 from rbxcompose.manifest.tree import at
 from rbxcompose.manifest.validate import to_plain
 from rbxcompose.testing.manifests import Checked, check_text
@@ -50,7 +50,7 @@ class Project:
             self.folder / "robots/one",
             others=others,
             profiles=profiles,
-            overlays=[str(self.folder / one) for one in overlays],
+            overlays=[str(self.folder / overlay) for overlay in overlays],
             sets=sets,
             environment=environment,
         )

@@ -12,14 +12,14 @@ from typing import Any
 import pytest
 import yaml
 
-from rbxcompose.body.lint import lint
-from rbxcompose.body.model import Body
-from rbxcompose.body.urdf import read_body
-from rbxcompose.body.xacro import Expanded, expand
-from rbxcompose.body.xml_reader import XmlElement, read_urdf
-from rbxcompose.findings import Span
-from rbxcompose.geometry import Transform3, Vector3
-from rbxcompose.units import parse_quantity
+from rbxcompose.base.findings import Span
+from rbxcompose.base.geometry import Transform3, Vector3
+from rbxcompose.base.units import parse_quantity
+from rbxcompose.domains.body.lint import lint
+from rbxcompose.domains.body.model import Body
+from rbxcompose.domains.body.urdf import read_body
+from rbxcompose.domains.body.xacro import Expanded, expand
+from rbxcompose.domains.body.xml_reader import XmlElement, read_urdf
 
 PARTS = Path(__file__).parents[2] / "parts"
 HERE = Span("robot.yaml", 1, 1, 1, 1)
@@ -41,14 +41,14 @@ WHOLE: dict[str, tuple[str, list[str], list[str], tuple[float, float]]] = {  # r
     "xtion": ("link", CAMERA, [], (0.15, 0.3)),
     "laser": ("link", ["frame"], [], (0.1, 0.4)),
     "pan_tilt_head": ("base_link", ["pan_link", "tilt_link", "top"], ["pan_joint", "tilt_joint"], (0.12, 0.25)),
-    "arm": ("base_link", [*(f"{one}_link" for one in ARM), "tip"], [f"{one}_joint" for one in ARM], (0.4, 0.8)),
-    "roll_arm": ("base_link", ["tip"], [f"{one}_joint" for one in ROLLING], (5, 12)),
+    "arm": ("base_link", [*(f"{text}_link" for text in ARM), "tip"], [f"{text}_joint" for text in ARM], (0.4, 0.8)),
+    "roll_arm": ("base_link", ["tip"], [f"{text}_joint" for text in ROLLING], (5, 12)),
     "lift": ("link", ["carriage_link", "shoulder", "top"], ["joint"], (20, 25)),
     "parallel_gripper": ("link", ["right_finger_link", "grasp"], ["left_finger_joint"], (1, 2)),
     "gripper": ("link", ["static_finger_link", "finger_link", "grasp"], ["finger_joint"], (0.1, 0.3)),
 }
 PIECES = sorted(path.name.split(".")[0] for path in PARTS.glob("body/*.urdf.xacro"))
-MIRRORED = {f"{one}_joint" for one in ARM} - {"shoulder_lift_joint", "forearm_flex_joint"}  # turn the other way
+MIRRORED = {f"{text}_joint" for text in ARM} - {"shoulder_lift_joint", "forearm_flex_joint"}  # turn the other way
 
 
 def defaults(name: str) -> dict[str, str]:
@@ -174,8 +174,10 @@ def test_reflect_mirrors_exactly(name: str) -> None:
 def test_reflect_mirrors_all_shapes(name: str) -> None:
     right, left = piece(name, reflect="-1"), piece(name, reflect="1")
     for link in right.links.values():
-        there = {(rounded(mirrored(one.origin.translation)), one.geometry.size) for one in link.visuals}
-        assert {(rounded(one.origin.translation), one.geometry.size) for one in left.links[link.name].visuals} == there
+        there = {(rounded(mirrored(visual.origin.translation)), visual.geometry.size) for visual in link.visuals}
+        assert {
+            (rounded(visual.origin.translation), visual.geometry.size) for visual in left.links[link.name].visuals
+        } == there
 
 
 def test_the_arm_hangs_down_and_is_stretched_forwards_by_its_lift() -> None:
@@ -199,7 +201,7 @@ def test_the_arm_that_rolls_is_stretched_forwards_and_its_positive_lift_lowers_i
     assert tip.translation == pytest.approx((shoulder.translation[0] + 0.878, *shoulder.translation[1:]))
     assert body.poses({"shoulder_lift_joint": 0.3})["tip"].translation[2] < tip.translation[2]
     rolling = {joint.name for joint in body.moving if joint.kind == "continuous"}
-    assert rolling == {f"{one}_roll_joint" for one in ("upperarm", "forearm", "wrist")}
+    assert rolling == {f"{text}_roll_joint" for text in ("upperarm", "forearm", "wrist")}
 
 
 def test_the_head_pans_left_and_tilts_down() -> None:

@@ -222,5 +222,5 @@ def test_paths_in_a_part_and_in_an_overlay_are_relative_to_it(project: Project) 
         overlays=["layers/o.yaml"],
     )
     assert project.findings == [], project.text
-    paths = {name: one.path for name, one in project.manifest.missions.items()}
+    paths = {name: mission_entry.path for name, mission_entry in project.manifest.missions.items()}
     assert paths == {"a_tour": project.folder / "parts/tour.yaml", "other": project.folder / "layers/tour.yaml"}

@@ -8,13 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.cli.main import main
-from rbxcompose.composition.dump import dump_robot, exact
-from rbxcompose.findings import Report
-from rbxcompose.manifest.fill import fill
-from rbxcompose.manifest.fill_names import Names
+from rbxcompose.base.findings import Report
+from rbxcompose.base.units import ANGLE, LENGTH, RATIO, SPEED, TIME, Dimension, to_si
+from rbxcompose.commands.main import main
+from rbxcompose.compiler.composition.dump import dump_robot, exact
+from rbxcompose.manifest.fill import Names, fill
 from rbxcompose.manifest.tree import NOWHERE, Entry, MappingNode, ScalarNode
-from rbxcompose.units import ANGLE, LENGTH, RATIO, SPEED, TIME, Dimension, to_si
 from tests.parts.project import BATTERY, Project
 
 ROBOT = """\
@@ -107,11 +106,11 @@ def test_profiles_that_were_not_chosen_say_nothing_of_overlays_and_sets(project:
     robot = ROBOT.replace("battery: {runtime: 30 s}", "battery: !remove").replace("values:", "about:")
     overlay = OVERLAY + "components:\n  battery: {warn: 40 %}\n"
     project.check(robot, files={"o.yaml": overlay}, overlays=["o.yaml"], sets=["battery.error=10 %"])
-    assert [one.code for one in project.findings if one.code == "RBX1302"] == []
+    assert [finding.code for finding in project.findings if finding.code == "RBX1302"] == []
 
 
 def steps(project: Project, *path: str) -> list[str]:
-    return [f"{one.layer} {one.span}" for one in project.manifest.history.of(path)]
+    return [f"{step.layer} {step.span}" for step in project.manifest.history.of(path)]
 
 
 def test_every_value_knows_the_layers_that_it_won_over(project: Project) -> None:
@@ -138,7 +137,7 @@ def test_every_value_knows_the_layers_that_it_won_over(project: Project) -> None
         "'--set' --set:1:23",
     ]
     warn = project.manifest.history.of(("components", "spare_battery", "warn"))
-    assert [(one.layer, one.node is None) for one in warn] == [("the robot", False), ("overlay 'o.yaml'", True)]
+    assert [(step.layer, step.node is None) for step in warn] == [("the robot", False), ("overlay 'o.yaml'", True)]
     assert project.manifest.history.layer(("components", "spare_charger", "dock")) == "part 'spare'"
     assert steps(project, "places", "dock", "x") == ["the robot robots/one/robot.yaml:4:20"]
     assert steps(project, "nothing", "there") == []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rbxcompose.findings import Related
+from rbxcompose.base.findings import Related
 from tests.parts.project import BATTERY, Project
 
 SPARE = "places: {dock: {x: 0 m, y: 0 m}}\ninclude:\n  spare: {part: ../../parts/battery.yaml, with: {runtime: 9 s}}\n"
@@ -15,14 +15,14 @@ def codes(project: Project) -> list[str]:
 
 
 def chain(related: tuple[Related, ...]) -> list[str]:
-    return [f"{one.span.file}:{one.span.line} {one.message}" for one in related]
+    return [f"{item.span.file}:{item.span.line} {item.message}" for item in related]
 
 
 def test_a_finding_inside_a_part_tells_the_chain_of_includes(project: Project) -> None:
     arm = "include:\n  hand: battery.yaml\n"
     broken = BATTERY.replace("type: charger", "type: chargr")
     project.check("include:\n  arm: ../../parts/arm.yaml\n", {"arm": arm, "battery": broken})
-    (finding,) = (one for one in project.findings if one.code == "RBX3004")
+    (finding,) = (candidate for candidate in project.findings if candidate.code == "RBX3004")
     assert str(finding.span) == "parts/battery.yaml:9:19"
     assert chain(finding.related) == [
         "parts/arm.yaml:5 included here as 'arm.hand'",
@@ -105,7 +105,9 @@ MISTAKES = [
 def test_a_mistake_of_an_include_is_found(project: Project, entry: str, code: str, message: str) -> None:
     parts = {"battery": BATTERY, "needy": "args: {port: {type: text}}\n", "started": "start: tour\n"}
     project.check(f"places: {{dock: {{x: 0 m, y: 0 m}}}}\ninclude:\n  {entry}\n", parts)
-    assert any(one.code == code and one.message.startswith(message) for one in project.findings), project.text
+    assert any(finding.code == code and finding.message.startswith(message) for finding in project.findings), (
+        project.text
+    )
 
 
 def test_two_parts_that_bring_the_same_input_are_told_at_the_second(project: Project) -> None:
@@ -119,8 +121,8 @@ def test_two_parts_that_bring_the_same_input_are_told_at_the_second(project: Pro
 
 def test_two_parts_whose_names_meet_are_told(project: Project) -> None:
     robot = "include:\n  a: ../../parts/one.yaml\n  a_b: ../../parts/two.yaml\n"
-    one, two = "components: {b_c: {type: go_to}}\n", "components: {c: {type: go_to}}\n"
-    project.check(robot, {"one": one, "two": two})
+    text, two = "components: {b_c: {type: go_to}}\n", "components: {c: {type: go_to}}\n"
+    project.check(robot, {"one": text, "two": two})
     (finding,) = project.findings
     assert finding.message == "part 'a_b' and part 'a' both bring 'a_b_c' of 'components'"
 
@@ -136,7 +138,11 @@ def test_a_fix_never_writes_a_name_of_the_robot_into_a_part(project: Project) ->
         "components:\n  battery_sensor: {type: battery_sim, runtime: 9 s}\nvalues: {b: battery_senso.battery_level}\n"
     )
     project.check("include:\n  a: ../../parts/p.yaml\n", {"p": part})
-    (finding,) = (one for one in project.findings if one.code == "RBX3009" or "battery_senso" in one.message)
+    (finding,) = (
+        candidate
+        for candidate in project.findings
+        if candidate.code == "RBX3009" or "battery_senso" in candidate.message
+    )
     assert finding.fix is None
 
 
@@ -168,7 +174,7 @@ def test_what_a_part_provides_is_checked(project: Project) -> None:
         assert "RBX3022" not in codes(project), project.text
     broken = provides.replace("Float32", "Float64").replace("[recharge]", "[charge]").replace("[level]", "[volume]")
     project.check(SPARE, {"battery": part + broken})
-    assert sorted(one.message for one in project.findings if one.code == "RBX3022") == [
+    assert sorted(finding.message for finding in project.findings if finding.code == "RBX3022") == [
         "part 'spare' does not have the skill 'charge', which it says it provides",
         "part 'spare' does not have the topic 'battery_level' (std_msgs/Float64), which it says it provides",
         "part 'spare' does not have the value 'volume', which it says it provides",

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.cli.main import main
-from rbxcompose.composition.dump import dump_robot
-from rbxcompose.config import Secret
-from rbxcompose.formats import format_names
+from rbxcompose.base.config import Secret
+from rbxcompose.base.formats import format_names
+from rbxcompose.commands.main import main
+from rbxcompose.compiler.composition.dump import dump_robot
 from rbxcompose.msgs.std_msgs import String
 from rbxcompose.sdk import Component, Config, Out, component, registry
-from rbxcompose.testing.robots import run_robot
+from rbxcompose.testing.bench import run_robot
 from tests.parts.project import Project
 
 PLANTED = "correct-horse-battery"
@@ -102,11 +102,11 @@ def test_a_link_and_a_folder_are_no_secrets(project: Project) -> None:
     path = plant(project)
     path.symlink_to(path.rename(path.with_name("other")))
     project.check(ROBOT)
-    assert [one.code for one in project.findings] == ["RBX1207"]
+    assert [finding.code for finding in project.findings] == ["RBX1207"]
     path.unlink()
     path.mkdir()
     project.check(ROBOT)
-    assert [one.code for one in project.findings] == ["RBX1207"]
+    assert [finding.code for finding in project.findings] == ["RBX1207"]
 
 
 TEXT_ARGUMENT = 'args: {t: {type: text, default: "${secret.token}"}}\n'
@@ -140,7 +140,7 @@ def test_a_secret_stands_nowhere_else_and_no_output_shows_it(
         "leak.yaml": header + 'do:\n  log: "${secret.token}"\n',
     }
     project.check(robot, files=files)
-    assert code in [one.code for one in project.findings], project.text
+    assert code in [finding.code for finding in project.findings], project.text
     shown = project.text + dump_robot(project.manifest)
     for form in format_names():
         main(["check", "robots/one", "--format", form])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rbxcompose.findings import Finding
+from rbxcompose.base.findings import Finding
 from tests.parts.project import Project
 
 POWER = """\
@@ -105,7 +105,7 @@ def test_only_the_instance_that_is_given_a_wrong_value_is_told(project: Project)
           wrong: {{part: ../../parts/power.yaml, with: {{warn: 140 %}}, {connect}}}
         """
     project.check(robot, PARTS)
-    [finding] = [one for one in project.findings if one.code == "RBX1005"]
+    [finding] = [candidate for candidate in project.findings if candidate.code == "RBX1005"]
     assert told(finding) == ("RBX1005", f"{ROBOT_FILE}:8")
 
 

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from rbxcompose.plan.model import extent
+from rbxcompose.compiler.plan.model import extent
 
 
 @pytest.mark.parametrize(

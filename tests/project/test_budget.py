@@ -191,7 +191,7 @@ def rooms() -> dict[str, tuple[int, int, int, int]]:
 def modules_of_check() -> int:
     """Return how many modules of ours a process imports to check the patrol robot."""
     script = (
-        "import sys\nfrom rbxcompose.cli.main import main\nmain(['check', 'robots/turtlebot'])\n"
+        "import sys\nfrom rbxcompose.commands.main import main\nmain(['check', 'robots/turtlebot'])\n"
         "sys.stderr.write(str(sum(name.partition('.')[0] == 'rbxcompose' for name in sys.modules)))\n"
     )
     done = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True)

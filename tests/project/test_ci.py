@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 import yaml
 
-from rbxcompose.cli.verbs import load
+from rbxcompose.commands.verbs import load
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs/ci.md").read_text(encoding="utf-8")

@@ -9,14 +9,14 @@ import pytest
 
 from docs import generate
 from docs.generating.families import declared, next_code
-from rbxcompose.check_runner import all_checks
-from rbxcompose.expressions.types import TYPES
-from rbxcompose.finding_pages import FAMILIES, all_kinds, family_of, page_folder
-from rbxcompose.findings import KINDS, kind
+from rbxcompose.base.expressions.types import TYPES
+from rbxcompose.base.findings import KINDS, kind
+from rbxcompose.base.rules import OUR_CODES
+from rbxcompose.commands.finding_pages import FAMILIES, all_kinds, family_of, page_folder
+from rbxcompose.compiler.check_runner import all_checks
 from rbxcompose.manifest.registry import sections
 from rbxcompose.manifest.section import ROBOT
 from rbxcompose.missions.analysis.check_runner import mission_checks
-from rbxcompose.rules import OUR_CODES
 
 
 def test_every_page_is_there_and_none_is_out_of_date() -> None:
@@ -29,7 +29,7 @@ def test_every_page_says_more_than_its_title() -> None:
 
 
 def test_every_section_has_an_example() -> None:
-    assert [one.name for one in sections(ROBOT) if not one.example] == []
+    assert [section.name for section in sections(ROBOT) if not section.example] == []
 
 
 def test_every_type_has_its_row() -> None:
@@ -45,8 +45,8 @@ def test_the_page_of_every_kind_is_a_file_and_no_declaration_has_prose() -> None
     kinds = {code: one for code, one in all_kinds().items() if code.startswith(OUR_CODES)}
     assert {page.stem for page in page_folder().glob("RBX*.md")} == kinds.keys()
     assert [code for code, one in kinds.items() if one.doc] == []
-    docstrings = {one.code: one.find.__doc__ for one in all_checks()}
-    docstrings |= {one.code: one.find.__doc__ for one in mission_checks()}
+    docstrings = {check.code: check.find.__doc__ for check in all_checks()}
+    docstrings |= {check.code: check.find.__doc__ for check in mission_checks()}
     assert [code for code in docstrings.keys() & kinds if len((docstrings[code] or "").splitlines()) != 1] == []
 
 
@@ -68,7 +68,7 @@ def test_the_table_of_families_counts_every_kind_and_the_next_code_is_free() -> 
 def test_no_kind_is_left_out_by_looking_for_declarations() -> None:
     script = (
         "import importlib, pkgutil, rbxcompose\n"
-        "from rbxcompose.findings import KINDS\n"
+        "from rbxcompose.base.findings import KINDS\n"
         "for module in pkgutil.walk_packages(rbxcompose.__path__, 'rbxcompose.'):\n"
         "    if not module.name.endswith('__main__'):\n"
         "        importlib.import_module(module.name)\n"

@@ -70,22 +70,22 @@ def character(items: list[Any]) -> str:
     return ""
 
 
-def holds(item: Any, one: str) -> bool:
+def holds(item: Any, text: str) -> bool:
     match item:
         case (codes.LITERAL, number):
-            return bool(ord(one) == number)
+            return bool(ord(text) == number)
         case (codes.RANGE, (low, high)):
-            return bool(low <= ord(one) <= high)
+            return bool(low <= ord(text) <= high)
         case (codes.CATEGORY, codes.CATEGORY_SPACE):
-            return one.isspace()
+            return text.isspace()
         case (codes.CATEGORY, codes.CATEGORY_NOT_SPACE):
-            return not one.isspace()
+            return not text.isspace()
         case (codes.CATEGORY, codes.CATEGORY_DIGIT):
-            return one.isdigit()
+            return text.isdigit()
         case (codes.CATEGORY, codes.CATEGORY_WORD):
-            return one.isalnum() or one == "_"
+            return text.isalnum() or text == "_"
         case (codes.CATEGORY, codes.CATEGORY_NOT_WORD):
-            return not (one.isalnum() or one == "_")
+            return not (text.isalnum() or text == "_")
     return False
 
 

@@ -15,13 +15,13 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
-from rbxcompose.expressions.check import check
-from rbxcompose.expressions.evaluate import evaluate, holds
-from rbxcompose.expressions.parser import parse
-from rbxcompose.expressions.text import fill, parse_template, show_value
-from rbxcompose.expressions.tree import ExpressionError
-from rbxcompose.expressions.types import FLAG, TYPES, UNKNOWN, Type, list_of, map_of
-from rbxcompose.expressions.values import NOT_ARRIVED, EvaluationError, NotArrived, NotArrivedError, Value
+from rbxcompose.base.expressions.check import check
+from rbxcompose.base.expressions.evaluate import evaluate, holds
+from rbxcompose.base.expressions.parser import parse
+from rbxcompose.base.expressions.text import fill, parse_template, show_value
+from rbxcompose.base.expressions.tree import ExpressionError
+from rbxcompose.base.expressions.types import FLAG, TYPES, UNKNOWN, Type, list_of, map_of
+from rbxcompose.base.expressions.values import NOT_ARRIVED, EvaluationError, NotArrived, NotArrivedError, Value
 
 MEMORY = 200_000_000  # bytes of address space beyond what the process has at its start
 DEADLINE = 20  # [s] of processor time for a batch of 500, more for more

@@ -12,11 +12,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.compiler import compile_robot
-from rbxcompose.components.charger import ChargerConfig
-from rbxcompose.config import Place, Secret
-from rbxcompose.plan.dump import PlanTextError, dump, load
-from rbxcompose.plan.model import Plan
+from rbxcompose.base.config import Place, Secret
+from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.compiler.plan.dump import PlanTextError, dump, load
+from rbxcompose.compiler.plan.model import Plan
+from rbxcompose.domains.power.components.charger import ChargerConfig
 from rbxcompose.testing import check_text, instance, run_robot
 
 ROOT = Path(__file__).parents[2]

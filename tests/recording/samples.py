@@ -18,11 +18,9 @@ from rbxcompose.msgs.geometry_msgs import (
 from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.msgs.std_msgs import Header, String
 from rbxcompose.msgs.types import Message
-from rbxcompose.qos import Qos
-from rbxcompose.recording.definitions import definition_of
-from rbxcompose.recording.message import Recorded
-from rbxcompose.recording.topics import RecordedTopic
-from rbxcompose.recording.writer import RecordingWriter
+from rbxcompose.runtime.recording.files import RecordingWriter
+from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic, definition_of
+from rbxcompose.sdk.ports import Qos
 
 SECOND = 1_000_000_000
 START = 1_700_000_000 * SECOND

@@ -11,8 +11,8 @@ import zstandard
 from mcap.data_stream import RecordBuilder
 from mcap.records import Channel, Chunk, Message, Schema
 
-from rbxcompose.recording import reader
-from rbxcompose.recording.reader import RecordingReader
+from rbxcompose.runtime.recording import reader
+from rbxcompose.runtime.recording.reader import RecordingReader
 
 HEAD = b"\x89MCAP0\r\n"
 CHANNEL_ID = 1
@@ -48,8 +48,8 @@ def chunk(content: bytes, crc: int | None = None) -> bytes:
 
 
 def read(data: bytes) -> tuple[int, str]:
-    one = RecordingReader(io.BytesIO(data))
-    return sum(1 for _ in one.messages()), one.damage
+    recording_reader = RecordingReader(io.BytesIO(data))
+    return sum(1 for _ in recording_reader.messages()), recording_reader.damage
 
 
 def test_records_of_a_chunk_take_no_more_memory_than_the_chunk(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -64,10 +64,10 @@ def test_records_of_a_chunk_take_no_more_memory_than_the_chunk(monkeypatch: pyte
 
 
 def test_channels_share_the_definition_of_their_type() -> None:
-    one = RecordingReader(io.BytesIO(HEAD + channel(range(1, 1000), b"#" * 100_000)))
-    assert not list(one.messages())
-    assert len(one.topics) == 999
-    assert len({id(topic.definition) for topic in one.topics}) == 1
+    recording_reader = RecordingReader(io.BytesIO(HEAD + channel(range(1, 1000), b"#" * 100_000)))
+    assert not list(recording_reader.messages())
+    assert len(recording_reader.topics) == 999
+    assert len({id(topic.definition) for topic in recording_reader.topics}) == 1
 
 
 def test_more_messages_than_a_recording_of_this_size_has_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:

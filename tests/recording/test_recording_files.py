@@ -17,12 +17,9 @@ from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
 from rbxcompose.msgs.nav2_msgs import NavigateToPose
-from rbxcompose.recording.files import ENDING, complete, create, part_of, recover_all
-from rbxcompose.recording.message import Recorded
-from rbxcompose.recording.reader import NotARecordingError, RecordingReader
-from rbxcompose.recording.recorder import Recorder, Split
-from rbxcompose.recording.recovery import recover
-from rbxcompose.recording.topics import RecordedTopic
+from rbxcompose.runtime.recording.files import ENDING, Recorder, Split, complete, create, part_of, recover, recover_all
+from rbxcompose.runtime.recording.reader import NotARecordingError, RecordingReader
+from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic
 from tests.recording.samples import MAP, ODOM, TWIST, odometry, recorded, some, topic, twist, unfinished, written
 
 MESSAGES = some()
@@ -45,8 +42,8 @@ def indexed(data: bytes) -> list[tuple[str, int, bytes]]:
 
 
 def plain(messages: list[Recorded]) -> list[tuple[str, int, bytes]]:
-    in_time = sorted(messages, key=lambda one: one.log_time)
-    return [(one.topic.name, one.log_time, one.payload) for one in in_time]
+    in_time = sorted(messages, key=lambda message: message.log_time)
+    return [(message.topic.name, message.log_time, message.payload) for message in in_time]
 
 
 def test_what_is_written_is_read_again() -> None:
@@ -70,7 +67,7 @@ def test_channels_tell_ros_the_encoding_the_hash_and_the_quality_of_service() ->
 
 def test_an_independent_decoder_reads_the_values_by_the_definitions_in_the_file() -> None:
     reader = make_reader(io.BytesIO(WHOLE), decoder_factories=[DecoderFactory()])
-    found = [one.decoded_message for one in reader.iter_decoded_messages(topics=["/odom", "/cmd_vel"])]
+    found = [message.decoded_message for message in reader.iter_decoded_messages(topics=["/odom", "/cmd_vel"])]
     assert len(found) == 120
     for number in range(60):
         odom, command = found[2 * number], found[2 * number + 1]
@@ -88,7 +85,7 @@ def test_an_independent_reader_of_ros_bags_opens_it_with_types_and_quality_of_se
     path = tmp_path / "a.mcap"
     path.write_bytes(written([*MESSAGES, recorded(topic("/go/_action/feedback", type(feedback)), feedback, 7.0)]))
     with AnyReader([path]) as reader:
-        qos: dict[str, Any] = {one.topic: one.ext for one in reader.connections}
+        qos: dict[str, Any] = {connection.topic: connection.ext for connection in reader.connections}
         values: dict[str, Any] = {one.topic: reader.deserialize(raw, one.msgtype) for one, _, raw in reader.messages()}
     assert qos["/map"].offered_qos_profiles[0].durability.name == "TRANSIENT_LOCAL"
     assert qos["/odom"].offered_qos_profiles[0].durability.name == "VOLATILE"
@@ -121,8 +118,8 @@ def test_a_recovered_recording_has_an_index(cut: int) -> None:
 @given(st.integers(8, len(WHOLE) - 1), st.binary(min_size=1, max_size=12))
 def test_changed_bytes_never_raise_and_never_invent_payloads(place: int, noise: bytes) -> None:
     messages, _ = read(WHOLE[:place] + noise + WHOLE[place + len(noise) :])
-    known = {one.payload for one in MESSAGES}
-    assert {one.payload for one in messages} <= known
+    known = {message.payload for message in MESSAGES}
+    assert {message.payload for message in messages} <= known
 
 
 @given(st.binary(max_size=400))
@@ -208,4 +205,4 @@ def test_a_completed_file_survives_its_writer(tmp_path: Path) -> None:
     file.flush()
     complete(path, file)
     assert read(path.read_bytes()) == (MESSAGES, "")
-    assert {one.topic for one in MESSAGES} == {MAP, ODOM, TWIST}
+    assert {message.topic for message in MESSAGES} == {MAP, ODOM, TWIST}

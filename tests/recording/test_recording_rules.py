@@ -7,24 +7,22 @@ from hypothesis import given
 from hypothesis import strategies as st
 from mcap_ros2._dynamic import generate_dynamic
 
-from rbxcompose.bus.classes import ros_qos
 from rbxcompose.bus.tokens import EndpointToken, EntityKind, NodeToken
-from rbxcompose.bus.wire import WIRE_PROFILES
+from rbxcompose.bus.wire import WIRE_PROFILES, ros_qos
 from rbxcompose.msgs import cdr, registry
 from rbxcompose.msgs.std_msgs import String
-from rbxcompose.qos import Qos
-from rbxcompose.recording.definitions import definition_of
-from rbxcompose.recording.message import Recorded
-from rbxcompose.recording.schedule import playlist
-from rbxcompose.recording.summary import summary_of
-from rbxcompose.recording.topics import (
+from rbxcompose.runtime.recording.reader import playlist, summary_of
+from rbxcompose.runtime.recording.topics import (
+    Recorded,
     RecordedTopic,
     Selection,
+    definition_of,
     is_replayable,
     qos_of_metadata,
     qos_of_token,
     topic_of,
 )
+from rbxcompose.sdk.ports import Qos
 from tests.recording.samples import MAP, ODOM, SECOND, TWIST, recorded, some
 
 HASH = "RIHS01_" + "0" * 64

@@ -14,20 +14,18 @@ from typing import Any
 import pytest
 from rosbags.highlevel import AnyReader
 
-from rbxcompose.cli import main as command
-from rbxcompose.executive.requests import CancelMission
+from rbxcompose.base.requests import as_data
+from rbxcompose.commands import main as command
+from rbxcompose.compiler.plan.dump import load
+from rbxcompose.compiler.plan.model import Instance, Plan
+from rbxcompose.missions.execution.requests import CancelMission
 from rbxcompose.msgs.cdr import encode
 from rbxcompose.msgs.std_msgs import String
-from rbxcompose.plan.dump import load
-from rbxcompose.plan.model import Instance, Plan
-from rbxcompose.recording.message import Recorded
-from rbxcompose.recording.reader import RecordingReader
-from rbxcompose.recording.recovery import recover
-from rbxcompose.recording.tape import ORDERS, PLAN
-from rbxcompose.recording.topics import RecordedTopic
-from rbxcompose.recording.writer import RecordingWriter
-from rbxcompose.replay.run import ReplayResult, missing_topics, replayed
-from rbxcompose.requests import as_data
+from rbxcompose.runtime.recording.files import RecordingWriter, recover
+from rbxcompose.runtime.recording.reader import RecordingReader
+from rbxcompose.runtime.recording.tape import ORDERS, PLAN
+from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic
+from rbxcompose.runtime.replay import ReplayResult, missing_topics, replayed
 
 ROOT = Path(__file__).parents[2]
 COMPONENTS = ["battery", "base", "go_to", "charger", "cmd_vel", "transforms", "diagnostics", "mission"]
@@ -43,7 +41,7 @@ class Recording:
     topics: list[RecordedTopic]
 
     def instance(self, name: str) -> Instance:
-        return next(one for one in self.plan.instances if one.name == name)
+        return next(instance for instance in self.plan.instances if instance.name == name)
 
     def again(self, name: str, records: list[Recorded] | None = None) -> ReplayResult:
         return replayed(self.plan, self.instance(name), self.records if records is None else records)
@@ -89,7 +87,7 @@ def test_a_component_sends_again_what_it_sent(recording: Recording, name: str) -
     assert missing_topics(recording.plan, recording.instance(name), recording.topics) == []
     found = recording.again(name)
     assert (found.difference, found.errors) == (None, ())
-    assert found.equal == len([one for one in recording.records if one.topic.node == name]) > 0
+    assert found.equal == len([record for record in recording.records if record.topic.node == name]) > 0
 
 
 def test_another_speed_is_told_with_time_field_and_both_values(
@@ -115,16 +113,16 @@ def test_what_it_sends_now_can_be_kept(recording: Recording, tmp_path: Path) -> 
     assert command.main(["replay", str(recording.path), "--into", "go_to", *other]) == 1
     kept = list(RecordingReader(io.BytesIO(path.read_bytes())).messages())
     assert kept[-1].log_time > 10e9  # it goes on behind the difference
-    assert {one.topic.node for one in kept} == {"go_to"}
+    assert {message.topic.node for message in kept} == {"go_to"}
 
 
 def test_an_output_that_is_too_few_or_too_many_is_told(recording: Recording) -> None:
-    mine = [number for number, one in enumerate(recording.records) if one.topic.node == "cmd_vel"]
-    fewer = [one for number, one in enumerate(recording.records) if number != mine[-1]]
+    mine = [number for number, record in enumerate(recording.records) if record.topic.node == "cmd_vel"]
+    fewer = [record for number, record in enumerate(recording.records) if number != mine[-1]]
     again = recording.again("cmd_vel", fewer).difference
     assert again
     assert "message" in again.now or again.now.startswith("at ")
-    twice = sorted([*recording.records, recording.records[mine[-1]]], key=lambda one: one.log_time)
+    twice = sorted([*recording.records, recording.records[mine[-1]]], key=lambda record: record.log_time)
     again = recording.again("cmd_vel", twice).difference
     assert again
     assert again.now == "nothing"
@@ -132,7 +130,7 @@ def test_an_output_that_is_too_few_or_too_many_is_told(recording: Recording) -> 
 
 def commanded(recording: Recording, data: object) -> ReplayResult:
     """Run the missions again as if a command had come right after the start."""
-    orders = [number for number, one in enumerate(recording.records) if one.topic.name == ORDERS]
+    orders = [number for number, record in enumerate(recording.records) if record.topic.name == ORDERS]
     start = next(number for number in orders if b'"start"' in recording.records[number].payload)
     payload = encode(String(data=json.dumps(["command", "mission", data])))
     records = list(recording.records)
@@ -153,7 +151,7 @@ def test_a_command_that_another_version_recorded_is_told(recording: Recording) -
 
 
 def test_without_an_input_the_first_output_that_needs_it_differs(recording: Recording) -> None:
-    without = [one for one in recording.records if one.topic.name != "/cmd_vel/navigation"]
+    without = [record for record in recording.records if record.topic.name != "/cmd_vel/navigation"]
     assert recording.again("cmd_vel", without).difference
 
 
@@ -167,7 +165,7 @@ def test_a_recording_that_was_cut_is_compared_up_to_there(recording: Recording) 
 def test_inputs_that_are_not_in_the_recording_are_named(
     recording: Recording, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    without = [one for one in recording.records if one.topic.name not in ("/tf", "/tf_static")]
+    without = [record for record in recording.records if record.topic.name not in ("/tf", "/tf_static")]
     path = recording.write(tmp_path / "less.mcap", without)
     assert command.main(["replay", str(path), "--into", "go_to"]) == 1
     assert "lacks inputs of 'go_to': /tf, /tf_static" in said(capsys)
@@ -201,13 +199,17 @@ def test_recovery_keeps_the_plan_and_the_silent_topics(recording: Recording) -> 
     reader = RecordingReader(io.BytesIO(whole.getvalue()))
     records = list(reader.messages())
     assert PLAN in reader.attachments
-    assert {one.name for one in reader.topics} >= {"/cmd_vel/navigation", "/tf_static"}
+    assert {topic.name for topic in reader.topics} >= {"/cmd_vel/navigation", "/tf_static"}
     assert recording.again("diagnostics", records).difference is None
 
 
 def test_an_independent_reader_of_ros_bags_opens_it_with_the_events_of_services(recording: Recording) -> None:
     with AnyReader([recording.path]) as reader:
-        [events] = [one for one in reader.connections if one.topic == "/go_to/_action/send_goal/_service_event"][:1]
+        [events] = [
+            connection
+            for connection in reader.connections
+            if connection.topic == "/go_to/_action/send_goal/_service_event"
+        ][:1]
         first: Any = next(reader.deserialize(raw, one.msgtype) for one, _, raw in reader.messages([events]))
     assert events.msgtype == "nav2_msgs/action/NavigateToPose_SendGoal_Event"
     assert (len(first.request), len(first.response)) in ((1, 0), (0, 1))

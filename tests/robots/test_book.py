@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.compiler import Compilation, compile_robot
-from rbxcompose.plan.model import Plan
-from rbxcompose.rendering.text import render_text
-from rbxcompose.testing.robots import Ran, run_robot
+from rbxcompose.commands.formats.text import render_text
+from rbxcompose.compiler.compile import Compilation, compile_robot
+from rbxcompose.compiler.plan.model import Plan
+from rbxcompose.testing.bench import Ran, run_robot
 
 FOLDER = Path(__file__).parents[2] / "robots"
 ROBOTS = ("house", "patroller")
@@ -34,8 +34,8 @@ MISSIONS = [(robot, mission) for robot in ROBOTS for mission in missions_of(robo
 
 def starting(plan: Plan, mission: str) -> Plan:
     """Return a plan that runs another mission, without compiling the robot again, which takes longer than to run it."""
-    others = tuple(one for one in plan.instances if one.name != "mission")
-    [executive] = (one for one in plan.instances if one.name == "mission")
+    others = tuple(instance for instance in plan.instances if instance.name != "mission")
+    [executive] = (instance for instance in plan.instances if instance.name == "mission")
     config = executive.config.model_copy(update={"start": mission})
     return replace(plan, instances=(*others, replace(executive, config=config)))
 

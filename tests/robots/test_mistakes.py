@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.compiler import compile_robot
-from rbxcompose.rendering.text import render_text
+from rbxcompose.commands.formats.text import render_text
+from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.testing.golden import Golden
 
 ROBOT, MISSION = "robots/turtlebot/robot.yaml", "missions/patrol.yaml"

@@ -9,11 +9,11 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.compiler import Compilation, compile_robot
-from rbxcompose.controllers.gripper import GripperConfig, model_of
-from rbxcompose.plan.model import Plan
-from rbxcompose.servo_bus_config import ServoBusConfig
-from rbxcompose.testing.robots import Ran, run_robot
+from rbxcompose.compiler.compile import Compilation, compile_robot
+from rbxcompose.compiler.plan.model import Plan
+from rbxcompose.domains.servos.bus_config import ServoBusConfig
+from rbxcompose.domains.servos.controllers.gripper import GripperConfig, model_of
+from rbxcompose.testing.bench import Ran, run_robot
 from tests.conftest import ROOT
 from tests.soak import Soak
 
@@ -38,7 +38,7 @@ def ran(plan: Plan, mission: str, seed: int, twin: str) -> Ran:
                 return config.model_copy(update={"twin": twin})
         return config
 
-    instances = tuple(replace(one, config=changed(one.name, one.config)) for one in plan.instances)
+    instances = tuple(replace(instance, config=changed(instance.name, instance.config)) for instance in plan.instances)
     return run_robot(replace(plan, instances=instances), most=120.0)
 
 
@@ -73,7 +73,7 @@ def test_its_fingers_are_as_far_apart_as_its_gripper_is_told() -> None:
     assert out.robot
     assert out.robot.manifest.body
     body = out.robot.manifest.body.body
-    [bus] = [one.config for one in out.plan.instances if isinstance(one.config, ServoBusConfig)]
+    [bus] = [instance.config for instance in out.plan.instances if isinstance(instance.config, ServoBusConfig)]
     hand = bus.controllers["right_gripper_controller"].config
     assert isinstance(hand, GripperConfig)
     model = model_of(hand)

@@ -6,13 +6,13 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.compiler import compile_robot
-from rbxcompose.controllers.gripper import model_of
+from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.domains.servos.controllers.gripper import model_of
 from rbxcompose.msgs.rbxcompose_msgs import Grip
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.std_msgs import Float64
-from rbxcompose.qos import Qos
 from rbxcompose.sdk.bound import Outcome
+from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench
 from tests.conftest import ROOT
 
@@ -34,7 +34,7 @@ def driver(name: str, profile: str = "") -> Any:
     profiles = [profile] if profile else []
     plan = compile_robot(str(ROOT / f"robots/{name}"), profiles=profiles, environment={}).plan
     assert plan
-    [found] = [one for one in plan.instances if one.type == "servo_bus"]
+    [found] = [instance for instance in plan.instances if instance.type == "servo_bus"]
     return found
 
 
@@ -55,7 +55,7 @@ def driver(name: str, profile: str = "") -> Any:
 def test_one_bus_has_all_joints_of_all_parts(name: str, profile: str, ids: dict[str, int]) -> None:
     config = driver(name, profile).config
     assert {joint: one.servos[0].id for joint, one in config.joints.items()} == ids
-    led = [joint for one in config.controllers.values() for joint in one.config.claimed]
+    led = [joint for controller in config.controllers.values() for joint in controller.config.claimed]
     assert sorted(led) == sorted(ids)
 
 
@@ -105,6 +105,6 @@ def test_the_gripper_holds_what_is_between_its_fingers(name: str) -> None:
     servos: Any = robot.component("servos")
     servos.cycle.bus.line[9].faults.is_jammed = True
     robot.advance(2.0)
-    assert [one.outcome for one in ends] == [Outcome.SUCCEEDED] * 2
+    assert [end.outcome for end in ends] == [Outcome.SUCCEEDED] * 2
     assert (ends[0].result.reached, ends[1].result.stalled) == (True, True)
     assert 0.02 < ends[1].result.opening < 0.1

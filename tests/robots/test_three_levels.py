@@ -15,12 +15,12 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.compiler import compile_robot
+from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.std_msgs import Float64
 from rbxcompose.msgs.std_srvs import SetBool, Trigger
-from rbxcompose.plan.model import Plan
-from rbxcompose.qos import Qos
+from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench
 from tests.conftest import ROOT
 
@@ -69,7 +69,7 @@ class Stepped(Stage):
 
     def __init__(self, level: str) -> None:
         plan = planned("pi_robot", f"buses.servos.sim={level}")
-        [driver] = [one for one in plan.instances if one.type == "servo_bus"]
+        [driver] = [instance for instance in plan.instances if instance.type == "servo_bus"]
         self.robot = Bench(driver, start=False)
         self.states: dict[str, float] = {}
         self.robot.bus.subscribe("me", "/joint_states", JointState, Qos.STATE, self._moved)
@@ -221,9 +221,9 @@ def test_real_servos_get_the_plan_of_simulated_ones(name: str, tmp_path: Path) -
     real, simulated = (planned(name, real=is_real, **options) for is_real in (True, False))
     assert [one.name for one in real.instances] == [one.name for one in simulated.instances]
     assert real.bus == simulated.bus
-    for one, twin in zip(real.instances, simulated.instances, strict=True):
-        assert (one.type, one.process, one.wires) == (twin.type, twin.process, twin.wires)
-        own, other = one.config.model_dump(), twin.config.model_dump()
+    for instance, twin in zip(real.instances, simulated.instances, strict=True):
+        assert (instance.type, instance.process, instance.wires) == (twin.type, twin.process, twin.wires)
+        own, other = instance.config.model_dump(), twin.config.model_dump()
         differing = {key for key in own if own[key] != other[key]}
         assert differing <= OF_THE_TWIN
-        assert ("twin" in differing) == (one.type == "servo_bus")
+        assert ("twin" in differing) == (instance.type == "servo_bus")

@@ -7,13 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.compiler import Compilation, compile_robot
-from rbxcompose.executive.requests import ResumeMission
-from rbxcompose.geometry import Pose2
-from rbxcompose.rendering.text import render_text
-from rbxcompose.robot_events import MissionOver
-from rbxcompose.testing.bench import Bench
-from rbxcompose.testing.robots import Ran, run_robot
+from rbxcompose.base.geometry import Pose2
+from rbxcompose.commands.formats.text import render_text
+from rbxcompose.compiler.compile import Compilation, compile_robot
+from rbxcompose.missions.execution.requests import ResumeMission
+from rbxcompose.sdk.robot_events import MissionOver
+from rbxcompose.testing.bench import Bench, Ran, run_robot
 
 ROBOT = "robots/turtlebot/robot.yaml"
 CORNERS = {"corner_1": (1.0, 0.0), "corner_2": (1.0, 1.0), "corner_3": (0.0, 1.0), "corner_4": (0.0, 0.0)}

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.compiler import Compilation, compile_robot
-from rbxcompose.rendering.text import render_text
-from rbxcompose.testing.robots import Ran, run_robot
+from rbxcompose.commands.formats.text import render_text
+from rbxcompose.compiler.compile import Compilation, compile_robot
+from rbxcompose.testing.bench import Ran, run_robot
 
 
 @pytest.fixture(autouse=True)

@@ -12,8 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from rbxcompose.runtime.folder import RobotFolder
-from rbxcompose.runtime.follow import read_log
-from rbxcompose.runtime.log import NAME, PREVIOUS
+from rbxcompose.runtime.log import NAME, PREVIOUS, read_log
 from rbxcompose.runtime.processes import Process, titled
 
 ROOT = Path(__file__).parents[2]
@@ -68,14 +67,14 @@ class Robot:
 
     def process_of(self, component: str) -> Process:
         """Return the process that runs a component."""
-        return Process.of(next(one["pid"] for one in self.ps()["components"] if one["name"] == component))
+        return Process.of(next(entry["pid"] for entry in self.ps()["components"] if entry["name"] == component))
 
     def supervisor(self) -> Process:
         return Process.of(self.ps()["supervisor"]["pid"])
 
     def processes(self) -> list[Process]:
         """Return all of its processes, whoever started them."""
-        return [one for one in titled(f"rbxcompose {self.name}: ") if one.is_running]
+        return [process for process in titled(f"rbxcompose {self.name}: ") if process.is_running]
 
     def last_words(self, source: str) -> list[str]:
         """Return the last two things that a toy said, but for the count of its steps, which goes on while it brakes."""
@@ -83,7 +82,7 @@ class Robot:
 
     def texts(self, source: str | None = None) -> list[str]:
         """Return what was logged."""
-        return [one.text for one in read_log(self.folder.path / NAME) if source in (None, one.source)]
+        return [record.text for record in read_log(self.folder.path / NAME) if source in (None, record.source)]
 
     def has_logged(self, text: str) -> bool:
         return any(text in one for one in self.texts())

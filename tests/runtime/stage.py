@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from rbxcompose.levels import Level
-from rbxcompose.plan.model import Instance, Plan
+from rbxcompose.base.levels import Level
+from rbxcompose.base.scheduler import Scheduler
+from rbxcompose.compiler.plan.model import Instance, Plan
 from rbxcompose.runtime import channel as say
-from rbxcompose.runtime.host_report import HostReport
-from rbxcompose.runtime.options import RunOptions
+from rbxcompose.runtime.channel import HostReport
+from rbxcompose.runtime.folder import RunOptions
 from rbxcompose.runtime.supervision.conductor import Conductor
-from rbxcompose.scheduler import Scheduler
 from rbxcompose.testing.bench import instance
 
 ENDPOINT = "tcp/127.0.0.1:7447"
@@ -25,7 +25,7 @@ def robot() -> Plan:
     """Three processes; `base` starts first, `world` holds simulated truth."""
     inputs = {name: {"priority": priority, "timeout": "0.5 s"} for name, priority in (("teleop", 9), ("way", 1))}
     go_to = placed("go_to", "go_to", "robot")
-    through_mux = tuple(replace(one, topic="/cmd_vel/way") if one.port == "cmd_vel" else one for one in go_to.wires)
+    through_mux = tuple(replace(wire, topic="/cmd_vel/way") if wire.port == "cmd_vel" else wire for wire in go_to.wires)
     instances = (
         placed("base", "diff_drive_sim", "world"),
         placed("mux", "mux", "robot", output="cmd_vel", inputs=inputs),

@@ -55,7 +55,7 @@ class Changing:
         return done.stdout + done.stderr
 
     def ps(self) -> dict[str, dict[str, Any]]:
-        return {one["name"]: one for one in json.loads(self.do("ps", "--json"))["components"]}
+        return {component["name"]: component for component in json.loads(self.do("ps", "--json"))["components"]}
 
     def why_not(self) -> str:
         """Return why the robot cannot take what its file says just now."""
@@ -73,7 +73,7 @@ def robot(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[
     made = Changing(tmp_path, tmp_path_factory.mktemp("runtime"))
     yield made
     made.plain("down", NAME)
-    assert [one for one in titled(f"rbxcompose {NAME}: ") if one.is_running] == []
+    assert [process for process in titled(f"rbxcompose {NAME}: ") if process.is_running] == []
 
 
 LAMP = ("  charger:\n", "  lamp:\n    type: transforms\n    process: lights\n  charger:\n")
@@ -94,8 +94,8 @@ def test_only_what_has_changed_restarts(robot: Changing) -> None:
     shown = robot.do("apply", "robots/turtlebot", "--yes")
     assert "speed: 0.3 m/s -> 0.4 m/s at robots/turtlebot/robot.yaml:40:12" in shown
     after = robot.ps()
-    assert {name: one["pid"] for name, one in after.items() if name in before} == {
-        name: one["pid"] for name, one in before.items()
+    assert {name: entry["pid"] for name, entry in after.items() if name in before} == {
+        name: entry["pid"] for name, entry in before.items()
     }
     assert (after["lamp"]["state"], after["lamp"]["process"]) == ("active", "lights")
     assert "0.4" in robot.do("param", "get", "go_to", "speed")
@@ -108,7 +108,7 @@ def test_only_what_has_changed_restarts(robot: Changing) -> None:
     assert robot.ps().keys() == after.keys()
     robot.do("apply", NAME, "--undo", "--yes")
     assert robot.ps().keys() == before.keys()
-    assert len([one for one in titled(f"rbxcompose {NAME}: ") if one.is_running]) == 6
+    assert len([process for process in titled(f"rbxcompose {NAME}: ") if process.is_running]) == 6
 
 
 @pytest.mark.timeout(60)
@@ -159,7 +159,7 @@ def test_who_needs_what_has_failed_for_good_is_blocked_until_the_next_apply(robo
     robot.eventually(lambda: "all motion is held" in robot.do("logs"))
     robot.do("apply", "robots/turtlebot", "--yes")
     after = robot.ps()
-    assert {one["state"] for one in after.values()} == {"active"}
+    assert {entry["state"] for entry in after.values()} == {"active"}
     [supervisor] = titled(f"rbxcompose {NAME}: supervisor")
     supervisor.send_signal(signal.SIGSTOP)
     robot.eventually(lambda: supervisor.is_stopped)

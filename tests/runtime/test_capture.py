@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.levels import Level
+from rbxcompose.base.levels import Level
 from rbxcompose.runtime.process_group.capture import Capture, take_printed
 
 Told = list[tuple[Level, str]]
@@ -63,7 +63,7 @@ def test_loggers_of_other_packages_are_told_with_name_and_level() -> None:
             raise OSError("no such device")
         except OSError:
             log.exception("broken")
-    assert [one[:2] for one in told] == [
+    assert [row[:2] for row in told] == [
         (Level.OK, "some.package: ready after 3 s"),
         (Level.WARN, "some.package: hot"),
         (Level.ERROR, "some.package: broken"),

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from rbxcompose.plan.dump import dump, load
-from rbxcompose.plan.model import BusPlan, Plan
-from rbxcompose.restarts import Restart
+from rbxcompose.base.config import Restart
+from rbxcompose.compiler.plan.dump import dump, load
+from rbxcompose.compiler.plan.model import BusPlan, Plan
 from rbxcompose.runtime.supervision.changes import Changes, Fate, changes
 from rbxcompose.testing.bench import instance
 from tests.conftest import ROOT
@@ -59,7 +59,7 @@ def test_what_is_new_is_added_and_what_has_gone_is_removed() -> None:
 def test_what_has_failed_is_tried_again() -> None:
     found = between(failed=("charger",))
     assert fates(found) == {"charger": Fate.RESTARTED}
-    assert [str(one) for one in found.fated[3].reasons] == ["state: failed -> active"]
+    assert [str(reason) for reason in found.fated[3].reasons] == ["state: failed -> active"]
 
 
 def test_simulated_truth_never_restarts() -> None:

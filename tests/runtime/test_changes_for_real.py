@@ -36,7 +36,7 @@ def test_a_client_that_is_killed_in_the_middle_of_a_change_leaves_it_whole(robot
     client.wait()
     assert not robot.has_logged("set: size")
     (tmp_path / "wait").unlink()
-    eventually(lambda: sum("set: size = 5" in one for one in robot.texts()) == 2)
+    eventually(lambda: sum("set: size = 5" in text for text in robot.texts()) == 2)
     assert sizes(robot) == ["5", "5"]
     assert robot.do("down").returncode == 0
 

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import pytest
 
-from rbxcompose.levels import Level
-from rbxcompose.plan.dump import load
-from rbxcompose.plan.model import Instance, Plan
+from rbxcompose.base.levels import Level
+from rbxcompose.compiler.plan.dump import load
+from rbxcompose.compiler.plan.model import Instance, Plan
 from rbxcompose.runtime import channel as say
-from rbxcompose.runtime.options import RunOptions
+from rbxcompose.runtime.folder import RunOptions
 from rbxcompose.runtime.supervision.changes import changes
 from tests.runtime.stage import Stage, placed, robot
 from tests.runtime.test_giving_up import with_never
@@ -20,12 +20,12 @@ DRIVER = "'base' moves"
 
 def changed(plan: Plan, name: str, **fields: object) -> Plan:
     """Return a plan in which one instance is another."""
-    instances = tuple(replace(one, **fields) if one.name == name else one for one in plan.instances)  # type: ignore[arg-type]
+    instances = tuple(replace(instance, **fields) if instance.name == name else instance for instance in plan.instances)  # type: ignore[arg-type]
     return replace(plan, instances=instances)
 
 
 def with_settings(plan: Plan, name: str, **config: object) -> Plan:
-    old = next(one for one in plan.instances if one.name == name)
+    old = next(instance for instance in plan.instances if instance.name == name)
     return changed(plan, name, config=old.config.model_copy(update=config))
 
 
@@ -59,7 +59,7 @@ class Changed(Stage):
 
     def prepared(self) -> dict[str, list[str]]:
         orders = [(name, order) for name, order in self.sent if isinstance(order, say.Prepare)]
-        return {name: [one.name for one in load(order.plan).instances] for name, order in orders}
+        return {name: [instance.name for instance in load(order.plan).instances] for name, order in orders}
 
 
 def test_what_changes_is_retired_in_reverse_order_then_started_in_order() -> None:
@@ -112,7 +112,7 @@ def test_a_new_process_is_forked_with_the_new_plan_and_started() -> None:
     assert [name for name, *_ in stage.forks] == ["lights"]
     adopt, configure = (order for name, order in stage.sent if name == "lights")
     assert isinstance(adopt, say.Adopt)
-    assert [one.name for one in load(adopt.plan).instances] == ["lamp"]
+    assert [instance.name for instance in load(adopt.plan).instances] == ["lamp"]
     assert isinstance(configure, say.Configure)
     stage.configure("lights")
     stage.activate()
@@ -171,7 +171,7 @@ def test_a_process_that_dies_while_it_retires_comes_back_with_the_new_plan() -> 
     assert stage.prepared() == {}
     stage.pass_time(0.3)
     [adopt] = [order for name, order in stage.sent if name == "robot" and isinstance(order, say.Adopt)]
-    assert [one.name for one in load(adopt.plan).instances] == ["mux", "go_to"]
+    assert [instance.name for instance in load(adopt.plan).instances] == ["mux", "go_to"]
     stage.configure("robot")
     stage.activate()
     assert stage.done == [("mux restarted", False)]

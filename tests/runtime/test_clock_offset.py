@@ -8,11 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.bus.transport import Arrival, NoTransport
-from rbxcompose.plan.model import OtherHost, Share
-from rbxcompose.qos import Qos
-from rbxcompose.runtime.clock_offset import ClockOffset, Echo, OffsetFilter
-from rbxcompose.runtime.host_report import HostReport
-from rbxcompose.runtime.process_group.host_line import HostLine, host_key
+from rbxcompose.compiler.plan.model import OtherHost, Share
+from rbxcompose.runtime.channel import HostReport
+from rbxcompose.runtime.folder import ClockOffset, Echo, OffsetFilter
+from rbxcompose.runtime.process_group.router import HostLine, host_key
+from rbxcompose.sdk.ports import Qos
 
 DELAYS = st.integers(10_000, 1_000_000_000)  # [ns]
 MILLI = 1_000_000  # [ns]
@@ -103,7 +103,7 @@ def test_hosts_learn_how_far_their_clocks_are_apart_and_strangers_are_ignored() 
         robot.tell(HostReport("robot", "1", "run"))
     listeners[host_key("bot", "robot")][0](_Bytes(b"{}"))
     found = heard["desk"].clock, heard["robot"].clock
-    for one, offset in zip(found, (0.3, -0.3), strict=True):
-        assert one is not None
-        assert abs(one.offset - offset) <= one.uncertainty <= 0.003
-        assert one.is_too_far
+    for clock_offset, offset in zip(found, (0.3, -0.3), strict=True):
+        assert clock_offset is not None
+        assert abs(clock_offset.offset - offset) <= clock_offset.uncertainty <= 0.003
+        assert clock_offset.is_too_far

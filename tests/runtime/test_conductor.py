@@ -5,14 +5,14 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.executive.requests import RunMission
-from rbxcompose.levels import Level
-from rbxcompose.plan.model import BusPlan, Plan
-from rbxcompose.requests import as_data
-from rbxcompose.robot_events import MissionOver, RobotHeld
+from rbxcompose.base.levels import Level
+from rbxcompose.base.requests import as_data
+from rbxcompose.compiler.plan.model import BusPlan, Plan
+from rbxcompose.missions.execution.requests import RunMission
 from rbxcompose.runtime import channel as say
-from rbxcompose.runtime.options import RunOptions
+from rbxcompose.runtime.folder import RunOptions
 from rbxcompose.runtime.supervision.members import Phase
+from rbxcompose.sdk.robot_events import MissionOver, RobotHeld
 from tests.runtime.stage import ENDPOINT, Stage, robot
 
 # The beginning
@@ -300,7 +300,7 @@ def test_a_process_that_a_signal_suspends_is_told_at_once_and_ended_after_two_se
     stage.beats.discard("robot")
     stage.suspended = {"robot"}
     stage.pass_time(0.3)
-    assert {one.cause for _, one in stage.sent if isinstance(one, say.Lost)} == {
+    assert {order.cause for _, order in stage.sent if isinstance(order, say.Lost)} == {
         "process 'robot' was suspended by a signal"
     }
     assert stage.killed == []

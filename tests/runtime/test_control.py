@@ -9,10 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.requests import Query, Refused, requests
+from rbxcompose.base.requests import Query, Refused, name_in, requests, to_data
 from rbxcompose.runtime.control import ControlServer, NoAnswerError, ask
 from rbxcompose.runtime.folder import SOCKET, RobotFolder
-from rbxcompose.typed_json import name_in, to_data
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.runtime.clock_offset import Echo
-from rbxcompose.runtime.deaf_links import FRESH, LONGEST, PATIENCE, DeafLinks
+from rbxcompose.runtime.folder import Echo
+from rbxcompose.runtime.process_group.router import FRESH, LONGEST, PATIENCE, DeafLinks
 
 PERIOD = 0.25  # [s] of reports
 AHEAD = 3600.0  # [s] by which the clocks of the others are ahead

@@ -6,21 +6,20 @@ from collections.abc import Callable
 
 import pytest
 
-from rbxcompose.bus.attachment import Attachment
+from rbxcompose.base.clock import SteppedClock
+from rbxcompose.base.levels import Level
+from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.bus import Bus
-from rbxcompose.bus.names import dds_type
+from rbxcompose.bus.graph import SILENCE
+from rbxcompose.bus.names import Attachment, dds_type
 from rbxcompose.bus.tokens import EntityKind, NodeToken
 from rbxcompose.bus.transport import Arrival, NoTransport
-from rbxcompose.bus.writers import SILENCE
-from rbxcompose.clock import SteppedClock
-from rbxcompose.levels import Level
 from rbxcompose.msgs.cdr import encode
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray
 from rbxcompose.msgs.std_msgs import Float32
-from rbxcompose.qos import Qos
-from rbxcompose.runtime.process_group.deliveries import PERIOD, Deliveries
-from rbxcompose.runtime.process_group.statuses import Statuses
-from rbxcompose.scheduler import Scheduler
+from rbxcompose.runtime.process_group.host import PERIOD, Deliveries
+from rbxcompose.runtime.process_group.hosted import Statuses
+from rbxcompose.sdk.ports import Qos
 
 GOOD = encode(Float32(data=0.5))
 
@@ -69,7 +68,7 @@ class Process:
         deliveries.start()
 
     def _note(self, message: DiagnosticArray) -> None:
-        self.told += [(one.name, Level(one.level), one.message) for one in message.status]
+        self.told += [(status.name, Level(status.level), status.message) for status in message.status]
 
     def advance(self, seconds: float) -> None:
         self.scheduler.advance(self.clock.now())
@@ -116,7 +115,7 @@ def test_a_silent_publisher_is_told_until_it_speaks(process: Process) -> None:
 def test_the_parts_of_an_action_may_be_silent(process: Process) -> None:
     waiting = ("charge/_action/feedback", "charge/_action/status")
     subscriptions = [process.bus.subscribe("mission", name, Float32, Qos.STATE, print) for name in waiting]
-    assert not any(one.reader.expects_speech for one in subscriptions)
+    assert not any(subscription.reader.expects_speech for subscription in subscriptions)
     assert process.bus.subscribe("mission", "charge", Float32, Qos.STATE, print).reader.expects_speech
 
 

@@ -6,13 +6,11 @@ import socket
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from rbxcompose.clock import MonotonicClock, SteppedClock
+from rbxcompose.base.clock import MonotonicClock, SteppedClock
+from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.channel import Channel
-from rbxcompose.runtime.process_group.driver import RealTimeDriver, SteppedDriver
-from rbxcompose.runtime.process_group.inbox import CallbackInbox
-from rbxcompose.runtime.process_group.turns import Turns
-from rbxcompose.scheduler import Scheduler
+from rbxcompose.runtime.process_group.connection import CallbackInbox, RealTimeDriver, SteppedDriver, Turns
 
 
 class Driven:

@@ -15,21 +15,20 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.cli.main import main as run_command
-from rbxcompose.clock import NANOSECONDS, PATIENCE, ExternalClock, SteppedClock, Turn
+from rbxcompose.base.clock import NANOSECONDS, PATIENCE, ExternalClock, SteppedClock, Turn
+from rbxcompose.base.scheduler import Scheduler
+from rbxcompose.commands.main import main as run_command
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.msgs.rosgraph_msgs import Clock
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Empty
-from rbxcompose.qos import Qos
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.channel import Channel
-from rbxcompose.runtime.options import RunOptions
-from rbxcompose.runtime.process_group.driver import ExternalDriver
-from rbxcompose.runtime.process_group.inbox import CallbackInbox
-from rbxcompose.scheduler import Scheduler
+from rbxcompose.runtime.folder import RunOptions
+from rbxcompose.runtime.process_group.connection import CallbackInbox, ExternalDriver
+from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench, instance
 from tests.bus.conftest import Network, network
 from tests.runtime.stage import ENDPOINT, Stage
@@ -268,7 +267,7 @@ def test_a_real_robot_follows_stands_goes_on_jumps_and_bears_a_dispute(
     process.bus.subscribe("simulator", "odom", Odometry, Qos.STATE, odometry.append)
 
     def take(message: DiagnosticArray) -> None:
-        levels.extend(one.level for one in message.status if one.name == "bus.clock")
+        levels.extend(status.level for status in message.status if status.name == "bus.clock")
 
     process.bus.subscribe("simulator", "/diagnostics", DiagnosticArray, Qos.STATE, take)
 

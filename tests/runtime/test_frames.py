@@ -8,19 +8,19 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from rbxcompose.bus.attachment import Attachment
+from rbxcompose.base.clock import SteppedClock
+from rbxcompose.base.levels import Level
+from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.bus import Bus
+from rbxcompose.bus.names import Attachment
 from rbxcompose.bus.transport import Arrival, NoTransport
-from rbxcompose.clock import SteppedClock
-from rbxcompose.levels import Level
 from rbxcompose.msgs.cdr import encode
 from rbxcompose.msgs.geometry_msgs import Quaternion, Transform, TransformStamped, Vector3
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.msgs.tf2_msgs import TFMessage
-from rbxcompose.qos import Qos
-from rbxcompose.runtime.process_group.frames import MOST_TOLD, Frames, Lookup
-from rbxcompose.scheduler import Scheduler
+from rbxcompose.runtime.process_group.live_ports import MOST_TOLD, Frames, Lookup
+from rbxcompose.sdk.ports import Qos
 
 
 @dataclass(frozen=True, slots=True)

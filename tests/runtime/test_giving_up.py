@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from rbxcompose.levels import Level
-from rbxcompose.plan.model import Plan
-from rbxcompose.restarts import Restart
+from rbxcompose.base.config import Restart
+from rbxcompose.base.levels import Level
+from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.supervision.members import Phase
 from tests.runtime.stage import Stage, robot
@@ -16,7 +16,9 @@ NEVER = Restart(when="never")
 
 def with_never(*names: str) -> Plan:
     plan = robot()
-    instances = tuple(replace(one, restart=NEVER) if one.name in names else one for one in plan.instances)
+    instances = tuple(
+        replace(instance, restart=NEVER) if instance.name in names else instance for instance in plan.instances
+    )
     return replace(plan, instances=instances)
 
 

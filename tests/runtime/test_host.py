@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import pytest
 
-from rbxcompose.executive.requests import PauseMission
-from rbxcompose.levels import Level
+from rbxcompose.base.config import Restart
+from rbxcompose.base.levels import Level
+from rbxcompose.base.requests import as_data
+from rbxcompose.missions.execution.requests import PauseMission
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray
 from rbxcompose.msgs.std_msgs import Float32
-from rbxcompose.requests import as_data
-from rbxcompose.restarts import Restart
 from rbxcompose.runtime.channel import Failed
 from rbxcompose.sdk import Component, Config, In, Out, Refused, component
 from rbxcompose.testing import Bench, instance
@@ -88,7 +88,7 @@ def test_a_component_that_raises_is_restarted_and_the_others_go_on(method: str) 
 def test_a_mistake_is_told_with_method_cause_and_line_and_its_traceback_is_in_the_log() -> None:
     robot = bench("step")
     robot.advance(1.0)
-    record = next(one for one in robot.records if one.level is Level.ERROR)
+    record = next(candidate for candidate in robot.records if candidate.level is Level.ERROR)
     assert record.source == "broken"
     assert record.text.startswith("break_in raised ValueError: planted (test_host.py:")
     assert "Traceback" in record.detail
@@ -98,16 +98,16 @@ def test_a_component_in_error_says_so_in_diagnostics_until_it_is_back() -> None:
     robot = bench("step")
     reports = robot.collect("/diagnostics", DiagnosticArray)
     robot.advance(0.15)
-    assert {one.name: one.level for one in reports[-1].status} == {"broken": Level.ERROR, "healthy": Level.OK}
+    assert {status.name: status.level for status in reports[-1].status} == {"broken": Level.ERROR, "healthy": Level.OK}
     robot.advance(2.0)
-    assert {one.level for one in reports[-1].status} == {Level.OK}
+    assert {status.level for status in reports[-1].status} == {Level.OK}
 
 
 def test_a_component_that_keeps_failing_has_failed_and_the_supervisor_is_told() -> None:
     robot = bench("step", times=100)
     robot.advance(10.0)
     assert robot.host.states()["broken"] == ("failed", 4)
-    assert [one.instance for one in robot.events if isinstance(one, Failed)] == ["broken"]
+    assert [event.instance for event in robot.events if isinstance(event, Failed)] == ["broken"]
     assert robot.host.states()["healthy"] == ("active", 0)
 
 
@@ -121,7 +121,7 @@ def test_a_component_that_is_never_restarted_stays_failed_and_the_robot_goes_on(
     robot.advance(10.0)
     assert robot.host.states() == {"broken": ("failed", 0), "healthy": ("active", 0)}
     assert "broken: stays failed: it is never restarted" in robot.texts()
-    assert [one for one in robot.events if isinstance(one, Failed)] == []
+    assert [event for event in robot.events if isinstance(event, Failed)] == []
 
 
 def test_a_component_that_is_always_restarted_outlives_any_number_of_failures() -> None:
@@ -134,7 +134,7 @@ def test_the_bound_of_failures_is_that_of_the_component() -> None:
     robot = with_restart(Restart(max=2), times=30)
     robot.advance(10.0)
     assert robot.host.states()["broken"] == ("failed", 1)
-    assert [one.instance for one in robot.events if isinstance(one, Failed)] == ["broken"]
+    assert [event.instance for event in robot.events if isinstance(event, Failed)] == ["broken"]
 
 
 def test_a_message_that_breaks_its_handler_restarts_only_that_component() -> None:

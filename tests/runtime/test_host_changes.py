@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Annotated
 
-from rbxcompose.config import Live
-from rbxcompose.executive.requests import PauseMission, ResumeMission
-from rbxcompose.levels import Level
+from rbxcompose.base.config import Live, Restart
+from rbxcompose.base.levels import Level
+from rbxcompose.missions.execution.requests import PauseMission, ResumeMission
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray
 from rbxcompose.msgs.std_msgs import Float32
-from rbxcompose.restarts import Restart
 from rbxcompose.runtime.process_group.hosted import Lifecycle
 from rbxcompose.sdk import Component, Config, Out, Refused, component
 from rbxcompose.testing import Bench, instance

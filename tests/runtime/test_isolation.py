@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 
 from rbxcompose.msgs.std_msgs import Float32
-from rbxcompose.qos import Qos
+from rbxcompose.sdk.ports import Qos
 from tests.bus.conftest import Network
 
 MESSAGES = 500

@@ -12,21 +12,20 @@ from contextlib import closing, suppress
 
 import pytest
 
+from rbxcompose.base.clock import MonotonicClock
+from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.bus import Bus
-from rbxcompose.bus.probe import MISSES, Probe, ProbeResult, probe_key
+from rbxcompose.bus.endpoints import tcp_endpoint
+from rbxcompose.bus.liveness import MISSES, Probe, ProbeResult, probe_key
 from rbxcompose.bus.renewal import RenewableTransport
 from rbxcompose.bus.transport import TransportReply
 from rbxcompose.bus.zenoh_session import open_client, open_peer, open_router
 from rbxcompose.bus.zenoh_transport import ZenohTransport
-from rbxcompose.clock import MonotonicClock
-from rbxcompose.endpoints import tcp_endpoint
 from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.msgs.std_srvs import Trigger
-from rbxcompose.qos import Qos
-from rbxcompose.runtime.process_group.lifeline import BEATS, Lifeline, answer
-from rbxcompose.runtime.process_group.roll_caller import RollCaller
-from rbxcompose.scheduler import Scheduler
+from rbxcompose.runtime.process_group.connection import LIFELINE_BEATS, Lifeline, RollCaller, answer
 from rbxcompose.sdk.bound import Reply
+from rbxcompose.sdk.ports import Qos
 
 ROBOT = "toys"
 PATIENCE = 10.0  # [s]
@@ -43,7 +42,7 @@ def test_a_session_is_stuck_after_three_misses_in_a_row_and_not_before() -> None
 def test_one_answer_of_anybody_clears_the_misses() -> None:
     probe = Probe(expects_router=True)
     heard = [ProbeResult.NOTHING, ProbeResult.NOTHING, ProbeResult.ANSWER] * 20
-    assert not any(probe.judge(one, is_router_up=False) for one in heard)
+    assert not any(probe.judge(message, is_router_up=False) for message in heard)
 
 
 def test_a_dead_router_is_no_stuck_session() -> None:
@@ -162,7 +161,7 @@ class Probed:
         self._woken.append((owner, callback))
 
     def probe(self) -> None:
-        for _ in range(BEATS):
+        for _ in range(LIFELINE_BEATS):
             self.lifeline.beat()
 
     def turn(self) -> None:
@@ -199,8 +198,8 @@ def until(holds: Callable[[], object], *processes: Probed | Visitor | Beating) -
     deadline = time.monotonic() + PATIENCE
     while not holds():
         assert time.monotonic() < deadline, "it never came true"
-        for one in processes:
-            one.turn()
+        for process in processes:
+            process.turn()
         os.sched_yield()
 
 
@@ -249,9 +248,9 @@ def test_a_stuck_session_is_opened_again_with_all_that_was_declared(port: int) -
         visitor.bus.close()
 
 
-def lose_link(one: ZenohTransport, other: ZenohTransport) -> None:
+def lose_link(transport: ZenohTransport, other: ZenohTransport) -> None:
     """Shut the connection between two sessions of this process, which Zenoh made when they learnt of each other."""
-    (link,) = [link for link in one._session.info.links() if str(link.zid) == other.session]
+    (link,) = [link for link in transport._session.info.links() if str(link.zid) == other.session]
     ends = {str(end).partition("/")[2] for end in (link.src, link.dst)}
     for descriptor in map(int, os.listdir("/proc/self/fd")):
         with suppress(OSError):  # no socket, or one that listens
@@ -283,8 +282,8 @@ def test_two_that_have_lost_their_link_find_each_other_again(port: int) -> None:
     until(lambda: tell.has_match, robot, world)
     tell(Float32(data=1.0))
     until(lambda: heard, robot, world)
-    for one in (robot.bus, world.bus, router):
-        one.close()
+    for bus in (robot.bus, world.bus, router):
+        bus.close()
 
 
 class Beating:
@@ -294,10 +293,10 @@ class Beating:
         self._roll, self._processes, self._due = roll, processes, 0.0
 
     def turn(self) -> None:
-        for one in self._processes:
-            one.turn()
+        for process in self._processes:
+            process.turn()
         if time.monotonic() > self._due:
             self._due = time.monotonic() + 0.02
             self._roll.beat()
-            for one in self._processes:
-                one.lifeline.beat()
+            for process in self._processes:
+                process.lifeline.beat()

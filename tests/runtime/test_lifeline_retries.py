@@ -5,11 +5,10 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 
-from rbxcompose.bus.probe import MISSES
+from rbxcompose.bus.liveness import MISSES
 from rbxcompose.bus.renewal import RenewableTransport
 from rbxcompose.bus.transport import LONGEST_WAIT, NoTransport, Transport, TransportReply
-from rbxcompose.runtime.process_group.driver import BEAT
-from rbxcompose.runtime.process_group.lifeline import BEATS, FIRST_PAUSE, LONGEST_PAUSE, Lifeline
+from rbxcompose.runtime.process_group.connection import BEAT, FIRST_PAUSE, LIFELINE_BEATS, LONGEST_PAUSE, Lifeline
 
 OPENED_ANEW = "the session on the bus no longer carries anything; opening it again"
 
@@ -64,7 +63,7 @@ class Fragile:
 
 def test_it_is_tried_again_and_told_until_there_is_a_session() -> None:
     process = Fragile(failures=2)
-    process.beat((MISSES + 1) * BEATS)
+    process.beat((MISSES + 1) * LIFELINE_BEATS)
     assert process.tries == 1
     process.beat(FIRST_PAUSE)
     assert process.tries == 2

@@ -11,10 +11,8 @@ from pathlib import Path
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.levels import Level
-from rbxcompose.runtime.follow import Follower, read_log
-from rbxcompose.runtime.log import NAME, PARTS, PREVIOUS, LogFile, start_new
-from rbxcompose.runtime.records import Record
+from rbxcompose.base.levels import Level
+from rbxcompose.runtime.log import NAME, PARTS, PREVIOUS, Follower, LogFile, Record, read_log, start_new
 
 
 def record(number: int, text: str = "text") -> Record:
@@ -73,8 +71,8 @@ def test_a_follower_goes_on_with_the_next_run(tmp_path: Path) -> None:
     second.write(record(3))
     assert follower.read() == [record(2), record(3)]
     assert read_log(tmp_path / PREVIOUS) == [record(1), record(2)]
-    for one in (first, second, follower):
-        one.close()
+    for file in (first, second, follower):
+        file.close()
 
 
 def test_a_log_that_is_not_there_holds_nothing(tmp_path: Path) -> None:
@@ -84,7 +82,7 @@ def test_a_log_that_is_not_there_holds_nothing(tmp_path: Path) -> None:
 def test_several_processes_never_tear_each_others_lines(tmp_path: Path) -> None:
     script = (
         "import sys; from pathlib import Path; from rbxcompose.runtime.log import LogFile\n"
-        "from rbxcompose.runtime.records import Record; from rbxcompose.levels import Level\n"
+        "from rbxcompose.runtime.log import Record; from rbxcompose.base.levels import Level\n"
         "log = LogFile(Path(sys.argv[1]))\n"
         "for n in range(300): log.write(Record(n, Level.OK, 'x', 'y' * (n * 20)))"
     )
@@ -189,7 +187,7 @@ def test_the_log_of_the_run_before_is_kept_whole(tmp_path: Path) -> None:
 def test_several_processes_and_many_files_lose_no_line(tmp_path: Path) -> None:
     script = (
         "import sys; from pathlib import Path; from rbxcompose.runtime.log import LogFile\n"
-        "from rbxcompose.runtime.records import Record; from rbxcompose.levels import Level\n"
+        "from rbxcompose.runtime.log import Record; from rbxcompose.base.levels import Level\n"
         "log = LogFile(Path(sys.argv[1]), largest=20_000)\n"
         "for n in range(150): log.write(Record(n, Level.OK, sys.argv[2], 'y' * 100))"
     )

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from rbxcompose.levels import Level
-from rbxcompose.plan.model import OtherHost, Plan, Share
-from rbxcompose.robot_events import MissionOver
+from rbxcompose.base.levels import Level
+from rbxcompose.compiler.plan.model import OtherHost, Plan, Share
 from rbxcompose.runtime import channel as say
-from rbxcompose.runtime.clock_offset import ClockOffset
-from rbxcompose.runtime.host_report import HostReport, RobotEnd
+from rbxcompose.runtime.channel import HostReport, RobotEnd
+from rbxcompose.runtime.folder import ClockOffset
 from rbxcompose.runtime.supervision.changes import changes
 from rbxcompose.runtime.supervision.conductor import INTERRUPTED
 from rbxcompose.runtime.supervision.members import Phase
 from rbxcompose.runtime.supervision.other_hosts import SILENT
+from rbxcompose.sdk.robot_events import MissionOver
 from tests.runtime.stage import Stage, robot
 
 BASE = ("base",)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rbxcompose.levels import Level
+from rbxcompose.base.levels import Level
 from rbxcompose.msgs.geometry_msgs import PoseStamped
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header

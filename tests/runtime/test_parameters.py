@@ -8,14 +8,14 @@ from typing import Annotated, Any, Literal
 import pytest
 from pydantic import Field, model_validator
 
+from rbxcompose.base.units import ANGLE, Quantity
 from rbxcompose.msgs import rcl_interfaces as rcl
 from rbxcompose.msgs.rbxcompose_parameters import ChangeParameters
 from rbxcompose.msgs.types import Message, Service
-from rbxcompose.params.values import to_message
 from rbxcompose.sdk import Angle, Component, Config, Live, Refused, component
 from rbxcompose.sdk.bound import Reply
+from rbxcompose.sdk.parameters import to_message
 from rbxcompose.testing import Bench, instance
-from rbxcompose.units import ANGLE, Quantity
 
 
 class Gains(Config):
@@ -81,7 +81,7 @@ def ask(bench: Bench, what: str, service: type[Service[Any, Any]], request: Mess
 def set_each(bench: Bench, **values: object) -> list[tuple[bool, str]]:
     request = rcl.SetParameters.Request(parameters=tuple(_parameter(*one) for one in values.items()))
     answer = ask(bench, "toy/set_parameters", rcl.SetParameters, request)
-    return [(one.successful, one.reason) for one in answer.results]
+    return [(result.successful, result.reason) for result in answer.results]
 
 
 def _parameter(name: str, value: object) -> rcl.Parameter:
@@ -106,7 +106,7 @@ def test_a_component_tells_its_parameters(bench: Bench) -> None:
     assert types.types == bytes([4, 3, 0])
     request = rcl.DescribeParameters.Request(names=names)
     told = ask(bench, "/toy/describe_parameters", rcl.DescribeParameters, request).descriptors
-    assert [(one.name, one.read_only, one.description) for one in told] == [
+    assert [(descriptor.name, descriptor.read_only, descriptor.description) for descriptor in told] == [
         ("name", True, "What it is called."),
         ("size", False, "How large it is."),
         ("nothing", False, ""),
@@ -120,7 +120,10 @@ def test_a_change_reaches_the_component_the_log_and_who_listens(bench: Bench) ->
     assert (toy.followed, toy.config.size) == ([(1.0, 2.0)], 2.0)
     assert "toy: set: size = 2.0" in bench.texts()
     changed = events[0].changed_parameters
-    assert (events[0].node, [(one.name, one.value.double_value) for one in changed]) == ("/toy", [("size", 2.0)])
+    assert (events[0].node, [(parameter.name, parameter.value.double_value) for parameter in changed]) == (
+        "/toy",
+        [("size", 2.0)],
+    )
     assert bench.component("other").config.size == 1.0
 
 
@@ -197,7 +200,7 @@ def test_a_setting_in_a_group_is_set_by_its_dotted_name(bench: Bench) -> None:
     assert set_each(bench, **{"gains.p": 2, "gains.lean": "90 deg", "gains.way": "down"}) == [(True, "")] * 3
     config = bench.component("toy").config
     assert (config.gains, config.size) == (Gains(p=2.0, lean=Quantity(math.pi / 2, ANGLE), way="down"), 1.0)
-    assert [one.changed_parameters[0].name for one in events] == ["gains.p", "gains.lean", "gains.way"]
+    assert [event.changed_parameters[0].name for event in events] == ["gains.p", "gains.lean", "gains.way"]
 
 
 @pytest.mark.parametrize(

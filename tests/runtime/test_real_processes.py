@@ -9,8 +9,7 @@ import time
 
 import pytest
 
-from rbxcompose.runtime.follow import read_log
-from rbxcompose.runtime.log import NAME
+from rbxcompose.runtime.log import NAME, read_log
 from rbxcompose.runtime.processes import titled, wait_until_ended
 from tests.runtime.real_robot import PATIENCE, Robot, eventually
 
@@ -20,7 +19,7 @@ def test_up_ps_down(robot: Robot) -> None:
     shown = robot.ps()
     assert shown["robot"] == robot.name
     assert shown["router"]["endpoint"].startswith("tcp/127.0.0.1:")
-    assert [(one["name"], one["state"], one["restarts"]) for one in shown["components"]] == [
+    assert [(component["name"], component["state"], component["restarts"]) for component in shown["components"]] == [
         ("first", "active", 0),
         ("second", "active", 0),
     ]
@@ -44,13 +43,13 @@ def test_commands_reach_the_running_robot(robot: Robot) -> None:
 
 def test_a_component_stops_the_robot_and_nobody_releases_it_before_the_reason_is_over(robot: Robot) -> None:
     robot.up_detached(holds_at=0.5, holds_for=6.0)
-    eventually(lambda: all("held" in robot.texts(one) for one in ("first", "second")))
+    eventually(lambda: all("held" in robot.texts(text) for text in ("first", "second")))
     refused = robot.do("release")
     assert refused.returncode != 0
     assert "the robot must stand still: a toy is on the floor" in refused.stdout + refused.stderr
     eventually(lambda: robot.do("release").returncode == 0)
-    eventually(lambda: all(robot.last_words(one)[-1] == "free again" for one in ("first", "second")))
-    assert [robot.texts(one).count("held") for one in ("first", "second")] == [1, 1]
+    eventually(lambda: all(robot.last_words(text)[-1] == "free again" for text in ("first", "second")))
+    assert [robot.texts(text).count("held") for text in ("first", "second")] == [1, 1]
     assert robot.do("down").returncode == 0
 
 
@@ -129,7 +128,10 @@ def test_a_killed_process_is_started_again(robot: Robot) -> None:
     process.send_signal(signal.SIGKILL)
     eventually(lambda: robot.texts("first").count("started") == 2)
     assert robot.has_logged("lost first: process 'robot' was killed by SIGKILL")
-    assert [(one["state"], one["restarts"]) for one in robot.ps()["components"]] == [("active", 1), ("active", 0)]
+    assert [(component["state"], component["restarts"]) for component in robot.ps()["components"]] == [
+        ("active", 1),
+        ("active", 0),
+    ]
     assert robot.process_of("first") != process
     robot.do("down")
 
@@ -151,7 +153,7 @@ def test_without_its_supervisor_the_robot_comes_to_rest_and_ends(robot: Robot) -
     robot.supervisor().send_signal(signal.SIGKILL)
     assert wait_until_ended(processes, 2.0) == []
     assert robot.last_words("first") == ["braking", "deactivated"]
-    assert [one["state"] for one in robot.ps()["components"]] == ["dead", "dead"]
+    assert [component["state"] for component in robot.ps()["components"]] == ["dead", "dead"]
     assert robot.do("down").returncode == 0
 
 
@@ -168,7 +170,7 @@ def test_without_the_prefork_parent_the_robot_goes_down(robot: Robot) -> None:
 def test_a_suspended_process_is_shown_as_such_and_told_to_the_others_before_it_is_started_again(robot: Robot) -> None:
     robot.up_detached()
     robot.process_of("first").send_signal(signal.SIGSTOP)
-    assert [one["state"] for one in robot.ps()["components"]] == ["suspended", "active"]
+    assert [component["state"] for component in robot.ps()["components"]] == ["suspended", "active"]
     eventually(lambda: robot.has_logged("lost first: process 'robot' was suspended by a signal"))
     eventually(lambda: robot.texts("first").count("started") == 2)
     robot.do("down")
@@ -196,7 +198,7 @@ def test_what_a_dead_supervisor_left_is_ended_by(who: str, robot: Robot) -> None
 def test_down_ends_a_robot_whose_supervisor_is_stopped(robot: Robot) -> None:
     robot.up_detached()
     robot.supervisor().send_signal(signal.SIGSTOP)
-    assert [one["state"] for one in robot.ps()["components"]] == ["active", "active"]
+    assert [component["state"] for component in robot.ps()["components"]] == ["active", "active"]
     assert robot.do("down").returncode == 0
     assert robot.last_words("first") == ["braking", "deactivated"]
 
@@ -204,7 +206,7 @@ def test_down_ends_a_robot_whose_supervisor_is_stopped(robot: Robot) -> None:
 def test_a_process_that_hangs_ends_itself_and_says_where(robot: Robot) -> None:
     process = robot.up(hangs_at=0.3)
     eventually(lambda: robot.has_logged("hung and ended itself"))
-    hang = next(one for one in read_log(robot.folder.path / NAME) if "hung" in one.text)
+    hang = next(record for record in read_log(robot.folder.path / NAME) if "hung" in record.text)
     assert "in step" in hang.detail
     process.send_signal(signal.SIGINT)
     process.communicate(timeout=PATIENCE)
@@ -262,7 +264,7 @@ def test_on_a_stepped_clock_a_mission_that_waits_in_vain_ends_the_run(robot: Rob
 def test_on_a_stepped_clock_the_duration_is_exact(robot: Robot) -> None:
     process = robot.up("--stepped", "--duration", "7")
     process.communicate(timeout=PATIENCE)
-    braking = [one.time for one in read_log(robot.folder.path / NAME) if one.text == "braking"]
+    braking = [record.time for record in read_log(robot.folder.path / NAME) if record.text == "braking"]
     assert (process.returncode, braking) == (0, [7.0, 7.0])
 
 
@@ -281,6 +283,9 @@ def test_a_supervisor_that_was_stopped_for_a_while_goes_on_with_a_sound_robot(ro
     heard = len(robot.texts("first"))
     eventually(lambda: len(robot.texts("first")) >= heard + 6)  # 3 s of its steps
     supervisor.send_signal(signal.SIGCONT)
-    assert [(one["state"], one["restarts"]) for one in robot.ps()["components"]] == [("active", 0), ("active", 0)]
+    assert [(component["state"], component["restarts"]) for component in robot.ps()["components"]] == [
+        ("active", 0),
+        ("active", 0),
+    ]
     assert robot.processes() == before
     robot.do("down")

@@ -10,30 +10,35 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.components.mission import MissionConfig
-from rbxcompose.executive.requests import ListMissions, PauseMission
-from rbxcompose.levels import Level
-from rbxcompose.plan.dump import dump
-from rbxcompose.plan.model import Instance, Plan
-from rbxcompose.requests import Command, Request, answers, as_data
-from rbxcompose.restarts import Restart
-from rbxcompose.robot_events import RobotHeld
+from rbxcompose.base.config import Restart
+from rbxcompose.base.levels import Level
+from rbxcompose.base.requests import Command, Request, answers, as_data, from_data
+from rbxcompose.base.scheduler import Scheduler
+from rbxcompose.compiler.plan.dump import dump
+from rbxcompose.compiler.plan.model import Instance, Plan
+from rbxcompose.missions.components.mission import MissionConfig
+from rbxcompose.missions.execution.requests import ListMissions, PauseMission
 from rbxcompose.runtime import channel as say
-from rbxcompose.runtime.folder import RobotState
-from rbxcompose.runtime.host_report import HostReport
-from rbxcompose.runtime.options import RunOptions
-from rbxcompose.runtime.plan_requests import ApplyPlan, ComparePlan, PlanComparison
+from rbxcompose.runtime.channel import HostReport
+from rbxcompose.runtime.folder import RobotState, RunOptions
 from rbxcompose.runtime.processes import Process
-from rbxcompose.runtime.requests import BringDown, ReleaseRobot, RobotStatus, StopRobot
+from rbxcompose.runtime.requests import (
+    ApplyPlan,
+    BringDown,
+    ComparePlan,
+    PlanComparison,
+    ReleaseRobot,
+    RobotStatus,
+    StopRobot,
+)
 from rbxcompose.runtime.supervision.changes import Fate
 from rbxcompose.runtime.supervision.conductor import Conductor
 from rbxcompose.runtime.supervision.judge import Judge
 from rbxcompose.runtime.supervision.request_handler import RequestHandler
-from rbxcompose.runtime.supervision.setting_line import SettingLine
-from rbxcompose.scheduler import Scheduler
+from rbxcompose.runtime.supervision.supervisor import SettingLine
 from rbxcompose.sdk import Component, Config, component
+from rbxcompose.sdk.robot_events import RobotHeld
 from rbxcompose.testing.bench import Bench, instance
-from rbxcompose.typed_json import from_data
 
 PLAN = Plan("toys", "toys.yaml", (Instance("patrol", "mission", MissionConfig(), "mission"),))
 
@@ -231,7 +236,7 @@ def test_another_plan_is_compared_first_and_taken_only_if_nobody_was_faster() ->
     text = dump(replace(PLAN, instances=(replace(PLAN.instances[0], restart=Restart(when="never")),)))
     found = desk.compare(text)
     assert (found.generation, found.why_not) == (0, "")
-    assert [one.fate for one in found.components] == [Fate.LIVE]
+    assert [change.fate for change in found.components] == [Fate.LIVE]
     assert str(desk.ask(ApplyPlan(text, 7))[0]).startswith("it was changed by someone else meanwhile")
     assert desk.sent == []
 

@@ -8,11 +8,11 @@ from pathlib import Path
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.compiler import compile_robot
-from rbxcompose.manifest.options import ComponentOptions
-from rbxcompose.plan.dump import dump, load
-from rbxcompose.plan.model import Plan
-from rbxcompose.restarts import Restart, When
+from rbxcompose.base.config import Restart, When
+from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.compiler.plan.dump import dump, load
+from rbxcompose.compiler.plan.model import Plan
+from rbxcompose.manifest.section import ComponentOptions
 from rbxcompose.runtime.faults import RestartPolicy
 from rbxcompose.testing import instance
 

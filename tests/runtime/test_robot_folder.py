@@ -106,10 +106,10 @@ def process_with(title: str) -> Iterator[Process]:
 
 
 def test_processes_of_another_boot_or_another_life_are_not_alive() -> None:
-    with process_with("rbxcompose toys: robot") as one:
-        assert state(one).alive() == {"robot": one}
-        assert state(one, boot="another").alive() == {}
-        assert state(Process(one.pid, one.started - 1)).alive() == {}
+    with process_with("rbxcompose toys: robot") as process:
+        assert state(process).alive() == {"robot": process}
+        assert state(process, boot="another").alive() == {}
+        assert state(Process(process.pid, process.started - 1)).alive() == {}
 
 
 def test_a_process_that_does_not_call_itself_one_of_the_robot_is_none() -> None:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from rbxcompose.levels import Level
+from rbxcompose.base.levels import Level
 from rbxcompose.msgs.rcl_interfaces import Log
 from rbxcompose.testing import Bench, instance
 
@@ -17,7 +17,7 @@ def test_a_log_line_goes_out_on_rosout_with_its_level_and_component(level: Level
     lines = bench.collect("/rosout", Log)
     bench.component("battery").context.log(level, "hello")
     bench.advance(0.0)
-    assert [(one.level, one.name, one.msg) for one in lines] == [(number, "battery", "hello")]
+    assert [(line.level, line.name, line.msg) for line in lines] == [(number, "battery", "hello")]
 
 
 def test_a_failure_is_told_on_rosout_too() -> None:
@@ -34,5 +34,5 @@ def test_what_is_below_the_level_of_a_component_goes_nowhere() -> None:
     for level in (Level.OK, Level.WARN, Level.ERROR):
         bench.component("battery").context.log(level, level.name)
     bench.advance(0.0)
-    assert [one.msg for one in lines] == ["WARN", "ERROR"]
-    assert [one.text for one in bench.records] == ["WARN", "ERROR"]
+    assert [line.msg for line in lines] == ["WARN", "ERROR"]
+    assert [record.text for record in bench.records] == ["WARN", "ERROR"]

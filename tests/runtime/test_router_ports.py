@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import socket
 
-from rbxcompose.endpoints import LOOPBACK
+from rbxcompose.bus.endpoints import LOOPBACK
 from rbxcompose.runtime.process_group.router import free_ports
 
 

@@ -8,12 +8,12 @@ from itertools import count
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.config import Config
-from rbxcompose.params.change import ChangeRefusal, WantedChange
-from rbxcompose.plan.model import Instance, Plan
+from rbxcompose.base.config import Config
+from rbxcompose.compiler.plan.model import Instance, Plan
 from rbxcompose.runtime import channel as say
-from rbxcompose.runtime import setting_messages as tell
+from rbxcompose.runtime import channel as tell
 from rbxcompose.runtime.supervision.setting_changes import SettingChanges, WhenJudged
+from rbxcompose.sdk.parameters import ChangeRefusal, WantedChange
 
 NAMES = ("a", "b", "c")
 REFUSED, LATE, RULED = 7, 8, 9  # values that are refused when they are prepared, when they are taken, by a rule
@@ -82,7 +82,7 @@ class Robot:
 
     def die(self, name: str) -> None:
         """End a process, which comes back with the values of its plan."""
-        self.orders = [one for one in self.orders if one[0] != name]
+        self.orders = [order for order in self.orders if order[0] != name]
         self.values[name] = 0
         self.prepared.pop(name, None)
         self.changes.gone(name)

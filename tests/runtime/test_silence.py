@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.levels import Level
+from rbxcompose.base.levels import Level
 from rbxcompose.runtime import channel as say
 from tests.runtime.stage import Stage
 
@@ -17,7 +17,7 @@ def test_a_process_that_waits_for_a_processor_is_told_but_not_ended_until_it_had
     for tenth in range(100):
         stage.waited["robot"] = 0.09 * tenth
         stage.pass_time(0.1)
-    (cause,) = {one.cause for _, one in stage.sent if isinstance(one, say.Lost)}
+    (cause,) = {order.cause for _, order in stage.sent if isinstance(order, say.Lost)}
     assert cause == "process 'robot' waited 0.5 s for a processor: this machine has too much to do"
     assert stage.killed == []
     stage.pass_time(2.0)

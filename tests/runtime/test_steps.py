@@ -7,8 +7,8 @@ from collections.abc import Callable
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.runtime.process_group.steps import GoalSteps
-from rbxcompose.scheduler import Scheduler
+from rbxcompose.base.scheduler import Scheduler
+from rbxcompose.runtime.process_group.hosted import GoalSteps
 
 PERIOD = 0.05
 

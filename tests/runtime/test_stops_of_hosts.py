@@ -5,10 +5,10 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.robot_events import RobotHeld
-from rbxcompose.runtime.host_report import HostReport, StopMark
+from rbxcompose.runtime.channel import HostReport, StopMark
 from rbxcompose.runtime.supervision.members import Member
 from rbxcompose.runtime.supervision.stop_latch import StopLatch
+from rbxcompose.sdk.robot_events import RobotHeld
 from tests.runtime.stage import Stage
 
 HOSTS = ("robot", "desk", "cloud")
@@ -40,7 +40,7 @@ class Hosts:
     def marks_known_to(self, host: str) -> set[StopMark]:
         latch = self.latches[host]
         seen = [latch.shared, *latch._others.values()]
-        return {one.own for one in seen if one.own is not None}
+        return {other.own for other in seen if other.own is not None}
 
     def are_stopped(self) -> set[bool]:
         return {latch.is_stopped for latch in self.latches.values()}

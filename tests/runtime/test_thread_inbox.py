@@ -6,8 +6,8 @@ import threading
 
 import pytest
 
-from rbxcompose.runtime.process_group.inbox import CallbackInbox
-from rbxcompose.scheduler import Scheduler
+from rbxcompose.base.scheduler import Scheduler
+from rbxcompose.runtime.process_group.connection import CallbackInbox
 
 
 def is_readable(inbox: CallbackInbox) -> bool:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from rbxcompose.levels import Level
-from rbxcompose.robot_events import RobotHeld
+from rbxcompose.base.levels import Level
 from rbxcompose.runtime import channel as say
+from rbxcompose.sdk.robot_events import RobotHeld
 from tests.runtime.stage import Stage
 
 

@@ -15,10 +15,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.clock import MonotonicClock, SteppedClock
-from rbxcompose.runtime.process_group.inbox import CallbackInbox
-from rbxcompose.runtime.process_group.turns import MOST, REST, SLOW, Turns
-from rbxcompose.scheduler import Scheduler
+from rbxcompose.base.clock import MonotonicClock, SteppedClock
+from rbxcompose.base.scheduler import Scheduler
+from rbxcompose.runtime.process_group.connection import MOST, REST, SLOW, CallbackInbox, Turns
 
 NEVER = 1e9  # [s]
 OWNERS = st.sampled_from(["a", "b", "c"])
@@ -85,8 +84,8 @@ class Process:
                 assert all(due > self.clock.now() for due in self.timers), "what is due comes first"
                 self.lent.append(number)
             self.ran.append(number)
-            for one in consequences:
-                one()
+            for consequence in consequences:
+                consequence()
 
         return self._alone(run)
 
@@ -273,7 +272,7 @@ def test_real_threads_never_run_two_callbacks_at_once() -> None:
         one.start()
     with selectors.SelectSelector() as selector:
         selector.register(inbox, selectors.EVENT_READ)
-        while any(one.is_alive() for one in bringers) or inbox.has_some:
+        while any(item.is_alive() for item in bringers) or inbox.has_some:
             turns.rest(clock.now() + 0.01)
             selector.select(0.01)
             turns.resume()

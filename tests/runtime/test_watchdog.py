@@ -6,9 +6,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from rbxcompose.runtime.process_group.watchdog import HANG, PERIOD, Watchdog
+from rbxcompose.runtime.process_group.connection import HANG, PERIOD, Watchdog
 
-MODULE = "rbxcompose.runtime.process_group.watchdog"
+MODULE = "rbxcompose.runtime.process_group.connection"
 
 
 class EndedError(Exception):

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from rbxcompose.executive.requests import ListMissions
-from rbxcompose.runtime.process_group.handover import HandedOver
+from rbxcompose.missions.execution.requests import ListMissions
+from rbxcompose.runtime.process_group.worker import HandedOver
 
 
 class Later:

@@ -10,23 +10,23 @@ from typing import ClassVar
 
 import pytest
 
+from rbxcompose.base.clock import MonotonicClock
+from rbxcompose.base.levels import Level
+from rbxcompose.base.requests import Command, answers
+from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.bus import Bus
-from rbxcompose.clock import MonotonicClock
-from rbxcompose.levels import Level
+from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray, DiagnosticStatus
 from rbxcompose.msgs.rbxcompose_msgs import Recharge
 from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.msgs.std_srvs import Trigger
-from rbxcompose.plan.model import Plan
-from rbxcompose.qos import Qos
-from rbxcompose.requests import Command, answers
+from rbxcompose.runtime.log import Record
+from rbxcompose.runtime.process_group.connection import CallbackInbox
 from rbxcompose.runtime.process_group.host import Host
 from rbxcompose.runtime.process_group.hosted import Lifecycle
-from rbxcompose.runtime.process_group.inbox import CallbackInbox
 from rbxcompose.runtime.process_group.worker import CONFIGURE, LONGEST, Worker
-from rbxcompose.runtime.records import Record
-from rbxcompose.scheduler import Scheduler
 from rbxcompose.sdk import Calls, Component, Config, In, Out, Refused, Reply, Serves, ServesAction, component
+from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench, instance
 
 PATIENCE = 10.0  # [s]
@@ -168,7 +168,7 @@ class Process:
     def until(self, holds: Callable[[], object]) -> None:
         deadline = time.monotonic() + PATIENCE
         while not holds():
-            assert time.monotonic() < deadline, f"it never came true: {[one.text for one in self.records]}"
+            assert time.monotonic() < deadline, f"it never came true: {[record.text for record in self.records]}"
             self.turn()
             time.sleep(0)
 
@@ -184,7 +184,7 @@ class Process:
         self.bus.subscribe("test", "/diagnostics", DiagnosticArray, Qos.EVENT, reports.append)
         self.host.statuses.publish()
         self.until(lambda: reports)
-        return {one.name: one for one in reports[-1].status}
+        return {status.name: status for status in reports[-1].status}
 
     def close(self) -> None:
         Planner.gate.opened.set()
@@ -227,7 +227,7 @@ def test_it_runs_in_its_thread_and_what_it_sends_is_sent_from_the_schedulers(pro
     assert done == [1.0, 2.0, 3.0]
     assert process.planner.threads == {"planner"}
     assert threads == process.senders == {threading.current_thread().name}
-    assert [one.text for one in process.records if "works" in one.text] == [f"works on {n}" for n in (1, 2, 3)]
+    assert [record.text for record in process.records if "works" in record.text] == [f"works on {n}" for n in (1, 2, 3)]
 
 
 def test_a_request_is_answered_when_it_has_returned_and_its_own_is_answered_in_its_thread(process: Process) -> None:
@@ -276,7 +276,7 @@ def test_a_fault_in_its_thread_restarts_it_alone(process: Process) -> None:
     Planner.gate.opened.set()
     process.send("work", 1.0)
     process.until(lambda: process.host.states() == {"planner": ("active", 1), "wheels": ("active", 0)})
-    error = next(one for one in process.records if one.level is Level.ERROR)
+    error = next(record for record in process.records if record.level is Level.ERROR)
     assert error.source == "planner"
     assert error.text.startswith("on_work raised ValueError: planted (test_worker.py:")
 
@@ -291,7 +291,7 @@ def test_a_call_that_takes_long_is_told_and_one_that_never_returns_is_a_fault(pr
     hung, Planner.gate = Planner.gate, Gate()
     process.clock.ahead = LONGEST + 1.0
     process.host.look_at_workers()
-    error = next(one for one in process.records if one.level is Level.ERROR)
+    error = next(record for record in process.records if record.level is Level.ERROR)
     assert "on_work has not returned for 30 s" in error.text
     assert "in hold" in error.detail  # where it hangs
     process.clock.ahead += 1.0
@@ -314,7 +314,7 @@ def test_a_component_that_says_so_may_be_configured_for_longer() -> None:
     assert failures == []
     clock.ahead = 101.0
     worker.look()
-    assert [str(one) for one in failures] == ["configure has not returned for 100 s"]
+    assert [str(failure) for failure in failures] == ["configure has not returned for 100 s"]
     gate.opened.set()
     assert returned.wait(PATIENCE)
     assert worker.close(PATIENCE)
@@ -352,7 +352,7 @@ def test_on_a_stepped_clock_it_runs_inline() -> None:
     bench = Bench(replace(instance("planner", "toy_planner")))
     done = bench.collect("done", Float32)
     bench.publish("work", Float32(data=1.0), Qos.EVENT)
-    assert [one.data for one in done] == [1.0]
+    assert [item.data for item in done] == [1.0]
     planner = bench.component("planner")
     assert isinstance(planner, Planner)
     assert planner.threads == {threading.current_thread().name}

@@ -11,10 +11,10 @@ from typing import Annotated
 
 from pydantic import ValidationInfo, field_validator
 
-from rbxcompose.cli.robots.run_view import run_plan
-from rbxcompose.plan.model import BusPlan, Instance, Plan
-from rbxcompose.runtime.options import RunOptions
+from rbxcompose.compiler.plan.model import BusPlan, Instance, Plan
+from rbxcompose.runtime.folder import RunOptions
 from rbxcompose.sdk import Component, Config, Live, MissionOver, MissionWaits, RobotHeld, component
+from rbxcompose.tools.run_view import run_plan
 
 SLOW = 5.0  # [s]
 

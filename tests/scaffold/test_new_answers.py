@@ -8,10 +8,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.scaffold.answers import AnswerError, read_name, read_place, read_text, read_yes
-from rbxcompose.scaffold.component import read_component_name
-from rbxcompose.scaffold.robot import RobotAnswers, read_base, robot_files
+from rbxcompose.commands.new_files import AnswerError, read_name, read_place, read_text, read_yes
 from rbxcompose.testing import check_file
+from rbxcompose.tools.scaffold.robot import RobotAnswers, read_base, read_component_name, robot_files
 
 WRONG_NAMES = ["", "Cart", "my-cart", "1st", "_x", "a b", "../x", "a/b", "a" * 61, "ä", "a\n", "true", "null"]
 

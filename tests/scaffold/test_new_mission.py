@@ -6,9 +6,9 @@ from pathlib import PurePosixPath
 
 import pytest
 
-from rbxcompose.config import Place
-from rbxcompose.scaffold.mission import MissionAnswers, mission_files, with_entry
+from rbxcompose.base.config import Place
 from rbxcompose.testing import Golden
+from rbxcompose.tools.scaffold.robot import MissionAnswers, mission_files, with_entry
 
 ROBOT = PurePosixPath("robots/cart/robot.yaml")
 LAP = MissionAnswers("lap", ROBOT)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from rbxcompose.scaffold.part import part_files
 from rbxcompose.testing import Golden
+from rbxcompose.tools.scaffold.robot import part_files
 
 
 def test_it_is_written_as_people_would_write_it(golden: Golden) -> None:

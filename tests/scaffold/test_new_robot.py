@@ -8,13 +8,13 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.composition.section_reader import reserved_names
-from rbxcompose.expressions.functions import FUNCTIONS
+from rbxcompose.base.expressions.functions import FUNCTIONS
+from rbxcompose.commands.new_files import AnswerError
+from rbxcompose.compiler.composition.robot_file import reserved_names
 from rbxcompose.missions.modifiers.registry import modifier_keys
 from rbxcompose.missions.program.registry import kinds
-from rbxcompose.scaffold.answers import AnswerError
-from rbxcompose.scaffold.robot import DOCK, MOST_PLACES, RobotAnswers, read_places, robot_files
 from rbxcompose.testing import Checked, Golden, check_file, run_robot
+from rbxcompose.tools.scaffold.robot import DOCK, MOST_PLACES, RobotAnswers, read_places, robot_files
 
 WORDS = ["and", "or", "not", "in", "is", "lambda", "do", "then", "else", "when", "m"]
 WORDS += ["place", "battery", "pose", "base", "dock", "low"]

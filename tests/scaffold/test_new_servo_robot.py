@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.actuation.servo_models import servo_models
-from rbxcompose.scaffold.new_files import write_new
-from rbxcompose.scaffold.servo_robot import NewServo, ServoRobotAnswers, servo_robot_files
+from rbxcompose.commands.new_files import write_new
+from rbxcompose.domains.servos.models import servo_models
+from rbxcompose.domains.servos.new_robot import NewServo, ServoRobotAnswers, servo_robot_files
 from rbxcompose.testing import check_file
 
 SUPPLY = 12.0  # [V]
@@ -16,12 +16,12 @@ SUPPLY = 12.0  # [V]
 
 @pytest.mark.parametrize("port", ["/dev/ttyUSB0", "/dev/serial/by-path/pci-0:1.0-port0", "/tmp/a b#$:", "COM3: x"])
 def test_it_has_no_findings_for_any_model_and_port(port: str, tmp_path: Path) -> None:
-    models = [one for one in servo_models().values() if one.volts[0] <= SUPPLY <= one.volts[1]]  # on one cable
+    models = [model for model in servo_models().values() if model.volts[0] <= SUPPLY <= model.volts[1]]  # on one cable
     servos = [NewServo(id_, model) for id_, model in enumerate(models)]
     assert write_new(tmp_path, servo_robot_files(ServoRobotAnswers("arm", port, 57_600, servos))) is None
     checked = check_file(tmp_path / "robots/arm/robot.yaml")
     assert checked.text == ""
-    [driver] = [one.config for one in checked.plan.instances if one.type == "servo_bus"]
+    [driver] = [instance.config for instance in checked.plan.instances if instance.type == "servo_bus"]
     assert getattr(driver, "port", None) == port
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.scaffold.new_files import write_new
+from rbxcompose.commands.new_files import write_new
 
 FILES = {"a/one.txt": "1\n", "a/b/two.txt": "2\n", "three.txt": "3 ä\n"}
 

@@ -13,15 +13,15 @@ import pytest
 from jsonschema import Draft7Validator
 from referencing import Registry, Resource
 
-from rbxcompose.cli.main import main as command
-from rbxcompose.config import Config, Length, Time
+from rbxcompose.base.config import Config, Length, Time
+from rbxcompose.commands.main import main as command
+from rbxcompose.compiler.schema.documents import MAKERS, as_text, files
+from rbxcompose.compiler.schema.settle import referred
 from rbxcompose.manifest.file_models import FILES, file_model
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.validate import to_plain
 from rbxcompose.missions.modifiers.registry import modifiers
 from rbxcompose.missions.program.registry import kinds
-from rbxcompose.schema.documents import MAKERS, as_text, files
-from rbxcompose.schema.settle import referred
 from rbxcompose.sdk import Component, component
 from rbxcompose.sdk.registry import PLUGINS
 from tests.conftest import ROOT
@@ -57,7 +57,7 @@ def mistakes(text: str) -> list[str]:
     alone = Draft7Validator(schemas()[kind])
     beside = Draft7Validator(written()[f"{kind}.schema.json"], registry=neighbours())
     found, again = (
-        [".".join(map(str, one.absolute_path)) for one in made.iter_errors(data)] for made in (alone, beside)
+        [".".join(map(str, error.absolute_path)) for error in made.iter_errors(data)] for made in (alone, beside)
     )
     assert found == again
     return found
@@ -90,7 +90,7 @@ def test_a_schema_and_its_definitions_are_of_draft_7(name: str) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_schema_that_is_printed_can_be_used_alone(name: str) -> None:
-    assert all(one["$ref"].startswith("#/") for one in references(schemas()[name]))
+    assert all(reference["$ref"].startswith("#/") for reference in references(schemas()[name]))
 
 
 def maps(schema: object) -> Iterator[dict[str, Any]]:
@@ -184,7 +184,7 @@ def references(schema: object) -> Iterator[dict[str, Any]]:
 @pytest.mark.parametrize("name", NAMES)
 def test_beside_a_reference_stand_only_notes_because_nothing_else_there_counts(name: str) -> None:
     notes = {"$ref", "description", "default"}
-    assert [one for one in references(schemas()[name]) if not one.keys() <= notes] == []
+    assert [reference for reference in references(schemas()[name]) if not reference.keys() <= notes] == []
 
 
 @pytest.mark.parametrize(("name", "model"), [(kind.lower(), file_model(kind)) for kind in FILES])
@@ -194,7 +194,7 @@ def test_every_section_has_a_schema(name: str, model: type[Config]) -> None:
 
 def test_every_key_of_a_kind_or_modifier_is_described() -> None:
     declared = [*kinds().values(), *modifiers().values()]
-    assert [(one.name, key) for one in declared for key, field in one.fields.items() if not field.help] == []
+    assert [(kind.name, key) for kind in declared for key, field in kind.fields.items() if not field.help] == []
 
 
 @pytest.mark.parametrize(
@@ -227,7 +227,7 @@ def test_a_mistake_in_a_robot_is_refused_at_its_place(right: str, wrong: str, pl
     assert ROBOT.count(right) == 1
     found = mistakes(ROBOT.replace(right, wrong))
     assert found
-    assert all(place.startswith(one) for one in found), found
+    assert all(place.startswith(mistake) for mistake in found), found
 
 
 @pytest.mark.parametrize(
@@ -245,7 +245,7 @@ def test_a_mistake_in_a_robot_is_refused_at_its_place(right: str, wrong: str, pl
 def test_a_mistake_in_what_every_component_may_have_is_refused(right: str, wrong: str, place: str) -> None:
     found = mistakes(ROBOT.replace(right, wrong))
     assert found
-    assert all(one.startswith(f"components.battery.{place}") for one in found), found
+    assert all(mistake.startswith(f"components.battery.{place}") for mistake in found), found
 
 
 CHANGES = [

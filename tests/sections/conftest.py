@@ -9,10 +9,10 @@ from typing import Any, cast
 
 import pytest
 
+from rbxcompose.compiler.schema.documents import installed_schema
 from rbxcompose.manifest import registry
 from rbxcompose.manifest.section import Section
 from rbxcompose.manifest.validate import ENTRY_WORDS
-from rbxcompose.schema.documents import installed_schema
 from rbxcompose.sdk import registry as types
 
 
@@ -20,7 +20,7 @@ from rbxcompose.sdk import registry as types
 def lamps(monkeypatch: pytest.MonkeyPatch) -> Iterator[Section[Any, Any]]:
     """Declare the section `lamps`, and forget it when the test ends."""
     types.usable_names()
-    monkeypatch.setattr(registry, "_SECTIONS", {one.name: one for one in registry.sections()})
+    monkeypatch.setattr(registry, "_SECTIONS", {section.name: section for section in registry.sections()})
     monkeypatch.setattr(types, "_TYPES", dict(types._TYPES))
     monkeypatch.setitem(ENTRY_WORDS, "lamps", "lamp")
     monkeypatch.delitem(sys.modules, "tests.sections.toy", raising=False)

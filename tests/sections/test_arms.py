@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.body.link_pairs import digest_of
-from rbxcompose.motion.inverse_kinematics import SolverSettings
+from rbxcompose.domains.arms.motion.inverse_kinematics import SolverSettings
+from rbxcompose.domains.body.link_pairs import digest_of
 from tests.parts.project import Project
 
 ROBOT = """
@@ -20,7 +20,7 @@ include:
 
 def arm_of(project: Project) -> Any:
     assert project.checked
-    [found] = [one for one in project.checked.plan.instances if one.type == "arm"]
+    [found] = [instance for instance in project.checked.plan.instances if instance.type == "arm"]
     return found
 
 
@@ -180,7 +180,7 @@ def group(text: str) -> str:
 
 def config_of(project: Project, name: str) -> Any:
     assert project.checked
-    return next(one for one in project.checked.plan.instances if one.name == name).config
+    return next(instance for instance in project.checked.plan.instances if instance.name == name).config
 
 
 def test_an_arm_of_other_arms_has_the_joints_of_all_in_the_order_of_the_body(tmp_path: Path) -> None:

@@ -10,11 +10,11 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.actuation import bus_types
-from rbxcompose.actuation.bus import ServoBus
-from rbxcompose.actuation.servo_models import ServoModel, servo_models
+from rbxcompose.domains.servos import bus as bus_types
+from rbxcompose.domains.servos.bus import ServoBus
+from rbxcompose.domains.servos.models import ServoModel, servo_models
+from rbxcompose.domains.servos.twins.servo_twin import TwinBus
 from rbxcompose.testing import Bench, FakeServo, check_text
-from rbxcompose.twins.servo_twin import TwinBus
 from tests.sections.test_servo_sections import BODY, HEAD, SERVOS
 
 TOYS = {"TOY-1": replace(servo_models()["XL430-W250"], name="TOY-1", number=9999)}
@@ -47,7 +47,7 @@ def opened() -> Iterator[list[str]]:
 def driver(folder: Path, *, real: bool) -> Any:
     checked = check_text(ROBOT, folder, others={"head.urdf": BODY}, real=real)
     assert checked.codes == [], checked.text
-    [found] = [one for one in checked.plan.instances if one.type == "servo_bus"]
+    [found] = [instance for instance in checked.plan.instances if instance.type == "servo_bus"]
     return found
 
 
@@ -56,7 +56,7 @@ def test_real_servos_are_opened_by_it(tmp_path: Path, opened: list[str]) -> None
     bench.advance(0.2)
     assert opened == ["/dev/toys"]
     component: Any = bench.component("servos")
-    assert {servo.model.name for one in component.cycle.drives.values() for servo in one.joint.servos} == {"TOY-1"}
+    assert {servo.model.name for drive in component.cycle.drives.values() for servo in drive.joint.servos} == {"TOY-1"}
 
 
 def test_simulated_servos_are_of_its_models(tmp_path: Path, opened: list[str]) -> None:

@@ -19,7 +19,7 @@ def check(folder: Path, port: str, devices: str = DEVICES) -> Checked:
 
 
 def port_of(checked: Checked) -> Any:
-    [found] = [one.config for one in checked.plan.instances if one.type == "servo_bus"]
+    [found] = [instance.config for instance in checked.plan.instances if instance.type == "servo_bus"]
     return getattr(found, "port", None)
 
 
@@ -59,7 +59,9 @@ def test_what_is_no_number_of_a_vendor_is_told(number: str, tmp_path: Path) -> N
 def test_a_serial_number_that_is_lost_or_none_is_told(serial: str, tmp_path: Path) -> None:
     device = f"devices:\n  it:\n    vendor: 0403\n    product: 6014\n    serial: {serial}\n"
     checked = check(tmp_path, "dev:it", device)
-    assert [one.span.line for one in checked.compilation.report if one.span and one.code == "RBX1003"] == [9]
+    assert [
+        finding.span.line for finding in checked.compilation.report if finding.span and finding.code == "RBX1003"
+    ] == [9]
 
 
 @pytest.mark.parametrize("place", ["1", "1.4", "1-", "1-1.4:1.0", "usb1"])
@@ -82,7 +84,9 @@ def test_what_is_no_usb_port_is_told(place: str, tmp_path: Path) -> None:
 )
 def test_devices_that_are_not_clear_are_told(entries: str, code: str, line: int, tmp_path: Path) -> None:
     checked = check(tmp_path, "dev:it", f"devices:\n  {entries}\n")
-    assert [(one.code, one.span.line) for one in checked.compilation.report if one.span] == [(code, line)]
+    assert [(finding.code, finding.span.line) for finding in checked.compilation.report if finding.span] == [
+        (code, line)
+    ]
 
 
 def test_devices_that_differ_are_fine(tmp_path: Path) -> None:

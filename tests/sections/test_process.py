@@ -17,7 +17,7 @@ def processes(project: Project, process: str, *profiles: str) -> dict[str, str]:
     """Return the processes of all components."""
     robot = project.check(ROBOT.replace("PROCESS", process), profiles=profiles).compilation.robot
     assert robot
-    return {name: one.process for name, one in robot.components.items()}
+    return {name: component.process for name, component in robot.components.items()}
 
 
 def test_without_it_each_type_has_its_default(tmp_path: Path) -> None:
@@ -29,17 +29,17 @@ def test_all_components_run_there_but_those_that_name_their_own(tmp_path: Path) 
     project = Project(tmp_path)
     found = processes(project, "world", "one")
     assert found == {"base": "world", "battery": "power", "transforms": "world", "diagnostics": "world"}
-    assert [one.help for one in project.findings if one.code == "RBX6001"] == ["remove 'process'"]
+    assert [finding.help for finding in project.findings if finding.code == "RBX6001"] == ["remove 'process'"]
 
 
 def test_what_is_simulated_belongs_into_the_world_also_if_the_robot_has_a_single_process(tmp_path: Path) -> None:
     project = Project(tmp_path)
     processes(project, "robot", "one")
-    told = [one for one in project.findings if one.code == "RBX6001"]
-    assert {one.help for one in told} == {"write 'process: world'", "remove 'process'"}
+    told = [finding for finding in project.findings if finding.code == "RBX6001"]
+    assert {finding.help for finding in told} == {"write 'process: world'", "remove 'process'"}
 
 
 def test_a_process_is_a_name(tmp_path: Path) -> None:
     project = Project(tmp_path)
     project.check(ROBOT.replace("PROCESS", "1 2"), profiles=["one"])
-    assert [one.code for one in project.findings if one.severity.name == "ERROR"]
+    assert [finding.code for finding in project.findings if finding.severity.name == "ERROR"]

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.config import Config
+from rbxcompose.base.config import Config
+from rbxcompose.base.plugins import Plugins
 from rbxcompose.manifest import registry
 from rbxcompose.manifest.registry import section, sections
 from rbxcompose.manifest.section import Reading
-from rbxcompose.plugins import Plugins
 from rbxcompose.testing import Checked, check_text
 from tests.third_party.places import put
 
@@ -43,7 +43,7 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Install
         put(tmp_path, "horns", {f"section.{name}": "horn_module"}, {"horn_module.py": text})
         monkeypatch.syspath_prepend(str(tmp_path))
         monkeypatch.delitem(sys.modules, "horn_module", raising=False)
-        monkeypatch.setattr(registry, "PLUGINS", Plugins("section", "rbxcompose.sections"))
+        monkeypatch.setattr(registry, "PLUGINS", Plugins("section", "sections"))
         registry._problems.cache_clear()
 
     yield give

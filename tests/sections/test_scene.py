@@ -20,7 +20,7 @@ CUP = "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex
 
 def scene_of(project: Project) -> Any:
     assert project.checked
-    [found] = [one for one in project.checked.plan.instances if one.type == "scene"]
+    [found] = [instance for instance in project.checked.plan.instances if instance.type == "scene"]
     return found.config
 
 
@@ -37,7 +37,7 @@ scene:
     bin: {cone: {radius: 5 cm, length: 10 cm}, frame: map}
 """
     project.check(ROBOT + scene, files={"table.scene": TABLE, "cup.stl": CUP})
-    assert [one.code for one in project.findings] == ["RBX2379"]  # nobody tells where the arm is in `map`
+    assert [finding.code for finding in project.findings] == ["RBX2379"]  # nobody tells where the arm is in `map`
     config = scene_of(project)
     assert [*config.objects] == ["cup", "floor", "bin", "table"]
     cup = config.objects["cup"].shapes[0]
@@ -56,7 +56,7 @@ def test_each_cloud_runs_what_makes_a_thing_of_it(tmp_path: Path) -> None:
     assert project.checked.plan
     config = scene_of(project)
     assert (config.clouds, config.frames) == (("camera",), ("map",))
-    [mapper] = [one for one in project.checked.plan.instances if one.type == "cloud_mapper"]
+    [mapper] = [instance for instance in project.checked.plan.instances if instance.type == "cloud_mapper"]
     made: Any = mapper.config
     assert (mapper.name, made.cell, made.frame) == ("scene_camera", 0.03, "map")
 

@@ -102,7 +102,7 @@ def check(folder: Path, text: str, body: str = BODY) -> Checked:
 
 
 def driver_of(checked: Checked) -> Any:
-    [found] = [one.config for one in checked.plan.instances if one.type == "servo_bus"]
+    [found] = [instance.config for instance in checked.plan.instances if instance.type == "servo_bus"]
     return found
 
 
@@ -157,10 +157,15 @@ def test_faults_reach_the_driver_of_their_bus(tmp_path: Path) -> None:
     )
     checked = check(tmp_path, more.partition("controllers")[0] + FAULTS)
     assert checked.codes == []
-    configs: dict[str, Any] = {one.name: one.config for one in checked.plan.instances if one.type == "servo_bus"}
+    configs: dict[str, Any] = {
+        instance.name: instance.config for instance in checked.plan.instances if instance.type == "servo_bus"
+    }
     assert configs["more"].faults == {}
     faults = configs["servos"].faults
-    assert {name: (one.at, one.joint, one.fault, one.lasts) for name, one in faults.items()} == {
+    assert {
+        name: (twin_fault.at, twin_fault.joint, twin_fault.fault, twin_fault.lasts)
+        for name, twin_fault in faults.items()
+    } == {
         "hot": (3.0, "pan_joint", "overheat", 10.0),
         "pulled": (5.0, "", "unplug", None),
     }
@@ -178,7 +183,7 @@ def test_faults_of_a_part_are_of_its_joints(tmp_path: Path) -> None:
     robot = "rbx: 1\nkind: Robot\nname: one\nbuses: {servos: {type: dynamixel}}\ninclude:\n  left: part.yaml\n"
     checked = check_text(robot, tmp_path, others={"head.urdf": BODY, "part.yaml": part})
     assert checked.codes == []
-    assert {name: one.joint for name, one in driver_of(checked).faults.items()} == {"left_hot": "left_pan_joint"}
+    assert {name: fault.joint for name, fault in driver_of(checked).faults.items()} == {"left_hot": "left_pan_joint"}
 
 
 def test_two_instances_of_a_part_bring_their_joints_to_one_bus(tmp_path: Path) -> None:
@@ -189,11 +194,11 @@ def test_two_instances_of_a_part_bring_their_joints_to_one_bus(tmp_path: Path) -
     checked = check_text(robot, tmp_path, others={"head.urdf": BODY, "part.yaml": PART})
     assert checked.codes == []
     config = driver_of(checked)
-    assert {name: one.servos[0].id for name, one in config.joints.items()} == {
+    assert {name: joint.servos[0].id for name, joint in config.joints.items()} == {
         "left_pan_joint": 1,
         "right_pan_joint": 2,
     }
-    assert {name: one.config.claimed for name, one in config.controllers.items()} == {
+    assert {name: controller.config.claimed for name, controller in config.controllers.items()} == {
         "left_look": ("left_pan_joint",),
         "right_look": ("right_pan_joint",),
     }

@@ -12,16 +12,15 @@ import pytest
 from jsonschema import Draft7Validator
 
 from docs.generating.robot import whole_page
-from rbxcompose.findings import Fix
-from rbxcompose.lsp.completion import complete
-from rbxcompose.lsp.definition import define
-from rbxcompose.lsp.document import Document
-from rbxcompose.lsp.hover import describe
-from rbxcompose.lsp.project import Project as OpenProject
+from rbxcompose.base.findings import Fix
+from rbxcompose.compiler.schema.documents import files, installed_schema
 from rbxcompose.manifest import registry
 from rbxcompose.manifest.registry import sections
 from rbxcompose.manifest.section import Section
-from rbxcompose.schema.documents import files, installed_schema
+from rbxcompose.tools.lsp.answers import define, describe
+from rbxcompose.tools.lsp.completion import complete
+from rbxcompose.tools.lsp.document import Document
+from rbxcompose.tools.lsp.project import Project as OpenProject
 from tests.parts.project import Project
 
 pytestmark = pytest.mark.usefixtures("lamps")
@@ -44,8 +43,8 @@ def project(tmp_path: Path) -> Project:
 
 def told(project: Project) -> list[tuple[str, str, int]]:
     """Return code, message and line of the errors."""
-    found = [one for one in project.findings if one.severity.name == "ERROR"]
-    return [(one.code, one.message, one.span.line if one.span else 0) for one in found]
+    found = [finding for finding in project.findings if finding.severity.name == "ERROR"]
+    return [(finding.code, finding.message, finding.span.line if finding.span else 0) for finding in found]
 
 
 def test_its_model_holds_and_a_word_may_stand_for_an_entry(project: Project) -> None:
@@ -75,7 +74,7 @@ def test_a_name_that_does_not_exist_is_found_at_its_place(
 ) -> None:
     project.check(BASE + f"lamps:\n  front: base\n  {entry}\n")
     assert told(project) == [("RBX1004", message, 8)]
-    fixes: Sequence[Fix] = [one.fix for one in project.findings if one.fix]
+    fixes: Sequence[Fix] = [finding.fix for finding in project.findings if finding.fix]
     assert [edit.text for fix in fixes for edit in fix.edits] == ([fixed] if fixed else [])
 
 
@@ -142,7 +141,7 @@ def test_a_set_that_names_no_lamp_is_told_what_is_there(
     project: Project, path: str, message: str, help_text: str
 ) -> None:
     project.check(ROBOT, sets=[path])
-    [finding] = [one for one in project.findings if one.code == "RBX1302"]
+    [finding] = [candidate for candidate in project.findings if candidate.code == "RBX1302"]
     assert finding.message == message
     assert help_text in finding.help
 
@@ -155,7 +154,7 @@ def test_a_set_changes_what_stands_in_an_entry(project: Project) -> None:
 
 def test_an_overlay_that_changes_a_misspelt_lamp_is_told_which_is_meant(project: Project) -> None:
     project.check(ROBOT + "profiles: {dim: {lamps: {reer: {after: []}}}}\n", profiles=["dim"])
-    [finding] = [one for one in project.findings if one.code == "RBX1302"]
+    [finding] = [candidate for candidate in project.findings if candidate.code == "RBX1302"]
     assert finding.message == "profile 'dim' changes the lamp 'reer', which the robot does not have"
     assert "'rear'" in finding.help
 
@@ -225,7 +224,7 @@ def test_schemas_have_it(kind: str) -> None:
 
 def test_schemas_grow_by_few_lines_for_it(lamps: Section[Any, Any], monkeypatch: pytest.MonkeyPatch) -> None:
     with_it = files()
-    others = {one.name: one for one in sections() if one.name != lamps.name}
+    others = {section.name: section for section in sections() if section.name != lamps.name}
     monkeypatch.setattr(registry, "_SECTIONS", others)
     without = files()
     changed = [
@@ -244,5 +243,5 @@ def test_the_reference_has_it_with_its_keys_and_example() -> None:
 
 
 def test_it_stands_at_its_place_among_the_others(lamps: Section[Any, Any]) -> None:
-    names = [one.name for one in sections()]
+    names = [section.name for section in sections()]
     assert names.index("missions") < names.index(lamps.name) < names.index("bus")

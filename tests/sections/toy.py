@@ -5,12 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Annotated
 
-from rbxcompose.config import Config, Name, PlaceName
+from rbxcompose.base.config import COMPONENT, Config, Name, PlaceName, Refers
 from rbxcompose.manifest.registry import section
-from rbxcompose.manifest.section import Contents, Reading
-from rbxcompose.manifest.short_forms import Short
-from rbxcompose.manifest.wanted_components import WantedComponent, Wiring
-from rbxcompose.references import COMPONENT, Refers
+from rbxcompose.manifest.section import Contents, Reading, Short, WantedComponent, Wiring
 from rbxcompose.sdk import Component, component
 
 LAMP = "lamp"

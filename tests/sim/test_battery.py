@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.levels import Level
-from rbxcompose.sim.battery import BatteryCore, BatterySettings
+from rbxcompose.base.levels import Level
+from rbxcompose.domains.power.battery_twin import BatteryCore, BatterySettings
 
 SETTINGS = BatterySettings(runtime=60.0)
 

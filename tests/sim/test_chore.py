@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.geometry import AT_REST, Velocity2
-from rbxcompose.sim.chore import ChoreCore, ChoreSettings
+from rbxcompose.base.geometry import AT_REST, Velocity2
+from rbxcompose.domains.bases.twins import ChoreCore, ChoreSettings
 
 DT = 0.05  # [s]
 TIMES = st.floats(0.0, 20.0)

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.geometry import AT_REST, Pose2, Velocity2, wrap_angle
-from rbxcompose.sim.diff_drive import DiffDriveCore, DiffDriveSettings
+from rbxcompose.base.geometry import AT_REST, Pose2, Velocity2, wrap_angle
+from rbxcompose.domains.bases.twins import DiffDriveCore, DiffDriveSettings
 
 SETTINGS = DiffDriveSettings()
 NEVER_TIMES_OUT = DiffDriveSettings(command_timeout=1e6)

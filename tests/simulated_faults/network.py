@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import Protocol, TypeVar
 
-from rbxcompose.bus.inbox import Post
+from rbxcompose.base.scheduler import Scheduler
+from rbxcompose.bus.local import Post
 from rbxcompose.bus.transport import LONGEST_WAIT, Arrival, Question, TransportReply
 from rbxcompose.bus.zenoh_transport import GONE
-from rbxcompose.qos import Qos
-from rbxcompose.scheduler import Scheduler
+from rbxcompose.sdk.ports import Qos
 
 E = TypeVar("E")
 OWNER = "network"
@@ -81,10 +81,10 @@ class Network:
         for other in list(self._members.values()):
             self._part(gone, other)
 
-    def cut(self, one: str, other: str, seconds: float) -> None:
+    def cut(self, text: str, other: str, seconds: float) -> None:
         """Let two processes not reach each other for a while; each takes the other for gone."""
-        pair, (near, far) = frozenset((one, other)), (self._members.get(one), self._members.get(other))
-        if near is None or far is None or one == other:
+        pair, (near, far) = frozenset((text, other)), (self._members.get(text), self._members.get(other))
+        if near is None or far is None or text == other:
             return
         self._cuts[pair] = self._cuts.get(pair, 0) + 1
         if self._cuts[pair] == 1:
@@ -94,7 +94,7 @@ class Network:
 
     def others(self, session: str) -> list[SimulatedTransport]:
         """Return whom a process reaches."""
-        return [one for name, one in self._members.items() if name != session and self._is_whole(session, name)]
+        return [member for name, member in self._members.items() if name != session and self._is_whole(session, name)]
 
     def carry(self, source: str, sink: str, arrive: Callable[[], None], *, may_be_lost: bool = False) -> None:
         """Bring something from one process to another, as the weather has it."""
@@ -111,8 +111,8 @@ class Network:
         if sink in self._members and not (may_be_lost and not self._is_whole(source, sink)):
             arrive()
 
-    def _is_whole(self, one: str, other: str) -> bool:
-        return frozenset((one, other)) not in self._cuts
+    def _is_whole(self, text: str, other: str) -> bool:
+        return frozenset((text, other)) not in self._cuts
 
     def _mend(self, pair: frozenset[str]) -> None:
         self._cuts[pair] -= 1
@@ -129,8 +129,8 @@ class Network:
         for token in known.tokens:
             other.see(known.session, token, is_there=True)
         for publisher in known.publishers:
-            for one in other.listening(publisher.key):
-                publisher.repeat(one)
+            for subscription in other.listening(publisher.key):
+                publisher.repeat(subscription)
 
     def _part(self, gone: SimulatedTransport, other: SimulatedTransport) -> None:
         """Let `other` see that the tokens of `gone` have gone, and give up what it has asked there."""
@@ -149,14 +149,14 @@ class _Publisher:
 
     @property
     def has_match(self) -> bool:
-        return self.qos is Qos.LATCHED or any(one.listening(self.key) for one in self.transport.peers)
+        return self.qos is Qos.LATCHED or any(peer.listening(self.key) for peer in self.transport.peers)
 
     def put(self, payload: bytes, attachment: bytes) -> None:
         sample = Sample(payload, attachment)
         self.kept = sample if self.qos is Qos.LATCHED else None
         for peer in self.transport.peers:
-            for one in peer.listening(self.key):
-                self._send(one, sample)
+            for subscription in peer.listening(self.key):
+                self._send(subscription, sample)
 
     def repeat(self, listener: _Subscription) -> None:
         """Send to one listener what is kept, if anything is."""
@@ -233,7 +233,7 @@ class _Asked:
             self._look()
 
     def lose(self, session: str) -> None:
-        self.servers = [one for one in self.servers if one != session]
+        self.servers = [server for server in self.servers if server != session]
         self._look()
 
     def close(self) -> None:
@@ -286,7 +286,7 @@ class SimulatedTransport:
 
     def listening(self, key: str) -> list[_Subscription]:
         """Return the subscriptions to a key."""
-        return [one for one in self.subscriptions if one.key == key]
+        return [subscription for subscription in self.subscriptions if subscription.key == key]
 
     def send(self, sink: SimulatedTransport, arrive: Callable[[], None], *, may_be_lost: bool = False) -> None:
         """Bring something to another process."""
@@ -324,9 +324,9 @@ class SimulatedTransport:
         self.subscriptions.append(made)
         if qos is Qos.LATCHED:
             for peer in self.peers:
-                for one in peer.publishers:
-                    if one.key == key:
-                        one.repeat(made)
+                for publisher in peer.publishers:
+                    if publisher.key == key:
+                        publisher.repeat(made)
         return made
 
     def serve(self, key: str, asked: Callable[[Question], None]) -> _Server:
@@ -346,10 +346,10 @@ class SimulatedTransport:
         asked = _Asked(self, answered)
         self.asked.append(asked)
         for peer in self.peers:
-            for one in [one for one in peer.servers if one.key == key]:
+            for server in [one for one in peer.servers if one.key == key]:
                 asked.servers.append(peer.session)
                 question = _Question(peer, asked, payload, attachment)
-                self.send(peer, lambda one=one, question=question: one.asked(question))  # type: ignore[misc]
+                self.send(peer, lambda one=server, question=question: one.asked(question))  # type: ignore[misc]
         if not asked.servers:
             asked.servers.append(self.session)
             self._post("", lambda: asked.lose(self.session))

@@ -7,14 +7,13 @@ from collections.abc import Callable
 from random import Random
 
 from rbxcompose.bus.topics import Publisher
-from rbxcompose.executive.requests import ResumeMission
+from rbxcompose.compiler.plan.model import Plan
+from rbxcompose.missions.execution.requests import ResumeMission
 from rbxcompose.msgs import rcl_interfaces as rcl
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
-from rbxcompose.plan.model import Plan
-from rbxcompose.qos import Qos
 from rbxcompose.runtime.supervision.members import Phase
-from rbxcompose.testing.invariants import Laws, Violation, violations
-from rbxcompose.testing.stories import laws_of
+from rbxcompose.sdk.ports import Qos
+from rbxcompose.testing.safety import Laws, Violation, laws_of, violations
 from tests.simulated_faults.whole_robot import Guest, WholeRobot
 
 RAGES, CALMS = 9.0, 4.0  # [s] of robot time
@@ -96,7 +95,7 @@ class Storm:
         return f"{one} and {other} do not reach each other for {seconds:.2f} s"
 
     def raise_(self) -> str:
-        one = self._random.choice([one for one in self.robot.plan.instances if one.name != "base"])
+        one = self._random.choice([instance for instance in self.robot.plan.instances if instance.name != "base"])
         process = self.robot.processes.get(one.process)
 
         def planted() -> None:

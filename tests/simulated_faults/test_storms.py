@@ -8,15 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.plan.model import Plan
-from rbxcompose.recording.message import Recorded
-from rbxcompose.recording.reader import RecordingReader
-from rbxcompose.recording.writer import RecordingWriter
+from rbxcompose.compiler.plan.model import Plan
+from rbxcompose.domains.bases.twins import DiffDriveCore
+from rbxcompose.runtime.recording.files import RecordingWriter
+from rbxcompose.runtime.recording.reader import RecordingReader
+from rbxcompose.runtime.recording.topics import Recorded
 from rbxcompose.runtime.supervision.members import Phase
-from rbxcompose.sim.diff_drive import DiffDriveCore
 from rbxcompose.testing import check_file
-from rbxcompose.testing.invariants import SentVelocity, violations
-from rbxcompose.testing.stories import events_of, laws_of
+from rbxcompose.testing.safety import SentVelocity, events_of, laws_of, violations
 from tests.simulated_faults.network import Calm
 from tests.simulated_faults.storms import Storm
 from tests.simulated_faults.whole_robot import WholeRobot
@@ -105,7 +104,9 @@ def test_without_faults_the_robot_drives_its_patrol_over_the_network(plan: Plan)
     robot = WholeRobot(plan, Calm())
     robot.advance(12.0)
     assert sum("success" in text for text in robot.texts) == 2
-    assert any(isinstance(one, SentVelocity) and one.topic == "/odom" and not one.is_rest for one in robot.story)
+    assert any(
+        isinstance(event, SentVelocity) and event.topic == "/odom" and not event.is_rest for event in robot.story
+    )
 
 
 def test_a_base_that_outlives_its_deadline_is_found(plan: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -113,4 +114,4 @@ def test_a_base_that_outlives_its_deadline_is_found(plan: Plan, monkeypatch: pyt
     monkeypatch.setattr(DiffDriveCore, "brake", lambda self: brake(self) if self.at_rest else None)
     storm = Storm(plan, 0)
     storm.run()
-    assert "unwarranted motion" in {one.law for one in storm.violations()}, storm
+    assert "unwarranted motion" in {violation.law for violation in storm.violations()}, storm

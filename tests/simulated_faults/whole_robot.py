@@ -6,26 +6,24 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 
+from rbxcompose.base.clock import SteppedClock
+from rbxcompose.base.levels import Level
+from rbxcompose.base.requests import Command, Refused, as_data, to_data
+from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.bus import Bus
-from rbxcompose.clock import SteppedClock
-from rbxcompose.levels import Level
-from rbxcompose.plan.model import Plan
-from rbxcompose.recording.message import Recorded
-from rbxcompose.recording.tape import Tape
-from rbxcompose.requests import Command, Refused, as_data
-from rbxcompose.robot_events import MissionWaits
+from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.runtime import channel as say
-from rbxcompose.runtime.host_report import HostReport
-from rbxcompose.runtime.options import RunOptions
-from rbxcompose.runtime.process_group.driver import BEAT
+from rbxcompose.runtime.channel import HostReport
+from rbxcompose.runtime.folder import RunOptions
+from rbxcompose.runtime.log import Record
+from rbxcompose.runtime.process_group.connection import BEAT
 from rbxcompose.runtime.process_group.host import Host, Notice
-from rbxcompose.runtime.records import Record
+from rbxcompose.runtime.recording.tape import Tape
+from rbxcompose.runtime.recording.topics import Recorded
 from rbxcompose.runtime.supervision.conductor import Conductor
 from rbxcompose.runtime.supervision.members import Phase
-from rbxcompose.scheduler import Scheduler
-from rbxcompose.testing.invariants import ROBOT, ObservedEvent, Ordered
-from rbxcompose.testing.stories import events_of, laws_of
-from rbxcompose.typed_json import to_data
+from rbxcompose.sdk.robot_events import MissionWaits
+from rbxcompose.testing.safety import ROBOT, ObservedEvent, Ordered, events_of, laws_of
 from tests.simulated_faults.network import Network, Weather
 
 FORK = 0.01  # [s] until a process listens
@@ -191,11 +189,11 @@ class WholeRobot:
         end = self.clock.now() + seconds
         while self.conductor.phase is not Phase.ENDED:
             due = [one.next_due() for one in self._loops]
-            following = min(one for one in (*due, self.scheduler.next_due(), end) if one is not None)
+            following = min(value for value in (*due, self.scheduler.next_due(), end) if value is not None)
             self.clock.advance_to(max(following, self.clock.now()))
             self.scheduler.advance(self.clock.now())
-            for one in self._loops:
-                one.turn()
+            for loop in self._loops:
+                loop.turn()
             if following >= end:
                 return
 
@@ -211,11 +209,11 @@ class WholeRobot:
     @property
     def texts(self) -> list[str]:
         """Return the log."""
-        return [f"{one.time:.3f} {one.source}: {one.text}" for one in self.records]
+        return [f"{record.time:.3f} {record.source}: {record.text}" for record in self.records]
 
     def command(self, instance: str, command: Command) -> None:
         """Pass a person's command on to a component."""
-        process = next(one.process for one in self.plan.instances if one.name == instance)
+        process = next(candidate.process for candidate in self.plan.instances if candidate.name == instance)
         self.send(process, say.Ask(0, instance, as_data(command)))
 
     def to_hosts(self, report: HostReport) -> None:

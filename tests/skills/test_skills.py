@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import pytest
 
-from rbxcompose.expressions.types import COUNT, FLAG, PLACE, TEXT, TYPES, choice_of
+from rbxcompose.base.expressions.types import COUNT, FLAG, PLACE, TEXT, TYPES, choice_of
 from rbxcompose.sdk import Activity, Place, Speed, skill
 from rbxcompose.sdk.skills import PLUGINS, skill_names, skill_type
 from rbxcompose.testing import clock_uses
@@ -30,8 +30,8 @@ def test_it_never_asks_for_time_itself(name: str) -> None:
 @all_skills
 def test_one_that_can_pause_knows_how(name: str) -> None:
     declared = skill_type(name)
-    methods = [getattr(declared.make, one, None) for one in ("pause", "resume")]
-    own = [one for one in methods if one not in (Activity.pause, Activity.resume)]
+    methods = [getattr(declared.make, text, None) for text in ("pause", "resume")]
+    own = [method for method in methods if method not in (Activity.pause, Activity.resume)]
     assert bool(own) is declared.pausable
 
 

@@ -41,7 +41,7 @@ def emulator(folder: Path, init: str, programs: Iterable[str], modules: Iterable
     inserted = "".join(f"insmod /modules/{name}.ko\n" for name in modules)
     text = f"#!/bin/sh\nmkdir -p /proc /dev /sys\nmount -t proc proc /proc\nmount -t sysfs sys /sys\n{inserted}{init}"
     files = [(f"modules/{name}.ko", known[name]) for name in modules]
-    files += [one for name in ("sh", "mkdir", "mount", "insmod", *programs) for one in _with_libraries(name)]
+    files += [pair for name in ("sh", "mkdir", "mount", "insmod", *programs) for pair in _with_libraries(name)]
     image = folder / "initramfs"
     image.write_bytes(_archive([("init", text.encode()), *((path, one.read_bytes()) for path, one in files)]))
     return [*words, "-kernel", str(kernel), "-initrd", str(image), "-append", APPEND]
@@ -74,7 +74,7 @@ def _archive(files: Iterable[tuple[str, bytes]]) -> bytes:
         if path not in made:
             made.add(path)
             fields = [len(made), mode, 0, 0, 1, 0, len(contents), 0, 0, 0, 0, len(path) + 1, 0]
-            found.extend(b"070701" + b"".join(b"%08x" % one for one in fields) + path.encode() + b"\0")
+            found.extend(b"070701" + b"".join(b"%08x" % field for field in fields) + path.encode() + b"\0")
             found.extend(bytes(-len(found) % 4) + contents)
             found.extend(bytes(-len(found) % 4))
 

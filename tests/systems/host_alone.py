@@ -10,11 +10,11 @@ import sys
 import time
 from pathlib import Path
 
+from rbxcompose.bus.endpoints import tcp_endpoint
 from rbxcompose.bus.transport import Arrival
 from rbxcompose.bus.zenoh_session import RouterLink, open_peer, open_router
 from rbxcompose.bus.zenoh_transport import ZenohTransport
-from rbxcompose.endpoints import tcp_endpoint
-from rbxcompose.qos import Qos
+from rbxcompose.sdk.ports import Qos
 from tests.systems.namespaces import DEVICE
 
 PORT, KEY = 7447, "0/scan/type/hash"
@@ -24,7 +24,7 @@ SENT = Path(f"/sys/class/net/{DEVICE}/statistics/tx_bytes")
 
 def main(listen: str, dial: str) -> None:
     """Run the router; the host that listens talks once the other one is linked, and ends."""
-    ends = [() if one == "-" else (one,) for one in (listen, dial)]
+    ends = [() if text == "-" else (text,) for text in (listen, dial)]
     router = open_router(tcp_endpoint(PORT), RouterLink(ends[0], ends[1]))
     if listen == "-":
         signal.sigwait([signal.SIGINT, signal.SIGTERM])

@@ -10,8 +10,8 @@ import os
 import select
 import sys
 
+from rbxcompose.bus.endpoints import tcp_endpoint
 from rbxcompose.bus.zenoh_session import RouterLink, open_router
-from rbxcompose.endpoints import tcp_endpoint
 from tests.systems.test_links import free_port
 
 PERIOD = 0.02  # [s]
@@ -19,7 +19,7 @@ PERIOD = 0.02  # [s]
 
 def main(listen: str, dial: str, tls: str) -> None:
     """Run the router and tell who is linked."""
-    ends = [() if one == "-" else (one,) for one in (listen, dial)]
+    ends = [() if text == "-" else (text,) for text in (listen, dial)]
     router = open_router(tcp_endpoint(free_port()), RouterLink(ends[0], ends[1], json.loads(tls)))
     told: set[str] = set()
     _tell(str(router.zid()))

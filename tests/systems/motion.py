@@ -13,7 +13,7 @@ from rbxcompose.bus.zenoh_session import open_peer
 from rbxcompose.bus.zenoh_transport import ZenohTransport
 from rbxcompose.msgs.cdr import decode
 from rbxcompose.msgs.nav_msgs import Odometry
-from rbxcompose.qos import Qos
+from rbxcompose.sdk.ports import Qos
 
 ROLLING, TURNING = 0.01, 0.05  # [m/s], [rad/s]
 

@@ -102,7 +102,7 @@ class PatrolOnHosts:
         return (
             state is not None
             and alive >= len(state.processes)
-            and all(one.state == "active" for one in state.components)
+            and all(component.state == "active" for component in state.components)
         )
 
     def state(self, host: str) -> RobotState | None:

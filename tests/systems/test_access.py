@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.bus.access_control import AllowedHost, access_control
+from rbxcompose.bus.endpoints import tcp_endpoint
 from rbxcompose.bus.transport import Arrival
 from rbxcompose.bus.zenoh_session import RouterLink, open_router, tls_settings
-from rbxcompose.endpoints import tcp_endpoint
-from rbxcompose.qos import Qos
-from rbxcompose.systems.access import access_of
-from rbxcompose.systems.certificates import common_name, make_authority, make_certificate, missing, tls_of
+from rbxcompose.compiler.systems.certificates import common_name, make_authority, make_certificate, missing, tls_of
+from rbxcompose.compiler.systems.share import access_of
+from rbxcompose.sdk.ports import Qos
 from tests.systems.test_links import free_port, transport, until
 from tests.systems.test_shares import ROBOT, SYSTEM
 
@@ -25,7 +25,7 @@ def test_a_host_may_give_and_take_what_its_components_declare_and_nothing_else()
     desk = access_of(SYSTEM, ROBOT, "robot", "desk")
     robot = access_of(SYSTEM, ROBOT, "desk", "robot")
     assert (robot.gives, robot.takes) == (desk.takes, desk.gives)
-    gives, takes = (tuple(one for one in names if "parameter" not in one) for names in (desk.gives, desk.takes))
+    gives, takes = (tuple(name for name in names if "parameter" not in name) for names in (desk.gives, desk.takes))
     assert (gives, takes) == (("/cmd_vel",), ("/battery_level", "/set_battery_level", "/tf"))
     assert "/battery/set_parameters" in desk.takes
     assert "/go_to/set_parameters" in desk.gives

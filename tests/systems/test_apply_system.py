@@ -11,11 +11,11 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.cli.systems import apply_system
-from rbxcompose.cli.systems.hosts import Remote
+from rbxcompose.commands.hosts import Remote
+from rbxcompose.compiler.systems.model import System
 from rbxcompose.manifest.system_file import HostModel
-from rbxcompose.systems.model import System
 from rbxcompose.testing.golden import Golden
+from rbxcompose.tools import apply_system
 
 _HOST = """
 import json, pathlib, sys
@@ -43,7 +43,7 @@ class _Host(Remote):
 
     def __init__(self, folder: Path, name: str, *, refuses: bool = False, fails: bool = False, changes: bool = True):
         super().__init__(name, HostModel())
-        self.script = [str(folder), name, *("yes" if one else "no" for one in (refuses, fails, changes))]
+        self.script = [str(folder), name, *("yes" if flag else "no" for flag in (refuses, fails, changes))]
 
     def rbxcompose(self, words: Sequence[str], *, folder: str = "", has_terminal: bool = False) -> list[str]:
         return [sys.executable, "-c", _HOST, *self.script, *words]
@@ -104,5 +104,5 @@ def test_json_is_one_document(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     applied(tmp_path, monkeypatch, [_Host(tmp_path, "a")], json=True)
-    (one,) = json.loads(capsys.readouterr().out)["hosts"]
-    assert (one["host"], one["answer"]["generation"]) == ("a", 3)
+    (host,) = json.loads(capsys.readouterr().out)["hosts"]
+    assert (host["host"], host["answer"]["generation"]) == ("a", 3)

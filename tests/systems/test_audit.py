@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.cli.main import main
-from rbxcompose.cli.security import certificate_findings
-from rbxcompose.plan.model import LinkTls
-from rbxcompose.systems.audit import NETWORK, ReachableKey, listeners, reachable_keys
-from rbxcompose.systems.certificates import common_name, make_authority, make_certificate, tls_of
+from rbxcompose.commands.main import main
+from rbxcompose.compiler.plan.model import LinkTls
+from rbxcompose.compiler.systems.audit import NETWORK, ReachableKey, listeners, reachable_keys
+from rbxcompose.compiler.systems.certificates import common_name, make_authority, make_certificate, tls_of
+from rbxcompose.tools.commands.security import certificate_findings
 from tests.systems.test_shares import SYSTEM
 
 needs_openssl = pytest.mark.skipif(shutil.which("openssl") is None, reason="needs openssl")
@@ -20,7 +20,7 @@ needs_openssl = pytest.mark.skipif(shutil.which("openssl") is None, reason="need
 
 def test_with_certificates_a_key_is_for_the_hosts_that_declare_it_and_else_for_everybody() -> None:
     def keys(security: str) -> dict[tuple[str, str], ReachableKey]:
-        return {(one.host, one.name): one for one in reachable_keys(replace(SYSTEM, security=security))}
+        return {(key.host, key.name): key for key in reachable_keys(replace(SYSTEM, security=security))}
 
     open_, closed = keys("tls"), keys("mtls")
     assert closed["robot", "/cmd_vel"].written_by == ("host 'desk'",)
@@ -28,9 +28,9 @@ def test_with_certificates_a_key_is_for_the_hosts_that_declare_it_and_else_for_e
     assert closed["robot", "/set_battery_level"].written_by == ("host 'desk'",)
     assert closed["desk", "/battery_level"].written_by == ("host 'robot'",)
     assert open_.keys() == closed.keys()
-    assert {one.written_by for one in open_.values()} == {(NETWORK,)}
-    assert not any(one.is_open for one in closed.values())
-    assert not any(one.is_open for one in listeners(replace(SYSTEM, security="mtls")))
+    assert {key.written_by for key in open_.values()} == {(NETWORK,)}
+    assert not any(key.is_open for key in closed.values())
+    assert not any(listener.is_open for listener in listeners(replace(SYSTEM, security="mtls")))
 
 
 def certified(folder: Path, host: str = "desk", days: int = 100) -> LinkTls:
@@ -55,8 +55,8 @@ def test_a_certificate_is_examined_as_the_other_hosts_will(tmp_path: Path) -> No
     for expected, tls in files.items():
         code, _, words = expected.partition(": ")
         found = [f"{one.code}: {one.message}" for one in certificate_findings(tls, common_name("lab", "desk"), "x")]
-        assert [one[: len(code)] for one in found] == ([code] if code else []), expected
-        assert all(words in one for one in found), (expected, found)
+        assert [text[: len(code)] for text in found] == ([code] if code else []), expected
+        assert all(words in text for text in found), (expected, found)
 
 
 @needs_openssl

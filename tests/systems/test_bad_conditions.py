@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.systems.certificates import folder_of, make_authority, make_certificate
+from rbxcompose.compiler.systems.certificates import folder_of, make_authority, make_certificate
 from tests.conftest import ROOT
 from tests.soak import Soak
 from tests.systems.emulated_link import EmulatedLink

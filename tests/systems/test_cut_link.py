@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.geometry import Velocity2
-from rbxcompose.sim.diff_drive import DiffDriveCore, DiffDriveSettings
-from rbxcompose.systems.cut_link import CYCLES, stops_after_cut
+from rbxcompose.base.geometry import Velocity2
+from rbxcompose.compiler.systems.cut_link import CYCLES, stops_after_cut
+from rbxcompose.domains.bases.twins import DiffDriveCore, DiffDriveSettings
 from tests.systems.test_shares import ROBOT, SHARES, spread
 
 CYCLE = 0.02  # [s]
@@ -22,7 +22,7 @@ BASE = ROBOT.robot.components["base"].config
 def test_a_base_has_a_bound_exactly_if_its_commands_cross(hosts: dict[str, str]) -> None:
     _, robot = spread(hosts)
     way = {hosts[name] for name in ("base", "cmd_vel", "go_to")}
-    assert [(one.base, one.host) for one in stops_after_cut(robot)] == ([("base", hosts["base"])] * (len(way) > 1))
+    assert [(stop.base, stop.host) for stop in stops_after_cut(robot)] == ([("base", hosts["base"])] * (len(way) > 1))
 
 
 def test_a_slower_base_needs_two_of_its_own_cycles() -> None:

@@ -9,20 +9,20 @@ from pathlib import Path
 
 import zenoh
 
+from rbxcompose.base.clock import MonotonicClock
+from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.bus import Bus
+from rbxcompose.bus.endpoints import tcp_endpoint
 from rbxcompose.bus.names import data_key
 from rbxcompose.bus.zenoh_session import RouterLink, exchange_settings, open_exchange, open_peer, open_router
 from rbxcompose.bus.zenoh_transport import ZenohTransport
-from rbxcompose.clock import MonotonicClock
-from rbxcompose.endpoints import tcp_endpoint
+from rbxcompose.compiler.plan.model import BusPlan, Exchange, SharedWire
+from rbxcompose.compiler.systems.exchange import exchange_of
+from rbxcompose.compiler.systems.reader import compile_system
 from rbxcompose.msgs.std_msgs import Int64, String
-from rbxcompose.plan.model import BusPlan, Exchange, SharedWire
-from rbxcompose.qos import Qos
+from rbxcompose.runtime.process_group.connection import CallbackInbox
 from rbxcompose.runtime.process_group.exchange import RobotExchange
-from rbxcompose.runtime.process_group.inbox import CallbackInbox
-from rbxcompose.scheduler import Scheduler
-from rbxcompose.systems.exchange import exchange_of
-from rbxcompose.systems.reader import compile_system
+from rbxcompose.sdk.ports import Qos
 from tests.conftest import ROOT
 from tests.systems.test_links import free_port, until
 
@@ -59,8 +59,8 @@ def robots(*exchanges: Exchange) -> Iterator[list[RobotWithExchange]]:
     try:
         yield made
     finally:
-        for one in made:
-            one.close()
+        for exchange in made:
+            exchange.close()
 
 
 def test_what_is_shared_arrives_also_late_and_nothing_else_does_in_either_direction() -> None:
@@ -105,8 +105,8 @@ def test_what_is_shared_arrives_also_late_and_nothing_else_does_in_either_direct
             until(has_arrived)
 
 
-def _taken(one: SharedWire) -> SharedWire:
-    return SharedWire(one.shared, one.shared, one.type, one.qos)
+def _taken(wire: SharedWire) -> SharedWire:
+    return SharedWire(wire.shared, wire.shared, wire.type, wire.qos)
 
 
 def test_whoever_dials_a_robot_can_take_what_it_shares_and_put_nothing() -> None:
@@ -170,13 +170,13 @@ def test_instances_take_hosts_of_a_label_in_turn_and_only_what_somebody_takes_is
     (tmp_path / "system.yaml").write_text(SYSTEM.replace("ROOT", str(ROOT)), encoding="utf-8")
     system = compile_system(str(tmp_path / "system.yaml"), environment={})
     assert not system.report.has_errors
-    scouts = {name: set(one.hosts.values()) for name, one in system.robots.items() if name != "watcher"}
+    scouts = {name: set(robot.hosts.values()) for name, robot in system.robots.items() if name != "watcher"}
     assert scouts == {"scout_1": {"one"}, "scout_2": {"two"}, "scout_3": {"one"}}
-    assert len({one.plan.bus.port for one in system.robots.values()}) == 4, "each router has a port of its own"
+    assert len({robot.plan.bus.port for robot in system.robots.values()}) == 4, "each router has a port of its own"
     given = exchange_of(system, system.robots["scout_2"], "two")
     taken = exchange_of(system, system.robots["watcher"], "desk")
     assert given is not None
     assert taken is not None
     assert given.listen == taken.connect == ("tcp/10.0.0.2:8448",)
-    assert [one.shared for one in given.gives] == [one.own for one in taken.takes] == ["/scout_2/odom"]
+    assert [wire.shared for wire in given.gives] == [wire.own for wire in taken.takes] == ["/scout_2/odom"]
     assert exchange_of(system, system.robots["scout_1"], "one") is None

@@ -119,7 +119,7 @@ def test_the_base_stands_in_time_and_all_goes_on(tmp_path: Path) -> None:
 
 
 @pytest.mark.timeout(240)
-@pytest.mark.parametrize("fault", FAULTS, ids=[one.name for one in FAULTS])
+@pytest.mark.parametrize("fault", FAULTS, ids=[fault.name for fault in FAULTS])
 def test_each_fault(fault: HostFault, tmp_path: Path, soak: Soak) -> None:
     if not soak.is_on:
         pytest.skip("with --soak")

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.rendering.text import render_text
-from rbxcompose.systems.reader import compile_system
+from rbxcompose.commands.formats.text import render_text
+from rbxcompose.compiler.systems.reader import compile_system
 from rbxcompose.testing.golden import Golden
 from tests.conftest import ROOT
 
@@ -86,5 +86,5 @@ def test_a_mistake_is_a_finding_at_its_place(
     (tmp_path / "systems").mkdir()
     (tmp_path / "systems/system.yaml").write_text(texts[False], encoding="utf-8")
     system = compile_system("systems/system.yaml", environment={})
-    assert code[:7] in {one.code for one in system.report}
+    assert code[:7] in {finding.code for finding in system.report}
     golden.check(f"{code}.txt", render_text(system.report, system.sources, False))

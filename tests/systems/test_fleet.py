@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.cli import fleet
-from rbxcompose.cli.main import main
-from rbxcompose.cli.systems.hosts import Remote, Shares, shares_of
+from rbxcompose.commands.hosts import Remote, Shares, shares_of
+from rbxcompose.commands.main import main
+from rbxcompose.compiler.systems.model import System
 from rbxcompose.manifest.system_file import HostModel
-from rbxcompose.systems.model import System
 from rbxcompose.testing.golden import Golden
+from rbxcompose.tools.commands import fleet
 from tests.conftest import ROOT
 
 SYSTEM = """
@@ -62,7 +62,7 @@ def path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
 
 def test_each_robot_is_a_row_with_what_is_wrong(path: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["fleet", "ls", path, "--json"]) == 1
-    rows = {one["robot"]: one for one in json.loads(capsys.readouterr().out)["robots"]}
+    rows = {robot["robot"]: robot for robot in json.loads(capsys.readouterr().out)["robots"]}
     assert rows["scout_1"] == {
         "robot": "scout_1",
         "host": "one",
@@ -86,7 +86,7 @@ def test_each_robot_is_a_row_with_what_is_wrong(path: str, capsys: pytest.Captur
 def test_a_mission_starts_on_the_robots_that_have_all_labels(
     path: str, capsys: pytest.CaptureFixture[str], labels: list[str], robots: set[str]
 ) -> None:
-    options = [word for one in labels for word in ("--label", one)]
+    options = [word for label in labels for word in ("--label", label)]
     assert main(["fleet", "run", "patrol", path, "--set", "rounds=3", *options]) == 0
     told = capsys.readouterr().out
     lines = [line for line in told.splitlines() if "mission run patrol --set rounds=3" in line]

@@ -11,13 +11,13 @@ from time import time_ns
 import pytest
 
 from rbxcompose.bus.access_control import AllowedHost, access_control
+from rbxcompose.bus.endpoints import tcp_endpoint
 from rbxcompose.bus.zenoh_session import RouterLink, open_router, tls_settings
 from rbxcompose.bus.zenoh_transport import ZenohTransport
-from rbxcompose.endpoints import tcp_endpoint
-from rbxcompose.plan.model import HostAccess, OtherHost, Share
-from rbxcompose.runtime.host_report import HostReport
-from rbxcompose.runtime.process_group.host_line import HostLine
-from rbxcompose.systems.certificates import common_name, make_authority, make_certificate, tls_of
+from rbxcompose.compiler.plan.model import HostAccess, OtherHost, Share
+from rbxcompose.compiler.systems.certificates import common_name, make_authority, make_certificate, tls_of
+from rbxcompose.runtime.channel import HostReport
+from rbxcompose.runtime.process_group.router import HostLine
 from tests.systems.test_links import free_port, until
 
 ROBOT, HOSTS = "walker", ("a", "b")
@@ -53,20 +53,20 @@ def linked(folder: Path, *, is_open: bool) -> Iterator[tuple[Line, Line]]:
     try:
         yield lines[0], lines[1]
     finally:
-        for one in reversed(lines):
-            one.transport.close()
+        for line in reversed(lines):
+            line.transport.close()
 
 
 def both_tell(lines: tuple[Line, Line]) -> bool:
     for one in lines:
         one.line.tell(one.report)
-    return all(one.heard for one in lines)
+    return all(line.heard for line in lines)
 
 
 def test_a_report_arrives_and_what_is_denied_does_not(tmp_path: Path) -> None:
     with linked(tmp_path, is_open=False) as lines:
         until(lambda: both_tell(lines))
-        assert [set(one.heard) for one in lines] == [{"b"}, {"a"}]
+        assert [set(line.heard) for line in lines] == [{"b"}, {"a"}]
 
 
 def test_a_router_that_lets_through_what_it_must_deny_is_found_before_the_first_report_counts(tmp_path: Path) -> None:

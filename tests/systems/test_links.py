@@ -9,12 +9,12 @@ from collections.abc import Callable
 
 import zenoh
 
+from rbxcompose.bus.endpoints import tcp_endpoint
 from rbxcompose.bus.names import topic_pattern
 from rbxcompose.bus.transport import Arrival
 from rbxcompose.bus.zenoh_session import RouterLink, open_peer, open_router
 from rbxcompose.bus.zenoh_transport import ZenohTransport
-from rbxcompose.endpoints import tcp_endpoint
-from rbxcompose.qos import Qos
+from rbxcompose.sdk.ports import Qos
 
 LONGEST = 20.0  # [s]
 SENT = 50
@@ -38,7 +38,7 @@ def transport(router: str) -> ZenohTransport:
 
 def test_a_topic_is_downsampled_on_its_way_to_another_host_and_whole_on_its_own() -> None:
     link, here, there = (tcp_endpoint(free_port()) for _ in range(3))
-    one = open_router(here, RouterLink((link,), (), downsample={topic_pattern(0, "/scan"): 0.1}))
+    session = open_router(here, RouterLink((link,), (), downsample={topic_pattern(0, "/scan"): 0.1}))
     other = open_router(there, RouterLink((), (link,)))
     sender, neighbour, stranger = transport(here), transport(here), transport(there)
     got: Counter[str] = Counter()
@@ -70,7 +70,7 @@ def test_a_topic_is_downsampled_on_its_way_to_another_host_and_whole_on_its_own(
         until(lambda: got["here scan"] >= SENT and got["there odom"] >= SENT)
         assert got["there scan"] <= 1 + LONGEST * 0.1
     finally:
-        for each in (sender, neighbour, stranger, one, other):
+        for each in (sender, neighbour, stranger, session, other):
             each.close()
 
 

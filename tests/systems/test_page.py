@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.findings import Severity
+from rbxcompose.base.findings import Severity
+from rbxcompose.compiler.systems.exchange import exchange_of
+from rbxcompose.compiler.systems.reader import compile_system
 from rbxcompose.manifest.system_file import HostModel, LinkModel, SystemFile, SystemRobotModel
-from rbxcompose.systems.exchange import exchange_of
-from rbxcompose.systems.reader import compile_system
 from tests.conftest import ROOT
 
 PAGE = (ROOT / "docs/systems.md").read_text(encoding="utf-8")
@@ -26,9 +26,9 @@ def test_its_example_can_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     (tmp_path / "systems/two_hosts.yaml").write_text(example[1], encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     system = compile_system("systems/two_hosts.yaml", environment={})
-    assert [one for one in system.report if one.severity is Severity.ERROR] == []
+    assert [finding for finding in system.report if finding.severity is Severity.ERROR] == []
     hall = compile_system("systems/two_hosts.yaml", environment={}, profiles=["hall"])
-    assert [one for one in hall.report if one.severity is Severity.ERROR] == []
+    assert [finding for finding in hall.report if finding.severity is Severity.ERROR] == []
     assert hall.hosts["robot"].address == "10.9.0.2"
     hosts = system.robots["turtlebot"].hosts
     assert (hosts["base"], hosts["mission"], hosts["go_to"], hosts["charger"]) == ("robot", "desk", "desk", "tablet")
@@ -39,8 +39,8 @@ def test_its_robot_may_command_the_other_as_its_mission_says(tmp_path: Path, mon
     shutil.copytree(ROOT / "missions", tmp_path / "missions")
     (tmp_path / "robots/turtlebot").rename(tmp_path / "robots/scout")
     blocks = re.findall(r"^```yaml\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
-    (robots,) = (one for one in blocks if "callers:" in one)
-    (mission,) = (one for one in blocks if one.startswith("do:"))
+    (robots,) = (block for block in blocks if "callers:" in block)
+    (mission,) = (block for block in blocks if block.startswith("do:"))
     (tmp_path / "robots/dispatcher").mkdir()
     (tmp_path / "systems").mkdir()
     hosts = "hosts: {one: {address: 10.0.0.1, labels: [floor]}, desk: {}}"
@@ -51,10 +51,10 @@ def test_its_robot_may_command_the_other_as_its_mission_says(tmp_path: Path, mon
     (tmp_path / "robots/dispatcher/robot.yaml").write_text(robot, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     system = compile_system("systems/system.yaml", environment={})
-    assert [one.message for one in system.report] == []
+    assert [finding.message for finding in system.report] == []
     given = exchange_of(system, system.robots["scout"], "one")
     assert given is not None
-    assert [one.own for one in given.gives] == ["/go_to", "/set_battery_level"], "nobody takes its odometry"
+    assert [wire.own for wire in given.gives] == ["/go_to", "/set_battery_level"], "nobody takes its odometry"
 
 
 @pytest.mark.parametrize("model", [SystemFile, HostModel, SystemRobotModel, LinkModel])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.systems.placement import HostOffer, Wishes, hosts_called, place
+from rbxcompose.compiler.systems.model import HostOffer, Wishes, hosts_called, place
 
 NAMES = st.sampled_from([f"c{number}" for number in range(8)])
 HOSTS = ("robot", "desk", "cloud")
@@ -36,20 +36,20 @@ def test_each_component_is_on_exactly_one_host_and_wishes_come_before_devices_be
     components, hosts, wishes, parts, devices = robot
     placed = place(components, hosts, wishes, parts, devices)
     assert list(placed) == components
-    for name, one in placed.items():
-        assert one.host in hosts
-        assert one.reason
+    for name, placement in placed.items():
+        assert placement.host in hosts
+        assert placement.reason
         around = [wishes.place[part] for part in parts if name in parts[part] and part in wishes.place]
         ports = devices.get(name, set())
         having = [host for host, offer in hosts.items() if ports and offer.devices >= ports]
         if name in wishes.place:
-            assert one.host in hosts_called(wishes.place[name], hosts)
+            assert placement.host in hosts_called(wishes.place[name], hosts)
         elif around:
-            assert any(one.host in hosts_called(called, hosts) for called in around)
+            assert any(placement.host in hosts_called(called, hosts) for called in around)
         elif having:
-            assert one.host == having[0]
+            assert placement.host == having[0]
         elif wishes.on is not None:
-            assert one.host in hosts_called(wishes.on, hosts)
+            assert placement.host in hosts_called(wishes.on, hosts)
 
 
 def test_the_smallest_part_around_a_component_counts_and_a_label_goes_where_least_runs() -> None:
@@ -57,7 +57,7 @@ def test_the_smallest_part_around_a_component_counts_and_a_label_goes_where_leas
     wishes = Wishes("robot", {"arm": "one", "arm.hand": "gpu"})
     parts = {"arm": {"elbow", "finger", "thumb"}, "arm.hand": {"finger", "thumb"}}
     placed = place(["base", "elbow", "finger", "thumb"], hosts, wishes, parts, {})
-    assert {name: one.host for name, one in placed.items()} == {
+    assert {name: entry.host for name, entry in placed.items()} == {
         "base": "robot",
         "elbow": "one",
         "finger": "two",

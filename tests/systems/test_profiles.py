@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.rendering.text import render_text
-from rbxcompose.systems.reader import compile_system
+from rbxcompose.commands.formats.text import render_text
+from rbxcompose.compiler.systems.reader import compile_system
 from tests.conftest import ROOT
 
 PROFILES = """
@@ -43,6 +43,6 @@ def test_a_chosen_profile_changes_the_system_and_its_robots_and_others_do_not(sy
 
 def test_what_a_profile_breaks_is_reported_and_an_unknown_one_with_those_that_exist(system: str) -> None:
     broken = compile_system(system, environment={}, profiles=["broken"])
-    assert "RBX6100" in {one.code for one in broken.report}
+    assert "RBX6100" in {finding.code for finding in broken.report}
     unknown = compile_system(system, environment={}, profiles=["hal"])
     assert "did you mean 'hall'" in render_text(unknown.report, unknown.sources, False)

@@ -9,16 +9,16 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.cli.main import main
-from rbxcompose.cli.robots.live_rules import compiled_with
-from rbxcompose.cli.systems import hosts as everywhere
-from rbxcompose.cli.systems import hosts as forward
-from rbxcompose.cli.systems.hosts import Remote, Shares, shares_of
-from rbxcompose.compiler import Compilation
+from rbxcompose.commands import hosts as everywhere
+from rbxcompose.commands import hosts as forward
+from rbxcompose.commands.hosts import Remote, Shares, shares_of
+from rbxcompose.commands.main import main
+from rbxcompose.compiler.compile import Compilation
+from rbxcompose.compiler.systems.model import System
 from rbxcompose.manifest.system_file import HostModel
-from rbxcompose.runtime.options import ChosenLayers
-from rbxcompose.systems.model import System
+from rbxcompose.runtime.folder import ChosenLayers
 from rbxcompose.testing.golden import Golden
+from rbxcompose.tools.live_rules import compiled_with
 
 ROBOT = """rbx: 1
 kind: Robot
@@ -104,14 +104,14 @@ def test_a_robot_with_real_devices_is_compiled_as_that(folder: Path, monkeypatch
         chosen.append(layers)
         return compiled(file, layers, unsaved)
 
-    monkeypatch.setattr("rbxcompose.cli.parameters.files.compiled_with", noted)
+    monkeypatch.setattr("rbxcompose.tools.parameters.files.compiled_with", noted)
     assert main(["param", "diff", "--robot", "lab.yaml"]) == 1
-    assert {one.real for one in chosen} == {False}
+    assert {item.real for item in chosen} == {False}
     chosen.clear()
     (folder / "cart.yaml").write_text(REAL, encoding="utf-8")
     (folder / "lab.yaml").write_text(SYSTEM.replace("far:", "real_one:"), encoding="utf-8")
     assert main(["param", "save", "--robot", "lab.yaml"]) == 0
-    assert {one.real for one in chosen} == {True}
+    assert {item.real for item in chosen} == {True}
     assert (folder / "cart.yaml").read_text(encoding="utf-8") == REAL.replace("20", "30")
 
 

@@ -8,13 +8,12 @@ from contextlib import contextmanager
 
 import pytest
 
-from rbxcompose.bus.action_client import ActionClient
-from rbxcompose.bus.action_server import ActionServer, ServedGoal
-from rbxcompose.endpoints import tcp_endpoint
+from rbxcompose.bus.actions import ActionClient, ActionServer, ServedGoal
+from rbxcompose.bus.endpoints import tcp_endpoint
+from rbxcompose.compiler.plan.model import Exchange, SharedWire
 from rbxcompose.msgs.action_msgs import CancelGoal
 from rbxcompose.msgs.nav2_msgs import NavigateToPose
 from rbxcompose.msgs.std_srvs import SetBool
-from rbxcompose.plan.model import Exchange, SharedWire
 from rbxcompose.sdk.bound import Ended, Outcome, Reply
 from tests.systems.relay import Relay
 from tests.systems.test_exchange import RobotWithExchange, robots
@@ -89,8 +88,8 @@ def _pair() -> Iterator[_Pair]:
             cable.is_cut = False
 
 
-def _taken(one: SharedWire) -> SharedWire:
-    return SharedWire(one.shared, one.shared, one.type)
+def _taken(wire: SharedWire) -> SharedWire:
+    return SharedWire(wire.shared, wire.shared, wire.type)
 
 
 def test_a_service_of_another_robot_answers_and_is_gone_with_its_server(pair: _Pair) -> None:

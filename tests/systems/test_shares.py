@@ -9,20 +9,19 @@ from pathlib import Path
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.inspection.system_text import system_text
+from rbxcompose.compiler.plan.dump import dump, load
+from rbxcompose.compiler.systems.model import PlacedRobot, Placement, System
+from rbxcompose.compiler.systems.reader import compile_system
+from rbxcompose.compiler.systems.share import share_of
 from rbxcompose.manifest.system_file import HostModel, LinkModel
-from rbxcompose.plan.dump import dump, load
-from rbxcompose.systems.model import PlacedRobot, System
-from rbxcompose.systems.placement import Placement
-from rbxcompose.systems.reader import compile_system
-from rbxcompose.systems.share import share_of
 from rbxcompose.testing.golden import Golden
+from rbxcompose.tools.inspection.plan_text import system_text
 from tests.conftest import ROOT
 
 HOSTS = {name: HostModel(address=f"10.0.0.{number}") for number, name in enumerate(("a", "b", "c"), 1)}
 SYSTEM = compile_system(str(ROOT / "systems/patrol_two_hosts.yaml"), environment=os.environ)
 ROBOT = SYSTEM.robots["turtlebot"]
-SHARES = st.fixed_dictionaries({one.name: st.sampled_from(sorted(HOSTS)) for one in ROBOT.plan.instances})
+SHARES = st.fixed_dictionaries({instance.name: st.sampled_from(sorted(HOSTS)) for instance in ROBOT.plan.instances})
 
 
 def spread(hosts: dict[str, str]) -> tuple[System, PlacedRobot]:
@@ -35,12 +34,12 @@ def spread(hosts: dict[str, str]) -> tuple[System, PlacedRobot]:
 def test_the_shares_of_all_hosts_are_the_robot_and_their_text_can_be_read_back(hosts: dict[str, str]) -> None:
     system, robot = spread(hosts)
     shares = [share_of(system, robot, host) for host in sorted(set(hosts.values()))]
-    names = [one.name for share in shares for one in share.instances]
+    names = [instance.name for share in shares for instance in share.instances]
     assert sorted(names) == sorted(hosts)
     for share in shares:
-        order = [one.name for one in ROBOT.plan.instances if one in share.instances]
-        assert [one.name for one in share.instances] == order
-        assert {one.name for one in share.everywhere} == set(hosts)
+        order = [instance.name for instance in ROBOT.plan.instances if instance in share.instances]
+        assert [instance.name for instance in share.instances] == order
+        assert {instance.name for instance in share.everywhere} == set(hosts)
         assert load(dump(share, reveals_secrets=True, keeps_order=True)) == share
 
 
@@ -50,11 +49,11 @@ def test_of_each_two_hosts_exactly_one_dials_the_other_which_listens(hosts: dict
     used = sorted(set(hosts.values()))
     shares = {host: share_of(system, robot, host).share for host in used}
     listens = {host: share.listen for host, share in shares.items() if share}
-    for index, one in enumerate(used):
+    for index, host in enumerate(used):
         for other in used[index + 1 :]:
             dialled = [
                 there
-                for here, there in ((one, other), (other, one))
+                for here, there in ((host, other), (other, host))
                 if (share := shares[here]) and set(share.connect) & set(listens[there])
             ]
             assert len(dialled) == 1

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.bus.zenoh_session import tls_settings
-from rbxcompose.systems.certificates import make_authority, make_certificate, tls_of
+from rbxcompose.compiler.systems.certificates import make_authority, make_certificate, tls_of
 from tests.conftest import ROOT
 from tests.systems.test_links import free_port
 

@@ -6,11 +6,11 @@ import sys
 from collections.abc import Sequence
 from typing import Any
 
-from rbxcompose.cli.robots.picture import SILENT, ShareView, system_lines
-from rbxcompose.cli.systems.hosts import Remote
-from rbxcompose.cli.top import LiveShare
+from rbxcompose.commands.hosts import Remote
 from rbxcompose.manifest.system_file import HostModel
 from rbxcompose.testing.golden import Golden
+from rbxcompose.tools.commands.top import LiveShare
+from rbxcompose.tools.robot_picture import SILENT, ShareView, system_lines
 from tests.systems.test_links import until
 
 TOLD: dict[str, Any] = {

@@ -9,12 +9,7 @@ import pytest
 
 from tests.systems.host_alone import DURATION, RATE, SIZE
 from tests.systems.namespaces import NotPermittedError
-from tests.systems.patrol import (
-    ADDRESSES,
-    ENVIRONMENT,
-    LONGEST,
-    PatrolOnHosts,
-)
+from tests.systems.patrol import ADDRESSES, ENVIRONMENT, LONGEST, PatrolOnHosts
 from tests.systems.sshd import serve, wrapper
 
 STOP_WITHIN = 0.6  # [s] after a cut, as the system declares and `check` has computed

@@ -10,7 +10,7 @@ import pytest
 
 from rbxcompose.bus.goals import GoalState
 from rbxcompose.testing import check_file
-from rbxcompose.testing.invariants import (
+from rbxcompose.testing.safety import (
     ROBOT,
     ActionClaim,
     Base,
@@ -21,9 +21,9 @@ from rbxcompose.testing.invariants import (
     Switch,
     SwitchInput,
     ToldGoals,
+    laws_of,
     violations,
 )
-from rbxcompose.testing.stories import laws_of
 
 PATROL = Path(__file__).parents[2] / "robots/turtlebot/robot.yaml"
 BASE = Base("/cmd", "/odom", "world", timeout=0.5, cycle=0.02, deceleration=(1.0, 3.0))
@@ -38,7 +38,7 @@ REST = (0.0, 0.0)
 
 
 def laws_broken(laws: Laws, story: Sequence[ObservedEvent]) -> list[tuple[float, str]]:
-    return [(one.time, one.law) for one in violations(laws, story)]
+    return [(violation.time, violation.law) for violation in violations(laws, story)]
 
 
 def moving(*events: ObservedEvent) -> list[tuple[float, str]]:
@@ -162,9 +162,9 @@ def test_a_process_that_is_shut_down_leaves_no_goal_open() -> None:
 
 def test_the_laws_of_the_patrol_robot_come_from_its_plan() -> None:
     laws = laws_of(check_file(PATROL).plan)
-    assert [(one.command, one.timeout, one.deceleration) for one in laws.bases] == [("/cmd_vel", 0.5, (1.0, 3.0))]
-    assert {topic: one.priority for topic, one in laws.switches[0].inputs.items()} == {
+    assert [(base.command, base.timeout, base.deceleration) for base in laws.bases] == [("/cmd_vel", 0.5, (1.0, 3.0))]
+    assert {topic: switch_input.priority for topic, switch_input in laws.switches[0].inputs.items()} == {
         "/cmd_vel/teleop": 100,
         "/cmd_vel/navigation": 10,
     }
-    assert {name: one.part for name, one in laws.claims.items()} == {"/go_to": "base", "/recharge": "base"}
+    assert {name: claim.part for name, claim in laws.claims.items()} == {"/go_to": "base", "/recharge": "base"}

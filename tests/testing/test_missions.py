@@ -20,7 +20,7 @@ def stepped(text: str) -> SteppedMission:
 def test_all_findings_of_a_mission_are_returned() -> None:
     program, findings = compile_mission("do: [blnik, {wait: 1 kg}]", ROBOT)
     assert program is not None
-    assert sorted(one.code for one in findings) == ["RBX4102", "RBX4106"]
+    assert sorted(finding.code for finding in findings) == ["RBX4102", "RBX4106"]
 
 
 def test_what_is_no_mission_has_no_program() -> None:

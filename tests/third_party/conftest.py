@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from rbxcompose.findings import KINDS
-from rbxcompose.rules import OUR_CODES
+from rbxcompose.base.findings import KINDS
+from rbxcompose.base.rules import OUR_CODES
 
 collect_ignore = ["rbx_lamp"]
 

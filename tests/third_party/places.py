@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose import check_runner as checking
-from rbxcompose.plugins import GROUP, Plugins
+from rbxcompose.base.plugins import GROUP, Plugins
+from rbxcompose.compiler import check_runner as checking
 from rbxcompose.sdk import registry
 
 LAMP = Path(__file__).parent / "rbx_lamp"
@@ -47,7 +47,7 @@ def see(site: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for module in site.glob("*.py"):
         monkeypatch.delitem(sys.modules, module.stem, raising=False)
     monkeypatch.syspath_prepend(str(site))
-    monkeypatch.setattr(registry, "PLUGINS", Plugins("component", "rbxcompose.components"))
+    monkeypatch.setattr(registry, "PLUGINS", Plugins("component", "components"))
     monkeypatch.setattr(registry, "_TYPES", dict(registry._TYPES))
-    monkeypatch.setattr(checking, "PLUGINS", Plugins("check", "rbxcompose.checks"))
+    monkeypatch.setattr(checking, "PLUGINS", Plugins("check", "checks"))
     monkeypatch.setattr(checking, "CHECKS", dict(checking.CHECKS))

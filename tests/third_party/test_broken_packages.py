@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.schema.documents import MAKERS
+from rbxcompose.compiler.schema.documents import MAKERS
 from rbxcompose.sdk import registry
 from rbxcompose.testing import Checked, check_text
 from tests.third_party.places import put, see

@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.actuation.servo_models import servo_models
-from rbxcompose.clock import SteppedClock
-from rbxcompose.twins.servo_fake import FakeServo
-from rbxcompose.twins.servo_twin import TwinBus
+from rbxcompose.base.clock import SteppedClock
+from rbxcompose.domains.servos.models import servo_models
+from rbxcompose.domains.servos.twins.servo_fake import FakeServo
+from rbxcompose.domains.servos.twins.servo_twin import TwinBus
 
 MODELS = sorted(servo_models())
 STATE = ("present_position", "present_speed", "present_load", "present_temperature", "moving")

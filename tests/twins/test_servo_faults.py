@@ -11,17 +11,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.actuation.dynamixel_bus import DynamixelBus
-from rbxcompose.clock import SteppedClock
-from rbxcompose.devices.port_errors import LostPortError
-from rbxcompose.requests import Refused
-from rbxcompose.twins.fault_script import FaultScript, InjectFault, TwinFault
-from rbxcompose.twins.servo_fake import FakeServo
-from rbxcompose.twins.servo_faults import FAULTS, UNPLUG, FaultName, servo_faults
-from rbxcompose.twins.servo_line import FakeLine
-from rbxcompose.twins.servo_port import FakePort
-from rbxcompose.twins.servo_stage import twin_of
-from rbxcompose.twins.servo_twin import TwinBus
+from rbxcompose.base.clock import SteppedClock
+from rbxcompose.base.requests import Refused
+from rbxcompose.domains.devices.serial_ports import LostPortError
+from rbxcompose.domains.servos.dynamixel_bus import DynamixelBus
+from rbxcompose.domains.servos.twins.fault_script import FaultScript, InjectFault, TwinFault
+from rbxcompose.domains.servos.twins.servo_fake import FakeServo
+from rbxcompose.domains.servos.twins.servo_faults import FAULTS, UNPLUG, FaultName, servo_faults
+from rbxcompose.domains.servos.twins.servo_line import FakeLine
+from rbxcompose.domains.servos.twins.servo_port import FakePort
+from rbxcompose.domains.servos.twins.servo_twin import TwinBus, twin_of
 
 MODELS = {1: "AX-12", 2: "XL430-W250", 3: "AX-12", 4: "XL430-W250"}
 SILENT = {"power_off", "mute", "late", "corrupt", "wrong_id"}
@@ -38,7 +37,7 @@ class Broken:
     def __init__(self, *faults: TwinFault) -> None:
         self.clock = SteppedClock()
         self.bus = TwinBus([FakeServo(model, id_) for id_, model in MODELS.items()], self.clock.now)
-        self.script = FaultScript(faults, {str(one.id): [one] for one in self.bus.line.servos}, self.bus)
+        self.script = FaultScript(faults, {str(servo.id): [servo] for servo in self.bus.line.servos}, self.bus)
 
     def at(self, time: float) -> set[int]:
         """Go to a time; return who answers."""
@@ -55,7 +54,7 @@ class Broken:
 @contextmanager
 def by_bytes(servos: list[FakeServo], folder: Path) -> Iterator[DynamixelBus]:
     line = FakeLine(servos, SteppedClock().now)
-    models = {one.id: one.model for one in servos}
+    models = {servo.id: servo.model for servo in servos}
     with FakePort(line, folder / "servos") as port, DynamixelBus(str(port.path), models, timeout=0.03) as bus:
         yield bus
 
@@ -68,18 +67,18 @@ def test_the_names_are_those_of_the_type() -> None:
 def test_a_servo_answers_by_bytes_just_when_it_does_as_memory(name: str, tmp_path: Path) -> None:
     servos = [FakeServo(model, id_) for id_, model in MODELS.items()]
     with by_bytes(servos, tmp_path) as bus:
-        for one in servos[:2]:
-            one.faults = servo_faults([name])
+        for servo in servos[:2]:
+            servo.faults = servo_faults([name])
         found = set(bus.read(list(MODELS), ["present_position"]))
         assert found == ({3, 4} if name in SILENT else set(MODELS))
-        for one in servos[:2]:
-            one.faults = servo_faults([])
+        for servo in servos[:2]:
+            servo.faults = servo_faults([])
         assert set(bus.read(list(MODELS), ["present_position"])) == set(MODELS)
     broken = Broken(fault(name, "1", 1.0, 1.0), fault(name, "2", 1.0, 1.0))
     assert broken.at(0.9) == set(MODELS)
     assert broken.at(1.5) == found
     assert broken.at(2.1) == set(MODELS)
-    assert all(one.faults == HEALTHY for one in broken.bus.line.servos)
+    assert all(fake_servo.faults == HEALTHY for fake_servo in broken.bus.line.servos)
 
 
 def test_a_script_acts_on_servos_behind_a_pseudo_terminal(tmp_path: Path) -> None:
@@ -192,4 +191,4 @@ def test_all_faults_end_with_their_times(script: list[tuple[str, str, float, flo
     broken.at(0.7)
     broken.at(2.1)
     assert broken.answering() == set(MODELS)
-    assert all(one.faults == HEALTHY for one in broken.bus.line.servos)
+    assert all(servo.faults == HEALTHY for servo in broken.bus.line.servos)

@@ -6,9 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.actuation.servo_models import servo_models
-from rbxcompose.twins.servo_fake import FakeServo
-from rbxcompose.twins.servo_motor import MotorTraits, ServoMotor
+from rbxcompose.domains.servos.models import servo_models
+from rbxcompose.domains.servos.twins.servo_fake import FakeServo, MotorTraits, ServoMotor
 
 TRAITS = MotorTraits()
 PER_TICK = 0.001  # [rad]
@@ -50,7 +49,7 @@ def test_a_motion_from_rest_never_overshoots(goal: int, fastest: float, accelera
         motor.approach(goal, fastest, acceleration, 0.01)
         positions.append(motor.position)
     assert positions == sorted(positions, reverse=goal < 0)
-    assert all(abs(one) <= abs(goal) + 1e-6 for one in positions)
+    assert all(abs(position) <= abs(goal) + 1e-6 for position in positions)
 
 
 def test_speed_and_acceleration_of_a_profile_are_kept_and_the_shaft_lags_behind() -> None:
@@ -130,7 +129,7 @@ def test_noise_is_as_large_as_it_shall_be_and_differs_between_servos() -> None:
             servo.step(0.01, 0.01 * index)
             found.append(servo.get("present_position") - 2048)
         assert abs(sum(found) / len(found)) < 0.5
-        assert (sum(one * one for one in found) / len(found)) ** 0.5 == pytest.approx(3.0, rel=0.1)
+        assert (sum(item * item for item in found) / len(found)) ** 0.5 == pytest.approx(3.0, rel=0.1)
         seen.append(found)
     assert seen[0] != seen[1]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from rbxcompose.dataclass import dataclass
-from rbxcompose.expressions.tree import (
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.expressions.tree import (
     Arithmetic,
     Comparison,
     ExpressionNode,
@@ -117,6 +117,6 @@ def _computed(operator: str, left: Bounds, right: Bounds) -> Bounds:
     ends = (left.least, left.most, right.least, right.most)
     if not all(map(math.isfinite, ends)) or (operator == "/" and right.least <= 0 <= right.most):
         return ANYTHING
-    both = [(one, other) for one in ends[:2] for other in ends[2:]]
-    found = [one * other if operator == "*" else one / other for one, other in both]
+    both = [(end, other) for end in ends[:2] for other in ends[2:]]
+    found = [value * other if operator == "*" else value / other for value, other in both]
     return Bounds(min(found), max(found))

@@ -7,11 +7,11 @@ import pkgutil
 from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 
-from rbxcompose.findings import Finding, FindingKind, Severity
+from rbxcompose.base.findings import Finding, FindingKind, Severity
+from rbxcompose.base.rules import Rule, belonging, declared
 from rbxcompose.missions import checks as package
 from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.missions.program.program import Program, RobotNames
-from rbxcompose.rules import Rule, belonging, declared
 
 MissionCheck = Rule[Examined]
 Find = Callable[[Examined], Iterable[Finding]]
@@ -63,9 +63,9 @@ def rule_findings(
     mission: Examined, tells: Callable[[MissionCheck], bool] = lambda rule: True
 ) -> Iterator[tuple[MissionCheck, Finding]]:
     """Yield the findings of some rules about a mission, each with its rule."""
-    for one in mission_checks():
-        if tells(one):
-            yield from ((one, finding) for finding in one(mission))
+    for check in mission_checks():
+        if tells(check):
+            yield from ((check, finding) for finding in check(mission))
 
 
 def _place(finding: Finding) -> tuple[str, int, int]:

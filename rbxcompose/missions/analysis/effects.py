@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from rbxcompose.missions.language.asked import Assignment
-from rbxcompose.missions.program.messages import MessageTemplate
-from rbxcompose.missions.program.moments import Deeds, WrittenSetting
+from rbxcompose.missions.program.answers import Deeds, WrittenSetting
+from rbxcompose.missions.program.machines import MessageTemplate
 from rbxcompose.missions.program.program import MissionNode, Program
 
 
@@ -32,7 +32,7 @@ def called(node: MissionNode) -> Iterator[MessageTemplate]:
 
 def replaced(program: Program) -> frozenset[str]:
     """Return the names of all data that are assigned while a mission runs."""
-    return program.saved.union(one.name for node in program.nodes for one in assignments(node))
+    return program.saved.union(assignment.name for node in program.nodes for assignment in assignments(node))
 
 
 def written(program: Program) -> frozenset[str]:
@@ -46,7 +46,7 @@ def sent_by(programs: Iterable[Program]) -> tuple[set[str], set[str]]:
     nodes = [node for program in programs for node in program.nodes]
     topics = {message.target.text for node in nodes for message in published(node)}
     services = {message.target.text for node in nodes for message in called(node)}
-    return topics, services | {one.service for one in settings_of(nodes)}
+    return topics, services | {setting.service for setting in settings_of(nodes)}
 
 
 def settings_of(nodes: Iterable[MissionNode]) -> list[WrittenSetting]:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from rbxcompose.config import Place
-from rbxcompose.expressions.tree import (
+from rbxcompose.base.config import Place
+from rbxcompose.base.expressions.tree import (
     Arithmetic,
     Expression,
     ExpressionError,
@@ -17,11 +17,11 @@ from rbxcompose.expressions.tree import (
     Word,
     walk,
 )
-from rbxcompose.expressions.values import Value
-from rbxcompose.findings import Span
+from rbxcompose.base.expressions.values import Value
+from rbxcompose.base.findings import Span
 from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.analysis.effects import written
-from rbxcompose.missions.language.spans import expression_of
+from rbxcompose.missions.language.asked import expression_of
 from rbxcompose.missions.program.answers import Skipped
 from rbxcompose.missions.program.program import MissionNode, Program, RobotNames
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from rbxcompose.dataclass import dataclass
-from rbxcompose.expressions.tree import Expression, ExpressionNode, FieldAccess, Index, Variable
-from rbxcompose.expressions.values import Value
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.expressions.tree import Expression, ExpressionNode, FieldAccess, Index, Variable
+from rbxcompose.base.expressions.values import Value
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, TreeNode
 
 ANY = None  # matches any entry of a list or a map

@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from dataclasses import field, replace
 
-from rbxcompose.dataclass import dataclass
-from rbxcompose.expressions.check import ExpressionProblem, check_value
-from rbxcompose.expressions.tree import Expression, Word
-from rbxcompose.expressions.types import PLACE, POSE, TEXT, UNKNOWN, Type, TypeKind, map_of
-from rbxcompose.findings import Finding, FindingKind, Span, nearest, replacement
+from rbxcompose.base.config import VALUE
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.expressions.check import ExpressionProblem, check_value
+from rbxcompose.base.expressions.tree import Expression, Word
+from rbxcompose.base.expressions.types import PLACE, POSE, TEXT, UNKNOWN, Type, TypeKind, map_of
+from rbxcompose.base.findings import Finding, FindingKind, Span, nearest, replacement
+from rbxcompose.base.units import TIME, minutes_help
 from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.engine.condition_watches import POSE as POSE_NAME
-from rbxcompose.missions.language.spans import inner_span
+from rbxcompose.missions.engine.world import POSE as POSE_NAME
+from rbxcompose.missions.language.asked import inner_span
 from rbxcompose.missions.program.program import MissionNode, Program, RobotNames
-from rbxcompose.references import VALUE
-from rbxcompose.units import TIME, minutes_help
 
 _MEASURED = (TypeKind.QUANTITY, TypeKind.COUNT, TypeKind.FLAG)  # types that no place can have
 
@@ -70,7 +70,7 @@ class View:
 def _named_twice(program: Program, robot: RobotNames) -> set[str]:
     """Return the names that the mission gives to something of another type than what the robot has under it."""
     of_robot = {**robot.values, POSE_NAME: POSE}
-    own = {name: one.type for name, one in program.inputs.items()}
+    own = {name: input_.type for name, input_ in program.inputs.items()}
     own |= {name: datum.type for name, datum in program.data.items()}
     return {name for name, found in own.items() if name in of_robot and found != of_robot[name]}
 
@@ -80,7 +80,7 @@ def base_names(program: Program, robot: RobotNames) -> dict[str, Type]:
     return {
         **robot.values,
         POSE_NAME: POSE,
-        **{name: one.type for name, one in program.inputs.items()},
+        **{name: input_.type for name, input_ in program.inputs.items()},
         **{name: datum.type for name, datum in program.data.items()},
         **dict.fromkeys(_named_twice(program, robot), UNKNOWN),  # that is told, and not what follows from it
         **{name: map_of(UNKNOWN, _entries(program, robot, name)) for name in program.saved - program.data.keys()},

@@ -6,9 +6,9 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import field
 
-from rbxcompose.config import Place
-from rbxcompose.dataclass import dataclass
-from rbxcompose.geometry import Pose2
+from rbxcompose.base.config import Place
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.geometry import Pose2
 from rbxcompose.missions.analysis.facts import Constants, goal_place, items_of, number_of
 from rbxcompose.missions.program.answers import NodeFlow
 from rbxcompose.missions.program.program import ROOT, MissionNode, Program

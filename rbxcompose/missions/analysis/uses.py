@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
 
-from rbxcompose.findings import Finding, Related, Span, kind
+from rbxcompose.base.findings import Finding, Related, Span, kind
 from rbxcompose.missions.program.linker import DEEPEST, MOST_NODES
 from rbxcompose.missions.program.program import Program
 
@@ -45,7 +45,7 @@ class Using:
             return 0, 0
         if name not in self._missions or name in self._sizes:
             return self._sizes.get(name, (0, 0))
-        sizes = {one: self._walk(one, [*above, name]) for one in self._uses[name]}
+        sizes = {other: self._walk(other, [*above, name]) for other in self._uses[name]}
         nodes = len(self._missions[name].nodes)
         for node in self._missions[name].nodes:
             if node.step.uses:
@@ -58,9 +58,9 @@ class Using:
         if names[0] in self.broken:
             return
         self.broken.update(names)
-        steps = [(one, other, self._uses[one][other]) for one, other in pairwise(names)]
+        steps = [(name, other, self._uses[name][other]) for name, other in pairwise(names)]
         message = f"missions use each other in a circle: {' -> '.join(names)}"
-        related = [Related(span, f"'{one}' uses '{other}'") for one, other, span in steps[1:]]
+        related = [Related(span, f"'{text}' uses '{other}'") for text, other, span in steps[1:]]
         help_text = "remove one of the steps; to do it again, write 'repeat' around it"
         self.findings.append(CIRCLE.at(steps[0][2], message, help=help_text, related=related))
 

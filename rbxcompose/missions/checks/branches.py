@@ -5,19 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import combinations
 
-from rbxcompose.expressions.check import check
-from rbxcompose.expressions.tree import Expression, Flag, Number, Text, Word, walk
-from rbxcompose.expressions.types import Type, TypeKind
-from rbxcompose.findings import Finding, Related, Severity, Span
+from rbxcompose.base.expressions.check import check
+from rbxcompose.base.expressions.tree import Expression, Flag, Number, Text, Word, walk
+from rbxcompose.base.expressions.types import Type, TypeKind
+from rbxcompose.base.findings import Finding, Related, Severity, Span
+from rbxcompose.base.rules import OWN
 from rbxcompose.missions.analysis.check_runner import mission_check
-from rbxcompose.missions.analysis.claims import claims_below
-from rbxcompose.missions.analysis.examined import Examined
-from rbxcompose.missions.language.asked import Asked
-from rbxcompose.missions.language.spans import inner_span
+from rbxcompose.missions.analysis.examined import Examined, claims_below
+from rbxcompose.missions.language.asked import Asked, inner_span
 from rbxcompose.missions.program.branches import ALL, Branches, compared_with_word
 from rbxcompose.missions.program.outcomes import FAILS, SUCCEEDS, Outcomes
 from rbxcompose.missions.program.program import MissionNode, Program
-from rbxcompose.rules import OWN
 
 
 @mission_check("RBX4138", Severity.WARNING, closed=(OWN,))

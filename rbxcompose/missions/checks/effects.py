@@ -5,22 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import pairwise
 
-from rbxcompose.expressions.tree import Expression, Junction, Minus, Not, Number
-from rbxcompose.expressions.types import FLAG
-from rbxcompose.findings import Finding, Related, Severity, Span
+from rbxcompose.base.expressions.tree import Expression, Junction, Minus, Not, Number
+from rbxcompose.base.expressions.types import FLAG
+from rbxcompose.base.findings import Finding, Related, Severity, Span
+from rbxcompose.base.rules import OWN
+from rbxcompose.base.units import TIME, format_quantity
 from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.analysis.bounds import truth
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.effects import written
-from rbxcompose.missions.analysis.endings import Ending
-from rbxcompose.missions.analysis.examined import Examined
+from rbxcompose.missions.analysis.examined import Ending, Examined
 from rbxcompose.missions.analysis.facts import Constants, constants_of, never_skipped, number_of, place_in_text
 from rbxcompose.missions.language.asked import Asked
 from rbxcompose.missions.program.answers import ModifierScope, NodeFlow
 from rbxcompose.missions.program.outcomes import FAILS, SUCCEEDS
 from rbxcompose.missions.program.program import CONTINUE, MissionNode, Program
-from rbxcompose.rules import OWN
-from rbxcompose.units import TIME, format_quantity
 
 
 @mission_check("RBX4125", Severity.WARNING, closed=(OWN,))
@@ -51,7 +50,7 @@ def _endless_branch(barrier: MissionNode, ending: Ending) -> Span | None:
     if branches is None or not branches.ends_with:
         return None
     ends = ending.of_branches(barrier)
-    others = [one.counting_as(SUCCEEDS) for name, one in ends.items() if name != branches.ends_with]
+    others = [end.counting_as(SUCCEEDS) for name, end in ends.items() if name != branches.ends_with]
     return branches.ends_at if any(others) else None
 
 
@@ -100,10 +99,10 @@ def _condition(node: MissionNode, key: str) -> Asked | None:
 
 def _go_together(first: Asked, second: Asked, *, is_second: bool) -> bool:
     """Return whether the first may hold while the second does, or does not."""
-    one, other = first.expression.tree, second.expression.tree
+    node, other = first.expression.tree, second.expression.tree
     if truth(other, {}) is not None:
         return True  # it is decided by itself, as when somebody tries something out
-    both = Junction(one.start, one.end, "and", (one, other if is_second else Not(other.start, other.end, other)))
+    both = Junction(node.start, node.end, "and", (node, other if is_second else Not(other.start, other.end, other)))
     return truth(both, {}) is not False and (is_second or first.expression.text != second.expression.text)
 
 
@@ -170,9 +169,9 @@ def idle_modifier(mission: Examined) -> Iterator[Finding]:
 
 def _attempt(node: MissionNode, known: Constants) -> Iterator[Finding]:
     """Yield the finding about a limit of each attempt that the limit of all forestalls."""
-    each = next((one.attempt_limit for one in node.modifiers.values() if one.attempt_limit), None)
-    one, whole = number_of(each, known), number_of(node.limit, known)
-    if each is not None and one is not None and whole is not None and one >= whole:
+    each = next((modifier.attempt_limit for modifier in node.modifiers.values() if modifier.attempt_limit), None)
+    value, whole = number_of(each, known), number_of(node.limit, known)
+    if each is not None and value is not None and whole is not None and value >= whole:
         yield idle_modifier.at(
             place_in_text(node, each),
             f"'attempt_timeout' changes nothing here: all attempts together end after {format_quantity(whole, TIME)}",
@@ -197,13 +196,13 @@ def _forgiven(mission: Examined, node: MissionNode) -> Iterator[Finding]:
 
 def _comes_again(program: Program, node: MissionNode) -> bool:
     """Return whether anything in the mission can start a node a second time."""
-    if any(one.afterwards != CONTINUE for one in program.interrupts):
+    if any(interrupt.afterwards != CONTINUE for interrupt in program.interrupts):
         return True
     parent = node.parent
     if parent is None:
         return node.number != program.main  # a reaction runs as often as its interrupt
     above = program.nodes[parent]
-    is_repeated = above.step.comes_again or any(one.repeats for one in above.modifiers.values())
+    is_repeated = above.step.comes_again or any(modifier.repeats for modifier in above.modifiers.values())
     return is_repeated or _comes_again(program, above)
 
 
@@ -211,7 +210,7 @@ def _comes_again(program: Program, node: MissionNode) -> bool:
 def pointless_number(mission: Examined) -> Iterator[Finding]:
     """A number of rounds or attempts, or a duration, leaves nothing to be done."""
     for node in mission.program.nodes:
-        modifiers = (one for modifier in node.modifiers.values() for one in modifier.numbers)
+        modifiers = (number for modifier in node.modifiers.values() for number in modifier.numbers)
         for what, expression, least in (*node.step.numbers, *modifiers):
             value = _written(expression)
             if value is not None and value < least:

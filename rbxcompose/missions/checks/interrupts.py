@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rbxcompose.findings import Finding, Related, Severity
+from rbxcompose.base.findings import Finding, Related, Severity
+from rbxcompose.base.rules import OWN
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.missions.program.program import END
-from rbxcompose.rules import OWN
 
 
 @mission_check("RBX4116", Severity.WARNING, closed=(OWN,))
 def not_restartable(mission: Examined) -> Iterator[Finding]:
     """An interrupt may restart a skill that cannot be restarted."""
-    cutting = [one for one in mission.program.interrupts if one.afterwards != END]
+    cutting = [interrupt for interrupt in mission.program.interrupts if interrupt.afterwards != END]
     for node in mission.program.below(mission.program.main) if cutting else ():
         skill = mission.robot.skills.get(node.skill)
         if skill and not skill.restartable and not skill.pausable:
@@ -29,12 +29,12 @@ def same_interrupt(mission: Examined) -> Iterator[Finding]:
     """Two interrupts have the same condition."""
     first: dict[str, int] = {}
     interrupts = mission.program.interrupts
-    for index, one in enumerate(interrupts):
-        other = interrupts[first.setdefault(one.when.expression.text, index)]
-        if other is not one:
+    for index, interrupt in enumerate(interrupts):
+        other = interrupts[first.setdefault(interrupt.when.expression.text, index)]
+        if other is not interrupt:
             yield same_interrupt.at(
-                one.when.scalar.span,
-                f"'{one.name}' has the condition of '{other.name}'",
+                interrupt.when.scalar.span,
+                f"'{interrupt.name}' has the condition of '{other.name}'",
                 help="change the condition, or put both reactions into one",
                 related=[Related(other.when.scalar.span, "the first one")],
             )

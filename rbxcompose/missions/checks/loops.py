@@ -4,21 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from rbxcompose.expressions.check import check
-from rbxcompose.expressions.tree import Expression, ExpressionNode, FieldAccess, Text, Variable, Word
-from rbxcompose.expressions.types import Type, TypeKind
-from rbxcompose.expressions.values import Value
-from rbxcompose.findings import Finding, Related, Severity, suggest
+from rbxcompose.base.config import PLACE
+from rbxcompose.base.expressions.check import check
+from rbxcompose.base.expressions.tree import Expression, ExpressionNode, FieldAccess, Text, Variable, Word
+from rbxcompose.base.expressions.types import Type, TypeKind
+from rbxcompose.base.expressions.values import Value
+from rbxcompose.base.findings import Finding, Related, Severity, suggest
+from rbxcompose.base.rules import OWN
 from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.effects import replaced
 from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.missions.analysis.facts import Constants, constants_of
 from rbxcompose.missions.analysis.scope_types import View
-from rbxcompose.missions.engine.condition_watches import POSE
+from rbxcompose.missions.engine.world import POSE
 from rbxcompose.missions.program.program import MissionNode, Program
-from rbxcompose.references import PLACE
-from rbxcompose.rules import OWN
 
 _MAY_BE = (TypeKind.PLACE, TypeKind.POSE, TypeKind.TEXT, TypeKind.UNKNOWN)  # a text may name a place
 
@@ -53,7 +53,7 @@ def _in_list(view: View, items: Expression, found: Type) -> Iterator[Finding]:
         yield nearest_of_no_places.at(span, f"{_ASKED}, and each item is {found.entry.phrase}", help=_HELP)
     elif isinstance(items.tree, Variable) and (name := items.tree.name) in data.keys() - replaced(view.program):
         value: Value = data[name].value
-        words = [one for one in value if isinstance(one, str)] if isinstance(value, list | tuple | Mapping) else []
+        words = [item for item in value if isinstance(item, str)] if isinstance(value, list | tuple | Mapping) else []
         for word in words:
             if not _is_place(view, word):
                 message, help_text = _told(view, word)
@@ -79,7 +79,7 @@ def never_waits(mission: Examined) -> Iterator[Finding]:
         if view.waits:
             continue
         ends = mission.ending.of(node.number)
-        for advice in (node.step.endless(ends), *(one.endless for one in node.modifiers.values())):
+        for advice in (node.step.endless(ends), *(modifier.endless for modifier in node.modifiers.values())):
             if advice:
                 yield never_waits.at(node.span, advice.message, help=advice.help)
 
@@ -94,7 +94,9 @@ def nothing_to_go_over(mission: Examined) -> Iterator[Finding]:
             yield nothing_to_go_over.at(node.span, "its list is empty: nothing in it is ever done", help=_LIST_HELP)
         if items is None or isinstance(items, tuple):
             continue
-        name, value = _start(items.tree, {key: one.value for key, one in program.data.items() if key not in changed})
+        name, value = _start(
+            items.tree, {key: datum.value for key, datum in program.data.items() if key not in changed}
+        )
         if isinstance(value, list | tuple | Mapping) and not value:
             yield nothing_to_go_over.at(
                 node.asked[0].scalar.span,
@@ -156,11 +158,11 @@ def _words(node: MissionNode, known: Constants) -> set[str]:
     items = node.step.items
     if isinstance(items, Expression):
         listed = known.get(items.tree.name) if isinstance(items.tree, Variable) else None
-        return {one for one in listed if isinstance(one, str)} if isinstance(listed, list | tuple) else set()
-    return {one.tree.name for one in items or () if isinstance(one.tree, Word)}
+        return {item for item in listed if isinstance(item, str)} if isinstance(listed, list | tuple) else set()
+    return {item.tree.name for item in items or () if isinstance(item.tree, Word)}
 
 
 def _written(program: Program, loop: MissionNode) -> Iterator[ScalarNode]:
     """Yield the values that steps inside of a loop give to skills and missions."""
     for node in program.nodes[loop.number + 1 : loop.end]:
-        yield from (one.value for one in node.step.arguments if isinstance(one.value, ScalarNode))
+        yield from (argument.value for argument in node.step.arguments if isinstance(argument.value, ScalarNode))

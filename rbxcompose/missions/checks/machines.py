@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rbxcompose.findings import DID_YOU_MEAN, Finding, Severity, replacement
+from rbxcompose.base.findings import DID_YOU_MEAN, Finding, Severity, replacement
+from rbxcompose.base.rules import OWN
 from rbxcompose.missions.analysis.check_runner import mission_check
-from rbxcompose.missions.analysis.examined import Examined
-from rbxcompose.missions.analysis.transitions import leading_to, reached, transitions
-from rbxcompose.missions.language.foreign_steps import OUTCOMES
-from rbxcompose.missions.program.look import Form
+from rbxcompose.missions.analysis.examined import Examined, leading_to, reached, transitions
+from rbxcompose.missions.language.keys import OUTCOMES
+from rbxcompose.missions.program.answers import Form
 from rbxcompose.missions.program.machines import MachineStates, Next
 from rbxcompose.missions.program.outcomes import FAILS, Outcomes
 from rbxcompose.missions.program.program import MissionNode
-from rbxcompose.rules import OWN
 
 ONE_WORD = "write 'next' as a map with 'success' and 'failure'"
 
@@ -72,7 +71,11 @@ def unknown_outcome(mission: Examined) -> Iterator[Finding]:
     for node in mission.program.nodes:
         leads_to = node.step.leads_to
         below = mission.program.below(node.number)
-        if leads_to is None or "" in leads_to.to or any(one.skill not in ("", *mission.robot.skills) for one in below):
+        if (
+            leads_to is None
+            or "" in leads_to.to
+            or any(mission_node.skill not in ("", *mission.robot.skills) for mission_node in below)
+        ):
             continue  # how a skill may end that the robot does not have is not known
         words, handled = mission.ending.of(node.number).words, leads_to.to
         counted = {counts_as for word, counts_as in words.items() if word not in handled}

@@ -6,7 +6,8 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
-from rbxcompose.findings import (
+from rbxcompose.base.config import MISSION
+from rbxcompose.base.findings import (
     DID_YOU_MEAN,
     MOST_NAMES,
     Finding,
@@ -17,21 +18,20 @@ from rbxcompose.findings import (
     suggest,
     surely_meant,
 )
+from rbxcompose.base.printable import plain
+from rbxcompose.base.rules import NAMES, WIRING
 from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.effects import assignments, called, published
 from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.missions.analysis.scope_types import View
 from rbxcompose.missions.codes import NAME_CLASH, UNKNOWN_NAME
-from rbxcompose.missions.engine.condition_watches import POSE
-from rbxcompose.missions.language.foreign_steps import FOREIGN
-from rbxcompose.missions.program.look import Form
-from rbxcompose.missions.program.messages import MessageTemplate
+from rbxcompose.missions.engine.world import POSE
+from rbxcompose.missions.language.keys import FOREIGN
+from rbxcompose.missions.program.answers import Form
+from rbxcompose.missions.program.machines import MessageTemplate
 from rbxcompose.missions.program.program import MissionNode, Program, RobotNames
 from rbxcompose.missions.program.registry import kinds
-from rbxcompose.printable import plain
-from rbxcompose.references import MISSION
-from rbxcompose.rules import NAMES, WIRING
 
 
 @mission_check(NAME_CLASH)
@@ -149,7 +149,7 @@ _WORD = re.compile(r"[a-zA-Z_].*")
 
 def _called(node: MissionNode) -> str:
     """Return the word after a step, as in 'service: go_to'."""
-    words = (one.value.text for one in node.step.arguments if isinstance(one.value, ScalarNode))
+    words = (argument.value.text for argument in node.step.arguments if isinstance(argument.value, ScalarNode))
     return next(words, "")
 
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rbxcompose.expressions.types import UNKNOWN, accepts, map_of
-from rbxcompose.findings import Finding, Related, Severity
+from rbxcompose.base.expressions.types import UNKNOWN, accepts, map_of
+from rbxcompose.base.findings import Finding, Related, Severity
+from rbxcompose.base.rules import OWN
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.effects import written
 from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.missions.program.answers import NodeFlow
 from rbxcompose.missions.program.program import CONTINUE, MissionNode, Program
-from rbxcompose.rules import OWN
 
 
 @mission_check("RBX4136")
@@ -27,7 +27,7 @@ def nothing_to_keep(mission: Examined) -> Iterator[Finding]:
 def read_too_early(mission: Examined) -> Iterator[Finding]:
     """A result is read before it is saved."""
     program = mission.program
-    if any(one.afterwards != CONTINUE for one in program.interrupts):
+    if any(interrupt.afterwards != CONTINUE for interrupt in program.interrupts):
         return  # what is restarted may read what an earlier run of it saved
     savers: dict[str, list[MissionNode]] = {}
     for node in program.nodes:
@@ -35,26 +35,30 @@ def read_too_early(mission: Examined) -> Iterator[Finding]:
             savers.setdefault(node.saved.text, []).append(node)
     for node in program.nodes if savers else ():
         for asked in node.asked:
-            for name in sorted({one.name for one in asked.expression.names} & savers.keys()):
+            for name in sorted({reference.name for reference in asked.expression.names} & savers.keys()):
                 if all(_is_later(program, node, saver) for saver in savers[name]):
                     yield read_too_early.at(
                         asked.scalar.span,
                         f"nothing has saved '{name}' when this is read",
                         help="read it after the step that saves it, or give it a first value under 'data'",
-                        related=[Related(one.saved.span, "saved here") for one in savers[name] if one.saved],
+                        related=[
+                            Related(mission_node.saved.span, "saved here")
+                            for mission_node in savers[name]
+                            if mission_node.saved
+                        ],
                     )
 
 
 def _is_later(program: Program, reader: MissionNode, saver: MissionNode) -> bool:
     """Return whether a step surely begins after another one has ended, and neither comes again."""
     before, after = _above(program, reader), _above(program, saver)
-    shared = [one for one in before if one in after]
+    shared = [number for number in before if number in after]
     if not shared or reader.number in after or saver.number in before:
         return False  # in different reactions, or one is within the other
     around = program.nodes[shared[0]]
     if around.step.flow is not NodeFlow.IN_TURN or around.step.goes_on_after != "success":
         return False
-    if any(_comes_again(program.nodes[one]) for one in shared):
+    if any(_comes_again(program.nodes[number]) for number in shared):
         return False
     return reader.number < saver.number
 
@@ -69,7 +73,7 @@ def _above(program: Program, node: MissionNode) -> list[int]:
 
 
 def _comes_again(node: MissionNode) -> bool:
-    return node.step.comes_again or any(one.repeats for one in node.modifiers.values())
+    return node.step.comes_again or any(modifier.repeats for modifier in node.modifiers.values())
 
 
 @mission_check("RBX4162")
@@ -95,7 +99,7 @@ def unwritten_output(mission: Examined) -> Iterator[Finding]:
     program = mission.program
     constant = program.data.keys() - written(program)
     for name, asked in program.outputs.items():
-        read = {one.name for one in asked.expression.names}
+        read = {reference.name for reference in asked.expression.names}
         if read and read <= constant:
             first = sorted(read)[0]
             yield unwritten_output.at(

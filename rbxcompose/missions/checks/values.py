@@ -5,33 +5,30 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 
-from rbxcompose.expressions.check import check
-from rbxcompose.expressions.tree import Number, walk
-from rbxcompose.expressions.types import COUNT, PLACE, TEXT, UNKNOWN, Type, TypeKind, choice_of, quantity_of
-from rbxcompose.findings import Finding, Related, Span, nearest, suggest
+from rbxcompose.base.expressions.check import check
+from rbxcompose.base.expressions.tree import Number, walk
+from rbxcompose.base.expressions.types import COUNT, PLACE, TEXT, UNKNOWN, Type, TypeKind, choice_of, quantity_of
+from rbxcompose.base.findings import Finding, Related, Span, nearest, suggest
+from rbxcompose.base.printable import plain
+from rbxcompose.base.units import NUMBER, QUOTIENT, Dimension, example
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions.analysis.check_runner import mission_check
 from rbxcompose.missions.analysis.effects import assignments, called, published
-from rbxcompose.missions.analysis.endings import Ending
-from rbxcompose.missions.analysis.examined import Examined
+from rbxcompose.missions.analysis.examined import Ending, Examined
 from rbxcompose.missions.analysis.scope_types import View, findings_of
 from rbxcompose.missions.codes import UNKNOWN_NAME, WRONG_INPUT, WRONG_TYPE
-from rbxcompose.missions.language.argument_types import check_written
-from rbxcompose.missions.language.asked import Asked, Assignment, WrittenArgument
-from rbxcompose.missions.language.literals import WrongValue, typed
-from rbxcompose.missions.language.spans import inner_span
-from rbxcompose.missions.language.written_poses import help_with_place, is_pose, nodes_of
+from rbxcompose.missions.language.asked import Asked, Assignment, WrittenArgument, inner_span
+from rbxcompose.missions.language.literals import WrongValue, check_written, typed
+from rbxcompose.missions.language.written import help_with_place, is_pose, nodes_of
 from rbxcompose.missions.modifiers.registry import modifier_keys
 from rbxcompose.missions.program.branches import RESULTS, compared_with_word
-from rbxcompose.missions.program.messages import MessageTemplate, TemplateShape, WrittenValue
+from rbxcompose.missions.program.machines import MessageTemplate, TemplateShape, WrittenValue
 from rbxcompose.missions.program.outcomes import Outcomes
 from rbxcompose.missions.program.program import Program, Skill
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.definitions import FieldShape, parse_type
-from rbxcompose.msgs.measures import measure_of
+from rbxcompose.msgs.fields import measure_of
 from rbxcompose.msgs.types import Message
-from rbxcompose.printable import plain
-from rbxcompose.units import NUMBER, QUOTIENT, Dimension, example
 
 PLACED = (TypeKind.PLACE, TypeKind.POSE)
 STRUCTURED = (TypeKind.LIST, TypeKind.MAP)
@@ -54,12 +51,12 @@ def wrong_argument(mission: Examined) -> Iterator[Finding]:
 def _written_pose(skill: Skill, arguments: Collection[WrittenArgument]) -> Finding | None:
     """Return the one finding about coordinates in the place of the argument that takes a place."""
     main = skill.arguments.get(skill.main)
-    unknown = {one.name: one for one in arguments if one.name not in skill.arguments}
+    unknown = {argument.name: argument for argument in arguments if argument.name not in skill.arguments}
     if main is None or main.kind not in PLACED or len(unknown) != len(arguments) or not is_pose(unknown):
         return None
     message = f"the skill '{skill.name}' takes {main.phrase}, not its coordinates"
     first = next(iter(unknown.values()))
-    help_text = help_with_place({name: one.value for name, one in unknown.items()})
+    help_text = help_with_place({name: argument.value for name, argument in unknown.items()})
     return wrong_argument.at(first.span, message, help=help_text)
 
 
@@ -103,7 +100,7 @@ def _argument(view: View, skill: Skill, argument: WrittenArgument) -> Iterator[F
         yield wrong_argument.at(argument.span, message, help=help_text)
     elif name not in skill.arguments:
         message = f"the skill '{skill.name}' has no argument '{name}'"
-        taken = {one.name for one in view.node.step.arguments}
+        taken = {written_argument.name for written_argument in view.node.step.arguments}
         arguments = skill.arguments
         if name in modifier_keys() and not nearest(name, arguments):
             help_text = f"'{name}' is a setting of the step: move it left, into the column of '{skill.name}'"
@@ -387,8 +384,8 @@ def _outcomes(view: View, ending: Ending) -> Iterator[Finding]:
     for outcome in branches.outcomes:
         if asked := outcome.asked:
             found = list(findings_of(asked.expression, asked.wanted, asked.scalar, scope, WRONG_TYPE))
-            unknown = [one for one in found if one.code == UNKNOWN_NAME.code]
-            others = (_with_results(one, asked, branch_ends) for one in found)
+            unknown = [finding for finding in found if finding.code == UNKNOWN_NAME.code]
+            others = (_with_results(finding, asked, branch_ends) for finding in found)
             yield from unknown or others  # the word compared with a misspelt branch would count as an unknown place
 
 

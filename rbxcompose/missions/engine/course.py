@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from rbxcompose.expressions.evaluate import holds
-from rbxcompose.missions.engine.condition_watches import Watched
+from rbxcompose.base.expressions.evaluate import holds
 from rbxcompose.missions.engine.scopes import SinceScope
 from rbxcompose.missions.engine.task import Task
+from rbxcompose.missions.engine.world import Watched
 from rbxcompose.missions.program.program import Interrupt, Target
 from rbxcompose.missions.program.statuses import RUNNING, SUCCESS
 

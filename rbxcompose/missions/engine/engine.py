@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from rbxcompose.expressions.values import Value
+from rbxcompose.base.expressions.values import Value
 from rbxcompose.missions.engine.build import Builder
 from rbxcompose.missions.engine.course import Reaction
 from rbxcompose.missions.engine.engine_base import ROUNDING, EngineBase
@@ -13,8 +13,7 @@ from rbxcompose.missions.engine.task import Task
 from rbxcompose.missions.engine.world import PLAIN, Settings, World
 from rbxcompose.missions.program.linker import link
 from rbxcompose.missions.program.program import Program, RobotNames
-from rbxcompose.missions.program.results import Result
-from rbxcompose.missions.program.statuses import FAILURE, IDLE, NAMES, RUNNING, SUCCESS
+from rbxcompose.missions.program.statuses import FAILURE, IDLE, NAMES, RUNNING, SUCCESS, Result
 
 TICKS_AT_ONCE = 100  # at one instant; then the mission is slowed down to its rate
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from rbxcompose.dataclass import dataclass
-from rbxcompose.expressions.values import Value
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.expressions.values import Value
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,21 +1,63 @@
-"""Values for the inputs of a mission, from `with:` or `--set`."""
+"""What a mission is started with: values for its inputs, and states that it begins in."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from types import MappingProxyType
 
-from rbxcompose.config import Place
-from rbxcompose.expressions.types import TypeKind
-from rbxcompose.expressions.values import Value
-from rbxcompose.findings import Finding, Span
+from rbxcompose.base.config import Place
+from rbxcompose.base.expressions.types import TypeKind
+from rbxcompose.base.expressions.values import Value
+from rbxcompose.base.findings import Finding, Span
 from rbxcompose.manifest.tree import NOWHERE, Entry, ScalarNode
 from rbxcompose.missions import codes
 from rbxcompose.missions.language.header import range_trouble
 from rbxcompose.missions.language.literals import WrongValue, typed
-from rbxcompose.missions.program.data import Datum, Input
-from rbxcompose.missions.program.program import Program
+from rbxcompose.missions.program.machines import Datum, Input
+from rbxcompose.missions.program.program import MissionNode, Program
+
+
+class NoSuchState(LookupError):  # noqa: N818 - shown to whoever names the state
+    """Raised with the reason and the existing states."""
+
+
+def start_at(program: Program, path: str) -> dict[int, str]:
+    """Return the initial states of machines, by node number, for a path such as `outer.inner`.
+
+    Each step names a state of a machine; the next step one of a machine inside that state. `program` is linked.
+
+    Raises:
+        NoSuchState: if a part names no state.
+    """
+    found: dict[int, str] = {}
+    below = program.main
+    for name in path.split("."):
+        machines = list(_outermost(program, below))
+        if not machines:
+            raise NoSuchState(f"'{path}': there is no machine in which '{name}' could be a state")
+        matching = [node for node in machines if name in _states(node)]
+        if not matching:
+            states = ", ".join(state for node in machines for state in _states(node))
+            raise NoSuchState(f"there is no state '{name}'; states are {states}")
+        machine = matching[0]
+        found[machine.number] = name
+        below = machine.children[_states(machine).index(name)]
+    return found
+
+
+def _states(machine: MissionNode) -> tuple[str, ...]:
+    return machine.step.states.names if machine.step.states else ()
+
+
+def _outermost(program: Program, number: int) -> Iterator[MissionNode]:
+    """Yield the machines of a node and below it, except those inside other machines."""
+    node = program.nodes[number]
+    if node.step.states:
+        yield node
+        return
+    for child in node.children:
+        yield from _outermost(program, child)
 
 
 def bind_texts(
@@ -23,7 +65,7 @@ def bind_texts(
 ) -> tuple[dict[str, Value], list[Finding]]:
     """Return the values of all inputs, the `known` ones overridden by those given as text, and the findings."""
     entries = {name: Entry(ScalarNode(name, NOWHERE), ScalarNode(text, NOWHERE)) for name, text in given.items()}
-    asked = {name: one for name, one in program.inputs.items() if name in given or name not in known}
+    asked = {name: input_ for name, input_ in program.inputs.items() if name in given or name not in known}
     values, findings = bind_inputs(replace(program, inputs=asked), entries, places, NOWHERE)
     return {**known, **values}, findings
 

@@ -1,20 +1,64 @@
-"""Instant actions of a task: publish messages, set data, log. They affect the result only by failing."""
+"""Instant actions of a task: publish messages, set and edit data, log."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from rbxcompose.expressions.evaluate import evaluate
-from rbxcompose.expressions.values import Value
+from rbxcompose.base.expressions.evaluate import evaluate
+from rbxcompose.base.expressions.tree import Expression, ExpressionNode, FieldAccess, Index, Variable
+from rbxcompose.base.expressions.values import Value, is_same
 from rbxcompose.missions.engine.events import Logged, Published
+from rbxcompose.missions.engine.scopes import MissionScope
 from rbxcompose.missions.engine.task import Task
 from rbxcompose.missions.language.asked import Assignment
-from rbxcompose.missions.program.messages import MessageTemplate, TemplateShape
-from rbxcompose.missions.program.moments import Deeds, Moments
-from rbxcompose.missions.program.results import NodeFailed
+from rbxcompose.missions.program.answers import Deeds, Moments
+from rbxcompose.missions.program.machines import MessageTemplate, TemplateShape
+from rbxcompose.missions.program.statuses import NodeFailed
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.definitions import parse_type
 from rbxcompose.msgs.types import Message
+
+
+def without(target: ExpressionNode, item: Value, data: dict[str, Value], scope: MissionScope) -> None:
+    """Remove an item from the list (the first equal one) or map (its key) that an expression names in the data.
+
+    Raises:
+        NodeFailed: if the expression names nothing in the data.
+    """
+    path = _path(target, scope)
+    name = path[0]
+    if name not in data:
+        raise NodeFailed(f"'{name}' is not in the data, so nothing can be removed from it")
+    data[str(name)] = _removed(data[str(name)], path[1:], item)
+
+
+def _path(tree: ExpressionNode, scope: MissionScope) -> list[Value]:
+    match tree:
+        case Variable(name=name):
+            return [name]
+        case FieldAccess(of=of, name=name):
+            return [*_path(of, scope), name]
+        case Index(of=of, index=index):
+            return [*_path(of, scope), evaluate(Expression("", index), scope)]
+    raise NodeFailed("'remove_done' needs named data, such as '$chores'")
+
+
+def _removed(value: Value, path: list[Value], item: Value) -> Value:
+    if path:
+        key, rest = path[0], path[1:]
+        if isinstance(value, dict):
+            return {name: _removed(entry, rest, item) if is_same(name, key) else entry for name, entry in value.items()}
+        if isinstance(value, list) and isinstance(key, int | float) and key in range(len(value)):
+            index = int(key)
+            return [*value[:index], _removed(value[index], rest, item), *value[index + 1 :]]
+        raise NodeFailed("there is nothing to remove from")
+    if isinstance(value, dict):
+        return {name: entry for name, entry in value.items() if not is_same(name, item)}
+    if isinstance(value, list):
+        found = next((at for at, one in enumerate(value) if is_same(one, item)), len(value))
+        return [*value[:found], *value[found + 1 :]]
+    raise NodeFailed("there is nothing to remove from")
+
 
 TEXT = "string"
 
@@ -49,7 +93,7 @@ def _value(shape: TemplateShape, ros_type: str, task: Task) -> Value:
     if isinstance(shape, Mapping):
         return _fields(shape, registry.message(base), task)
     if isinstance(shape, tuple):
-        return [_value(one, base, task) for one in shape]
+        return [_value(item, base, task) for item in shape]
     if base == TEXT:
         return task.run.written(shape.template, task.scope)
     if shape.expression is None:
@@ -67,7 +111,9 @@ def publish(message: MessageTemplate, task: Task) -> None:
 
 def assign(assignments: Iterable[Assignment], task: Task) -> None:
     """Evaluate all right-hand sides, then set the data, and request another tick for what may depend on it."""
-    task.run.data.update({one.name: evaluate(one.asked.expression, task.scope) for one in assignments})
+    task.run.data.update(
+        {assignment.name: evaluate(assignment.asked.expression, task.scope) for assignment in assignments}
+    )
     task.engine.again(task)
 
 

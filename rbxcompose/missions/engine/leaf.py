@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
-from rbxcompose.expressions.values import Value
+from rbxcompose.base.expressions.values import Value
 from rbxcompose.missions.engine.task import Site, Task
-from rbxcompose.missions.program.results import Result
-from rbxcompose.missions.program.statuses import FAILURE, IDLE, RUNNING, SUCCESS
+from rbxcompose.missions.program.statuses import FAILURE, IDLE, RUNNING, SUCCESS, Result
 
 STOPPED = "it was stopped, and may not be started again"
 

@@ -6,15 +6,15 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from rbxcompose.expressions.values import NOT_ARRIVED, Value, is_number
+from rbxcompose.base.expressions.values import NOT_ARRIVED, Value, is_number
+from rbxcompose.base.units import MOST
 from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.events import MissionEvent
 from rbxcompose.missions.engine.logbook import BEGIN, INPUTS, LogRecord, record_of
 from rbxcompose.missions.engine.snapshot import NoValue, from_plain
 from rbxcompose.missions.engine.world import PLAIN, Settings
 from rbxcompose.missions.program.program import Program, RobotNames
-from rbxcompose.missions.program.results import Result
-from rbxcompose.units import MOST
+from rbxcompose.missions.program.statuses import Result
 
 MOST_WORK = 600_000  # nodes that are started or continued, in all runs of a log: enough for all that a robot keeps
 _WORK_TO_BUILD = 5  # for one node
@@ -199,7 +199,7 @@ def _read(record: object) -> LoggedCall:
     if type(at) not in (float, int) or not abs(at) < MOST:
         raise _WrongRecordError("'time' is not a time in seconds")
     if what == BEGIN:
-        inputs = {name: from_plain(one) for name, one in _map(entries.get("inputs"), "'inputs'").items()}
+        inputs = {name: from_plain(entry) for name, entry in _map(entries.get("inputs"), "'inputs'").items()}
         return LoggedCall(what, float(at), inputs=inputs, settings=_settings(entries))
     if what not in INPUTS or not ("read" in entries or "results" in entries):
         return LoggedCall(what, float(at))

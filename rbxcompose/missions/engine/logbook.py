@@ -12,11 +12,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import fields
 from typing import Any, TypeVar
 
-from rbxcompose.expressions.values import NotArrived, Value
+from rbxcompose.base.expressions.values import NotArrived, Value
 from rbxcompose.missions.engine.events import MissionEvent
 from rbxcompose.missions.engine.snapshot import to_plain
 from rbxcompose.missions.engine.world import Settings, World
-from rbxcompose.missions.program.results import Result
+from rbxcompose.missions.program.statuses import Result
 
 BEGIN, TICK, PAUSE, RESUME, ABORT = "begin", "tick", "pause", "resume", "abort"
 INPUTS = frozenset({BEGIN, TICK, PAUSE, RESUME, ABORT})
@@ -30,7 +30,7 @@ _CAPITAL = re.compile(r"(?<!^)(?=[A-Z])")
 def record_of(event: MissionEvent) -> LogRecord:
     """Return an event as a record: `SkillStarted` becomes `skill_started`."""
     name = _CAPITAL.sub("_", type(event).__name__).lower()
-    return {"event": name, **{one.name: to_plain(getattr(event, one.name)) for one in fields(event)}}
+    return {"event": name, **{field.name: to_plain(getattr(event, field.name)) for field in fields(event)}}
 
 
 class LoggedWorld:

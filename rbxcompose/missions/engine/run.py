@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
-from rbxcompose.expressions.values import NOT_ARRIVED, Value
+from rbxcompose.base.expressions.tree import new_names
+from rbxcompose.base.expressions.types import FLAG
+from rbxcompose.base.expressions.values import NOT_ARRIVED, Value
 from rbxcompose.missions.engine.course import Course, Reaction
-from rbxcompose.missions.engine.engine_base import EngineBase
+from rbxcompose.missions.engine.engine_base import EngineBase, RunBase
 from rbxcompose.missions.engine.events import InterruptEnded, InterruptStarted, Reported
 from rbxcompose.missions.engine.resume_points import DEEP
-from rbxcompose.missions.engine.run_base import RunBase
-from rbxcompose.missions.engine.since import since_scope
-from rbxcompose.missions.program.history import WithHistory
+from rbxcompose.missions.engine.scopes import MissionScope, SinceScope
+from rbxcompose.missions.language.asked import Asked
+from rbxcompose.missions.program.in_turn import WithHistory
 from rbxcompose.missions.program.program import CONTINUE, END, Program, RobotNames, Target
-from rbxcompose.missions.program.results import words
-from rbxcompose.missions.program.statuses import FAILURE, RUNNING, SUCCESS
+from rbxcompose.missions.program.statuses import FAILURE, RUNNING, SUCCESS, words
+
+
+def since_scope(outer: MissionScope, asked: Sequence[Asked], robot: RobotNames, program: Program) -> SinceScope:
+    """Return the scope of what asks for these; a flag that is an event is false until it comes."""
+    names = frozenset[str]().union(*(new_names(item.expression) for item in asked))
+    read = {name.name for item in asked if item.is_watched for name in item.expression.names}
+    events = (read & robot.events) - {*program.data, *program.inputs}
+    return SinceScope(outer, names, {name: False if robot.values[name] == FLAG else NOT_ARRIVED for name in events})
+
 
 STILL_HOLDS = "its condition still holds after its reaction; it can act again once that has been false"
 
@@ -30,8 +40,8 @@ class Run(RunBase):
         self.failed: Course | None = None  # the one that made it fail
         self.mission = Course(len(program.interrupts))
         self.reactions = [
-            Reaction(order, one, since_scope(self.scope, (one.when,), robot, program))
-            for order, one in enumerate(program.interrupts)
+            Reaction(order, interrupt, since_scope(self.scope, (interrupt.when,), robot, program))
+            for order, interrupt in enumerate(program.interrupts)
         ]
         self.stack: list[Course] = [self.mission]  # suspended courses, with the running one on top
         self.returns: list[tuple[int, ...]] = []  # the leaves that each reaction of the stack halted
@@ -114,7 +124,11 @@ class Run(RunBase):
     def _cut(self, reaction: Reaction, now: float) -> None:
         reaction.is_armed = False
         condition, world = reaction.watched.condition, self.engine.world
-        robot_values = {one.name: world.value(one.name) for one in condition.names if self._is_robots(one.name)}
+        robot_values = {
+            reference.name: world.value(reference.name)
+            for reference in condition.names
+            if self._is_robots(reference.name)
+        }
         shown = {name: self.show(name, value) for name, value in robot_values.items()}
         self.engine.say(InterruptStarted(reaction.name, condition.text, shown))
         reaction.scope.mark()
@@ -143,7 +157,10 @@ class Run(RunBase):
                 afterwards = CONTINUE
         else:
             self.halt()
-            for root in (self.program.main, *(one.root for one in self.program.interrupts if one.root is not None)):
+            for root in (
+                self.program.main,
+                *(interrupt.root for interrupt in self.program.interrupts if interrupt.root is not None),
+            ):
                 self.engine.places.forget(root, self.engine.program.nodes[root].end)
             self.begin(dict(self.inputs))
             reaction.is_armed = False

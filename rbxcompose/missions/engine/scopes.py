@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Protocol
 
-from rbxcompose.config import Place
-from rbxcompose.expressions.values import NotArrived, Value
+from rbxcompose.base.config import Place
+from rbxcompose.base.expressions.values import NotArrived, Value
 
 
 class RobotValues(Protocol):

@@ -11,16 +11,16 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
-from rbxcompose.config import Place
-from rbxcompose.expressions.values import MOST_LEVELS, NOT_ARRIVED, NotArrived, Value
-from rbxcompose.geometry import Pose2
+from rbxcompose.base.config import Place
+from rbxcompose.base.expressions.values import MOST_LEVELS, NOT_ARRIVED, NotArrived, Value
+from rbxcompose.base.geometry import Pose2
+from rbxcompose.base.printable import plain as plain_text
 from rbxcompose.missions.analysis.held_nodes import HeldNode
 from rbxcompose.missions.engine.course import Course
 from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.run import Run
 from rbxcompose.missions.engine.task import Task
-from rbxcompose.missions.program.results import Result
-from rbxcompose.printable import plain as plain_text
+from rbxcompose.missions.program.statuses import Result
 
 VERSION = 2
 _CLASSES: Mapping[str, type[Any]] = {cls.__name__: cls for cls in (Place, Pose2, HeldNode, Result)}
@@ -118,7 +118,7 @@ def _run(run: Run) -> dict[str, Any]:
         "stack": [courses.index(course) for course in run.stack],
         "returns": [list(leaves) for leaves in run.returns],
         "courses": [[course.current is not None, *(getattr(course, name) for name in _COURSE)] for course in courses],
-        "reactions": [[one.is_armed, one.trouble, dict(one.scope.seen)] for one in run.reactions],
+        "reactions": [[reaction.is_armed, reaction.trouble, dict(reaction.scope.seen)] for reaction in run.reactions],
     }
 
 

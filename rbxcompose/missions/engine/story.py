@@ -6,8 +6,9 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import assert_never
 
-from rbxcompose.expressions.values import Value, is_named_pose
-from rbxcompose.levels import Level
+from rbxcompose.base.expressions.values import Value, is_named_pose
+from rbxcompose.base.levels import Level
+from rbxcompose.base.units import format_number
 from rbxcompose.missions.engine.events import (
     BranchEnded,
     InterruptEnded,
@@ -25,7 +26,6 @@ from rbxcompose.missions.engine.events import (
 )
 from rbxcompose.missions.engine.value_text import show
 from rbxcompose.missions.program.program import RESTART, Skill
-from rbxcompose.units import format_number
 
 LEVELS = {"info": Level.OK, "warn": Level.WARN, "error": Level.ERROR}
 RESULTS = {"success": Level.OK, "halted": Level.OK, "failure": Level.WARN}

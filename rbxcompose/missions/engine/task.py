@@ -5,17 +5,15 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import ClassVar
 
-from rbxcompose.dataclass import dataclass
-from rbxcompose.expressions.evaluate import evaluate
-from rbxcompose.expressions.tree import Expression
-from rbxcompose.expressions.values import Value
-from rbxcompose.missions.engine.engine_base import EngineBase
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.expressions.evaluate import evaluate
+from rbxcompose.base.expressions.tree import Expression
+from rbxcompose.base.expressions.values import Value
+from rbxcompose.missions.engine.engine_base import EngineBase, RunBase
 from rbxcompose.missions.engine.events import Reported
-from rbxcompose.missions.engine.run_base import RunBase
 from rbxcompose.missions.engine.scopes import ItemScope, MissionScope
 from rbxcompose.missions.program.program import MissionNode, Target
-from rbxcompose.missions.program.results import NodeFailed, words
-from rbxcompose.missions.program.statuses import FAILURE, IDLE, RUNNING
+from rbxcompose.missions.program.statuses import FAILURE, IDLE, RUNNING, NodeFailed, words
 
 
 @dataclass(frozen=True, slots=True)

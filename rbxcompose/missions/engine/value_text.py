@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping
 
-from rbxcompose.expressions.text import show_value
-from rbxcompose.expressions.types import UNKNOWN, Type
-from rbxcompose.expressions.values import Value, is_number
-from rbxcompose.units import format_number, format_quantity
+from rbxcompose.base.expressions.text import show_value
+from rbxcompose.base.expressions.types import UNKNOWN, Type
+from rbxcompose.base.expressions.values import Value, is_number
+from rbxcompose.base.units import format_number, format_quantity
 
 DIGITS = 3  # that people want to read of something measured
 
@@ -27,9 +27,9 @@ def spoken(value: Value, places: Collection[str]) -> Value:
         case str():
             return value.replace("_", " ") if value in places else value
         case list() | tuple():
-            return [spoken(one, places) for one in value]
+            return [spoken(item, places) for item in value]
         case Mapping():
-            return {str(spoken(name, places)): spoken(one, places) for name, one in value.items()}
+            return {str(spoken(name, places)): spoken(entry, places) for name, entry in value.items()}
     return value
 
 

@@ -1,4 +1,4 @@
-"""What an engine needs from outside, and how it is run."""
+"""What an engine needs from outside, and the conditions that something waits for."""
 
 from __future__ import annotations
 
@@ -6,10 +6,30 @@ from collections.abc import Mapping
 from dataclasses import field
 from typing import Protocol
 
-from rbxcompose.dataclass import dataclass
-from rbxcompose.expressions.values import Value
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.expressions.tree import Expression
+from rbxcompose.base.expressions.values import Value
 from rbxcompose.missions.engine.events import MissionEvent
 from rbxcompose.missions.engine.scopes import RobotValues
+
+POSE = "pose"  # `$pose` changes all the time without a message
+_UNANNOUNCED = frozenset({"age", "distance"})
+
+
+@dataclass(frozen=True, slots=True)
+class Watched:
+    """A condition, the `$names` that it reads, and whether it may change without a message."""
+
+    condition: Expression
+    names: frozenset[str]
+    is_polled: bool
+
+    @classmethod
+    def of(cls, condition: Expression) -> Watched:
+        """Return a condition with its dependencies."""
+        names = frozenset(reference.name for reference in condition.names)
+        calls = {reference.name for reference in condition.calls}
+        return cls(condition, names, POSE in names or bool(calls & _UNANNOUNCED))
 
 
 class World(RobotValues, Protocol):

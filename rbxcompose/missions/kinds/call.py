@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from rbxcompose.dataclass import dataclass
+from rbxcompose.base.dataclass import dataclass
 from rbxcompose.missions.engine.instant_actions import fields_of
 from rbxcompose.missions.engine.leaf import Leaf
 from rbxcompose.missions.engine.task import Site
 from rbxcompose.missions.language.fields import contents, message
+from rbxcompose.missions.program.answers import NodeEffects
 from rbxcompose.missions.program.families import LeafStep, ends
-from rbxcompose.missions.program.messages import MessageTemplate
-from rbxcompose.missions.program.moments import NodeEffects
+from rbxcompose.missions.program.machines import MessageTemplate
 from rbxcompose.missions.program.outcomes import ANY
 from rbxcompose.missions.program.program import MissionNode
 from rbxcompose.missions.program.registry import kind

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from rbxcompose.dataclass import dataclass
-from rbxcompose.expressions.evaluate import evaluate
-from rbxcompose.expressions.tree import Expression
-from rbxcompose.expressions.values import is_same
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.expressions.evaluate import evaluate
+from rbxcompose.base.expressions.tree import Expression
+from rbxcompose.base.expressions.values import is_same
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.asked import Asked
 from rbxcompose.missions.language.fields import cases, child, value

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from rbxcompose.dataclass import dataclass
-from rbxcompose.expressions.text import Template
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.expressions.text import Template
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.fields import choice, text
 from rbxcompose.missions.program.families import Deed, ends

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rbxcompose.missions.program.answers import NodeFlow
+from rbxcompose.missions.program.answers import NodeFlow, NodeLook, Possibility, started
 from rbxcompose.missions.program.in_turn import RANDOM, InTurn, InTurnTask
-from rbxcompose.missions.program.look import NodeLook
 from rbxcompose.missions.program.outcomes import FAILS, SUCCEEDS
-from rbxcompose.missions.program.possible import Possibility, started
 from rbxcompose.missions.program.program import MissionNode, RobotNames
 from rbxcompose.missions.program.registry import kind
 from rbxcompose.missions.program.statuses import SUCCESS

@@ -5,27 +5,24 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from rbxcompose.dataclass import dataclass
-from rbxcompose.expressions.check import StaticScope, check
-from rbxcompose.expressions.evaluate import evaluate
-from rbxcompose.expressions.tree import Expression, FieldAccess, Index, Variable
-from rbxcompose.expressions.types import TEXT, UNKNOWN, Type, TypeKind
-from rbxcompose.expressions.values import NOT_ARRIVED, Located, NotArrivedError, Value, is_located
-from rbxcompose.missions.engine.condition_watches import POSE
-from rbxcompose.missions.engine.data_edits import without
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.expressions.check import StaticScope, check
+from rbxcompose.base.expressions.evaluate import evaluate
+from rbxcompose.base.expressions.tree import Expression, FieldAccess, Index, Variable
+from rbxcompose.base.expressions.types import TEXT, UNKNOWN, Type, TypeKind
+from rbxcompose.base.expressions.values import NOT_ARRIVED, Located, NotArrivedError, Value, is_located
+from rbxcompose.missions.engine.instant_actions import without
 from rbxcompose.missions.engine.scopes import ItemScope
 from rbxcompose.missions.engine.task import Site, Task
+from rbxcompose.missions.engine.world import POSE
 from rbxcompose.missions.language.fields import child, choice, flag, item_name, items
-from rbxcompose.missions.program.answers import NodeFlow
+from rbxcompose.missions.program.answers import NO_EFFECTS, NodeEffects, NodeFlow, NodeLook
 from rbxcompose.missions.program.families import Loop
-from rbxcompose.missions.program.look import NodeLook
-from rbxcompose.missions.program.moments import NO_EFFECTS, NodeEffects
 from rbxcompose.missions.program.outcomes import ANY as ANYHOW
 from rbxcompose.missions.program.outcomes import Outcomes
 from rbxcompose.missions.program.program import NOTHING, Endings, MissionNode, Target
 from rbxcompose.missions.program.registry import kind
-from rbxcompose.missions.program.results import NodeFailed
-from rbxcompose.missions.program.statuses import FAILURE, RUNNING, SKIPPED, SUCCESS
+from rbxcompose.missions.program.statuses import FAILURE, RUNNING, SKIPPED, SUCCESS, NodeFailed
 
 WRITTEN, RANDOM, NEAREST = "written", "random", "nearest"
 STOP, NEXT = "stop", "next"

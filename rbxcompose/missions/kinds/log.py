@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from rbxcompose.dataclass import dataclass
-from rbxcompose.expressions.text import Template
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.expressions.text import Template
 from rbxcompose.missions.analysis.facts import is_sure
 from rbxcompose.missions.engine.events import Logged
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.fields import choice, text
+from rbxcompose.missions.program.answers import LEVELS
 from rbxcompose.missions.program.families import Deed
-from rbxcompose.missions.program.moments import LEVELS
 from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, ANY, Outcomes
 from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.registry import kind

@@ -6,25 +6,22 @@ from collections.abc import Iterator
 from dataclasses import field
 from typing import Self
 
-from rbxcompose.dataclass import dataclass
-from rbxcompose.expressions.values import Value
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.expressions.values import Value
 from rbxcompose.missions.engine.events import Transition
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.fields import kept
 from rbxcompose.missions.language.grammar import Takes
 from rbxcompose.missions.language.machine_reader import read_machine, read_state
 from rbxcompose.missions.language.node_reader import NodeReader
-from rbxcompose.missions.program.answers import Advice, NodeFlow, Skipped
+from rbxcompose.missions.program.answers import Advice, Form, NodeFlow, NodeLook, Possibility, Skipped, led
 from rbxcompose.missions.program.families import Loop, Straight
-from rbxcompose.missions.program.history import WithHistory
-from rbxcompose.missions.program.look import Form, NodeLook
+from rbxcompose.missions.program.in_turn import WithHistory
 from rbxcompose.missions.program.machines import ENDS, FAILED, FINISHED, STATE, MachineStates, Next
 from rbxcompose.missions.program.outcomes import ANY, Outcomes
-from rbxcompose.missions.program.possible import Possibility, led
 from rbxcompose.missions.program.program import Endings, MissionNode, RobotNames
 from rbxcompose.missions.program.registry import kind
-from rbxcompose.missions.program.results import NodeFailed
-from rbxcompose.missions.program.statuses import FAILURE, NAMES, RUNNING, SKIPPED, SUCCESS
+from rbxcompose.missions.program.statuses import FAILURE, NAMES, RUNNING, SKIPPED, SUCCESS, NodeFailed
 
 
 class MachineTask(WithHistory):
@@ -125,7 +122,7 @@ class MachineStep(Loop):
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return the ends that its states lead to."""
         leads = (endings.program.nodes[child].step.leads_to for child in node.children)
-        reached = {to for one in leads if one for to in one.to.values()}
+        reached = {to for lead in leads if lead for to in lead.to.values()}
         named = {end: counts for end, counts in self.states.ends.items() if end in reached and end not in ENDS}
         return Outcomes(FINISHED in reached, FAILED in reached, named)
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from rbxcompose.dataclass import dataclass
-from rbxcompose.expressions.evaluate import holds
-from rbxcompose.expressions.tree import Expression
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.expressions.evaluate import holds
+from rbxcompose.base.expressions.tree import Expression
 from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.fields import branch, branches, count, flag, kept
 from rbxcompose.missions.language.grammar import Takes
-from rbxcompose.missions.program.answers import NodeFlow, Skipped
+from rbxcompose.missions.program.answers import Form, NodeFlow, NodeLook, Skipped
 from rbxcompose.missions.program.branches import (
     ALL,
     ANY,
@@ -20,12 +20,10 @@ from rbxcompose.missions.program.branches import (
     read_outcomes,
 )
 from rbxcompose.missions.program.families import Straight
-from rbxcompose.missions.program.look import Form, NodeLook
 from rbxcompose.missions.program.outcomes import FAILS, SUCCEEDS, Outcomes, either
 from rbxcompose.missions.program.program import Endings, MissionNode, Target
 from rbxcompose.missions.program.registry import kind
-from rbxcompose.missions.program.results import NodeFailed
-from rbxcompose.missions.program.statuses import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS
+from rbxcompose.missions.program.statuses import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, NodeFailed
 
 PLAIN = {SUCCEEDS: SUCCEEDS, FAILS: FAILS}
 
@@ -195,13 +193,13 @@ class ParallelStep(Straight):
     @property
     def reads(self) -> frozenset[str]:
         """Return all `$names` that its outcomes read beside its branches."""
-        conditions = (one.condition for one in self.outcomes if one.condition)
-        return frozenset(name.name for one in conditions for name in one.names).difference(self.names)
+        conditions = (outcome.condition for outcome in self.outcomes if outcome.condition)
+        return frozenset(name.name for condition in conditions for name in condition.names).difference(self.names)
 
     def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
         """Return the outcomes by conditions, else those of the `ends_with` branch, else the plain ones."""
         branches = self.branches
         if branches.outcomes:
-            return Outcomes(False, False, {one.name: PLAIN.get(one.name, "") for one in branches.outcomes})
+            return Outcomes(False, False, {outcome.name: PLAIN.get(outcome.name, "") for outcome in branches.outcomes})
         deciding = either(map(endings.of, branches.deciding(node.children)))
         return deciding if branches.ends_with in branches.names else deciding.plain

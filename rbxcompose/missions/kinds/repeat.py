@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 
-from rbxcompose.dataclass import dataclass
-from rbxcompose.expressions.evaluate import holds
-from rbxcompose.expressions.tree import Expression, Number
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.expressions.evaluate import holds
+from rbxcompose.base.expressions.tree import Expression, Number
 from rbxcompose.missions.analysis.facts import is_simple, takes_time
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.fields import child, count_or_forever, duration, watched
-from rbxcompose.missions.program.answers import Advice, NodeFlow
+from rbxcompose.missions.program.answers import Advice, NodeFlow, NodeLook
 from rbxcompose.missions.program.families import Loop
-from rbxcompose.missions.program.look import NodeLook
 from rbxcompose.missions.program.outcomes import ANY, Outcomes
 from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.registry import kind
@@ -120,7 +119,9 @@ class RepeatStep(Loop):
         """Return whether the number of rounds and their period are literals, and `until` can always be evaluated."""
         if not any(asked.expression.names for asked in node.asked):
             return True
-        return is_simple(node) and all(one is None or isinstance(one.tree, Number) for one in (self.rounds, self.every))
+        return is_simple(node) and all(
+            expression is None or isinstance(expression.tree, Number) for expression in (self.rounds, self.every)
+        )
 
     def endless(self, ends: Outcomes) -> Advice | None:
         """Return advice on an endless loop."""

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from rbxcompose.dataclass import dataclass
-from rbxcompose.expressions.evaluate import evaluate
-from rbxcompose.expressions.tree import Expression
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.expressions.evaluate import evaluate
+from rbxcompose.base.expressions.tree import Expression
 from rbxcompose.missions.analysis.held_nodes import HeldNode
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.fields import value
-from rbxcompose.missions.program.answers import NodeFlow, Skipped
+from rbxcompose.missions.program.answers import PLAIN, NodeFlow, Skipped
 from rbxcompose.missions.program.families import Straight
-from rbxcompose.missions.program.look import PLAIN
 from rbxcompose.missions.program.outcomes import ALWAYS_FAILS, ANY, Outcomes, either
 from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.registry import kind
-from rbxcompose.missions.program.results import NodeFailed
+from rbxcompose.missions.program.statuses import NodeFailed
 
 
 class RunTask(Task):

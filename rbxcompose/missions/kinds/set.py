@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from rbxcompose.dataclass import dataclass
+from rbxcompose.base.dataclass import dataclass
 from rbxcompose.missions.analysis.facts import is_sure
 from rbxcompose.missions.engine.instant_actions import assign
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.asked import Assignment
 from rbxcompose.missions.language.fields import assignments
+from rbxcompose.missions.program.answers import NodeEffects
 from rbxcompose.missions.program.families import Deed
-from rbxcompose.missions.program.moments import NodeEffects
 from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, ANY, Outcomes
 from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.registry import kind
@@ -54,7 +54,7 @@ class SetStep(Deed):
 
     def text(self, node: MissionNode) -> str:
         """Return the assignments as text."""
-        return ", ".join(f"{one.name} = {one.asked.scalar.text}" for one in self.assignments)
+        return ", ".join(f"{assignment.name} = {assignment.asked.scalar.text}" for assignment in self.assignments)
 
     @property
     def effects(self) -> NodeEffects:

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from rbxcompose.dataclass import dataclass
-from rbxcompose.expressions.types import Type, TypeKind
-from rbxcompose.expressions.values import Value
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.expressions.types import Type, TypeKind
+from rbxcompose.base.expressions.values import Value
 from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.engine.leaf import Leaf
 from rbxcompose.missions.engine.task import Site
 from rbxcompose.missions.language.asked import WrittenArgument
 from rbxcompose.missions.language.fields import new_name, record, value, word
 from rbxcompose.missions.language.written import getter
+from rbxcompose.missions.program.answers import NodeEffects, WrittenSetting
 from rbxcompose.missions.program.families import LeafStep, ends
-from rbxcompose.missions.program.moments import NodeEffects, WrittenSetting
 from rbxcompose.missions.program.outcomes import ANY
 from rbxcompose.missions.program.program import MissionNode
 from rbxcompose.missions.program.registry import kind

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import field
 from typing import Self
 
-from rbxcompose.dataclass import dataclass
-from rbxcompose.expressions.values import Value
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.expressions.values import Value
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions.engine.events import Reported, SkillEnded, SkillStarted
 from rbxcompose.missions.engine.leaf import Leaf
@@ -15,13 +15,12 @@ from rbxcompose.missions.engine.task import Site
 from rbxcompose.missions.language.asked import WrittenArgument
 from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.language.written import Getter, getter
+from rbxcompose.missions.program.answers import Possibility, ended
 from rbxcompose.missions.program.families import LeafStep
 from rbxcompose.missions.program.outcomes import ANY, FAILS, SUCCEEDS, Outcomes
-from rbxcompose.missions.program.possible import Possibility, ended
 from rbxcompose.missions.program.program import Endings, MissionNode, RobotNames
 from rbxcompose.missions.program.registry import SKILL, kind
-from rbxcompose.missions.program.results import Result
-from rbxcompose.missions.program.statuses import FAILURE, NAMES, RUNNING, SUCCESS
+from rbxcompose.missions.program.statuses import FAILURE, NAMES, RUNNING, SUCCESS, Result
 
 
 class SkillTask(Leaf):
@@ -87,7 +86,7 @@ class SkillTask(Leaf):
 
     def _starts_over(self) -> bool:
         nodes = self.engine.program.nodes
-        return any(one.number <= self.number < nodes[one.number].end for one in self.engine.restarting)
+        return any(target.number <= self.number < nodes[target.number].end for target in self.engine.restarting)
 
     def stop(self) -> None:
         """Stop the skill in the world."""
@@ -138,7 +137,7 @@ class SkillStep(LeafStep):
 
     def text(self, node: MissionNode) -> str:
         """Return its arguments."""
-        return ", ".join(f"{one.name} {_written(one.value)}".strip() for one in self.arguments)
+        return ", ".join(f"{argument.name} {_written(argument.value)}".strip() for argument in self.arguments)
 
 
 def _written(value: TreeNode) -> str:

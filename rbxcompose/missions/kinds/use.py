@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from rbxcompose.dataclass import dataclass
-from rbxcompose.expressions.evaluate import evaluate
-from rbxcompose.expressions.values import NotArrivedError, Value
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.expressions.evaluate import evaluate
+from rbxcompose.base.expressions.values import NotArrivedError, Value
 from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.engine.resume_points import LAST
 from rbxcompose.missions.engine.task import Site
 from rbxcompose.missions.language.asked import WrittenArgument
 from rbxcompose.missions.language.fields import history, inputs, word
 from rbxcompose.missions.language.written import PLACED, getter, place
-from rbxcompose.missions.program.answers import NodeFlow, Skipped
+from rbxcompose.missions.program.answers import NodeFlow, NodeLook, Skipped
 from rbxcompose.missions.program.families import Straight
-from rbxcompose.missions.program.history import WithHistory
-from rbxcompose.missions.program.look import NodeLook
+from rbxcompose.missions.program.in_turn import WithHistory
 from rbxcompose.missions.program.outcomes import Outcomes
 from rbxcompose.missions.program.program import Endings, MissionNode, Target
 from rbxcompose.missions.program.registry import kind
@@ -35,7 +34,9 @@ class UseTask(WithHistory):
         self.history = step.history
         self.outputs: dict[str, Value] = {}
         inputs = self.inner.program.inputs
-        self.getters = {one.name: getter(one.value, inputs[one.name].type) for one in step.arguments}
+        self.getters = {
+            argument.name: getter(argument.value, inputs[argument.name].type) for argument in step.arguments
+        }
 
     def begin(self) -> int:
         """Start the mission; with a deep history, restore its data and continue where it was."""

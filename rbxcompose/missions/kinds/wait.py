@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from rbxcompose.dataclass import dataclass
-from rbxcompose.expressions.tree import Expression, Number
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.expressions.tree import Expression, Number
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.fields import duration
 from rbxcompose.missions.program.families import LeafStep

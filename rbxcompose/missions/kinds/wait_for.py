@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from rbxcompose.dataclass import dataclass
-from rbxcompose.expressions.evaluate import holds
-from rbxcompose.expressions.tree import Expression
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.expressions.evaluate import holds
+from rbxcompose.base.expressions.tree import Expression
 from rbxcompose.missions.analysis.facts import is_simple
-from rbxcompose.missions.engine.condition_watches import Watched
 from rbxcompose.missions.engine.task import Site, Task
+from rbxcompose.missions.engine.world import Watched
 from rbxcompose.missions.language.fields import watched
 from rbxcompose.missions.program.families import LeafStep
 from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, ANY, Outcomes

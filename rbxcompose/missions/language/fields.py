@@ -6,8 +6,8 @@ import dataclasses
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, Self
 
-from rbxcompose.dataclass import dataclass
-from rbxcompose.expressions.types import COUNT, UNKNOWN
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.expressions.types import COUNT, UNKNOWN
 from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.engine.resume_points import HISTORIES
 from rbxcompose.missions.language.grammar import KeySlot, Takes
@@ -72,13 +72,13 @@ class Declared:
     def bind(cls, name: str) -> None:
         """Give the class its word."""
         word = dataclasses.replace
-        named = [word(one, key=name, help=first_line(cls.__doc__)) for one in cls.declared[:1]]
-        cls.name, cls.fields = name, {one.key: one for one in (*named, *cls.declared[1:])}
+        named = [word(field, key=name, help=first_line(cls.__doc__)) for field in cls.declared[:1]]
+        cls.name, cls.fields = name, {field.key: field for field in (*named, *cls.declared[1:])}
 
     @classmethod
     def options(cls) -> list[Field]:
         """Return its fields besides the word."""
-        return [one for one in cls.fields.values() if one.key != cls.name]
+        return [field for field in cls.fields.values() if field.key != cls.name]
 
     @classmethod
     def read(cls, reader: NodeReader) -> Self:
@@ -89,16 +89,16 @@ class Declared:
     @classmethod
     def values(cls, reader: NodeReader) -> dict[str, Any]:
         """Read its fields, and return what is kept by attribute."""
-        values = [(one.attribute, one.value(reader)) for one in cls.fields.values()]
+        values = [(field.attribute, field.value(reader)) for field in cls.fields.values()]
         return {name: value for name, value in values if name}
 
     @property
     def numbers(self) -> tuple[Counted, ...]:
         """Return its numbers, each with the least value that makes sense."""
         return tuple(
-            Counted(one.counted or f"'{one.key}'", getattr(self, one.attribute), one.least)
-            for one in self.fields.values()
-            if one.least is not None
+            Counted(field.counted or f"'{field.key}'", getattr(self, field.attribute), field.least)
+            for field in self.fields.values()
+            if field.least is not None
         )
 
 
@@ -210,10 +210,10 @@ def new_name(what: str, help: str = "") -> Any:
 
 def record(what: str, **keys: Any) -> Any:
     """Declare a map with these keys, each of which must be there; their scalars are kept in a tuple."""
-    inner = {key: dataclasses.replace(one.metadata[_FIELD], key=key) for key, one in keys.items()}
+    inner = {key: dataclasses.replace(topic.metadata[_FIELD], key=key) for key, topic in keys.items()}
 
     def read(reader: NodeReader, key: str) -> tuple[ScalarNode, ...]:
-        return reader.record(key, what, {name: one.words for name, one in inner.items()})
+        return reader.record(key, what, {name: entry.words for name, entry in inner.items()})
 
     return kept(Takes.RECORD, read, what, keys=inner)
 

@@ -6,8 +6,8 @@ from collections.abc import Collection, Mapping
 from enum import StrEnum
 from typing import NamedTuple
 
-from rbxcompose.dataclass import dataclass
-from rbxcompose.findings import Span
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.findings import Span
 from rbxcompose.manifest.tree import BROKEN, Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 
 LEVELS = 40  # of nested steps

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from rbxcompose.expressions.types import TYPES, UNKNOWN, Type, choice_of
-from rbxcompose.findings import Report
+from rbxcompose.base.expressions.types import TYPES, UNKNOWN, Type, choice_of
+from rbxcompose.base.findings import Report
 from rbxcompose.manifest.arguments import CHOICE, unknown_type
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions import codes
 from rbxcompose.missions.engine.value_text import show
 from rbxcompose.missions.language.literals import WrongValue, literal, typed
 from rbxcompose.missions.language.names import NAME, no_name
-from rbxcompose.missions.program.data import Datum, Input
+from rbxcompose.missions.program.machines import Datum, Input
 from rbxcompose.missions.program.program import RATE
 from rbxcompose.missions.program.registry import kinds
 

@@ -1,7 +1,8 @@
-"""Finds the key that says what a step is: the word of a kind, or the name of a skill."""
+"""The key that says what a step is: the word of a kind, the name of a skill, or what other languages call it."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
 
 from rbxcompose.manifest.tree import MappingNode, ScalarNode
@@ -10,6 +11,29 @@ from rbxcompose.missions.language.grammar import BELOW, Takes, is_told
 from rbxcompose.missions.language.value_reader import Nodes
 from rbxcompose.missions.modifiers.registry import modifier_keys
 from rbxcompose.missions.program.registry import StepType, kinds
+
+_OURS = {
+    "fallback": "selector sel priority_selector",
+    "sequence": "seq steps sequential",
+    "parallel": "par simultaneously together concurrently",
+    "repeat": "loop",
+    "for": "foreach for_each",
+    "wait": "sleep delay pause",
+    "choose": "switch match case",
+    "log": "print echo",
+    "use": "subtree sub_tree submission include",
+    "run": "exec script",
+    "end": "return stop exit abort terminate",
+    "wait_for": "wait_until await wait_template wait_for_trigger",
+}
+FOREIGN: Mapping[str, str] = {name: ours for ours, names in _OURS.items() for name in names.split()}
+"""Our word for each of another mission language or of a behaviour tree."""
+
+OUTCOMES: Mapping[str, str] = {
+    **dict.fromkeys(("succeeded", "succeed", "succeeds", "done", "ok", "true"), "success"),
+    **dict.fromkeys(("aborted", "failed", "fail", "fails", "error", "preempted", "canceled", "false"), "failure"),
+}
+"""Our outcome for each of other mission languages."""
 
 
 @cache
@@ -23,7 +47,9 @@ def keys_taking(*taken: Takes) -> frozenset[str]:
     """Return the keys of steps, states, machines and interrupts that take one of these."""
     of_kinds = (field for kind in kinds().values() for field in kind.fields.values())
     below = ((key, slot.takes) for slots in BELOW.values() for key, slot in slots.items())
-    return frozenset(key for key, takes in (*below, *((one.key, one.takes) for one in of_kinds)) if takes in taken)
+    return frozenset(
+        key for key, takes in (*below, *((field.key, field.takes) for field in of_kinds)) if takes in taken
+    )
 
 
 def _cure(step: MappingNode) -> str:

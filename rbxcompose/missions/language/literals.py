@@ -1,26 +1,36 @@
-"""Literal values in a manifest: of any type (data) and of a declared type (inputs)."""
+"""Literal values in a manifest, and whether the value of a typed argument or input can be of that type."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
-from rbxcompose.expressions.types import (
-    COUNT,
-    FLAG,
-    TEXT,
-    UNKNOWN,
-    Type,
-    TypeKind,
-    list_of,
-    map_of,
-    quantity_of,
-)
-from rbxcompose.expressions.values import Value
-from rbxcompose.findings import DID_YOU_MEAN, surely_meant
+from rbxcompose.base.expressions.text import TextSlot, parse_template, refuse_foreign
+from rbxcompose.base.expressions.tree import ExpressionError
+from rbxcompose.base.expressions.types import COUNT, FLAG, TEXT, UNKNOWN, Type, TypeKind, list_of, map_of, quantity_of
+from rbxcompose.base.expressions.values import Value
+from rbxcompose.base.findings import DID_YOU_MEAN, Finding, FindingKind, surely_meant
+from rbxcompose.base.units import NUMBER, Quantity, UnitError, parse_quantity, to_si
 from rbxcompose.manifest.scalars import describe, plain_value
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, TreeNode
-from rbxcompose.missions.program.data import Datum
-from rbxcompose.units import NUMBER, Quantity, UnitError, parse_quantity, to_si
+from rbxcompose.missions import codes
+from rbxcompose.missions.analysis.scope_types import View
+from rbxcompose.missions.language.asked import expression_of, inner_span
+from rbxcompose.missions.program.machines import Datum
+
+
+def check_written(view: View, scalar: ScalarNode, wanted: Type, kind: FindingKind) -> Iterator[Finding]:
+    """Yield the findings on a value that must have a type; a wrong type is a finding of the given kind."""
+    try:
+        if wanted.kind is not TypeKind.TEXT:
+            yield from view.typed(expression_of(scalar), wanted, scalar, kind)
+            return
+        refuse_foreign(scalar.text)
+        for slot in parse_template(scalar.text).parts:
+            if isinstance(slot, TextSlot):
+                part = ScalarNode(slot.value.text, inner_span(scalar, slot.start, slot.end))
+                yield from view.typed(slot.value, UNKNOWN, part, kind)
+    except ExpressionError as error:
+        yield codes.NO_EXPRESSION.at(inner_span(scalar, error.start, error.end), error.message, help=error.help)
 
 
 class WrongValue(ValueError):  # noqa: N818 - a user's mistake, told apart from errors of ours
@@ -38,10 +48,12 @@ def literal(node: TreeNode) -> Datum:
     match node:
         case MappingNode(entries=entries):
             values = {name: literal(entry.value) for name, entry in entries.items()}
-            return Datum({name: one.value for name, one in values.items()}, map_of(_common(values.values())), node.span)
+            return Datum(
+                {name: datum.value for name, datum in values.items()}, map_of(_common(values.values())), node.span
+            )
         case SequenceNode(items=items):
             read = [literal(item) for item in items]
-            return Datum([one.value for one in read], list_of(_common(read)), node.span)
+            return Datum([datum.value for datum in read], list_of(_common(read)), node.span)
         case ScalarNode():
             value = node.filled if node.filled is not None else _measured(node)
             return Datum(*_typed(value), node.span)
@@ -114,5 +126,5 @@ def _typed(value: object) -> tuple[Value, Type]:
 
 
 def _common(read: Iterable[Datum]) -> Type:
-    types = {one.type for one in read}
+    types = {datum.type for datum in read}
     return types.pop() if len(types) == 1 else UNKNOWN

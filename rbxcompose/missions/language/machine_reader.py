@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from rbxcompose.findings import Span
+from rbxcompose.base.findings import Span
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode
 from rbxcompose.missions import codes
 from rbxcompose.missions.engine.resume_points import HISTORIES

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from rbxcompose.findings import Finding, Fix
+from rbxcompose.base.findings import Finding, Fix
 from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions import codes
 

@@ -5,18 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 
-from rbxcompose.expressions.text import Template, parse_template
-from rbxcompose.expressions.tree import Expression, ExpressionError
-from rbxcompose.expressions.types import UNKNOWN
-from rbxcompose.findings import Span
+from rbxcompose.base.expressions.text import Template, parse_template
+from rbxcompose.base.expressions.tree import Expression, ExpressionError
+from rbxcompose.base.expressions.types import UNKNOWN
+from rbxcompose.base.findings import Span
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.asked import Asked, Assignment, WrittenArgument
+from rbxcompose.missions.language.asked import Asked, Assignment, WrittenArgument, expression_of
 from rbxcompose.missions.language.grammar import is_told
-from rbxcompose.missions.language.spans import expression_of
 from rbxcompose.missions.language.value_reader import Nodes, ValueReader, read_expression
-from rbxcompose.missions.program.messages import MessageTemplate, TemplateShape, WrittenValue
-from rbxcompose.missions.program.moments import DEEDS, LEVELS, OPTIONS, Deeds, Moments
+from rbxcompose.missions.program.answers import DEEDS, LEVELS, OPTIONS, Deeds, Moments
+from rbxcompose.missions.program.machines import MessageTemplate, TemplateShape, WrittenValue
 
 
 class NodeReader(ValueReader):

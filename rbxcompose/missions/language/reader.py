@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from dataclasses import replace
 
-from rbxcompose.expressions.tree import Expression
-from rbxcompose.expressions.types import UNKNOWN
-from rbxcompose.findings import Finding, Related, Report, Span
-from rbxcompose.manifest.meant_keys import meant_keys, with_keys
-from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.expressions.tree import Expression
+from rbxcompose.base.expressions.types import UNKNOWN
+from rbxcompose.base.findings import Finding, Related, Report, Span
+from rbxcompose.manifest.documents import meant_keys, with_keys
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode, children, count
 from rbxcompose.missions import codes
 from rbxcompose.missions.analysis.held_nodes import ITEM, PathPattern, matching, pattern_of, with_held
 from rbxcompose.missions.analysis.uses import TOO_MUCH
 from rbxcompose.missions.language.asked import Asked
-from rbxcompose.missions.language.budget import MOST_HELD, MOST_WRITTEN, Budget
 from rbxcompose.missions.language.grammar import LEVELS, long_form
 from rbxcompose.missions.language.header import read_data, read_inputs, read_rate
 from rbxcompose.missions.language.keys import find_key
@@ -27,6 +27,52 @@ from rbxcompose.missions.program import program
 from rbxcompose.missions.program.machines import STATE
 from rbxcompose.missions.program.program import AFTERWARDS, RESTART, Interrupt, Program, Target
 from rbxcompose.missions.program.registry import SKILL, StepType, all_kinds, kinds
+
+MOST_HELD = 5_000  # values, names and operators of nodes in the data, counted for each `run` that may get them
+MOST_WRITTEN = 30_000  # names and operators in all texts
+
+_SHORT = 8  # characters of a text that is not worth counting, such as a number
+_OPERATORS = ("$", "<", ">", "=", "+", "-", "*", "/", ",", ".", "(", "[", "'", '"', " and ", " or ", " in ", "not ")
+
+
+@dataclass(slots=True)
+class Budget:
+    """What may still be read of the missions of one robot; below zero it is used up."""
+
+    held: int = MOST_HELD
+    written: int = MOST_WRITTEN
+
+    def affords_held(self, node: TreeNode) -> bool:
+        """Return whether a node in the data may be read once more, and count it."""
+        if self.held >= 0:
+            self.held -= count(node) + sum(map(operators, _texts(node)))
+        return self.held >= 0
+
+    def unaffordable(self, root: TreeNode) -> ScalarNode | None:
+        """Count the texts of a mission; return the first that is too much."""
+        for text in _texts(root):
+            self.written -= operators(text)
+            if self.written < 0:
+                return text
+        return None
+
+
+def operators(scalar: ScalarNode) -> int:
+    """Return about how many names and operators a text has: reading it as an expression takes as many steps."""
+    text = scalar.text
+    return 0 if len(text) <= _SHORT else sum(map(text.count, _OPERATORS))
+
+
+def _texts(root: TreeNode) -> Iterator[ScalarNode]:
+    """Yield the texts of a tree, the keys of its maps excepted, in the order in which they are written."""
+    waiting = [root]
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, ScalarNode):
+            yield node
+        else:
+            waiting += reversed([child for _, child in children(node)])
+
 
 BODIES = ("do", "machine")
 KEYS = ("rbx", "kind", "name", "about", "inputs", "data", "outputs", "interrupts", "rate", *BODIES)
@@ -64,7 +110,7 @@ def read_program(
     reader.child(body, "do" if "do" in root else "", None)
     interrupts = reader.interrupts(root.get("interrupts"))
     nodes = tuple(node for node in reader.nodes if node)
-    data = {name: replace(one, value=with_held(one.value, reader.found, (name,))) for name, one in data.items()}
+    data = {name: replace(datum, value=with_held(datum.value, reader.found, (name,))) for name, datum in data.items()}
     return Program(
         _text(root, "name"),
         _text(root, "about"),
@@ -290,7 +336,9 @@ class _Reader:
         # A restart may name a node in the reaction of a later interrupt, which it may cut short: all are read by now.
         targets = self.targets()
         return tuple(
-            replace(one, targets=targets.get(one.restarts.text, ()) if one.restarts else ()) for one in read if one
+            replace(interrupt, targets=targets.get(interrupt.restarts.text, ()) if interrupt.restarts else ())
+            for interrupt in read
+            if interrupt
         )
 
     def interrupt(self, name: str, entry: Entry) -> Interrupt | None:

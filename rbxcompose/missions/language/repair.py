@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 
-from rbxcompose.dataclass import dataclass
-from rbxcompose.findings import Report
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.findings import Report
+from rbxcompose.base.slips import repaired
 from rbxcompose.manifest.tree import Key, MappingNode, ScalarNode, TreeNode, with_children
 from rbxcompose.missions.language.fields import Declared
 from rbxcompose.missions.language.grammar import (
@@ -23,7 +24,6 @@ from rbxcompose.missions.modifiers.registry import modifiers
 from rbxcompose.missions.modifiers.state_hooks import ON_ENTER
 from rbxcompose.missions.program.registry import kinds
 from rbxcompose.missions.slips import slip
-from rbxcompose.slips import repaired
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,8 +38,8 @@ class Repairs:
         """Return the repairs for a mission of a robot with these skills, as far as they are known."""
         of_kinds = {name: _slots(kind) for name, kind in kinds().items()}
         found: dict[str, KeySlot] = {"name": KeySlot(Takes.NAME)}
-        for one in modifiers().values():
-            found |= {} if one.only_states else _slots(one)
+        for modifier in modifiers().values():
+            found |= {} if modifier.only_states else _slots(modifier)
         return cls(report, Words(of_kinds, found, frozenset(skills)))
 
     def mission(self, root: MappingNode) -> MappingNode:
@@ -79,4 +79,4 @@ class Repairs:
 
 
 def _slots(cls: type[Declared]) -> dict[str, KeySlot]:
-    return {key: one.slot for key, one in cls.fields.items()}
+    return {key: field.slot for key, field in cls.fields.items()}

@@ -6,19 +6,18 @@ import re
 from dataclasses import replace
 from typing import Protocol
 
-from rbxcompose.expressions.text import Template, TextSlot, parse_template, refuse_foreign
-from rbxcompose.expressions.tree import Expression, ExpressionError, Number
-from rbxcompose.expressions.types import COUNT, FLAG, TEXT, UNKNOWN, Type, quantity_of
-from rbxcompose.expressions.written import quotes_needed
-from rbxcompose.findings import Finding, Span, surely_meant
+from rbxcompose.base.expressions.check import quotes_needed
+from rbxcompose.base.expressions.text import Template, TextSlot, parse_template, refuse_foreign
+from rbxcompose.base.expressions.tree import Expression, ExpressionError, Number
+from rbxcompose.base.expressions.types import COUNT, FLAG, TEXT, UNKNOWN, Type, quantity_of
+from rbxcompose.base.findings import Finding, Span, surely_meant
+from rbxcompose.base.units import NUMBER, TIME
 from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.asked import Asked
+from rbxcompose.missions.language.asked import Asked, expression_of, inner_span
 from rbxcompose.missions.language.grammar import is_told
 from rbxcompose.missions.language.names import NAME, no_name
-from rbxcompose.missions.language.spans import expression_of, inner_span
-from rbxcompose.units import NUMBER, TIME
 
 FOREVER = "forever"
 WORDS = "it can be"

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import field
 from typing import Self
 
-from rbxcompose.dataclass import dataclass
+from rbxcompose.base.dataclass import dataclass
 from rbxcompose.missions.language.node_reader import NodeReader
-from rbxcompose.missions.program.answers import ModifierScope
+from rbxcompose.missions.program.answers import ModifierScope, Moments
 from rbxcompose.missions.program.modifier import Modifier
-from rbxcompose.missions.program.moments import Moments
 from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, Outcomes
 
 

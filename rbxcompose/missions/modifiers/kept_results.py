@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rbxcompose.dataclass import dataclass
+from rbxcompose.base.dataclass import dataclass
 from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.fields import new_name

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from typing import Self
 
-from rbxcompose.dataclass import dataclass
-from rbxcompose.expressions.evaluate import holds
-from rbxcompose.expressions.tree import Expression
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.expressions.evaluate import holds
+from rbxcompose.base.expressions.tree import Expression
+from rbxcompose.base.units import TIME, format_quantity
 from rbxcompose.missions import codes
 from rbxcompose.missions.analysis.facts import takes_time
-from rbxcompose.missions.engine.condition_watches import Watched
 from rbxcompose.missions.engine.task import Site, Task
+from rbxcompose.missions.engine.world import Watched
 from rbxcompose.missions.language.fields import count_or_forever, duration, watched
 from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.modifiers.registry import Decorator, modifier
@@ -19,7 +20,6 @@ from rbxcompose.missions.program.answers import Advice, ModifierScope
 from rbxcompose.missions.program.modifier import Modifier
 from rbxcompose.missions.program.outcomes import ALWAYS_FAILS, SUCCEEDS, Outcomes
 from rbxcompose.missions.program.statuses import FAILURE, RUNNING
-from rbxcompose.units import TIME, format_quantity
 
 SHORTEST = 1e-6  # [s] of a meaningful timeout
 
@@ -213,7 +213,7 @@ class Attempts(Modifier):
     @property
     def said(self) -> str:
         """Return its settings."""
-        return ", ".join(one.text for one in (self.value, self.timeout, self.pause) if one)
+        return ", ".join(expression.text for expression in (self.value, self.timeout, self.pause) if expression)
 
     @property
     def endless(self) -> Advice | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from rbxcompose.dataclass import dataclass
+from rbxcompose.base.dataclass import dataclass
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.fields import flag
 from rbxcompose.missions.modifiers.registry import Decorator, modifier

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from rbxcompose.dataclass import dataclass
-from rbxcompose.expressions.evaluate import holds
-from rbxcompose.expressions.tree import Expression
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.expressions.evaluate import holds
+from rbxcompose.base.expressions.tree import Expression
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.fields import condition, duration, flag
 from rbxcompose.missions.modifiers.families import Skipping

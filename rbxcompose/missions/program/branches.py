@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from rbxcompose.dataclass import dataclass
-from rbxcompose.expressions.tree import Comparison, Expression, ExpressionNode, Variable, Word
-from rbxcompose.expressions.values import NotArrived, Value
-from rbxcompose.findings import Span
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.expressions.tree import Comparison, Expression, ExpressionNode, Variable, Word
+from rbxcompose.base.expressions.values import NotArrived, Value
+from rbxcompose.base.findings import Span
 from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions import codes
 from rbxcompose.missions.engine.scopes import Inner, MissionScope

@@ -6,14 +6,22 @@ from abc import abstractmethod
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from rbxcompose.expressions.check import StaticScope
-from rbxcompose.expressions.tree import Expression
-from rbxcompose.expressions.types import Type
-from rbxcompose.missions.program.answers import NodeFlow, Skipped
-from rbxcompose.missions.program.look import PLAIN, Form, NodeLook
-from rbxcompose.missions.program.moments import NO_EFFECTS, NodeEffects
+from rbxcompose.base.expressions.check import StaticScope
+from rbxcompose.base.expressions.tree import Expression
+from rbxcompose.base.expressions.types import Type
+from rbxcompose.missions.program.answers import (
+    NO_EFFECTS,
+    PLAIN,
+    Form,
+    NodeEffects,
+    NodeFlow,
+    NodeLook,
+    Possibility,
+    Skipped,
+    skipped,
+    started,
+)
 from rbxcompose.missions.program.outcomes import Outcomes
-from rbxcompose.missions.program.possible import Possibility, skipped, started
 from rbxcompose.missions.program.program import Endings, MissionNode, RobotNames, Step
 
 

@@ -7,8 +7,8 @@ from collections.abc import Callable, Collection, Mapping
 from types import MappingProxyType
 from typing import Any, TypeVar
 
-from rbxcompose.config import Place
-from rbxcompose.expressions.types import (
+from rbxcompose.base.config import Place
+from rbxcompose.base.expressions.types import (
     COUNT,
     FLAG,
     POSE,
@@ -20,19 +20,18 @@ from rbxcompose.expressions.types import (
     quantity_of,
     record_of,
 )
-from rbxcompose.expressions.values import Value
-from rbxcompose.geometry import Pose2
+from rbxcompose.base.expressions.values import Value
+from rbxcompose.base.geometry import Pose2
+from rbxcompose.base.units import NUMBER, TIME, Dimension
 from rbxcompose.missions.program.program import Skill
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.definitions import INTEGERS, FieldShape, attribute, parse_type
-from rbxcompose.msgs.entries import ArrayEntries
+from rbxcompose.msgs.fields import ArrayEntries, Measures
 from rbxcompose.msgs.geometry_msgs import Point, Pose, PoseStamped, Quaternion
-from rbxcompose.msgs.measures import Measures
 from rbxcompose.msgs.plain import from_plain, to_plain
 from rbxcompose.msgs.stamps import to_duration, to_seconds
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.msgs.types import Action, Message, Service
-from rbxcompose.units import NUMBER, TIME, Dimension
 
 M = TypeVar("M", bound=Message)
 
@@ -116,7 +115,7 @@ def _asked(
     arguments |= {name: choice_of(*words) for name, words in choices.items()}
     if entries is not None:
         main = next(iter(choices), "")
-        return {name: quantity_of(one) for name, one in entries.each.items()} | arguments, main, frozenset()
+        return {name: quantity_of(dimension) for name, dimension in entries.each.items()} | arguments, main, frozenset()
     main = next(iter(arguments), "")
     is_needed = main in measures or (main and message.FIELDS[main] in (STAMPED, POSED, LASTING))
     needed = frozenset({main} if is_needed else ())
@@ -130,7 +129,7 @@ def _measured_fields(message: type[Message], measures: Measures) -> dict[str, Ty
         name: _measured(ros, measures[name]) if name in measures else known.get(name)
         for name, ros in message.FIELDS.items()
     }
-    return {name: one for name, one in found.items() if one is not None}
+    return {name: type_ for name, type_ in found.items() if type_ is not None}
 
 
 def _measured(ros: str, measure: Dimension | Measures | None) -> Type:
@@ -177,7 +176,7 @@ def _made(ros: str, value: Any) -> object:
     inner = registry.message(field_type.base)
     if field_type.shape is FieldShape.SINGLE:
         return message_of(inner, value)
-    return tuple(message_of(inner, one) for one in value)
+    return tuple(message_of(inner, item) for item in value)
 
 
 def message_of(message: type[M], fields: Mapping[str, Value]) -> M:
@@ -187,7 +186,7 @@ def message_of(message: type[M], fields: Mapping[str, Value]) -> M:
         ValueError: with the reason, if a field does not exist or a value does not fit into it.
     """
     made, findings = from_plain(
-        message, {name: _fitted(message.FIELDS.get(name, ""), one) for name, one in fields.items()}
+        message, {name: _fitted(message.FIELDS.get(name, ""), field) for name, field in fields.items()}
     )
     if made is None:
         raise ValueError(findings[0].message)
@@ -201,9 +200,9 @@ def _fitted(ros_type: str, value: Any) -> Any:
     base = parse_type(ros_type).base
     if isinstance(value, Mapping):
         known = registry.message(base).FIELDS if "/" in base else {}
-        return {name: _fitted(known.get(name, ""), one) for name, one in value.items()}
+        return {name: _fitted(known.get(name, ""), entry) for name, entry in value.items()}
     if isinstance(value, list | tuple):
-        return [_fitted(base, one) for one in value]
+        return [_fitted(base, item) for item in value]
     if base in _POSES and isinstance(value, Place | Pose2):
         return to_plain(_POSES[base](value))
     if base == LASTING and isinstance(value, int | float):

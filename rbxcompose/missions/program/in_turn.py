@@ -1,19 +1,42 @@
-"""What `sequence` and `fallback` share: nodes one after the other, until one of them decides."""
+"""What kinds share that run nodes one after the other and resume where they were halted."""
 
 from __future__ import annotations
 
 from typing import ClassVar
 
-from rbxcompose.dataclass import dataclass
-from rbxcompose.missions.engine.condition_watches import Watched
-from rbxcompose.missions.engine.task import Site
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.missions.engine.resume_points import DEEP, NO_HISTORY
+from rbxcompose.missions.engine.task import Site, Task
+from rbxcompose.missions.engine.world import Watched
 from rbxcompose.missions.language.fields import children, choice, flag, history
 from rbxcompose.missions.program.answers import Skipped
 from rbxcompose.missions.program.families import Straight
-from rbxcompose.missions.program.history import WithHistory
 from rbxcompose.missions.program.outcomes import ALWAYS_FAILS, ALWAYS_SUCCEEDS, FAILS, NEVER, Outcomes
 from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.statuses import FAILURE, IDLE, RUNNING, SKIPPED
+
+
+class WithHistory(Task):
+    """A task that may have a history; kinds set `history` and call `engine.places.take_up` when they begin."""
+
+    __slots__ = ("history",)
+    history: str
+    is_kept_after_failure: ClassVar[bool] = False
+
+    def halt(self) -> None:
+        """Stop what runs, and keep the place."""
+        places = self.engine.places
+        before, places.is_deep = places.is_deep, places.is_deep or self.history == DEEP
+        if self.history != NO_HISTORY:
+            places.kept.add(self)
+        super().halt()
+        places.is_deep = before
+
+    def forget_places(self) -> None:
+        """Forget the places of this node and those below it, since it has ended."""
+        if self.history != NO_HISTORY:
+            self.engine.places.forget(self.number, self.end)
+
 
 WRITTEN, RANDOM = "written", "random"
 

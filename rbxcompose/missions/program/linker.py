@@ -34,9 +34,9 @@ class _Linker:
     def mission(self, program: Program, parent: int | None, path: str) -> Program:
         """Copy the nodes of a mission, and return it with their new numbers."""
         numbers: dict[int, int] = {}
-        for root in [program.main, *(one.root for one in program.interrupts if one.root is not None)]:
+        for root in [program.main, *(interrupt.root for interrupt in program.interrupts if interrupt.root is not None)]:
             self.copy(program, root, parent, path, numbers)
-        interrupts = tuple(_renumbered(one, numbers) for one in program.interrupts)
+        interrupts = tuple(_renumbered(interrupt, numbers) for interrupt in program.interrupts)
         return replace(program, main=numbers[program.main], interrupts=interrupts)
 
     def copy(self, program: Program, old: int, parent: int | None, path: str, numbers: dict[int, int]) -> int:
@@ -50,7 +50,7 @@ class _Linker:
         if node.step.uses:
             used = self.missions[node.step.uses.text]
             inner = self.mission(used, number, f"{own}.")
-            roots = (one.root for one in inner.interrupts if one.root is not None)
+            roots = (interrupt.root for interrupt in inner.interrupts if interrupt.root is not None)
             children = (inner.main, *roots)
         self.nodes[number] = replace(
             node, number=number, parent=parent, path=own, children=children, end=len(self.nodes), inner=inner
@@ -60,5 +60,5 @@ class _Linker:
 
 def _renumbered(interrupt: Interrupt, numbers: Mapping[int, int]) -> Interrupt:
     root = None if interrupt.root is None else numbers[interrupt.root]
-    targets = tuple(Target(numbers[one.number], one.is_round) for one in interrupt.targets)
+    targets = tuple(Target(numbers[target.number], target.is_round) for target in interrupt.targets)
     return replace(interrupt, root=root, targets=targets)

@@ -5,11 +5,10 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import ClassVar
 
-from rbxcompose.expressions.tree import Expression
+from rbxcompose.base.expressions.tree import Expression
 from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.language.fields import Declared
-from rbxcompose.missions.program.answers import Advice, ModifierScope
-from rbxcompose.missions.program.moments import Moments
+from rbxcompose.missions.program.answers import Advice, ModifierScope, Moments
 from rbxcompose.missions.program.outcomes import Outcomes
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import field
 
-from rbxcompose.dataclass import dataclass
+from rbxcompose.base.dataclass import dataclass
 from rbxcompose.missions.program.statuses import FAILURE, NAMES, SUCCESS
 
 SUCCEEDS, FAILS = NAMES[SUCCESS], NAMES[FAILURE]
@@ -56,6 +56,6 @@ ANY = Outcomes()
 def either(several: Iterable[Outcomes]) -> Outcomes:
     """Return the outcomes of any of several."""
     found = NEVER
-    for one in several:
-        found = found.both(one)
+    for outcomes in several:
+        found = found.both(outcomes)
     return found

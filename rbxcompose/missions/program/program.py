@@ -8,28 +8,24 @@ from dataclasses import field
 from functools import cached_property
 from typing import ClassVar, Protocol
 
-from rbxcompose.config import Place
-from rbxcompose.dataclass import dataclass
-from rbxcompose.expressions.check import StaticScope
-from rbxcompose.expressions.text import parse_template
-from rbxcompose.expressions.tree import Expression
-from rbxcompose.expressions.types import Type
-from rbxcompose.expressions.values import Value
-from rbxcompose.findings import Span
+from rbxcompose.base.config import Place
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.expressions.check import StaticScope
+from rbxcompose.base.expressions.text import parse_template
+from rbxcompose.base.expressions.tree import Expression
+from rbxcompose.base.expressions.types import Type
+from rbxcompose.base.expressions.values import Value
+from rbxcompose.base.findings import Span
 from rbxcompose.manifest.tree import MappingNode, ScalarNode
 from rbxcompose.missions.engine.resume_points import NO_HISTORY
 from rbxcompose.missions.language.asked import Asked, WrittenArgument
 from rbxcompose.missions.language.fields import Declared
-from rbxcompose.missions.program.answers import Advice, NodeFlow, Skipped
+from rbxcompose.missions.program.answers import Advice, NodeEffects, NodeFlow, NodeLook, Possibility, Skipped
 from rbxcompose.missions.program.branches import BranchChoice, Branches
-from rbxcompose.missions.program.data import Datum, Input
-from rbxcompose.missions.program.look import NodeLook
-from rbxcompose.missions.program.machines import MachineStates, Next
+from rbxcompose.missions.program.machines import Datum, Input, MachineStates, Next
 from rbxcompose.missions.program.modifier import Modifier
-from rbxcompose.missions.program.moments import NodeEffects
 from rbxcompose.missions.program.outcomes import Outcomes
-from rbxcompose.missions.program.possible import Possibility
-from rbxcompose.msgs.entries import ArrayEntries
+from rbxcompose.msgs.fields import ArrayEntries
 
 ROOT = 0  # number of the node under `do`
 RATE = 20.0  # [Hz] for polling conditions that change without a message
@@ -282,22 +278,22 @@ class MissionNode:
     @property
     def saved(self) -> ScalarNode | None:
         """Return the name under which it saves its result."""
-        return next((one.saved for one in self.modifiers.values() if one.saved), None)
+        return next((modifier.saved for modifier in self.modifiers.values() if modifier.saved), None)
 
     @property
     def limit(self) -> Expression | None:
         """Return its time limit."""
-        return next((one.limit for one in self.modifiers.values() if one.limit), None)
+        return next((modifier.limit for modifier in self.modifiers.values() if modifier.limit), None)
 
     @property
     def may_be_left_out(self) -> bool:
         """Return whether a modifier may keep it from starting."""
-        return any(one.may_skip for one in self.modifiers.values())
+        return any(modifier.may_skip for modifier in self.modifiers.values())
 
     @property
     def is_forgiven(self) -> bool:
         """Return whether its failure may count as success."""
-        return any(one.forgives for one in self.modifiers.values())
+        return any(modifier.forgives for modifier in self.modifiers.values())
 
 
 CONTINUE, RESTART, END = "continue", "restart", "end"
@@ -381,7 +377,7 @@ class Program:
         for node in self.nodes:
             step, messages = node.step, (node.step.effects.published, node.step.effects.called)
             read.update(step.reads, *(message.names for message in messages if message))
-            read.update(*(one.moments.names for one in node.modifiers.values() if one.moments))
-            scalars = (one.value for one in step.arguments if isinstance(one.value, ScalarNode))
-            read.update(name.name for one in scalars for name in parse_template(one.text).names)
+            read.update(*(modifier.moments.names for modifier in node.modifiers.values() if modifier.moments))
+            scalars = (argument.value for argument in step.arguments if isinstance(argument.value, ScalarNode))
+            read.update(name.name for scalar in scalars for name in parse_template(scalar.text).names)
         return frozenset(read)

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from rbxcompose.base.slips import Repair, Slips
 from rbxcompose.manifest.tree import TreeNode
 from rbxcompose.missions.language.grammar import GrammarPlace
-from rbxcompose.slips import Repair, Slips
 
 slip: Slips[Callable[[GrammarPlace, TreeNode], Repair[TreeNode] | None]] = Slips(__name__)

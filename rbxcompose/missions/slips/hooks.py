@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from rbxcompose.findings import Edit, Finding, Fix, nearest
+from rbxcompose.base.findings import Edit, Finding, Fix, nearest
+from rbxcompose.base.slips import Repair
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions import codes
 from rbxcompose.missions.language.grammar import GrammarPlace, Takes, Words, told
-from rbxcompose.missions.program.moments import DEEDS, OPTIONS
+from rbxcompose.missions.program.answers import DEEDS, OPTIONS
 from rbxcompose.missions.slips import slip
-from rbxcompose.slips import Repair
 
 _KEYS = (*DEEDS, *OPTIONS)
 _CURES: Mapping[str, str] = {

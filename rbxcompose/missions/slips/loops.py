@@ -5,16 +5,16 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
-from rbxcompose.findings import Finding
+from rbxcompose.base.findings import Finding
+from rbxcompose.base.printable import plain
+from rbxcompose.base.slips import Repair
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions import codes
+from rbxcompose.missions.language.asked import inner_span
 from rbxcompose.missions.language.grammar import GrammarPlace, Takes, told
-from rbxcompose.missions.language.spans import inner_span
 from rbxcompose.missions.slips import slip
 from rbxcompose.missions.slips.settings import foreign_keys, unknown_settings
 from rbxcompose.missions.slips.steps import misspelt_kind
-from rbxcompose.printable import plain
-from rbxcompose.slips import Repair
 
 _WORDS = ("while", "until")
 _LONGEST = 60  # characters of the condition, in the help
@@ -25,7 +25,7 @@ def while_loop(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
     """Recognise the word with what to do beside it, where no step of another kind is."""
     if not isinstance(node, MappingNode) or place.words.kind_of(node) or "do" not in node:
         return None
-    word = next((one for one in _WORDS if one in node and one not in place.words.skills), "")
+    word = next((candidate for candidate in _WORDS if candidate in node and candidate not in place.words.skills), "")
     if not word:
         return None
     entry = node.entries[word]
@@ -117,8 +117,8 @@ def settings_of_a_loop(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] 
 def _lifted(node: MappingNode, below: MappingNode) -> Repair[TreeNode] | None:
     """Return the loop with its settings beside its word."""
     key = node.entries["repeat"].key
-    count = next((one for one in _COUNTS if one in below), "")
-    body = next((one for one in _BODIES if one in below), "")
+    count = next((candidate for candidate in _COUNTS if candidate in below), "")
+    body = next((candidate for candidate in _BODIES if candidate in below), "")
     if not body or "do" in node:
         return None
     rounds = below.entries[count].value if count else ScalarNode("forever", key.span)
@@ -127,7 +127,7 @@ def _lifted(node: MappingNode, below: MappingNode) -> Repair[TreeNode] | None:
         f"write 'repeat: {shown}', and the other keys below it, in the column of 'repeat', with 'do' for the steps"
     )
     finding = codes.WRONG_SHAPE.at(key.span, "the settings of 'repeat' are below it", help=help_text)
-    others = {name: one for name, one in below.entries.items() if name not in (count, body)}
+    others = {name: entry for name, entry in below.entries.items() if name not in (count, body)}
     made = {"repeat": Entry(key, rounds), "do": replace(below.entries[body], key=ScalarNode("do", key.span))}
     return Repair(replace(node, entries={**made, **others, **_but(node, "repeat")}), (finding,))
 
@@ -138,8 +138,8 @@ def _split(node: MappingNode, value: ScalarNode, found: re.Match[str]) -> Repair
     help_text = f"write 'for: {item}', and below it 'in: {items}'"
     finding: Finding = codes.WRONG_SHAPE.at(value.span, "'in' needs a line of its own", help=help_text)
     span = inner_span(value, found.start("list"), len(value.text))
-    words = [one.strip() for one in found["list"].strip("[] ").split(",")]
-    listed = SequenceNode(tuple(ScalarNode(one, span) for one in words), span)
+    words = [part.strip() for part in found["list"].strip("[] ").split(",")]
+    listed = SequenceNode(tuple(ScalarNode(word, span) for word in words), span)
     made = {
         "for": Entry(node.entries["for"].key, replace(value, text=item)),
         "in": Entry(ScalarNode("in", span), listed),
@@ -148,4 +148,4 @@ def _split(node: MappingNode, value: ScalarNode, found: re.Match[str]) -> Repair
 
 
 def _but(node: MappingNode, word: str) -> dict[str, Entry]:
-    return {name: one for name, one in node.entries.items() if name != word}
+    return {name: entry for name, entry in node.entries.items() if name != word}

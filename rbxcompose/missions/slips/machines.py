@@ -6,14 +6,14 @@ from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 
-from rbxcompose.findings import Edit, Finding, Fix, nearest
+from rbxcompose.base.findings import Edit, Finding, Fix, nearest
+from rbxcompose.base.slips import Repair
 from rbxcompose.manifest.tree import Entry, Key, MappingNode, ScalarNode, TreeNode, children, with_children
 from rbxcompose.missions import codes
 from rbxcompose.missions.language.grammar import GrammarPlace, Takes, told
 from rbxcompose.missions.language.names import NAME, cure, no_name
 from rbxcompose.missions.program.machines import ENDS, MACHINE_KEYS
 from rbxcompose.missions.slips import slip
-from rbxcompose.slips import Repair
 
 MACHINE = "machine"
 
@@ -89,7 +89,7 @@ def misnamed_states(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | N
 
 
 def _no_name(name: str, places: list[ScalarNode], meant: str) -> Finding:
-    edits = tuple(Edit(one.span, name, meant) for one in places)
+    edits = tuple(Edit(place.span, name, meant) for place in places)
     return no_name(places[0], Fix(edits, True, f"'{name}' -> '{meant}'") if meant else None)
 
 
@@ -137,7 +137,7 @@ def _ways(machine: MappingNode, states: MappingNode) -> Iterator[ScalarNode]:
     for entry in states.entries.values():
         to = entry.value.get("next") if isinstance(entry.value, MappingNode) else None
         leads += [one.value for one in to.entries.values()] if isinstance(to, MappingNode) else [to]
-    yield from (one for one in leads if isinstance(one, ScalarNode))
+    yield from (lead for lead in leads if isinstance(lead, ScalarNode))
 
 
 _ASKING = ("if", "then", "else", "when", "check", "choose", "cases")

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
-from rbxcompose.findings import DID_YOU_MEAN, Edit, Finding, Fix, nearest, replacement
+from rbxcompose.base.findings import DID_YOU_MEAN, Edit, Finding, Fix, nearest, replacement
+from rbxcompose.base.slips import Repair
+from rbxcompose.base.units import UnitError, parse_quantity
 from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode
 from rbxcompose.missions import codes
 from rbxcompose.missions.language.grammar import GrammarPlace, Takes, Words, without_word
 from rbxcompose.missions.slips import slip
-from rbxcompose.slips import Repair
-from rbxcompose.units import UnitError, parse_quantity
 
 FOREIGN: Mapping[str, str] = {
     "alias": "name",
@@ -153,7 +153,7 @@ def foreign_keys(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None
     meant = {theirs: ours for ours, names in words.items() if (theirs := _written(node, ours, names))}
     if not meant:
         return None
-    entries = {meant.get(name, name): _named(one, meant.get(name, name)) for name, one in node.entries.items()}
+    entries = {meant.get(name, name): _named(entry, meant.get(name, name)) for name, entry in node.entries.items()}
     what = f"beside '{kind}'" if kind else _WHAT.get(place.takes, "")
     findings = tuple(_told(node.entries[theirs], ours, what) for theirs, ours in meant.items())
     return Repair(MappingNode(entries, node.span), findings)

@@ -5,15 +5,15 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from rbxcompose.findings import DID_YOU_MEAN, Edit, Finding, Fix, nearest, replacement
+from rbxcompose.base.findings import DID_YOU_MEAN, Edit, Finding, Fix, nearest, replacement
+from rbxcompose.base.slips import Repair
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.foreign_steps import FOREIGN
 from rbxcompose.missions.language.grammar import GrammarPlace, Takes, Words, told, without_word
+from rbxcompose.missions.language.keys import FOREIGN
 from rbxcompose.missions.slips import slip
 from rbxcompose.missions.slips.machines import keys_outside_their_machine
 from rbxcompose.missions.slips.settings import unknown_in, unknown_settings
-from rbxcompose.slips import Repair
 
 _TIGHT = re.compile(r"-(?=[a-z][a-z0-9_]*$)")
 _INDENT = "  "
@@ -166,7 +166,9 @@ def second_step(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
         return None
     findings = tuple(_missing_dash(node, steps[0], second, place.words) for second in steps[1:])
     gone = set(steps) - {kind or steps[0]}
-    return Repair(MappingNode({key: one for key, one in node.entries.items() if key not in gone}, node.span), findings)
+    return Repair(
+        MappingNode({key: entry for key, entry in node.entries.items() if key not in gone}, node.span), findings
+    )
 
 
 def _missing_dash(step: MappingNode, first: str, second: str, words: Words) -> Finding:

@@ -6,16 +6,16 @@ import re
 from collections.abc import Mapping
 from dataclasses import replace
 
-from rbxcompose.findings import Edit, Fix, replacement
-from rbxcompose.manifest.brackets import bracketed, without_brackets
+from rbxcompose.base.findings import Edit, Fix, replacement
+from rbxcompose.base.slips import Repair
+from rbxcompose.manifest.slips.lists import bracketed, without_brackets
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions import codes
+from rbxcompose.missions.language.asked import inner_span
 from rbxcompose.missions.language.grammar import GrammarPlace, Takes, told
 from rbxcompose.missions.language.names import NAME, no_name
-from rbxcompose.missions.language.spans import inner_span
 from rbxcompose.missions.program.program import RESTART
 from rbxcompose.missions.slips import slip
-from rbxcompose.slips import Repair
 
 _WRITTEN = re.compile(
     r"\$?(?P<name>[a-z][a-z0-9_]*)(?P<sign>\s*(?::=|[+-]=|=(?!=))\s*|:)(?P<value>[^\s=].*)", re.DOTALL

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
-from rbxcompose.dataclass import dataclass
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.missions.program.answers import Form
 from rbxcompose.missions.program.linker import link
-from rbxcompose.missions.program.look import Form
 from rbxcompose.missions.program.program import Interrupt, MissionNode, Program, RobotNames
 
 LONGEST = 60  # characters of the text in a node
@@ -84,7 +84,7 @@ def picture_from_data(data: Mapping[str, Any]) -> MissionPicture:
 def _drawn_from(data: Mapping[str, Any]) -> Drawn:
     more = {
         "notes": tuple(data["notes"]),
-        "arrows": tuple(Arrow(**one) for one in data["arrows"]),
+        "arrows": tuple(Arrow(**arrow) for arrow in data["arrows"]),
         "children": tuple(map(_drawn_from, data["children"])),
     }
     return Drawn(**{**data, **more})
@@ -93,15 +93,17 @@ def _drawn_from(data: Mapping[str, Any]) -> Drawn:
 def picture_of(program: Program, robot: RobotNames) -> MissionPicture:
     """Return the picture of a mission, including the missions it uses."""
     linked = link(program, robot.missions)
-    interrupts = tuple(_interrupt(linked, one) for one in linked.interrupts)
+    interrupts = tuple(_interrupt(linked, interrupt) for interrupt in linked.interrupts)
     return MissionPicture(linked.name, linked.about, _drawn(linked, linked.main), interrupts, len(linked.nodes))
 
 
-def _interrupt(linked: Program, one: Interrupt) -> Drawn:
-    children = (_drawn(linked, one.root),) if one.root is not None else ()
-    restarts = f" {one.restarts.text}" if one.restarts else ""
-    notes = (f"afterwards {one.afterwards}{restarts}",)
-    return Drawn(None, "interrupt", f"when {one.when.expression.text}", one.name, "", notes, children=children)
+def _interrupt(linked: Program, interrupt: Interrupt) -> Drawn:
+    children = (_drawn(linked, interrupt.root),) if interrupt.root is not None else ()
+    restarts = f" {interrupt.restarts.text}" if interrupt.restarts else ""
+    notes = (f"afterwards {interrupt.afterwards}{restarts}",)
+    return Drawn(
+        None, "interrupt", f"when {interrupt.when.expression.text}", interrupt.name, "", notes, children=children
+    )
 
 
 def _drawn(linked: Program, number: int, role: str = "", is_start: bool = False) -> Drawn:
@@ -113,8 +115,8 @@ def _drawn(linked: Program, number: int, role: str = "", is_start: bool = False)
         for child, one in zip(node.children, _roles(linked, node), strict=True)
     )
     if node.inner is not None:
-        reactions = [one for one in node.inner.interrupts if one.root is not None]
-        children = (children[0], *(_interrupt(linked, one) for one in reactions))
+        reactions = [interrupt for interrupt in node.inner.interrupts if interrupt.root is not None]
+        children = (children[0], *(_interrupt(linked, reaction) for reaction in reactions))
     leads = step.leads_to.to.items() if step.leads_to else ()
     arrows = tuple(Arrow(outcome, to) for outcome, to in leads)
     name = "" if role == node.name else node.name
@@ -125,7 +127,7 @@ def _drawn(linked: Program, number: int, role: str = "", is_start: bool = False)
 def _roles(linked: Program, node: MissionNode) -> Sequence[str]:
     """Return what each child is to its node: the key under which it was written, where that is worth showing."""
     written = [linked.nodes[child].path.removeprefix(node.path).strip(".").partition(".")[0] for child in node.children]
-    return [one if node.step.look.has_roles and not one.isdecimal() else "" for one in written]
+    return [item if node.step.look.has_roles and not item.isdecimal() else "" for item in written]
 
 
 def _notes(node: MissionNode) -> Iterator[str]:

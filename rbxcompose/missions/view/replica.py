@@ -1,16 +1,72 @@
-"""What a viewer in another process knows of a mission or an arm: its full state from a query, and all updates since.
-
-Messages are those of `bus/window.py`. Updates that arrive before the full state wait for it; when some are missing, or
-the mission's process was restarted, the full state must be queried again.
-"""
+"""What a viewer sees of a running mission: its full state, then what has changed since."""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from rbxcompose.missions.view.mirror import joined
+from rbxcompose.missions.engine.engine import Engine
+from rbxcompose.missions.engine.snapshot import to_plain
+
+ACTIVE = frozenset({"running", "paused", "waiting"})  # states of a mission that is not over
+
+
+class Mirror:
+    """The statuses and data of an engine, each with the version in which it last changed."""
+
+    def __init__(self, engine: Engine) -> None:
+        self._engine = engine
+        self._version = 0
+        self._statuses: list[int] = []
+        self._changed: list[int] = []  # the version of each status
+        self._data: dict[str, Any] = {}
+        self._data_changed: dict[str, int] = {}
+
+    def look(self, since: int = 0) -> dict[str, Any]:
+        """Return what has changed since a version; 0 gives the full state.
+
+        The result has its `version`, `statuses` by node number, and `data` by name; `whole` means that it replaces what
+        the viewer knew before.
+        """
+        self._take()
+        if not 0 < since <= self._version:
+            since = 0
+        statuses = {number: self._statuses[number] for number, version in enumerate(self._changed) if version > since}
+        data = {name: value for name, value in self._data.items() if self._data_changed[name] > since}
+        return {"version": self._version, "whole": since == 0, "statuses": statuses, "data": data}
+
+    def _take(self) -> None:
+        """Note what has changed since the last look."""
+        now = self._engine.statuses
+        data = {name: to_plain(value) for name, value in self._engine.data.items()}
+        if now == self._statuses and data == self._data:
+            return
+        self._version += 1
+        if not self._statuses:
+            self._changed = [self._version] * len(now)
+        else:
+            for number, (before, after) in enumerate(zip(self._statuses, now, strict=True)):
+                if before != after:
+                    self._changed[number] = self._version
+        for name, value in data.items():
+            if name not in self._data or self._data[name] != value:
+                self._data_changed[name] = self._version
+        self._statuses, self._data = list(now), data
+
+
+def joined(known: Mapping[str, Any], news: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what a viewer knows after an update; keys of statuses may be texts, as in JSON."""
+    statuses: dict[int, int] = {} if news["whole"] else dict(known["statuses"])
+    statuses.update({int(number): status for number, status in news["statuses"].items()})
+    data = {**({} if news["whole"] else known["data"]), **news["data"]}
+    return {**known, **news, "statuses": statuses, "data": data}
+
+
+def status_list(known: Mapping[str, Any], count: int) -> Sequence[int]:
+    """Return the statuses of `count` nodes in order."""
+    return [known["statuses"].get(number, 0) for number in range(count)]
+
 
 Join = Callable[[Mapping[str, Any], Mapping[str, Any]], Mapping[str, Any]]
 MOST_WAITING = 100  # updates that wait for a full state; if there are more, it is queried again
@@ -31,9 +87,9 @@ class Replica:
         if message["source"] != self._source or message["sequence"] >= self._sequence:  # else more is known already
             self._source, self._sequence = message["source"], message["sequence"]
             self.seen = self._join({}, message["value"])
-        waiting = [one for one in self._waiting if one["source"] == self._source]
+        waiting = [entry for entry in self._waiting if entry["source"] == self._source]
         self._waiting.clear()
-        return [one for one in waiting if self.heard(one)] != []
+        return [entry for entry in waiting if self.heard(entry)] != []
 
     def heard(self, message: Mapping[str, Any]) -> bool:
         """Apply an update; return whether a full state must be queried."""

@@ -13,7 +13,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TextIO
 
-from rbxcompose.levels import Level
+from rbxcompose.base.levels import Level
 
 Told = Callable[[Level, str, str], None]  # level, text, detail; called in the thread that printed
 

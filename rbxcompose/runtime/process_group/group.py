@@ -1,4 +1,4 @@
-"""The main of a process group: its scheduler, clock, bus, host and driver, controlled by the supervisor's messages."""
+"""The main of a process group: its scheduler, clock, bus, host and driver, controlled by the supervisor."""
 
 from __future__ import annotations
 
@@ -8,42 +8,155 @@ import math
 import os
 import signal
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING
 
+from rbxcompose.base.clock import DISPUTE, Clock, ExternalClock, MonotonicClock, SteppedClock, Turn
+from rbxcompose.base.config import Config
+from rbxcompose.base.levels import Level
+from rbxcompose.base.requests import Command, Refused, to_data
+from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.bus import Bus
-from rbxcompose.clock import DISPUTE, ExternalClock, MonotonicClock, SteppedClock, Turn
-from rbxcompose.levels import Level
+from rbxcompose.bus.names import admin_key
+from rbxcompose.bus.transport import Closable, Question, Transport
+from rbxcompose.compiler.plan.dump import dump, load
+from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.msgs.rosgraph_msgs import Clock as ClockMessage
 from rbxcompose.msgs.stamps import to_nanoseconds
-from rbxcompose.params.change import RobotRules
-from rbxcompose.plan.dump import load
-from rbxcompose.plan.model import Plan
-from rbxcompose.qos import Qos
-from rbxcompose.requests import Command, Refused
-from rbxcompose.robot_events import MissionOver, MissionWaits
 from rbxcompose.runtime import channel as say
-from rbxcompose.runtime import setting_messages as tell
-from rbxcompose.runtime.log import LogFile
-from rbxcompose.runtime.options import RunOptions
+from rbxcompose.runtime import channel as tell
+from rbxcompose.runtime.folder import RunOptions
+from rbxcompose.runtime.log import LogFile, Record
 from rbxcompose.runtime.process_group.capture import Capture, take_printed
-from rbxcompose.runtime.process_group.connection import open_bus
-from rbxcompose.runtime.process_group.driver import Driver, ExternalDriver, RealTimeDriver, SteppedDriver
+from rbxcompose.runtime.process_group.connection import (
+    HANG,
+    CallbackInbox,
+    Driver,
+    ExternalDriver,
+    Lifeline,
+    RealTimeDriver,
+    SteppedDriver,
+    Turns,
+    Watchdog,
+    open_bus,
+)
 from rbxcompose.runtime.process_group.host import Host, Notice
-from rbxcompose.runtime.process_group.inbox import CallbackInbox
-from rbxcompose.runtime.process_group.lifeline import Lifeline
 from rbxcompose.runtime.process_group.parameters import Deciders
-from rbxcompose.runtime.process_group.setting_orders import change_settings
-from rbxcompose.runtime.process_group.stop_line import open_stop_line
-from rbxcompose.runtime.process_group.turns import Turns
-from rbxcompose.runtime.process_group.watchdog import HANG, Watchdog
-from rbxcompose.runtime.records import Record
-from rbxcompose.scheduler import Scheduler
-from rbxcompose.typed_json import to_data
+from rbxcompose.runtime.recording.files import Recorder
+from rbxcompose.runtime.recording.tape import PLAN, Tape
+from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic
+from rbxcompose.sdk.parameters import RobotRules
+from rbxcompose.sdk.ports import Qos
+from rbxcompose.sdk.robot_events import MissionOver, MissionWaits
 
-if TYPE_CHECKING:
-    from rbxcompose.runtime.process_group.run_recorder import Taping
+PATH = "stop"  # below the robot's own keys; a process adds its name
+
+
+def stop_key(robot: str, process: str = "*") -> str:
+    """Return the Zenoh key of the stop query of a process; without a name, that of all processes."""
+    return admin_key(robot, f"{PATH}/{process}")
+
+
+def open_stop_line(
+    transport: Transport,
+    robot: str,
+    process: str,
+    stop: Callable[[], None],
+    post: Callable[[str, Callable[[], None]], None],
+) -> Closable:
+    """Call `stop` in the scheduler's thread for each query, and answer with the name of the process."""
+
+    def asked(question: Question) -> None:
+        def carry_out() -> None:
+            stop()
+            question.reply(process.encode(), b"")
+
+        post("", carry_out)
+
+    return transport.serve(stop_key(robot, process), asked)
+
+
+def change_settings(host: Host, order: tell.SettingOrder, channel: say.Channel) -> None:
+    """Carry out an order, and answer it."""
+    changes = host.parameters.changes
+    match order:
+        case tell.PrepareChange():
+            channel.send(_prepared(host, order))
+        case tell.CommitChange(number):
+            channel.send(tell.ChangeFollowed(number, changes.commit(number)))
+        case tell.UndoChange(number):
+            channel.send(tell.ChangeFollowed(number, changes.undo(number)))
+        case tell.EndChange(number):
+            changes.end(number)
+        case tell.ChangeDecided(number, refusal):
+            host.parameters.decided(number, refusal)
+
+
+def _prepared(host: Host, order: tell.PrepareChange) -> tell.ChangePrepared:
+    changes = host.parameters.changes
+    try:
+        found = changes.prepare(order.number, order.wanted)
+    except Refused as refusal:
+        return tell.ChangePrepared(order.number, str(refusal))
+    new = {change.hosted.instance.name: change.new for change in found if change.is_ruled}
+    return tell.ChangePrepared(order.number, "", _text(host, changes.live), _text(host, new))
+
+
+def _text(host: Host, configs: dict[str, Config]) -> str:
+    """Return configurations of components as a plan in text; empty if there are none."""
+    instances = tuple(replace(host.hosted[name].instance, config=config) for name, config in configs.items())
+    return dump(replace(host.plan, instances=instances), reveals_secrets=True) if instances else ""
+
+
+class Taping:
+    """Writes a tape of a robot to a file, with its plan; secrets of the plan are left out."""
+
+    def __init__(self, path: Path, plan: Plan, clock: Clock, log: Callable[[str], None]) -> None:
+        """Take the robot's `clock`; `log` is called once with the reason if a recording ends too early."""
+        self._path, self._log = path, log
+        self._real = MonotonicClock()  # so that a killed recorder loses little
+        self._recorder: Recorder | None = None
+        self._try(lambda: self._begin(plan))
+        self.tape = Tape(clock, self._declare, self._add)
+
+    def keep(self) -> None:
+        """Write what is due; must be called several times a second."""
+        recorder = self._recorder
+        if recorder is not None:
+            self._try(lambda: recorder.keep(self._real.now()))
+
+    def finish(self) -> None:
+        """End the file, which then has its index and its name."""
+        recorder = self._recorder
+        if recorder is not None:
+            self._try(recorder.finish)
+        self._recorder = None
+
+    def _begin(self, plan: Plan) -> None:
+        self._recorder = Recorder(self._path, self._real.now())
+        self._recorder.attach(PLAN, dump(plan, keeps_order=True).encode())
+
+    def _declare(self, topic: RecordedTopic) -> None:
+        recorder = self._recorder
+        if recorder is not None:
+            self._try(lambda: recorder.declare(topic))
+
+    def _add(self, message: Recorded) -> None:
+        recorder = self._recorder
+        if recorder is not None:
+            self._try(lambda: recorder.add(message))
+
+    def _try(self, action: Callable[[], None]) -> None:
+        try:
+            action()
+        except OSError as error:
+            if self._recorder is not None:
+                self._recorder.abandon()
+            self._recorder = None
+            self._log(f"the recording '{self._path}' ends here: {error.strerror or error}")
+
 
 LONGEST_CONFIGURE = 30.0  # [s]
 LONGEST_CLOSE = 1.0  # [s] to deactivate, clean up and leave the bus
@@ -197,7 +310,7 @@ class ProcessGroup:
             self._scheduler.advance(time)
         instances = self._plan.of_group(self._name)
         if self._options.record is not None:
-            from rbxcompose.runtime.process_group.run_recorder import Taping  # only a recorded run needs MCAP
+            pass
 
             self._taping = Taping(
                 self._options.record, self._plan, self._clock, lambda text: self._complain("robot", text)

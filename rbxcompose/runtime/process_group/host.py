@@ -6,28 +6,86 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, TypeVar
 
+from rbxcompose.base.clock import Clock
+from rbxcompose.base.config import leaves, value_at, with_values
+from rbxcompose.base.levels import Level
+from rbxcompose.base.requests import Command, Refused, Request, UnreadableError, as_data
+from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.bus import Bus
-from rbxcompose.clock import Clock
-from rbxcompose.config import leaves, value_at, with_values
-from rbxcompose.levels import Level
-from rbxcompose.plan.model import Instance, Plan
-from rbxcompose.requests import Command, Refused, Request, as_data
-from rbxcompose.robot_events import RobotEvent
+from rbxcompose.bus.local import sentence
+from rbxcompose.bus.topics import Subscription
+from rbxcompose.compiler.plan.model import Instance, Plan
+from rbxcompose.msgs.rcl_interfaces import Log
+from rbxcompose.msgs.stamps import to_time
 from rbxcompose.runtime.channel import Failed, Repeated, States
 from rbxcompose.runtime.faults import RestartPolicy, explain
-from rbxcompose.runtime.process_group.deliveries import Deliveries
-from rbxcompose.runtime.process_group.frames import Frames
-from rbxcompose.runtime.process_group.hosted import Hosted, Lifecycle
+from rbxcompose.runtime.log import Record, WriteRecord
+from rbxcompose.runtime.process_group.hosted import Hosted, Lifecycle, Statuses
+from rbxcompose.runtime.process_group.live_ports import Frames
 from rbxcompose.runtime.process_group.parameters import NOBODY_ELSE, Deciders, Parameters
-from rbxcompose.runtime.process_group.rosout import Rosout
-from rbxcompose.runtime.process_group.statuses import Statuses
 from rbxcompose.runtime.process_group.worker import Post, Worker
-from rbxcompose.runtime.records import Record, WriteRecord
-from rbxcompose.scheduler import Scheduler
 from rbxcompose.sdk.component import Component
-from rbxcompose.sdk.ports import Looks
+from rbxcompose.sdk.ports import Looks, Qos
 from rbxcompose.sdk.registry import component_type
-from rbxcompose.typed_json import UnreadableError
+from rbxcompose.sdk.robot_events import RobotEvent
+
+TOPIC = "/rosout"
+_LEVELS = {Level.OK: Log.INFO, Level.WARN: Log.WARN, Level.ERROR: Log.ERROR, Level.STALE: Log.WARN}
+
+
+class Rosout:
+    """Publishes what the components of one process log."""
+
+    def __init__(self, owner: str, bus: Bus, clock: Clock) -> None:
+        self._clock = clock
+        self._publisher = bus.publisher(owner, TOPIC, Log, Qos.EVENT)
+
+    def publish(self, name: str, level: Level, text: str) -> None:
+        """Publish one line of the component `name`."""
+        self._publisher(Log(stamp=to_time(self._clock.stamp()), level=_LEVELS[level], name=name, msg=text))
+
+
+PERIOD = 1.0  # [s] between two checks
+
+
+class Deliveries:
+    """Checks each subscription once a second; an unhealthy one has a status `component: topic`."""
+
+    def __init__(self, owner: str, bus: Bus, scheduler: Scheduler, clock: Clock, statuses: Statuses) -> None:
+        self._bus, self._clock, self._statuses = bus, clock, statuses
+        self._every: Callable[[], object] = lambda: scheduler.every(PERIOD, owner, lambda dt: self._look())
+        self._writers = bus.watch_writers(owner)
+        self._started = 0.0  # [s]
+        self._told: set[str] = set()  # names of unhealthy statuses
+
+    def start(self) -> None:
+        """Begin to check: the whole robot is active, and all publishers may publish."""
+        self._started = self._clock.now()
+        self._every()
+
+    def _look(self) -> None:
+        troubled: set[str] = set()
+        for subscription in self._bus.subscriptions:
+            name = f"{subscription.reader.owner}: {subscription.route[0].lstrip('/')}"
+            if text := self._trouble(subscription):
+                troubled.add(name)
+                refused = subscription.refusals.total
+                self._statuses.set(name, Level.WARN, text, {"refused": refused} if refused else {})
+        for gate in self._bus.gates:
+            if news := gate.refusals.news():
+                name = f"{gate.owner}: {gate.name.lstrip('/')}"
+                troubled.add(name)
+                text = sentence(gate.name, news, "request")
+                self._statuses.set(name, Level.WARN, text, {"refused": gate.refusals.total})
+        for name in self._told - troubled:
+            self._statuses.set(name, Level.OK, "messages arrive as they should", {})
+        self._told = troubled
+
+    def _trouble(self, subscription: Subscription[Any]) -> str:
+        if news := subscription.refusals.news():
+            return sentence(subscription.route[0], news)
+        return self._writers.trouble(subscription.reader, self._clock.now(), self._started)
+
 
 A = TypeVar("A")
 
@@ -79,18 +137,20 @@ class Host:
         self._deliveries = Deliveries(self.owner, bus, scheduler, clock, self.statuses)
         self._rosout = Rosout(self.owner, bus, clock)
         self.frames = self._frames(instances)
-        self.hosted = {one.name: Hosted(self, one) for one in instances}
+        self.hosted = {instance.name: Hosted(self, instance) for instance in instances}
         namespace = plan.bus.namespace
         self.parameters = Parameters(self.owner, bus, clock, namespace, self.hosted, self._fails_soon, deciders)
         self.statuses.is_active = self._is_active
-        self._policies = {one.name: RestartPolicy(one.restart) for one in instances}
+        self._policies = {instance.name: RestartPolicy(instance.restart) for instance in instances}
         self._retired: dict[str, Component[Any]] = {}  # those that another one may replace
         self.at_work: str | None = None  # the component that runs in the scheduler's thread
         self.doing = ""  # what it does
         scheduler.on_error, scheduler.observe = self.failed, self._observed
 
     def _frames(self, instances: Sequence[Instance]) -> Frames | None:
-        looking = (port for one in instances for port in component_type(one.type).ports(one.config).values())
+        looking = (
+            port for instance in instances for port in component_type(instance.type).ports(instance.config).values()
+        )
         if not any(isinstance(port, Looks) for port in looking):
             return None
         log = partial(self.log, self.owner)
@@ -155,8 +215,8 @@ class Host:
     @property
     def rest_time(self) -> float:
         """Return how long the components may take to come to rest [s]."""
-        each = (one.instance for one in self.hosted.values())
-        return max((component_type(one.type).rest_time(one.config) for one in each), default=0.0)
+        each = (entry.instance for entry in self.hosted.values())
+        return max((component_type(instance.type).rest_time(instance.config) for instance in each), default=0.0)
 
     def brake(self) -> None:
         """Bring everything to rest for good: the robot goes down."""
@@ -227,36 +287,41 @@ class Host:
         """Configure components beside those that run, or in their place."""
         self.retire([one.name for one in instances])
         self.frames = self.frames or self._frames(instances)
-        for one in instances:
-            self.hosted[one.name] = Hosted(self, one)
-            self._policies[one.name] = RestartPolicy(one.restart)
-            self._guarded(one.name, self.hosted[one.name].configure)
-            old, made = self._retired.pop(one.name, None), self.hosted[one.name].component
+        for instance in instances:
+            self.hosted[instance.name] = Hosted(self, instance)
+            self._policies[instance.name] = RestartPolicy(instance.restart)
+            self._guarded(instance.name, self.hosted[instance.name].configure)
+            old, made = self._retired.pop(instance.name, None), self.hosted[instance.name].component
             if made is not None and type(old) is type(made):
-                self._guarded(one.name, partial(self.hosted[one.name].do, "take_over", partial(made.take_over, old)))
+                self._guarded(
+                    instance.name, partial(self.hosted[instance.name].do, "take_over", partial(made.take_over, old))
+                )
         self._retired.clear()
         self.statuses.publish()
 
     def follow(self, instances: Sequence[Instance], keys: Mapping[str, Sequence[str]]) -> dict[str, str]:
         """Apply the settings of `keys` to components; return the reasons of those that refuse, by name."""
         refused: dict[str, str] = {}
-        for one in instances:
-            if (hosted := self.hosted.get(one.name)) is None:
+        for instance in instances:
+            if (hosted := self.hosted.get(instance.name)) is None:
                 continue
-            if one.restart != hosted.instance.restart:
-                self._policies[one.name] = RestartPolicy(one.restart)
+            if instance.restart != hosted.instance.restart:
+                self._policies[instance.name] = RestartPolicy(instance.restart)
             names = [
-                name for name, _ in leaves(one.config) for key in keys[one.name] if f"{key}.".startswith(f"{name}.")
+                name
+                for name, _ in leaves(instance.config)
+                for key in keys[instance.name]
+                if f"{key}.".startswith(f"{name}.")
             ]
-            config = with_values(hosted.config, {name: value_at(one.config, name) for name in names})
+            config = with_values(hosted.config, {name: value_at(instance.config, name) for name in names})
             try:
                 self.parameters.change(hosted, config)
             except Refused as refusal:
-                refused[one.name] = f"'{one.name}' refuses: {refusal}"
+                refused[instance.name] = f"'{instance.name}' refuses: {refusal}"
                 continue
             except Exception as error:  # as in a step: the failure of the component alone
-                self.failed(one.name, error)
-            hosted.instance, hosted.config = one, config
+                self.failed(instance.name, error)
+            hosted.instance, hosted.config = instance, config
         return refused
 
     def work(self) -> tuple[list[str], dict[str, str]]:
@@ -280,16 +345,16 @@ class Host:
     @property
     def is_at_rest(self) -> bool:
         """Return whether everything that the components of this process move is at rest."""
-        return all(one.component.is_at_rest for one in self.hosted.values() if one.component)
+        return all(entry.component.is_at_rest for entry in self.hosted.values() if entry.component)
 
     def summary(self) -> dict[str, dict[str, str]]:
         """Return the components' facts for the summary: instance -> label -> text."""
-        facts = {name: one.component.summary() for name, one in self.hosted.items() if one.component}
+        facts = {name: entry.component.summary() for name, entry in self.hosted.items() if entry.component}
         return {name: some for name, some in facts.items() if some}
 
     def states(self) -> dict[str, tuple[str, int]]:
         """Return the state and the number of restarts of each instance."""
-        return {name: (one.state.value, self._policies[name].restarts) for name, one in self.hosted.items()}
+        return {name: (entry.state.value, self._policies[name].restarts) for name, entry in self.hosted.items()}
 
     def log(self, source: str, level: Level, text: str, detail: str = "") -> None:
         """Write one record to the log and to the bus, unless its level is below the configured one."""

@@ -1,36 +1,217 @@
-"""One component in its host: lifecycle state, ports, timers."""
+"""One component in its host: lifecycle state, ports, steps, timers."""
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from enum import StrEnum
 from functools import partial
 from typing import Any, Protocol
 
-from rbxcompose.bus.action_server import ActionServer
+from rbxcompose.base.clock import Clock
+from rbxcompose.base.config import Config
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.levels import Level
+from rbxcompose.base.requests import Command, Query, Refused, Request, as_data, to_data
+from rbxcompose.base.scheduler import Periodic, Scheduler
+from rbxcompose.bus.actions import ActionServer
 from rbxcompose.bus.bus import Bus
 from rbxcompose.bus.names import admin_key, resolve
-from rbxcompose.clock import Clock
-from rbxcompose.config import Config
-from rbxcompose.diagnostics.updater import DiagnosticTask
-from rbxcompose.levels import Level
-from rbxcompose.plan.model import Instance, Plan
-from rbxcompose.requests import Command, Query, Refused, Request, as_data
-from rbxcompose.robot_events import RobotEvent, RobotHeld
+from rbxcompose.compiler.plan.model import Instance, Plan
+from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray, DiagnosticStatus, KeyValue
+from rbxcompose.msgs.stamps import to_time
+from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.runtime.channel import Repeated
-from rbxcompose.runtime.process_group.frames import Frames
-from rbxcompose.runtime.process_group.handover import HandedOver, handed_over
-from rbxcompose.runtime.process_group.live_ports import bind, subscribe
-from rbxcompose.runtime.process_group.statuses import Statuses
-from rbxcompose.runtime.process_group.steps import GoalSteps
-from rbxcompose.runtime.process_group.worker import CONFIGURE, Worker
-from rbxcompose.scheduler import Scheduler
+from rbxcompose.runtime.process_group.live_ports import Frames, bind, subscribe
+from rbxcompose.runtime.process_group.worker import CONFIGURE, HandedOver, Worker, handed_over
 from rbxcompose.sdk.bound import Window
 from rbxcompose.sdk.component import Component
-from rbxcompose.sdk.ports import In, Port, ServesAction, ServesTopic
+from rbxcompose.sdk.ports import In, Port, Qos, ServesAction, ServesTopic
 from rbxcompose.sdk.registry import component_type
-from rbxcompose.typed_json import to_data
+from rbxcompose.sdk.robot_events import RobotEvent, RobotHeld
+from rbxcompose.sdk.updater import DiagnosticTask
+
+ROUNDING = 1e-9  # of a period
+
+
+class ServesGoals(Protocol):
+    """Has goals to carry out, one at a time; whoever wants to know of a new one sets `began`."""
+
+    began: Callable[[], None]
+
+    @property
+    def current(self) -> object:
+        """Return the goal to carry out, or None."""
+        ...
+
+
+class GoalSteps:
+    """Calls `step(dt)` every `period` [s] while one of `servers` has a goal, and once after the last one has ended.
+
+    The instants and `dt` are those of a timer that never rests.
+    """
+
+    def __init__(
+        self,
+        scheduler: Scheduler,
+        owner: str,
+        period: float,
+        step: Callable[[float], None],
+        servers: Sequence[ServesGoals],
+    ) -> None:
+        self._scheduler, self._owner, self._period, self._step = scheduler, owner, period, step
+        self._servers = servers
+        self._start = self._last = math.floor(scheduler.now / period) * period  # [s]
+        self._rests = True
+        for server in servers:
+            server.began = self._go_on
+        if self._has_goal:
+            self._go_on()
+
+    @property
+    def _has_goal(self) -> bool:
+        return any(server.current is not None for server in self._servers)
+
+    def _go_on(self) -> None:
+        if self._rests:
+            self._rests = False
+            self._last = self._plan() - self._period  # when it would have stepped last
+
+    def _plan(self) -> float:
+        """Schedule the next step and return its time [s]: the first on the grid that is later than now."""
+        now = self._scheduler.now
+        cycle = int((now - self._start) / self._period + ROUNDING)
+        if self._start + cycle * self._period <= now:
+            cycle += 1
+        due = self._start + cycle * self._period
+        self._scheduler.at(due, self._owner, self._run)
+        return due
+
+    def _run(self) -> None:
+        now = self._scheduler.now
+        dt, self._last = min(now - self._last, Periodic.LONGEST_DT * self._period), now
+        self._rests = not self._has_goal
+        if not self._rests:
+            self._plan()  # before the step, which may raise
+        self._step(dt)
+
+
+PERIOD = 1.0  # [s] between two reports
+TOPIC = "/diagnostics"
+
+
+@dataclass(frozen=True, slots=True)
+class _Slow:
+    """How many callbacks of a component have held up its process, and the longest of them [s]."""
+
+    number: int = 0
+    longest: float = 0.0
+    callback: str = ""
+
+    def values(self) -> tuple[KeyValue, ...]:
+        slowest = f"{self.callback}, {1000 * self.longest:.0f} ms"
+        return KeyValue(key="slow_callbacks", value=str(self.number)), KeyValue(key="slowest_callback", value=slowest)
+
+
+class Statuses:
+    """The last status of each component of a process."""
+
+    def __init__(self, owner: str, bus: Bus, scheduler: Scheduler, clock: Clock) -> None:
+        self._owner, self._scheduler, self._clock = owner, scheduler, clock
+        self._publisher = bus.publisher(owner, TOPIC, DiagnosticArray, Qos.STATE)
+        self._statuses: dict[str, DiagnosticStatus] = {}
+        self._blocked: dict[str, str] = {}
+        self._busy: dict[str, str] = {}
+        self._slow: dict[str, _Slow] = {}
+        self._tasks: dict[str, dict[str, DiagnosticTask]] = {}  # by component and name
+        self.is_active: Callable[[str], bool] = lambda name: True  # tells whose tasks are asked
+        self._is_due = False
+        scheduler.every(PERIOD, owner, lambda dt: self._report())
+
+    def set(self, name: str, level: Level, message: str, values: Mapping[str, object], hardware_id: str = "") -> None:
+        """Keep a status; publish it at this instant if its level is new."""
+        before = self._statuses.get(name)
+        pairs = tuple(KeyValue(key=key, value=str(value)) for key, value in values.items())
+        self._statuses[name] = DiagnosticStatus(
+            level=int(level), name=name, message=message, hardware_id=hardware_id, values=pairs
+        )
+        if before is None or before.level != level:
+            self._publish_soon()
+
+    def forget(self, name: str) -> None:
+        """Stop reporting on a component that no longer exists."""
+        for known in (self._statuses, self._busy, self._slow):
+            known.pop(name, None)
+        self.forget_tasks(name)
+
+    def watch(self, component: str, name: str, task: DiagnosticTask) -> None:
+        """Ask `task` once a second while the component is active, and report it as `component: name`."""
+        self._tasks.setdefault(component, {})[name] = task
+
+    def forget_tasks(self, component: str) -> None:
+        """Ask the tasks of a component no more."""
+        for name in self._tasks.pop(component, {}):
+            self._statuses.pop(f"{component}: {name}", None)
+
+    def block(self, causes: Mapping[str, str]) -> None:
+        """Show exactly these components as blocked, at least as a warning, whatever their own status."""
+        self._blocked = dict(causes)
+        self._publish_soon()
+
+    def busy(self, name: str, text: str) -> None:
+        """Show a component that does not return from a call with at least a warning; an empty text clears it."""
+        if text == self._busy.get(name, ""):
+            return
+        if bool(text) is not (name in self._busy):
+            self._publish_soon()
+        if text:
+            self._busy[name] = text
+        else:
+            del self._busy[name]
+
+    def slow(self, name: str, callback: str, seconds: float) -> None:
+        """Count a callback that held up the process for `seconds`, and name the longest."""
+        before = self._slow.get(name, _Slow())
+        longest = max((before.longest, before.callback), (seconds, callback))
+        self._slow[name] = _Slow(before.number + 1, *longest)
+
+    def _report(self) -> None:
+        now = self._clock.now()
+        for component, tasks in self._tasks.items():
+            for name, task in tasks.items():
+                if self.is_active(component):
+                    told = task(now)
+                    self.set(f"{component}: {name}", told.level, told.message, told.values)
+                else:
+                    self._statuses.pop(f"{component}: {name}", None)
+        self.publish()
+
+    def _publish_soon(self) -> None:
+        if not self._is_due:
+            self._is_due = True
+            self._scheduler.post(self._owner, self._publish_due)
+
+    def _publish_due(self) -> None:
+        if self._is_due:  # else it was published meanwhile
+            self.publish()
+
+    def _shown(self, status: DiagnosticStatus) -> DiagnosticStatus:
+        cause = self._blocked.get(status.name) or self._busy.get(status.name)
+        slow = self._slow.get(status.name)
+        if cause is None and slow is None:
+            return status
+        level = status.level if cause is None else max(status.level, int(Level.WARN))
+        values = (*status.values, *(slow.values() if slow is not None else ()))
+        return replace(status, level=level, message=cause or status.message, values=values)
+
+    def publish(self) -> None:
+        """Send all statuses."""
+        self._is_due = False
+        header = Header(stamp=to_time(self._clock.stamp()))
+        self._publisher(DiagnosticArray(header=header, status=tuple(map(self._shown, self._statuses.values()))))
+
 
 LONGEST_GOODBYE = 0.3  # [s] to wait for a component's own thread to end
 
@@ -329,7 +510,7 @@ class Hosted:
     def repeat(self, requests: Sequence[Command]) -> None:
         """Send these to the component again after it, or its process, was restarted."""
         self._repeated = requests
-        self.host.notify(Repeated(self.instance.name, [as_data(one) for one in requests]))
+        self.host.notify(Repeated(self.instance.name, [as_data(request) for request in requests]))
 
     def window(self, path: str, question: Query[Any]) -> Window:
         """Open a window for tools outside at `path` of the robot's own keys."""

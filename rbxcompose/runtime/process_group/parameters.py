@@ -1,30 +1,143 @@
-"""Parameters on the bus: the six services of each component, one of our own, and the events that report changes."""
+"""Parameters on the bus, and changes of live settings in two phases."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import field
 from functools import partial
 from itertools import count
 
+from rbxcompose.base.clock import Clock
+from rbxcompose.base.config import Config
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.requests import Refused
+from rbxcompose.base.units import format_quantity
 from rbxcompose.bus.bus import Bus
 from rbxcompose.bus.names import resolve
 from rbxcompose.bus.services import ServedRequest
-from rbxcompose.clock import Clock
-from rbxcompose.config import Config
-from rbxcompose.dataclass import dataclass
 from rbxcompose.msgs import rcl_interfaces as rcl
 from rbxcompose.msgs.rbxcompose_parameters import ChangeParameters, NodeChange
 from rbxcompose.msgs.stamps import to_time
-from rbxcompose.params import core
-from rbxcompose.params.change import ChangeRefusal, Configs, RobotRules, WantedChange
-from rbxcompose.params.history import BY_A_TOOL, ChangeCause, ParameterHistory
-from rbxcompose.params.values import from_message
-from rbxcompose.qos import Qos
-from rbxcompose.requests import Refused
+from rbxcompose.runtime.channel import AskForChange
 from rbxcompose.runtime.process_group.hosted import Hosted
-from rbxcompose.runtime.process_group.live_changes import LiveChanges
-from rbxcompose.runtime.setting_messages import AskForChange
-from rbxcompose.units import format_quantity
+from rbxcompose.runtime.settings_history import BY_A_TOOL, MARK, ChangeCause, ParameterHistory
+from rbxcompose.sdk import parameters as core
+from rbxcompose.sdk.parameters import ChangeRefusal, Configs, RobotRules, WantedChange, from_message, to_message
+from rbxcompose.sdk.ports import Qos
+from rbxcompose.sdk.registry import component_type
+
+Tell = Callable[[Hosted, Config, ChangeCause], None]  # that a component had another configuration before
+
+
+@dataclass(slots=True)
+class PreparedChange:
+    """A change of one component that would be accepted, with what it had before."""
+
+    hosted: Hosted
+    old: Config
+    new: Config
+    cause: ChangeCause
+
+    @property
+    def is_ruled(self) -> bool:
+        """Return whether rules about the whole robot could notice it: they know a component by its capabilities."""
+        if self.new == self.old:
+            return False
+        capabilities = component_type(self.hosted.instance.type).capabilities
+        return capabilities(self.old) != capabilities(self.new)
+
+
+@dataclass(slots=True)
+class LiveChanges:
+    """Prepares changes, carries them out and takes them back; nothing is told of a change before its end."""
+
+    hosted: Mapping[str, Hosted]
+    failed: Callable[[str, Exception], None]
+    tell: Tell
+    history: Callable[[str], ParameterHistory]
+    _prepared: dict[int, Sequence[PreparedChange]] = field(default_factory=dict)  # by number of the change
+    _done: dict[int, list[PreparedChange]] = field(default_factory=dict)
+
+    @property
+    def live(self) -> dict[str, Config]:
+        """Return the configurations that are not those of the plan, by component."""
+        return {name: entry.config for name, entry in self.hosted.items() if entry.config != entry.instance.config}
+
+    def is_open(self, name: str) -> bool:
+        """Return whether no change of a component is prepared."""
+        return all(change.hosted.instance.name != name for each in self._prepared.values() for change in each)
+
+    def prepare(self, number: int, wanted: WantedChange) -> Sequence[PreparedChange]:
+        """Return the changes of components if all would be accepted, and keep the components for this change.
+
+        Raises:
+            Refused: if one would not be, with the reason.
+        """
+        found = []
+        for name in wanted.parts:
+            part = wanted.part(name)
+            try:
+                found.append(self._part(name, part, ChangeCause(wanted.by, wanted.together, part.undoes)))
+            except (core.UnsettableError, Refused) as refusal:
+                raise Refused(f"'{name}': {refusal}" if wanted.together else str(refusal)) from refusal
+        self._prepared[number] = found
+        return found
+
+    def _part(self, name: str, wanted: NodeChange, cause: ChangeCause) -> PreparedChange:
+        hosted = self.hosted.get(name)
+        if hosted is None or hosted.component is None:
+            raise Refused(f"'{name}' is not active")
+        self._require_known(hosted, wanted.expected)
+        if hosted.is_busy:
+            raise Refused(f"'{name}' is busy")
+        new = core.changed(hosted.config, wanted.parameters, hosted.instance.bounds)
+        return PreparedChange(hosted, hosted.config, new, cause)
+
+    def _require_known(self, hosted: Hosted, expected: Sequence[rcl.Parameter]) -> None:
+        now = core.settings(hosted.config)
+        for parameter in expected:
+            if (there := now.get(parameter.name)) is None or to_message(there.value) != parameter.value:
+                history = self.history(hosted.instance.name).changes
+                last = next((each for each in reversed(history) if each.name == parameter.name), None)
+                who = f" by {last.by} ({last.component}{MARK}{last.number})" if last else ""
+                raise Refused(f"'{parameter.name}' was changed meanwhile{who}")
+
+    def commit(self, number: int) -> str:
+        """Carry out a prepared change; return why a component refuses: then all others have their old values."""
+        done = self._done[number] = []
+        for change in self._prepared.get(number, ()):
+            is_there = change.hosted.component is not None
+            if reason := self._follow(change.hosted, change.new) if is_there else "it has failed meanwhile":
+                return "; ".join(filter(None, (reason, self.undo(number))))
+            done.append(change)
+        return ""
+
+    def undo(self, number: int) -> str:
+        """Give components their old values back; return why one does not take them."""
+        done = self._done.pop(number, [])
+        reasons = [self._follow(change.hosted, change.old) for change in reversed(done)]
+        return "; ".join(filter(None, reasons))
+
+    def end(self, number: int) -> None:
+        """Tell what was carried out, and let go of the components."""
+        self._prepared.pop(number, None)
+        for change in self._done.pop(number, ()):
+            self.tell(change.hosted, change.old, change.cause)
+
+    def _follow(self, hosted: Hosted, config: Config) -> str:
+        name = hosted.instance.name
+        if hosted.component is None:  # it comes back with this
+            hosted.config = config
+            return ""
+        try:
+            hosted.reconfigure(config)
+        except Refused as refusal:
+            return str(refusal)
+        except Exception as error:  # as in a step: the failure of the component alone
+            self.failed(name, error)
+            return f"'{name}' has failed: {type(error).__name__}: {error}"
+        return ""
+
 
 EVENTS = "/parameter_events"
 BY_APPLY = ChangeCause("apply")
@@ -129,12 +242,12 @@ class Parameters:
     def _alone(self, wanted: WantedChange) -> tuple[bool, ChangeRefusal | None]:
         """Decide about a change of one component if no rule could notice it; return whether that was so."""
         try:
-            (one,) = self.changes.prepare(OWN, self._own(wanted))
+            (change,) = self.changes.prepare(OWN, self._own(wanted))
         except Refused as refusal:
             return True, ChangeRefusal(str(refusal))
-        reason = "" if one.is_ruled else self.changes.commit(OWN)
+        reason = "" if change.is_ruled else self.changes.commit(OWN)
         self.changes.end(OWN)
-        return not one.is_ruled, ChangeRefusal(reason) if reason else None
+        return not change.is_ruled, ChangeRefusal(reason) if reason else None
 
     def _decided(self, wanted: WantedChange, rules: RobotRules | None) -> ChangeRefusal | None:
         """Carry out a change here, where all components are in this process."""
@@ -142,7 +255,7 @@ class Parameters:
         if unknown := next((node for node in wanted.parts if node not in map(self.node, own.parts)), None):
             return ChangeRefusal(f"'{unknown}' is no component of this robot")
         try:
-            new: Configs = {one.hosted.instance.name: one.new for one in self.changes.prepare(OWN, own)}
+            new: Configs = {change.hosted.instance.name: change.new for change in self.changes.prepare(OWN, own)}
             broken = rules.why_not(self.changes.live, new) if rules else None
             reason = "" if broken else self.changes.commit(OWN)
         except Refused as refusal:
@@ -183,7 +296,7 @@ class _Served:
 
     def types(self, request: rcl.GetParameterTypes.Request) -> rcl.GetParameterTypes.Response:
         found = core.values_of(self._settings, request.names)
-        return rcl.GetParameterTypes.Response(types=bytes(one.type for one in found))
+        return rcl.GetParameterTypes.Response(types=bytes(value.type for value in found))
 
     def describe(self, request: rcl.DescribeParameters.Request) -> rcl.DescribeParameters.Response:
         known = self._settings
@@ -206,7 +319,7 @@ class _Served:
     @property
     def may_change(self) -> bool:
         """Return whether any of its parameters may change while the robot runs."""
-        return any(one.is_live for one in self._settings.values())
+        return any(setting.is_live for setting in self._settings.values())
 
     def change(self, asked: ServedRequest[ChangeParameters.Request, ChangeParameters.Response]) -> None:
         """Change all parameters or none, unless somebody has changed what the caller takes for known."""
@@ -226,7 +339,7 @@ class _Served:
                 )
             )
 
-        parts = {resolve(one.node, ""): one for one in request.others}
+        parts = {resolve(other.node, ""): other for other in request.others}
         if request.parameters:
             parts[self._node] = NodeChange(self._node, request.parameters, request.expected, request.undoes)
         if parts:
@@ -273,10 +386,10 @@ def _answer(then: Callable[[rcl.SetParametersResult], None], refusal: ChangeRefu
 
 def _say(hosted: Hosted, parameters: Sequence[rcl.Parameter], cause: ChangeCause) -> None:
     known, words = core.settings(hosted.config), []
-    for one in parameters:
-        value, dimension = from_message(one.value), known[one.name].dimension
+    for parameter in parameters:
+        value, dimension = from_message(parameter.value), known[parameter.name].dimension
         is_quantity = dimension is not None and isinstance(value, float)
-        words.append(f"{one.name} = {format_quantity(value, dimension) if is_quantity else value}")  # type: ignore[arg-type]
+        words.append(f"{parameter.name} = {format_quantity(value, dimension) if is_quantity else value}")  # type: ignore[arg-type]
     if hosted.component is not None:
         who = "" if cause == BY_A_TOOL else f", by {cause.by}"
         hosted.component.info(f"set: {', '.join(words)}{who}")

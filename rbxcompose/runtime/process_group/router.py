@@ -1,43 +1,196 @@
-"""The router of a robot: a small process by which the others find each other.
-
-No data passes through it but what goes to other hosts of the robot, whose routers it is linked with.
-"""
+"""The router of a robot, and the line to the routers of its other hosts."""
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import socket
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from threading import Thread
 from types import FrameType
 from typing import TypeVar
 
+from rbxcompose.base.clock import MonotonicClock
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.findings import kind
+from rbxcompose.base.levels import Level
+from rbxcompose.base.requests import UnreadableError, from_data, to_data
+from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.access_control import AllowedHost, access_control
-from rbxcompose.bus.names import topic_pattern
-from rbxcompose.bus.probe import probe_key
-from rbxcompose.bus.transport import Closable
+from rbxcompose.bus.endpoints import LOOPBACK, accepts, tcp_endpoint, unix_endpoint
+from rbxcompose.bus.liveness import probe_key
+from rbxcompose.bus.names import admin_key, denied_key, topic_pattern
+from rbxcompose.bus.transport import Arrival, Closable, Transport
 from rbxcompose.bus.zenoh_session import NO_LINK, RouterLink, open_router, tls_settings
 from rbxcompose.bus.zenoh_transport import ZenohTransport
-from rbxcompose.clock import MonotonicClock
-from rbxcompose.endpoints import LOOPBACK, accepts, tcp_endpoint, unix_endpoint
-from rbxcompose.levels import Level
-from rbxcompose.plan.dump import load
-from rbxcompose.plan.model import Exchange, Plan, Share
+from rbxcompose.compiler.plan.dump import load
+from rbxcompose.compiler.plan.model import Exchange, Plan, Share
 from rbxcompose.runtime import channel as say
-from rbxcompose.runtime.clock_offset import Echo
-from rbxcompose.runtime.deaf_links import DeafLinks
-from rbxcompose.runtime.host_report import HostReport
-from rbxcompose.runtime.process_group.driver import RealTimeDriver
-from rbxcompose.runtime.process_group.host_line import HostLine
-from rbxcompose.runtime.process_group.inbox import CallbackInbox
-from rbxcompose.runtime.process_group.lifeline import answer
-from rbxcompose.runtime.process_group.roll_caller import RollCaller
-from rbxcompose.runtime.process_group.turns import Turns
-from rbxcompose.runtime.process_group.watchdog import Watchdog
-from rbxcompose.runtime.records import Record, WriteRecord
-from rbxcompose.scheduler import Scheduler
+from rbxcompose.runtime.channel import HostReport
+from rbxcompose.runtime.folder import Echo, OffsetFilter
+from rbxcompose.runtime.log import Record, WriteRecord
+from rbxcompose.runtime.process_group.connection import (
+    CallbackInbox,
+    RealTimeDriver,
+    RollCaller,
+    Turns,
+    Watchdog,
+    answer,
+)
+from rbxcompose.sdk.ports import Qos
+
+FRESH = 1.0  # [s] since a report, after which it counts as missed; hosts report four times a second
+PATIENCE, LONGEST = 2.0, 64.0  # [s] of evidence until links are opened again: the first time, and at most
+
+
+@dataclass
+class _Doubt:
+    since: float
+    latest: float  # both [s]
+
+
+class DeafLinks:
+    """Judges the links of one host."""
+
+    def __init__(self, host: str, now: float) -> None:
+        self._host, self._begun = host, now
+        self._told, self._opened, self._sought = now, -LONGEST, now
+        self._patience = PATIENCE
+        self._heard: dict[str, float] = {}  # host -> when [s]
+        self._doubts: dict[str, _Doubt] = {}
+
+    def tell(self, now: float) -> None:
+        """Take that this host reported."""
+        self._told = now
+
+    def hear(self, teller: str, sent: int, heard: Mapping[str, Echo], now: float) -> str | None:
+        """Take a report, with what its host had heard until it was sent [ns, its clock].
+
+        Returns the host to which the link must be opened again, if there is evidence for long enough.
+        """
+        self._heard[teller] = now
+        if now - self._told > FRESH:
+            self._doubts.clear()  # nobody can hear this host
+            return None
+        hears = {host for host, echo in heard.items() if (sent - echo.arrived) * 1e-9 < FRESH}
+        if self._host in hears:
+            self._doubts.pop(teller, None)
+        unheard = {host for host in hears - {self._host} if now - self._heard.get(host, self._begun) > FRESH}
+        for host in unheard if self._host in hears else {teller, *unheard}:
+            if self._is_proven(host, now):
+                return self._give_up(host, now)
+        return None
+
+    def must_seek(self, now: float) -> bool:
+        """Return whether to seek a way to another host now, since none is heard any more."""
+        if not self._is_alone(now) or now - self._sought < FRESH / 2:
+            return False
+        self._sought = now
+        return True
+
+    def find(self, now: float) -> bool:
+        """Take that there is a way to another host; return whether all links must be opened again."""
+        is_proven = self._is_alone(now) and self._is_proven("", now)
+        if is_proven:
+            self._give_up("", now)
+        return is_proven
+
+    def _is_alone(self, now: float) -> bool:
+        return bool(self._heard) and now - max(self._heard.values()) > FRESH
+
+    def _is_proven(self, host: str, now: float) -> bool:
+        doubt = self._doubts.setdefault(host, _Doubt(now, now))
+        if now - doubt.latest > FRESH:
+            doubt.since = now  # what came before is of an earlier link
+        doubt.latest = now
+        return now - doubt.since > self._patience
+
+    def _give_up(self, host: str, now: float) -> str:
+        """Return the host, and wait longer for the next time unless all was well for a while."""
+        is_again = now - self._opened < self._patience + LONGEST
+        self._patience = min(2 * self._patience, LONGEST) if is_again else 2 * PATIENCE
+        self._opened = now
+        self._doubts.clear()
+        return host
+
+
+LETS_THROUGH = kind("RBX6142")
+
+
+def host_key(robot: str, host: str) -> str:
+    """Return the Zenoh key of the reports of a host."""
+    return admin_key(robot, f"hosts/{host}")
+
+
+@dataclass(frozen=True, slots=True)
+class _Sent:
+    """A report on its way: when it was sent, and when the last ones of the other hosts were sent and arrived [ns]."""
+
+    report: HostReport
+    sent: int
+    heard: dict[str, Echo]
+
+
+class HostLine:
+    """Sends the reports of this host; `heard` is called with those of the others, in the scheduler's thread.
+
+    `passed` is called with the reason if a message of another host came through that is denied. `stamp` is wall-clock
+    time [ns]; reports both ways tell how far the clocks of two hosts are apart. `judge` takes of each report its host,
+    when it was sent, and what that host had heard.
+    """
+
+    def __init__(
+        self,
+        robot: str,
+        share: Share,
+        transport: Transport,
+        heard: Callable[[HostReport], None],
+        passed: Callable[[str], None],
+        stamp: Callable[[], int],
+        judge: Callable[[str, int, Mapping[str, Echo]], None],
+    ) -> None:
+        self._heard, self._passed, self._transport, self._judge = heard, passed, transport, judge
+        self._stamp, self._host = stamp, share.host
+        self._echoes: dict[str, Echo] = {}
+        self._filters: dict[str, OffsetFilter] = {}
+        self._denied = transport.publisher(denied_key(robot, share.host), Qos.STATE) if share.access else None
+        for other in share.others if share.access else ():  # before the reports, so that whoever knows these knows both
+            transport.subscribe(denied_key(robot, other.name), Qos.STATE, partial(self._came_through, other.name))
+        self._publisher = transport.publisher(host_key(robot, share.host), Qos.STATE)
+        for other in share.others:
+            transport.subscribe(host_key(robot, other.name), Qos.STATE, self._arrived)
+
+    def tell(self, report: HostReport) -> None:
+        """Send a report; nobody waits for it."""
+        if self._denied is not None:
+            self._denied.put(b"", b"")
+        sent = _Sent(report, self._stamp(), self._echoes)
+        self._publisher.put(json.dumps(to_data(sent)).encode(), b"")
+
+    def _came_through(self, host: str, arrival: Arrival) -> None:
+        text = f"{LETS_THROUGH.code}: access control lets through what it denies to host '{host}'"
+        self._transport.wake("", lambda: self._passed(text))
+
+    def _arrived(self, arrival: Arrival) -> None:
+        data, arrived = arrival.payload, self._stamp()
+        self._transport.wake("", lambda: self._read(data, arrived))
+
+    def _read(self, data: bytes, arrived: int) -> None:
+        try:
+            told: _Sent = from_data(_Sent, json.loads(data))
+        except (UnreadableError, ValueError, RecursionError):
+            return  # another version, or a stranger: the host counts as silent, which is told
+        host = told.report.host
+        self._echoes[host] = answer = Echo(told.sent, arrived)
+        own = told.heard.get(self._host)
+        clock = self._filters.setdefault(host, OffsetFilter()).feed(own, answer) if own else None
+        self._heard(replace(told.report, clock=clock))
+        self._judge(host, told.sent, told.heard)
+
 
 V = TypeVar("V")
 KNOCK = 0.25  # [s] for another host to accept a connection
@@ -181,7 +334,7 @@ class Router:
             self._must_reopen = True
 
     def _seek(self) -> None:
-        if any(accepts(one, KNOCK) for one in self._link.connect):
+        if any(accepts(text, KNOCK) for text in self._link.connect):
             self._inbox.put("", self._find)
 
     def _find(self) -> None:
@@ -218,7 +371,10 @@ def _is_free(port: int) -> bool:
 def _link(plan: Plan, share: Share) -> RouterLink:
     own = share.tls
     tls = tls_settings(own.authority, own.certificate, own.key, mutual=own.mutual) if own else {}
-    allowed = [AllowedHost(one.certificate, one.gives, one.takes, one.both) for one in share.access]
+    allowed = [
+        AllowedHost(host_access.certificate, host_access.gives, host_access.takes, host_access.both)
+        for host_access in share.access
+    ]
     access = access_control(plan.robot, plan.bus.domain, allowed) if allowed else {}
     ways = (_by_key(plan, share.downsample), _by_key(plan, share.priorities), _by_key(plan, share.largest))
     return RouterLink(share.listen, share.connect, tls, access, *ways, lease=share.lease)

@@ -6,11 +6,11 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 from enum import StrEnum
 
-from rbxcompose.config import HIDDEN, Config, Secret, is_live, leaves
-from rbxcompose.dataclass import dataclass
-from rbxcompose.plan.diff import BOUNDS, WHOLE, Change, difference
-from rbxcompose.plan.model import Instance, OtherHost, Plan
-from rbxcompose.runtime.supervision.dependents import is_commanding
+from rbxcompose.base.config import HIDDEN, Config, Secret, is_live, leaves
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.compiler.plan.diff import BOUNDS, WHOLE, Change, difference
+from rbxcompose.compiler.plan.model import Instance, OtherHost, Plan
+from rbxcompose.runtime.supervision.members import is_commanding
 
 WORLD = "world"  # the process group of simulated truth, whose state a restart would lose
 DOWN_AND_UP = "needs 'down' and 'up'"
@@ -106,23 +106,30 @@ class Changes:
     @property
     def commanding(self) -> list[str]:
         """Return the components on the path of commands that are stopped or started."""
-        old = {one.name: one for one in self.before.instances}
+        old = {instance.name: instance for instance in self.before.instances}
         touched = (one.instance for one in self.fated if one.stops or one.starts)
-        return [one.name for one in touched if is_commanding(one) or (one.name in old and is_commanding(old[one.name]))]
+        return [
+            instance.name
+            for instance in touched
+            if is_commanding(instance) or (instance.name in old and is_commanding(old[instance.name]))
+        ]
 
 
 def changes(before: Plan, after: Plan, failed: Collection[str] = ()) -> Changes:
     """Return the changes from `before`, which runs, to `after`; components that have `failed` are started again."""
     found = difference(before, after)
-    old = {one.name: one for one in before.instances}
-    fated = [_fated(old.get(one.name), one, found.changed.get(one.name, ()), failed) for one in after.instances]
+    old = {instance.name: instance for instance in before.instances}
+    fated = [
+        _fated(old.get(instance.name), instance, found.changed.get(instance.name, ()), failed)
+        for instance in after.instances
+    ]
     fated += [Fated(one, Fate.REMOVED) for one in found.removed]
     impossible = (*_impossible(old, fated, found.plan), *_moved(before, after))
     return Changes(before, after, tuple(fated), impossible)
 
 
 def _links(plan: Plan) -> tuple[object, ...]:
-    share = plan.share and replace(plan.share, others=tuple(_named(one) for one in plan.share.others), version="")
+    share = plan.share and replace(plan.share, others=tuple(_named(other) for other in plan.share.others), version="")
     return share, plan.exchange
 
 
@@ -151,13 +158,13 @@ def _fated(before: Instance | None, after: Instance, reasons: tuple[Change, ...]
     return Fated(after, Fate.LIVE if is_live else Fate.RESTARTED, reasons)
 
 
-def _is_live(one: Instance, key: str) -> bool:
+def _is_live(instance: Instance, key: str) -> bool:
     head = key.partition(".")[0]
     if key.startswith(BOUNDS):
         return True
     if head in _OPTIONS:
         return head in _TAKEN_OVER
-    found = (field for name, field in leaves(one.config) if f"{key}.".startswith(f"{name}."))
+    found = (field for name, field in leaves(instance.config) if f"{key}.".startswith(f"{name}."))
     return any(is_live(field) for field in found)
 
 

@@ -10,23 +10,27 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from itertools import takewhile
 
-from rbxcompose.levels import Level
-from rbxcompose.plan.model import Plan
-from rbxcompose.robot_events import ComponentNoted, MissionOver, RobotHeld
+from rbxcompose.base.levels import Level
+from rbxcompose.base.scheduler import Scheduler
+from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.runtime import channel as say
-from rbxcompose.runtime.host_report import HostReport, RobotEnd
-from rbxcompose.runtime.options import RunOptions
-from rbxcompose.runtime.supervision.blocked import BlockedComponents
+from rbxcompose.runtime.channel import HostReport, RobotEnd
+from rbxcompose.runtime.folder import RunOptions
 from rbxcompose.runtime.supervision.changes import WORLD, Changes
-from rbxcompose.runtime.supervision.dependents import is_commanding
-from rbxcompose.runtime.supervision.kept_words import KeptWords
-from rbxcompose.runtime.supervision.members import ConductorEffects, Member, Phase
+from rbxcompose.runtime.supervision.members import (
+    BlockedComponents,
+    ConductorEffects,
+    KeptWords,
+    Member,
+    Phase,
+    is_commanding,
+)
 from rbxcompose.runtime.supervision.other_hosts import OtherHosts
 from rbxcompose.runtime.supervision.plan_change import LONGEST, Changing, WhenDone, text_of
 from rbxcompose.runtime.supervision.shutdown import END_BOUND, Closing, rest_time
 from rbxcompose.runtime.supervision.silence import LOOK, Silence
 from rbxcompose.runtime.supervision.stop_latch import StopLatch
-from rbxcompose.scheduler import Scheduler
+from rbxcompose.sdk.robot_events import ComponentNoted, MissionOver, RobotHeld
 
 FINE, MISSION_FAILED, ROBOT_FAILED, INTERRUPTED = 0, 3, 4, 130
 
@@ -45,7 +49,7 @@ class Conductor:
         self.endpoint = plan.bus.router
         self.facts: dict[str, dict[str, str]] = {}
         self.time = 0.0  # [s] of robot time, as far as known
-        self.states: dict[str, tuple[str, int]] = {one.name: ("unconfigured", 0) for one in plan.instances}
+        self.states: dict[str, tuple[str, int]] = {instance.name: ("unconfigured", 0) for instance in plan.instances}
         self.is_real_time = not options.is_stepped and not plan.follows_clock
         self.blocked = BlockedComponents(effects)
         self.plan, self.layers = plan, options.layers
@@ -95,14 +99,16 @@ class Conductor:
         """Do the next step of starting, for the whole robot or for restarted processes."""
         if self.is_going_down or not self._all_configured():
             return
-        waiting = [one for one in self.plan.instances if self.states[one.name][0] not in ("active", "failed")]
-        fresh = [one for one in waiting if one.name not in self.members[one.process].requested]
+        waiting = [
+            instance for instance in self.plan.instances if self.states[instance.name][0] not in ("active", "failed")
+        ]
+        fresh = [instance for instance in waiting if instance.name not in self.members[instance.process].requested]
         if self.phase is Phase.STARTING and waiting[:1] != fresh[:1]:
             return  # the answer of the first one is pending, or it is being restarted in place
         fresh = list(self.hosts.reached(fresh))
         if fresh:
             group = fresh[0].process
-            names = [one.name for one in takewhile(lambda one: one.process == group, fresh)]
+            names = [one.name for one in takewhile(lambda instance: instance.process == group, fresh)]
             self.members[group].requested.update(names)
             self._effects.send(group, say.Activate(names))
             return
@@ -126,8 +132,8 @@ class Conductor:
         if not member.is_started and not member.is_given_up:
             member.is_started = True
             self._effects.send(member.name, say.Start())
-            for one, request in self.kept.repeated(self.plan.of_group(member.name) if member.restarts else ()):
-                self._effects.send(member.name, say.Ask(0, one, request))  # nobody waits for the answer
+            for text, request in self.kept.repeated(self.plan.of_group(member.name) if member.restarts else ()):
+                self._effects.send(member.name, say.Ask(0, text, request))  # nobody waits for the answer
 
     # What processes say
 
@@ -211,8 +217,8 @@ class Conductor:
             self._went_on_without(name)
             return
         lost = self.plan.of_group(name)
-        is_for_good = bool(lost) and all(one.restart.when == "never" for one in lost)
-        self._are({one.name: ("failed" if is_for_good else "unconfigured", 0) for one in lost})
+        is_for_good = bool(lost) and all(item.restart.when == "never" for item in lost)
+        self._are({item.name: ("failed" if is_for_good else "unconfigured", 0) for item in lost})
         delay = member.policy.after_failure(self._scheduler.now)
         if name == WORLD:
             self.go_down(ROBOT_FAILED, f"process '{name}' {how}, and simulated truth with it", Level.ERROR, detail)
@@ -262,7 +268,9 @@ class Conductor:
         if self._options.is_stepped:  # there it would be received at another instant in each run
             return
         self.blocked.look(self.plan, self.states, self.hosts.failed, self.members)
-        commanding = [one.name for one in self.plan.instances if one.name in new and is_commanding(one)]
+        commanding = [
+            instance.name for instance in self.plan.instances if instance.name in new and is_commanding(instance)
+        ]
         if commanding and not self.is_stopped and self.phase is Phase.RUNNING:
             text = f"'{commanding[0]}' failed on the path of commands"
             self._effects.log(Level.ERROR, f"{text}: all motion is held until 'release'")
@@ -354,17 +362,21 @@ class Conductor:
     def _switch(self, changes: Changes) -> None:
         """Apply the new plan, now that everything that stops has stopped."""
         self.plan, self.generation = changes.after, self.generation + 1
-        fresh = {one.name: ("unconfigured", 0) for one in self.plan.instances if one.name in changes.starting}
+        fresh = {
+            instance.name: ("unconfigured", 0) for instance in self.plan.instances if instance.name in changes.starting
+        }
         self.hosts.adopt(self.plan.share)
         if self._router and changes.links_change and self.members[self._router].is_there:
             self._effects.send(self._router, say.Adopt(text_of(self.plan, ())))
-        self.latch.forget([one.name for one in self.plan.instances])
-        self.states = {one.name: fresh.get(one.name) or self.states[one.name] for one in self.plan.instances}
+        self.latch.forget([instance.name for instance in self.plan.instances])
+        self.states = {
+            instance.name: fresh.get(instance.name) or self.states[instance.name] for instance in self.plan.instances
+        }
 
     def _reconfigured(self, changing: Changing, process: str, refused: Mapping[str, str]) -> None:
         changing.reconfigured(process, refused)
-        old = {one.name: one for one in changing.changes.before.instances}
-        kept = tuple(old[one.name] if one.name in refused else one for one in self.plan.instances)
+        old = {instance.name: instance for instance in changing.changes.before.instances}
+        kept = tuple(old[instance.name] if instance.name in refused else instance for instance in self.plan.instances)
         self.plan = replace(self.plan, instances=kept)  # what the next change is compared with
         self._proceed()
 

@@ -18,16 +18,16 @@ from typing import Protocol
 
 import setproctitle
 
-from rbxcompose.config import Config
-from rbxcompose.params.change import ChangeRefusal, RobotRules
-from rbxcompose.plan.dump import load
-from rbxcompose.process_end import end_with
+from rbxcompose.base.config import Config
+from rbxcompose.base.processes import end_with
+from rbxcompose.base.scheduler import ScheduledCallback, Scheduler
+from rbxcompose.compiler.plan.dump import load
 from rbxcompose.runtime import channel as say
-from rbxcompose.runtime import setting_messages as tell
-from rbxcompose.runtime.options import ChosenLayers
+from rbxcompose.runtime import channel as tell
+from rbxcompose.runtime.folder import ChosenLayers
 from rbxcompose.runtime.processes import close_all, in_child
 from rbxcompose.runtime.supervision.setting_changes import WhenJudged
-from rbxcompose.scheduler import ScheduledCallback, Scheduler
+from rbxcompose.sdk.parameters import ChangeRefusal, RobotRules
 
 PATIENCE = 10.0  # [s] for an answer; the first one after another plan compiles the robot
 _OWNER = "judge"
@@ -153,4 +153,4 @@ class _Judging:
 
 
 def _configs(texts: Iterable[str]) -> dict[str, Config]:
-    return {one.name: one.config for text in texts for one in load(text).instances}
+    return {instance.name: instance.config for text in texts for instance in load(text).instances}

@@ -1,18 +1,22 @@
-"""What the conductor knows about a robot's processes, and what it can do to them."""
+"""What the conductor knows about a robot's processes: members, dependents, who waits for whom."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
 from enum import Enum, auto
-from typing import Protocol
+from typing import Any, Protocol
 
-from rbxcompose.dataclass import dataclass
-from rbxcompose.levels import Level
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.levels import Level
+from rbxcompose.compiler.plan.model import Instance, Plan, Wire
 from rbxcompose.runtime import channel as say
+from rbxcompose.runtime.channel import HostReport, Repeated
 from rbxcompose.runtime.faults import RestartPolicy
-from rbxcompose.runtime.host_report import HostReport
 from rbxcompose.runtime.processes import KILLED
+from rbxcompose.sdk.ports import Calls, CallsAction, In, Out, Qos, Serves, ServesAction
+from rbxcompose.sdk.registry import component_type
+from rbxcompose.sdk.robot_events import ComponentNoted
 
 
 class ConductorEffects(Protocol):
@@ -112,3 +116,98 @@ class Member:
         self.is_configured = self.is_started = self.is_at_rest = self.is_told_lost = False
         self.moves, self.runs, self.killed_for = (), {}, ""
         self.requested.clear()
+
+
+_FED_BY = {In.kind: Out.kind, Calls.kind: Serves.kind, CallsAction.kind: ServesAction.kind}
+
+
+def blocked_by(plan: Plan, failed: Collection[str]) -> dict[str, str]:
+    """Return the components that cannot work because all that serve or feed a port have failed: name -> one of those.
+
+    An input that is open to the outside waits for none. A component that starts after a failed one waits for it, too.
+    """
+    found: dict[str, str] = {}
+    for instance in plan.instances if failed else ():
+        if instance.name not in failed and (cause := _cause(plan, instance, failed)):
+            found[instance.name] = cause
+    return found
+
+
+def _cause(plan: Plan, instance: Instance, failed: Collection[str]) -> str:
+    late = [name for name in instance.starts_after if name in failed]
+    if late:
+        return late[0]
+    for wire in _needed(instance):
+        feeding = [other.name for other in plan.everywhere if _feeds(other, wire)]
+        if feeding and all(name in failed for name in feeding):
+            return feeding[0]
+    return ""
+
+
+def _needed(instance: Instance) -> list[Wire]:
+    ports = component_type(instance.type).ports(instance.config)
+    wires = (wire for wire in instance.wires if wire.kind in _FED_BY)
+    return [wire for wire in wires if not getattr(ports[wire.port], "is_open", False)]
+
+
+def _feeds(other: Instance, wanted: Wire) -> bool:
+    kind = _FED_BY[wanted.kind]
+    return any(wire.kind == kind and wire.topic == wanted.topic and wire.type == wanted.type for wire in other.wires)
+
+
+def is_commanding(instance: Instance) -> bool:
+    """Return whether an instance sends, passes on or receives commands: a driver, a mux, a base."""
+    ports = component_type(instance.type).ports(instance.config).values()
+    return any(isinstance(port, In | Out) and port.qos is Qos.COMMAND for port in ports)
+
+
+def blocked_text(causes: Mapping[str, str], name: str) -> str:
+    """Return in words what a component waits for."""
+    return f"waits for {causes[name]}, which failed"
+
+
+class KeptWords:
+    """By component: requests that it gets again after its process was restarted, and notes for people."""
+
+    def __init__(self) -> None:
+        self.notes: dict[str, str] = {}
+        self._requests: dict[str, list[dict[str, Any]]] = {}
+
+    def heard(self, message: Repeated | ComponentNoted) -> None:
+        """Keep this instead of what the component told before."""
+        if isinstance(message, Repeated):
+            self._requests[message.instance] = message.requests
+        else:
+            self.notes[message.component] = message.text
+
+    def repeated(self, instances: Iterable[Instance]) -> Iterator[tuple[str, dict[str, Any]]]:
+        """Yield the requests for components, each with the name of its component."""
+        for instance in instances:
+            yield from ((instance.name, request) for request in self._requests.get(instance.name, ()))
+
+
+class BlockedComponents:
+    """Knows who is blocked; `causes` has for each blocked component the one that failed."""
+
+    def __init__(self, effects: ConductorEffects) -> None:
+        self.causes: dict[str, str] = {}
+        self._effects = effects
+
+    def look(
+        self, plan: Plan, states: Mapping[str, tuple[str, int]], others: Collection[str], members: Mapping[str, Member]
+    ) -> None:
+        """Find out who is blocked now, and tell those for whom this is news; `others` have failed on other hosts."""
+        failed = {*others, *(name for name, (state, _) in states.items() if state == "failed")}
+        before, self.causes = self.causes, blocked_by(plan, failed)
+        for name in self.causes.keys() - before.keys():
+            self._effects.log(Level.WARN, f"'{name}' {blocked_text(self.causes, name)}")
+        touched = {name for name in {*before, *self.causes} if before.get(name) != self.causes.get(name)}
+        for group in dict.fromkeys(instance.process for instance in plan.instances if instance.name in touched):
+            if members[group].is_configured:
+                self.tell(plan, members[group], is_news=True)
+
+    def tell(self, plan: Plan, member: Member, *, is_news: bool = False) -> None:
+        """Tell a process which of its components are blocked."""
+        names = [instance.name for instance in plan.of_group(member.name) if instance.name in self.causes]
+        if names or is_news:
+            self._effects.send(member.name, say.Blocked({name: blocked_text(self.causes, name) for name in names}))

@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 
-from rbxcompose.dataclass import dataclass
-from rbxcompose.levels import Level
-from rbxcompose.plan.model import Instance, OtherHost, Share
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.levels import Level
+from rbxcompose.compiler.plan.model import Instance, OtherHost, Share
 from rbxcompose.runtime import channel as say
-from rbxcompose.runtime.clock_offset import ClockOffset
-from rbxcompose.runtime.host_report import HostReport, RobotEnd, SharedStop
+from rbxcompose.runtime.channel import HostReport, RobotEnd, SharedStop
+from rbxcompose.runtime.folder import ClockOffset
 from rbxcompose.runtime.supervision.members import ConductorEffects
 
 SILENT = 2.0  # [s] without a report after which the components of a host count as lost; links lose more than processes
@@ -37,7 +37,7 @@ class OtherHosts:
         """Take `tell`, which tells all own processes."""
         self._share, self._effects, self._tell = share, effects, tell
         self._own = HostReport(share.host, share.version, effects.run_id) if share else None
-        self._others = {one.name: one for one in share.others} if share else {}
+        self._others = {other.name: other for other in share.others} if share else {}
         self._known: dict[str, _Known] = {}
         self._wrong_clocks: set[str] = set()  # hosts whose clocks are too far from ours
         self._told_waiting = ""
@@ -46,7 +46,7 @@ class OtherHosts:
         """Take what a new plan knows of the other hosts."""
         if share is not None and self._own is not None:
             self._share, self._own = share, replace(self._own, version=share.version)
-            self._others = {one.name: one for one in share.others}
+            self._others = {other.name: other for other in share.others}
             self._known = {name: known for name, known in self._known.items() if name in self._others}
 
     def report(
@@ -81,7 +81,7 @@ class OtherHosts:
     def clocks(self) -> dict[str, ClockOffset]:
         """Return how far the clocks of the hosts that answer are from ours."""
         reports = (known.report for known in self._known.values() if not known.is_lost)
-        return {one.host: one.clock for one in reports if one.clock is not None}
+        return {report.host: report.clock for report in reports if report.clock is not None}
 
     def _look_at_clock(self, report: HostReport) -> None:
         """Log when the clock of a host is found too far from ours, and when it no longer is."""
@@ -115,40 +115,42 @@ class OtherHosts:
     def _lose(self, host: OtherHost, how: str) -> None:
         text = f"host '{host.name}' {how}"
         self._effects.log(Level.WARN, text)
-        self._tell(say.Lost([one.name for one in host.instances], text))
+        self._tell(say.Lost([instance.name for instance in host.instances], text))
 
     def told_lost(self) -> Iterator[say.Lost]:
         """Yield what a process must know that has missed it."""
         for name, known in self._known.items():
             if known.is_lost:
-                yield say.Lost([one.name for one in self._others[name].instances], f"host '{name}' does not answer")
+                yield say.Lost(
+                    [instance.name for instance in self._others[name].instances], f"host '{name}' does not answer"
+                )
 
     # Starting together
 
     def reached(self, instances: Iterable[Instance]) -> Iterator[Instance]:
         """Yield instances until the first one that starts after a component which another host has yet to activate."""
         elsewhere = {one.name for host in self._others.values() if not host.is_optional for one in host.instances}
-        for one in instances:
-            if any(name in elsewhere and self._state(name) not in _DONE for name in one.starts_after):
+        for instance in instances:
+            if any(name in elsewhere and self._state(name) not in _DONE for name in instance.starts_after):
                 return
-            yield one
+            yield instance
 
     def is_complete(self) -> bool:
         """Return whether everything is active on all hosts that the robot needs; if not, log once what is awaited."""
-        missing = [one for one in self._others.values() if not one.is_optional and not self._is_active(one)]
-        waiting = " and ".join(f"host '{one.name}'" for one in missing)
+        missing = [other for other in self._others.values() if not other.is_optional and not self._is_active(other)]
+        waiting = " and ".join(f"host '{other.name}'" for other in missing)
         if waiting and waiting != self._told_waiting:
             self._effects.log(Level.OK, f"everything is active here; waiting for {waiting}")
         self._told_waiting = waiting
         return not missing
 
     def _is_active(self, host: OtherHost) -> bool:
-        return all(self._state(one.name) in _DONE for one in host.instances) and host.name in self._known
+        return all(self._state(instance.name) in _DONE for instance in host.instances) and host.name in self._known
 
     def _state(self, name: str) -> str:
         """Return the state of a component of another host; unconfigured if this is unknown."""
         reports = (known.report for known in self._known.values() if not known.is_lost)
-        return next((one.states[name] for one in reports if name in one.states), "unconfigured")
+        return next((report.states[name] for report in reports if name in report.states), "unconfigured")
 
     @property
     def failed(self) -> set[str]:

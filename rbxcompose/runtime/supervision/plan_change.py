@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from itertools import groupby
 
-from rbxcompose.plan.dump import dump
-from rbxcompose.plan.model import Instance, Plan
+from rbxcompose.compiler.plan.dump import dump
+from rbxcompose.compiler.plan.model import Instance, Plan
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.supervision.changes import Changes, Fate
 from rbxcompose.runtime.supervision.members import ConductorEffects, Member
@@ -44,11 +44,12 @@ class Changing:
         self.refused: set[str] = set()  # components that did not take their new settings
         self._members, self._effects, self._switch, self._fork, self._done = members, effects, switch, fork, done
         old = changes.before.instances
-        stopping = [one for one in reversed(old) if one.name in changes.stopping]
+        stopping = [instance for instance in reversed(old) if instance.name in changes.stopping]
         self._retiring = [
-            (process, [one.name for one in run]) for process, run in groupby(stopping, key=lambda one: one.process)
+            (process, [item.name for item in run])
+            for process, run in groupby(stopping, key=lambda instance: instance.process)
         ]
-        self._ending = [one for one in reversed(changes.before.groups) if one not in changes.after.groups]
+        self._ending = [group for group in reversed(changes.before.groups) if group not in changes.after.groups]
         self._waited_for = ""  # the process whose answer is pending
         self._has_switched = False
         self._setting: set[str] = set()  # processes that are changing live settings
@@ -81,7 +82,7 @@ class Changing:
             if group not in after.groups:
                 del members[group]
         for group in after.groups:
-            mine = [one for one in after.of_group(group) if one.name in self.changes.starting]
+            mine = [instance for instance in after.of_group(group) if instance.name in self.changes.starting]
             member = members.pop(group) if group in members else Member(group)
             members[group] = member  # in start order, like the members of the first plan
             member.requested -= self.changes.starting
@@ -95,10 +96,10 @@ class Changing:
 
     def _set_live(self) -> None:
         live = [one for one in self.changes.fated if one.fate is Fate.LIVE]
-        for process in dict.fromkeys(one.instance.process for one in live):
-            mine = [one for one in live if one.instance.process == process]
-            keys = {one.instance.name: [change.key for change in one.reasons] for one in mine}
-            text = text_of(self.changes.after, (one.instance for one in mine))
+        for process in dict.fromkeys(item.instance.process for item in live):
+            mine = [item for item in live if item.instance.process == process]
+            keys = {item.instance.name: [change.key for change in item.reasons] for item in mine}
+            text = text_of(self.changes.after, (item.instance for item in mine))
             if self._members[process].is_there:
                 self._setting.add(process)
                 self._effects.send(process, say.Reconfigure(text, keys))

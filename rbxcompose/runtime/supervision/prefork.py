@@ -21,18 +21,17 @@ from pathlib import Path
 
 import setproctitle
 
-from rbxcompose.clock import MonotonicClock
-from rbxcompose.dataclass import dataclass
-from rbxcompose.plan.model import Plan
-from rbxcompose.process_end import end_with
+from rbxcompose.base.clock import MonotonicClock
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.processes import end_with
+from rbxcompose.base.requests import Family
+from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.runtime.channel import Channel
-from rbxcompose.runtime.folder import RobotFolder, title
+from rbxcompose.runtime.folder import RobotFolder, RunOptions, title
 from rbxcompose.runtime.log import LogFile
-from rbxcompose.runtime.options import RunOptions
 from rbxcompose.runtime.processes import Process, close_all, give_back_large_memory, in_child
 from rbxcompose.runtime.supervision.judge import FiledRules
 from rbxcompose.sdk.registry import component_type
-from rbxcompose.typed_json import Family
 
 ROUTER = "router"  # the process that no plan contains
 _MOST = 4096  # [B] of one message

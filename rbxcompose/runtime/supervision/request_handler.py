@@ -4,20 +4,27 @@ from __future__ import annotations
 
 from typing import Any, Protocol
 
-from rbxcompose.levels import Level
-from rbxcompose.plan.dump import PlanTextError, load
-from rbxcompose.plan.model import Instance, Plan
-from rbxcompose.requests import Command, Refused, Request, as_data, requests
+from rbxcompose.base.levels import Level
+from rbxcompose.base.requests import Command, Refused, Request, UnreadableError, as_data, name_in, requests, to_data
+from rbxcompose.compiler.plan.dump import PlanTextError, load
+from rbxcompose.compiler.plan.model import Instance, Plan
 from rbxcompose.runtime import channel as say
-from rbxcompose.runtime.folder import RobotState
-from rbxcompose.runtime.options import ChosenLayers
-from rbxcompose.runtime.plan_requests import ApplyPlan, ComparePlan, PlanComparison, RevertPlan
-from rbxcompose.runtime.requests import ROBOT, BringDown, ReleaseRobot, RobotStatus, StopRobot
+from rbxcompose.runtime.folder import ChosenLayers, RobotState
+from rbxcompose.runtime.requests import (
+    ROBOT,
+    ApplyPlan,
+    BringDown,
+    ComparePlan,
+    PlanComparison,
+    ReleaseRobot,
+    RevertPlan,
+    RobotStatus,
+    StopRobot,
+)
 from rbxcompose.runtime.supervision.changes import Changes, changes
 from rbxcompose.runtime.supervision.conductor import FINE, Conductor
 from rbxcompose.runtime.supervision.setting_changes import SettingChanges
 from rbxcompose.sdk.registry import component_type
-from rbxcompose.typed_json import UnreadableError, name_in, to_data
 
 OWN = requests(RobotStatus, StopRobot, ReleaseRobot, ComparePlan, ApplyPlan, RevertPlan, BringDown)
 
@@ -134,10 +141,10 @@ class RequestHandler:
     def _taker(self, name: str, wanted: object) -> Instance:
         """Return the first component that takes a request; one that names its component is for that one."""
         abouts = {ROBOT}
-        for one in self._supervisor.conductor.plan.instances:
-            known = component_type(one.type).requests().types
-            if name in known and wanted in ("", one.name):
-                return one
+        for instance in self._supervisor.conductor.plan.instances:
+            known = component_type(instance.type).requests().types
+            if name in known and wanted in ("", instance.name):
+                return instance
             abouts.update(each.about for each in known.values())
         about, dot, _ = name.partition(".")
         if wanted:

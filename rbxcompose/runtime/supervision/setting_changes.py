@@ -13,12 +13,12 @@ from dataclasses import field
 from enum import Enum, auto
 from typing import Protocol
 
+from rbxcompose.base.dataclass import dataclass
 from rbxcompose.bus.names import resolve
-from rbxcompose.dataclass import dataclass
-from rbxcompose.params.change import ChangeRefusal, WantedChange
-from rbxcompose.plan.model import Plan
+from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.runtime import channel as say
-from rbxcompose.runtime import setting_messages as tell
+from rbxcompose.runtime import channel as tell
+from rbxcompose.sdk.parameters import ChangeRefusal, WantedChange
 
 WhenJudged = Callable[[ChangeRefusal | None], None]
 
@@ -105,7 +105,7 @@ class SettingChanges:
 
     def gone(self, process: str) -> None:
         """Handle the end of a process: what it had applied is lost with it, since it comes back with its plan."""
-        self._queue = deque(one for one in self._queue if one[0] != process)
+        self._queue = deque(pair for pair in self._queue if pair[0] != process)
         change = self._change
         if change is None:
             return
@@ -131,9 +131,9 @@ class SettingChanges:
             self._count += 1
             change = self._change = _Change(process, asked, self._count, parts)
             change.waiting = set(self._effects.reached())
-            for one in sorted(change.waiting):  # those without a part of it tell the values that they have now
-                part = parts.get(one, WantedChange({}, asked.wanted.by))
-                self._effects.send(one, tell.PrepareChange(change.number, part))
+            for text in sorted(change.waiting):  # those without a part of it tell the values that they have now
+                part = parts.get(text, WantedChange({}, asked.wanted.by))
+                self._effects.send(text, tell.PrepareChange(change.number, part))
 
     def _parts(self, wanted: WantedChange) -> tuple[dict[str, WantedChange], ChangeRefusal | None]:
         """Return what is wanted of each process, or why that is impossible."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from rbxcompose.plan.model import Plan
+from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.supervision.members import ConductorEffects, Member, Phase
 from rbxcompose.sdk.registry import component_type
@@ -14,7 +14,7 @@ END_BOUND = 0.9  # [s] to end after everything is at rest; what is left then is 
 
 def rest_time(plan: Plan) -> float:
     """Return how long the components of a plan may take to come to rest [s]."""
-    return max((component_type(one.type).rest_time(one.config) for one in plan.instances), default=0.0)
+    return max((component_type(instance.type).rest_time(instance.config) for instance in plan.instances), default=0.0)
 
 
 class Closing:
@@ -46,7 +46,7 @@ class Closing:
 
     def close_when_at_rest(self) -> None:
         """Shut down if nothing moves any more."""
-        moving = [one for one in self._there() if one.name != self._router and not one.is_at_rest]
+        moving = [member for member in self._there() if member.name != self._router and not member.is_at_rest]
         if self.phase is Phase.BRAKING and not moving:
             self.close()
 

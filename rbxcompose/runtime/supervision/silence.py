@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 
-from rbxcompose.levels import Level
+from rbxcompose.base.levels import Level
 from rbxcompose.runtime.processes import longest_wait
 from rbxcompose.runtime.supervision.members import ConductorEffects, Member
 

@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import replace
 
-from rbxcompose.robot_events import RobotHeld
 from rbxcompose.runtime import channel as say
+from rbxcompose.runtime.channel import HostReport, SharedStop, StopMark
 from rbxcompose.runtime.folder import StopState
-from rbxcompose.runtime.host_report import HostReport, SharedStop, StopMark
 from rbxcompose.runtime.supervision.members import ConductorEffects, Member
+from rbxcompose.sdk.robot_events import RobotHeld
 
 
 class StopLatch:
@@ -105,7 +105,7 @@ class StopLatch:
         if self.shared.own is not None and self.shared.own in now.released:
             self._released_by(report.host)
         alive = [stop.own for stop in self._others.values()]
-        self.shared = replace(self.shared, released=[one for one in self.shared.released if one in alive])
+        self.shared = replace(self.shared, released=[mark for mark in self.shared.released if mark in alive])
         holding = [(host, stop) for host, stop in self._others.items() if stop.own and not self._is_released(stop.own)]
         if holding and not self.is_stopped:
             host, stop = holding[0]

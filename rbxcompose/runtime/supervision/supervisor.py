@@ -1,8 +1,4 @@
-"""The supervisor of a robot: the shell that carries out what the conductor decides.
-
-One thread waits for channels, the pre-fork parent, the control socket and signals. It uses neither the bus nor the
-terminal, so that neither can keep it from bringing the robot to rest.
-"""
+"""The supervisor of a robot: the shell that carries out what the conductor decides."""
 
 from __future__ import annotations
 
@@ -10,38 +6,146 @@ import os
 import selectors
 import signal
 import socket
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import suppress
 from functools import cached_property
 from types import FrameType
-from typing import Any
+from typing import Any, Protocol
 
-from rbxcompose.clock import MonotonicClock
-from rbxcompose.dataclass import dataclass
-from rbxcompose.endpoints import is_private, socket_of
-from rbxcompose.levels import Level
-from rbxcompose.plan.model import Plan
+from rbxcompose.base.clock import MonotonicClock
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.levels import Level
+from rbxcompose.base.scheduler import Scheduler
+from rbxcompose.bus.endpoints import is_private, socket_of
+from rbxcompose.compiler.plan.model import Instance, Plan
+from rbxcompose.msgs.geometry_msgs import Twist
 from rbxcompose.runtime import channel as say
+from rbxcompose.runtime.channel import HostReport
 from rbxcompose.runtime.control import ControlServer
-from rbxcompose.runtime.folder import SILENT, SUSPENDED, ComponentState, RobotFolder, RobotState
-from rbxcompose.runtime.host_report import HostReport
-from rbxcompose.runtime.process_group.watchdog import MARK
+from rbxcompose.runtime.folder import SILENT, SUSPENDED, ComponentState, Gauge, RobotFolder, RobotState
+from rbxcompose.runtime.log import Record
+from rbxcompose.runtime.process_group.connection import MARK
 from rbxcompose.runtime.processes import Process, adopt_orphans, boot_id, describe_exit, signal_descriptor, waits_of
-from rbxcompose.runtime.records import Record
-from rbxcompose.runtime.service_manager import ALIVE, READY, of_this_process
 from rbxcompose.runtime.supervision import silence
 from rbxcompose.runtime.supervision.conductor import INTERRUPTED, ROBOT_FAILED, Conductor
-from rbxcompose.runtime.supervision.gauges import gauges_of
 from rbxcompose.runtime.supervision.judge import Judge
 from rbxcompose.runtime.supervision.members import Phase
 from rbxcompose.runtime.supervision.prefork import ROUTER, Exited, Fork, Forked, Launch, Parent
 from rbxcompose.runtime.supervision.request_handler import RequestHandler
-from rbxcompose.runtime.supervision.setting_line import SettingLine
+from rbxcompose.runtime.supervision.setting_changes import SettingChanges, WhenJudged
 from rbxcompose.runtime.supervision.shutdown import rest_time
 from rbxcompose.runtime.supervision.silence import DEAD, LOOK
-from rbxcompose.runtime.supervision.teleoperation import teleoperated
-from rbxcompose.scheduler import Scheduler
-from rbxcompose.sdk.capabilities import RunsMissions
-from rbxcompose.sdk.registry import declared
+from rbxcompose.sdk.capabilities import Drains, Drives, Forwards, RunsMissions
+from rbxcompose.sdk.ports import Out
+from rbxcompose.sdk.registry import component_type, declared
+
+READY, ALIVE = b"READY=1", b"WATCHDOG=1"
+
+
+class ServiceManager:
+    """Sends to the socket in `NOTIFY_SOCKET`; without one, nobody listens."""
+
+    def __init__(self, environment: Mapping[str, str]) -> None:
+        name = environment.get("NOTIFY_SOCKET", "")
+        self._address = f"\0{name[1:]}" if name.startswith("@") else name
+        self._is_watched = "WATCHDOG_USEC" in environment
+
+    def tell(self, state: bytes) -> None:
+        """Send a state; if it cannot be taken now, it is not needed any more."""
+        if self._address and (state is not ALIVE or self._is_watched):
+            with suppress(OSError), socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sender:
+                sender.sendto(state, socket.MSG_DONTWAIT, self._address)
+
+
+def of_this_process() -> ServiceManager:
+    """Return the manager that has started this process."""
+    return ServiceManager(os.environ)
+
+
+def gauges_of(plan: Plan) -> dict[str, Gauge]:
+    """Return the gauges of the batteries, by component."""
+    return dict(_gauges(plan))
+
+
+def _gauges(plan: Plan) -> Iterator[tuple[str, Gauge]]:
+    for instance in plan.instances:
+        for drains in declared(instance.type, instance.config, Drains):
+            port = component_type(instance.type).ports(instance.config)[drains.level]
+            if isinstance(port, Out) and port.interface is not None:
+                yield instance.name, Gauge(instance.topic(drains.level), port.interface.TYPE, port.unit)
+
+
+def teleoperated(plan: Plan) -> dict[str, str]:
+    """Return the topic that takes a person's velocities, by base; a base that no input is free for is left out.
+
+    If a mux decides who commands the base, this is its open input of the highest priority on which nothing in the
+    robot publishes. An input that another mux feeds leads to the inputs of that one.
+    """
+    found = dict[str, str]()
+    for base in plan.instances:
+        for drives in declared(base.type, base.config, Drives):
+            wire = next(candidate for candidate in base.wires if candidate.port == drives.commands)
+            if wire.type == Twist.TYPE and (first := next(_free(plan, wire.topic, ()), None)):
+                found[base.name] = first
+    return found
+
+
+def _free(plan: Plan, topic: str, passed: tuple[str, ...]) -> Iterator[str]:
+    """Yield the topics that nobody writes and that command what listens to `topic`, the best one first."""
+    writers = [instance for instance in plan.instances if topic in _written(instance)]
+    if topic in passed:
+        return
+    if not writers:
+        yield topic
+    for mux in writers:
+        for forwards in declared(mux.type, mux.config, Forwards):
+            if mux.topic(forwards.output) == topic:
+                for name in forwards.inputs:
+                    yield from _free(plan, mux.topic(name), (*passed, topic))
+
+
+def _written(instance: Instance) -> set[str]:
+    ports = component_type(instance.type).ports(instance.config)
+    return {instance.topic(name) for name, port in ports.items() if isinstance(port, Out)}
+
+
+class _Supervisor(Protocol):
+    conductor: Conductor
+
+    def send(self, process: str, message: say.ChannelOrder) -> None: ...
+
+
+class SettingLine:
+    """What changes of settings can do; `changes` are those changes."""
+
+    def __init__(self, supervisor: _Supervisor, judge: Judge) -> None:
+        self._supervisor, self._judge = supervisor, judge
+        self.changes = SettingChanges(self)
+
+    def plan(self) -> Plan:
+        """Return the plan in effect."""
+        return self._supervisor.conductor.plan
+
+    def reached(self) -> Collection[str]:
+        """Return the processes that take orders; none if the robot goes down."""
+        conductor = self._supervisor.conductor
+        groups = () if conductor.is_going_down else conductor.plan.groups
+        return [name for name in groups if conductor.members[name].is_configured]
+
+    def send(self, process: str, message: say.ChannelOrder) -> None:
+        """Send a message to a process."""
+        self._supervisor.send(process, message)
+
+    def judge(self, now: list[str], new: list[str], then: WhenJudged) -> None:
+        """Ask the judge."""
+        conductor = self._supervisor.conductor
+        file = os.path.realpath(conductor.plan.file)
+        self._judge.ask(conductor.generation, file, conductor.layers, now, new, then)
+
+    def close(self) -> None:
+        """End the judge."""
+        self._judge.close()
+
 
 _TAIL = 8000  # [B] of a process's printed output that go into the log
 _LONGEST_WAIT = 60.0  # [s]
@@ -269,7 +373,7 @@ class Supervisor:
         self._write_state()
 
     def _exited(self, event: Exited) -> None:
-        name = next(name for name, one in self._children.items() if one.process and one.process.pid == event.pid)
+        name = next(name for name, child in self._children.items() if child.process and child.process.pid == event.pid)
         self._bury(name, describe_exit(event.status))
 
     def _bury(self, name: str, how: str) -> None:
@@ -375,7 +479,9 @@ class Supervisor:
         plan = self.conductor.plan
         if self._lasting.plan is not plan:
             self._lasting = _Lasting(plan)
-        components = tuple(self._component(one.name, one.type, one.process) for one in plan.instances)
+        components = tuple(
+            self._component(instance.name, instance.type, instance.process) for instance in plan.instances
+        )
         return RobotState(
             robot=self._launch.plan.robot,
             file=os.path.realpath(plan.file),
@@ -413,5 +519,5 @@ class Supervisor:
 
 
 def _executive(plan: Plan) -> str | None:
-    found = [one.name for one in plan.instances if declared(one.type, one.config, RunsMissions)]
+    found = [instance.name for instance in plan.instances if declared(instance.type, instance.config, RunsMissions)]
     return found[-1] if found else None  # the robot's own starts last

@@ -6,15 +6,15 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.check_runner import all_checks
-from rbxcompose.compiler import compile_robot
-from rbxcompose.finding_pages import all_kinds
+from rbxcompose.base.units import ANGLE, LENGTH
+from rbxcompose.commands.finding_pages import all_kinds
+from rbxcompose.commands.formats.text import render_text
+from rbxcompose.compiler.check_runner import all_checks
+from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.missions.analysis.check_runner import mission_checks
 from rbxcompose.msgs.rbxcompose_msgs import MoveJoints
-from rbxcompose.rendering.text import render_text
 from rbxcompose.sdk import ArrayEntries, Component, Config, ServesAction, component, skill
 from rbxcompose.testing.golden import Golden
-from rbxcompose.units import ANGLE, LENGTH
 
 HERE = Path(__file__).parent
 

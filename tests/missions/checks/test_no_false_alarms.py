@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rbxcompose.findings import Report
+from rbxcompose.base.findings import Report
 from rbxcompose.missions.analysis.check_runner import check_program
 from rbxcompose.missions.analysis.facts import constants_of
 from rbxcompose.missions.language.reader import read_program

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from rbxcompose.findings import Report
-from rbxcompose.slips import Repair, Slips, repaired
+from rbxcompose.base.findings import Report
+from rbxcompose.base.slips import Repair, Slips, repaired
 
 Find = Callable[[str, str], Repair[str] | None]
 

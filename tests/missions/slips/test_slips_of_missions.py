@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.findings import Report
+from rbxcompose.base.findings import Report
+from rbxcompose.base.slips import Repair
+from rbxcompose.commands.formats.text import render_text
 from rbxcompose.manifest.tree import TreeNode
 from rbxcompose.missions.language.grammar import GrammarPlace, Takes
 from rbxcompose.missions.language.reader import read_program
 from rbxcompose.missions.slips import slip
-from rbxcompose.rendering.text import render_text
-from rbxcompose.slips import Repair
 from rbxcompose.testing.golden import Golden
 from tests.missions.simulated import ROBOT, tree
 from tests.missions.test_slips import FILE, cured, report_of

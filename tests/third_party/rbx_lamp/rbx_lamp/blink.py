@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rbxcompose.check_runner import check
-from rbxcompose.findings import Finding, Severity
-from rbxcompose.model.flow import setting, setting_span
-from rbxcompose.model.robot import Robot
-from rbxcompose.units import TIME, format_quantity
+from rbxcompose.base.findings import Finding, Severity
+from rbxcompose.base.units import TIME, format_quantity
+from rbxcompose.compiler.check_runner import check
+from rbxcompose.compiler.model.flow import setting, setting_span
+from rbxcompose.compiler.model.robot import Robot
 
 TYPE = "lamp"
 SHORTEST = 0.1  # [s]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pydantic import Field
 
 from rbxcompose.msgs.std_msgs import Bool, Empty, Float64
-from rbxcompose.qos import Qos
 from rbxcompose.sdk import Component, Config, In, Level, Out, ServesAction, ServesTopic, Time, component
+from rbxcompose.sdk.ports import Qos
 
 from .msgs import Blink, Dimmed
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import field
 from typing import ClassVar
 
-from rbxcompose.dataclass import dataclass
+from rbxcompose.base.dataclass import dataclass
 from rbxcompose.msgs import builtin_interfaces, unique_identifier_msgs
 from rbxcompose.msgs.types import Action, Fields, Message, Service
 

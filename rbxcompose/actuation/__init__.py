@@ -1,1 +1,0 @@
-"""Servos: control tables of models, serial ports, and the buses on which servos are read and written."""

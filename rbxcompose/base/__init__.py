@@ -1,0 +1,1 @@
+"""What knows no robot: units, geometry, time, findings, expressions, files."""

@@ -1,0 +1,1 @@
+"""The expression language: tokens, trees, types, static checks, evaluation."""

@@ -1,0 +1,438 @@
+"""Findings: what the compiler reports about a manifest, as data with a place, and how it is worded for people."""
+
+from __future__ import annotations
+
+import difflib
+import heapq
+import re
+import sys
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import field
+from enum import StrEnum
+from functools import lru_cache, wraps
+from typing import NamedTuple, ParamSpec, TypeVar, cast
+
+from rbxcompose.base.dataclass import dataclass
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+GUESSES = 4_000_000  # units of work, each about 0.1 us
+
+
+@dataclass(slots=True)
+class _Memory:
+    """What one compile has found out, by function and arguments, and what it may still spend on guesses."""
+
+    known: dict[tuple[object, ...], object] = field(default_factory=dict)
+    left: int = GUESSES
+
+
+_MEMORY: ContextVar[_Memory | None] = ContextVar("memory", default=None)
+
+
+@contextmanager
+def one_compile() -> Iterator[None]:
+    """Remember and limit what is done in this block."""
+    token = _MEMORY.set(_Memory())
+    try:
+        yield
+    finally:
+        _MEMORY.reset(token)
+
+
+def once(function: Callable[P, T]) -> Callable[P, T]:
+    """Call a function only once per compile for the same positional arguments, which must be hashable."""
+
+    @wraps(function)
+    def remembered(*args: P.args, **kwargs: P.kwargs) -> T:
+        memory, key = _MEMORY.get(), (function, *args)
+        if memory is None or kwargs:
+            return function(*args, **kwargs)
+        if key not in memory.known:
+            memory.known[key] = function(*args)  # type: ignore[call-arg]
+        return cast(T, memory.known[key])
+
+    return remembered
+
+
+def may_guess(work: int = 0) -> bool:
+    """Spend units of work on a guess; return whether this compile may go on guessing."""
+    memory = _MEMORY.get()
+    if memory is None:
+        return True
+    memory.left -= work
+    return memory.left >= 0
+
+
+SIMILAR = 0.6  # difflib ratio above which a name is offered as "did you mean"
+LEAST_WORD = 2  # characters of a word that makes two names alike
+SOMEWHAT = 0.4  # difflib ratio above which a name comes first in a list of valid names
+MOST_NAMES = 8  # valid names listed when none is similar
+_CHANCE = 0.7  # difflib ratio below which names without a common word are alike by chance
+_LONG, _ALIKE = 6, 0.65  # names of as many characters have more in common by chance: `camera` and `charger`
+SURE = 0.8  # difflib ratio above which a similar name may replace a misspelt one,
+LEAD = 0.1  # if it leads every other name by this much
+VALID = "valid names"
+DID_YOU_MEAN = "did you mean"  # how the help begins if there is one name that was probably meant
+MOST_COMPARED = 100  # names; with more, only those one slip away are considered
+_LONGEST_COMPARED = 60  # characters of a name
+_PER_LOOKUP, _PER_NAME, _PER_CHARACTER, _PER_RATIO = 300, 12, 3, 500  # units of work of guessing
+
+
+class Severity(StrEnum):
+    """The severity of a finding; only errors keep a robot from starting."""
+
+    ERROR = "error"
+    WARNING = "warning"
+
+
+class Span(NamedTuple):
+    """A place in a text: lines and columns count from 1, the end is exclusive and on the same or a later line.
+
+    A tuple, since the compiler makes thousands of them.
+    """
+
+    file: str
+    line: int
+    column: int
+    end_line: int
+    end_column: int
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}:{self.column}"
+
+    def contains(self, other: Span) -> bool:
+        """Return whether another place lies inside this one."""
+        starts = (self.line, self.column) <= (other.line, other.column)
+        ends = (other.end_line, other.end_column) <= (self.end_line, self.end_column)
+        return self.file == other.file and starts and ends
+
+
+@dataclass(frozen=True, slots=True)
+class Related:
+    """A second place that a finding is about, with a short note on it."""
+
+    span: Span
+    message: str
+
+
+@dataclass(frozen=True, slots=True)
+class Edit:
+    """Replaces `old`, the text required at `span` (perhaps in quotes), with `text`.
+
+    If `old` is not there, the edit does not apply: the value came from elsewhere, or is written in another way. An edit
+    whose `text` equals `old` changes nothing; it only guards that the text is there.
+    """
+
+    span: Span
+    old: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Fix:
+    """Edits that together correct a mistake; a safe fix cannot change what the author meant. `title` describes it."""
+
+    edits: tuple[Edit, ...]
+    is_safe: bool
+    title: str
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One mistake: `message` says what is wrong, `label` stands beside the caret, `help` says what to do."""
+
+    code: str
+    message: str
+    span: Span | None = None
+    label: str = ""
+    help: str = ""
+    related: tuple[Related, ...] = ()
+    severity: Severity = Severity.ERROR
+    fix: Fix | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class FindingKind:
+    """A kind of finding: a stable code and its severity; `docs/findings/CODE.md` is its page.
+
+    `is_fixable` means that `check --fix` corrects at least some of its findings. `doc` is the page of a kind of another
+    package (first line: title). `origin` is where it is declared.
+    """
+
+    code: str
+    severity: Severity = Severity.ERROR
+    is_fixable: bool = False
+    doc: str = ""
+    origin: str = ""
+
+    def at(
+        self,
+        span: Span | None,
+        message: str,
+        *,
+        label: str = "",
+        help: str = "",
+        related: Iterable[Related] = (),
+        fix: Fix | None = None,
+    ) -> Finding:
+        """Return a finding of this kind at `span`."""
+        return Finding(self.code, message, span, label, help, tuple(related), self.severity, fix)
+
+    def misspelt(
+        self,
+        span: Span | None,
+        message: str,
+        name: str,
+        valid: Iterable[str],
+        what: str = VALID,
+        *,
+        taken: Collection[str] = (),
+        within: str = "",
+    ) -> Finding:
+        """Return a finding about a `name` at `span` that is not in `valid`, with the name that was probably meant.
+
+        `what` describes the valid names, which are listed if none is similar; see `correction` for the other arguments.
+        If `valid` holds things with a `span` by their names, the place of that name is told, too.
+        """
+        names = _ordered(valid)
+        fix = correction(name, names, span, taken=taken, within=within)
+        related = _declared(name, valid) if isinstance(valid, Mapping) else ()
+        return self.at(span, message, help=suggest(name, names, what), related=related, fix=fix)
+
+
+def _declared(name: str, valid: Mapping[str, object]) -> Iterator[Related]:
+    """Yield the place of the name that was probably meant."""
+    for near in nearest(name, valid):
+        if isinstance(span := getattr(valid[near], "span", None), Span):
+            yield Related(span, f"'{near}' is declared here")
+
+
+KINDS: dict[str, FindingKind] = {}  # every kind that has been imported, by code
+
+
+def kind(code: str, severity: Severity = Severity.ERROR, *, is_fixable: bool = False, doc: str = "") -> FindingKind:
+    """Declare a kind of finding beside the code that finds it.
+
+    Raises:
+        ValueError: if another kind has this code.
+    """
+    caller = sys._getframe(1)
+    made = FindingKind(code, severity, is_fixable, doc, f"{caller.f_globals['__name__']}:{caller.f_lineno}")
+    register_kind(made)
+    return made
+
+
+def register_kind(made: FindingKind) -> None:
+    """Enter a kind into `KINDS`; a code belongs to one kind only, whose module may be imported again."""
+    if KINDS.setdefault(made.code, made).origin != made.origin:
+        raise ValueError(f"two kinds of finding have the code {made.code}")
+
+
+@dataclass(slots=True)
+class Report:
+    """Collects the findings of one run."""
+
+    findings: list[Finding] = field(default_factory=list)
+
+    def add(self, finding: Finding) -> None:
+        """Add one finding."""
+        self.findings.append(finding)
+
+    def extend(self, findings: Iterable[Finding]) -> None:
+        """Add several findings."""
+        self.findings.extend(findings)
+
+    @property
+    def has_errors(self) -> bool:
+        """Return whether anything found keeps the robot from starting."""
+        return any(finding.severity is Severity.ERROR for finding in self.findings)
+
+    def __iter__(self) -> Iterator[Finding]:
+        """Yield each distinct finding once, sorted by place."""
+        return iter(sorted(dict.fromkeys(self.findings), key=_place))
+
+
+def _place(finding: Finding) -> tuple[bool, Span | None, str, str]:
+    # Findings without a place come first: they are about the whole run.
+    return (finding.span is not None, finding.span, finding.code, finding.message)
+
+
+def suggest(name: str, valid: Iterable[str], what: str = VALID) -> str:
+    """Return the help for a misspelt `name`: the nearest of `valid`, else the first of them, else nothing.
+
+    They are listed by their likeness to `name`; those that are equally unlike it keep their order, so callers put the
+    more likely kind first. A compile that has spent its guesses on thousands of other names gives no help any more.
+    """
+    if not may_guess():
+        return ""
+    names = _ordered(valid)
+    near = _completed(name, names) or nearest(name, names)
+    if near and not _is_chance(name, near[0]) and not _is_one_of_many(name, near[0], names):
+        return f"{DID_YOU_MEAN} '{near[0]}'?"
+    if not names:
+        return ""
+    rest = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+    return f"{what}: {', '.join(_by_likeness(name, names)[:MOST_NAMES])}{rest}"
+
+
+def _is_chance(name: str, near: str) -> bool:
+    """Return whether two names are only somewhat alike, in no word: `wheel_separation` and `acceleration`."""
+    words, others = _words(name), _words(near)
+    if min(len(name), len(near)) >= _LONG and _similarity(name, near) < _ALIKE and not _shared(words, others):
+        return not any(_is_slip(word, other) for word in words for other in others)
+    if _is_slip(name, near) or _shared(words, others) or _similarity(name, near) >= _CHANCE:
+        return False
+    return not any(_similarity(word, other) >= SURE for word in words for other in others)
+
+
+def _is_one_of_many(name: str, near: str, names: list[str]) -> bool:
+    """Return whether a name is like another only in a word that several have: `ram_monitor` and `cpu_monitor`."""
+    words = _words(name)
+    if _is_slip(name, near) or len(names) > MOST_COMPARED or not may_guess(_PER_NAME * len(names)):
+        return False
+    both = words & _words(near)
+    others = [word for word in words - both if word.isalpha()]
+    differs = [one for one in others if all(_similarity(one, other) < SIMILAR for other in _words(near))]
+    return bool(both and differs) and sum(bool(both & _words(one)) for one in names) > 2
+
+
+def _completed(name: str, names: list[str]) -> list[str]:
+    """Return the only name that begins with the words of a shorter one: `XL430` is that of `XL430-W250`."""
+    begun = [other for other in names if len(name) > LEAST_WORD and other != name and other.startswith(name)]
+    longer = [one for one in begun if not one[len(name)].isalnum()]
+    return longer if len(longer) == 1 and name not in names else []
+
+
+def _ordered(names: Iterable[str]) -> list[str]:
+    """Return names once each, in their order; those of a set, which has none, by the alphabet."""
+    return sorted(names) if isinstance(names, set | frozenset) else list(dict.fromkeys(names))
+
+
+def _by_likeness(name: str, names: list[str]) -> list[str]:
+    """Return names with those first that share words with `name`, then those that are spelt a little like it."""
+    if len(names) > MOST_COMPARED or not may_guess(_PER_NAME * len(names)):
+        return names
+    words = _words(name)
+    spelt = {text: rank for rank, text in enumerate(nearest(name, names, most=MOST_NAMES, cutoff=SOMEWHAT))}
+    return sorted(names, key=lambda one: (-_shared(words, _words(one)), spelt.get(one, MOST_NAMES)))
+
+
+def _shared(words: set[str], others: set[str]) -> int:
+    """Return how many words are in both sets, or begin one there: `baud` and `baudrate`."""
+    return sum(any(word.startswith(other) or other.startswith(word) for other in others) for word in words)
+
+
+def _words(name: str) -> set[str]:
+    return {word for word in re.split(r"[\W_]+", name.casefold()) if len(word) >= LEAST_WORD}
+
+
+def nearest(name: str, valid: Iterable[str], *, most: int = 1, cutoff: float = SIMILAR) -> list[str]:
+    """Return the valid names most similar to `name`, nearest first; among very many, only those one slip away.
+
+    Comparing takes time, and a file may contain thousands of wrong names: after many, a compile finds nothing near.
+    """
+    if not may_guess():
+        return []
+    names = frozenset(valid)
+    may_guess(_PER_NAME * len(names))
+    if len(names) > MOST_COMPARED:
+        slips = _slips(names)
+        names = frozenset(near for short in _shortened(name) for near in slips.get(short, ()))
+    return _closest(name, sorted(names), most, cutoff)
+
+
+_LOOK_ALIKE = str.maketrans("1I0O", "lloo")
+
+
+def _closest(name: str, names: list[str], most: int, cutoff: float) -> list[str]:
+    """Do what `difflib.get_close_matches` does, but count the work."""
+    may_guess(_PER_LOOKUP + _PER_NAME * len(names))
+    matcher = difflib.SequenceMatcher(None, "", name)
+    near = []
+    for other in names:
+        matcher.set_seq1(other)
+        if matcher.real_quick_ratio() < cutoff or not may_guess(_PER_CHARACTER * len(other)):
+            continue
+        if matcher.quick_ratio() < cutoff or not may_guess(_PER_RATIO + len(other) * len(name)):
+            continue
+        if (ratio := matcher.ratio()) >= cutoff:
+            near.append((ratio, _seen(other) == _seen(name), other))
+    return [one for *_, one in heapq.nlargest(most, near)]
+
+
+def _seen(name: str) -> str:
+    """Return a name as it looks: `corner_l` is `corner_1`."""
+    return name.translate(_LOOK_ALIKE)
+
+
+@lru_cache(maxsize=8)
+def _slips(names: frozenset[str]) -> dict[str, list[str]]:
+    """Return, for each text that is left when at most one character is removed, the names it comes from."""
+    found: dict[str, list[str]] = {}
+    for name in names:
+        may_guess(_PER_NAME * len(name))
+        for short in _shortened(name):
+            found.setdefault(short, []).append(name)
+    return found
+
+
+def _shortened(name: str) -> set[str]:
+    kept = name[:_LONGEST_COMPARED]
+    return {kept, *(kept[:index] + kept[index + 1 :] for index in range(len(kept)))}
+
+
+def correction(
+    name: str, valid: Iterable[str], span: Span | None, *, taken: Collection[str] = (), within: str = ""
+) -> Fix | None:
+    """Return the safe fix for a misspelt `name` at `span`, None if no name or more than one may be meant.
+
+    `taken` are names already used there: using one again would be a mistake, too. If the name is only part of the text
+    at `span`, `within` is the whole text, and `name` is its first occurrence there.
+    """
+    meant = surely_meant(name, valid)
+    if span is None or meant is None or meant in taken:
+        return None
+    old = within or name
+    new = old.replace(name, meant, 1)
+    return replacement(span, old, new)
+
+
+def replacement(span: Span, old: str, new: str, *, is_safe: bool = True) -> Fix:
+    """Return the fix that replaces `old` with `new`."""
+    return Fix((Edit(span, old, new),), is_safe, f"'{old}' -> '{new}'")
+
+
+def surely_meant(name: str, valid: Iterable[str]) -> str | None:
+    """Return the one name that `name` is a typing slip for, None if there is no such name."""
+    near = nearest(name, valid, most=2, cutoff=SURE - LEAD)
+    ratios = [_similarity(text, name) for text in near]
+    is_near = bool(near) and (ratios[0] >= SURE or _is_swap(name, near[0]))
+    is_clear = is_near and ratios[0] - sum(ratios[1:]) >= LEAD * len(near[1:])
+    return near[0] if is_clear and _is_slip(name, near[0]) else None
+
+
+def _similarity(text: str, other: str) -> float:
+    return difflib.SequenceMatcher(None, text, other).ratio()
+
+
+def _is_swap(name: str, meant: str) -> bool:
+    """Return whether two neighbouring characters are swapped."""
+    swaps = (name[:at] + name[at + 1] + name[at] + name[at + 2 :] for at in range(len(name) - 1))
+    return meant in swaps
+
+
+def _is_slip(name: str, meant: str) -> bool:
+    """Return whether two names differ within words: `corner_2` for `corner_1` or `min_speed` for `max_speed` do not."""
+    if re.findall(r"\d+", name) != re.findall(r"\d+", meant):
+        return False
+    words, others = re.split(r"[\W_]+", name), re.split(r"[\W_]+", meant)
+    if len(words) != len(others):
+        return _similarity("".join(words), "".join(others)) >= 1 - LEAD
+    return all(_similarity(word, other) >= SIMILAR for word, other in zip(words, others, strict=True))
+
+
+Sources = Mapping[str, str]  # text of every file that a span may refer to

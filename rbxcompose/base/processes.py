@@ -1,0 +1,94 @@
+"""Fences around processes that evaluate strangers' texts, and processes that end with their parent."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import resource
+import signal
+import sys
+import time
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+SECONDS = 1.2  # of processor time; with the rest of `check`, a file that never ends is told within 2 s
+STARTS = 12  # on a slow machine, as much processor time as so many starts of this process,
+MOST_SECONDS = 4.0  # but no more than this
+MEMORY = 140_000_000  # [bytes] of address space beyond what it has at its start
+ANSWER = 20_000_000  # [bytes] that it may write in all, to files that are open already
+_HARMLESS = {"compile", "exec", "glob.glob", "glob.glob/2", "builtins.id"}
+_LISTS = ("os.listdir", "os.scandir")
+_WRITES = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
+
+
+def is_below(path: str, roots: Iterable[str]) -> bool:
+    """Return whether a real path is one of the roots or lies below one."""
+    return any(os.path.commonpath([path, root]) == root for root in roots)
+
+
+def processor_time() -> float:
+    """Return the processor time that this process has taken [s]."""
+    return time.process_time()
+
+
+def fence(roots: Iterable[str], used: set[str], start: float) -> None:
+    """Limit what this process can use from now on, and refuse whatever Python reports that is not needed.
+
+    The files and folders that it reads, or tries to read, are added to `used`. `start` is the processor time [s] that
+    the start of such a process takes here.
+    """
+    real = [os.path.realpath(root) for root in roots]
+    _limit(start)
+
+    def audit(event: str, arguments: tuple[Any, ...]) -> None:
+        if event == "open":
+            if not _may_open(arguments[0], arguments[2], real):
+                raise PermissionError("a description may only read files of its project")
+        elif event in _LISTS:
+            if not _may_open(arguments[0], os.O_RDONLY, real):
+                raise PermissionError("a description may only list folders of its project")
+        elif event not in _HARMLESS:
+            raise PermissionError(f"a description may not use {event}")
+        else:
+            return
+        if isinstance(arguments[0], str | bytes):
+            used.add(os.path.realpath(os.fsdecode(arguments[0])))
+
+    sys.addaudithook(audit)
+
+
+def _limit(start: float) -> None:
+    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
+    most = pages * resource.getpagesize() + MEMORY
+    resource.setrlimit(resource.RLIMIT_AS, (most, most))
+    seconds = min(max(SECONDS, STARTS * start), MOST_SECONDS)
+    signal.setitimer(signal.ITIMER_PROF, seconds)  # ends the process
+    last = int(time.process_time() + seconds) + 1  # if it resets the timer
+    resource.setrlimit(resource.RLIMIT_CPU, (last, last))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (ANSWER, ANSWER))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    resource.setrlimit(resource.RLIMIT_NOFILE, (64, 64))
+
+
+def _may_open(file: object, flags: int, roots: list[str]) -> bool:
+    if isinstance(file, int):  # it is open already
+        return True
+    return (
+        isinstance(file, str | bytes) and not flags & _WRITES and is_below(os.path.realpath(os.fsdecode(file)), roots)
+    )
+
+
+_PR_SET_PDEATHSIG = 1
+_LIBC = ctypes.CDLL(None, use_errno=True)
+
+
+def end_with(parent: int, number: signal.Signals) -> None:
+    """Have the kernel send `number` to this process when its parent ends; end now if the parent has already ended.
+
+    Call it in a child of the main thread: for the kernel, the parent is the thread that forked.
+    """
+    if _LIBC.prctl(_PR_SET_PDEATHSIG, int(number), 0, 0, 0) != 0:
+        raise OSError(ctypes.get_errno(), "prctl(PR_SET_PDEATHSIG) failed")
+    if os.getppid() != parent:
+        os._exit(0)

@@ -1,0 +1,51 @@
+"""Where plug-ins stand: modules are found by their folders, without a list and without importing them.
+
+Each room of the package, that is each package at its top and each domain, may have a folder for each family of plug-ins
+(`components/`, `sections/`, `commands/`, ...): a file is a plug-in, and its name is that of the plug-in. Rules are an
+exception: all of them run, so a room has them in `checks.py` or in files of `checks/`, many in one.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from functools import cache
+
+_PACKAGE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+_NAME, _DOMAINS = "rbxcompose", "domains"
+
+
+@cache
+def modules_of(folder: str) -> dict[str, str]:
+    """Return the modules of a family, sorted, by their files; one that is a room's only file has the room's name."""
+    return dict(sorted(_found(folder)))
+
+
+def file_of(module: str) -> str:
+    """Return the file of one of these modules."""
+    return os.path.join(_PACKAGE, *module.split(".")[1:]) + ".py"
+
+
+def _found(folder: str) -> Iterator[tuple[str, str]]:
+    for room, path in _rooms():
+        try:
+            files = os.listdir(os.path.join(path, folder))
+        except FileNotFoundError:
+            if os.path.exists(os.path.join(path, f"{folder}.py")):
+                yield room.rpartition(".")[2], f"{room}.{folder}"
+            continue
+        stems = (file.removesuffix(".py") for file in files if file.endswith(".py") and file != "__init__.py")
+        yield from ((stem, f"{room}.{folder}.{stem}") for stem in stems)
+
+
+@cache
+def _rooms() -> tuple[tuple[str, str], ...]:
+    """Return the packages that may have plug-ins, each by its name and its folder."""
+    tops = _below(_NAME, _PACKAGE)
+    return (*tops, *_below(f"{_NAME}.{_DOMAINS}", os.path.join(_PACKAGE, _DOMAINS)))
+
+
+def _below(package: str, path: str) -> list[tuple[str, str]]:
+    with os.scandir(path) as entries:
+        names = sorted(entry.name for entry in entries if "." not in entry.name and not entry.name.startswith("_"))
+    return [(f"{package}.{name}", os.path.join(path, name)) for name in names]

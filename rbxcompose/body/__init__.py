@@ -1,1 +1,0 @@
-"""The body of a robot: its frames and where they are."""

@@ -1,0 +1,344 @@
+"""Actions of ROS 2: servers and clients around the core in `goals`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from itertools import count
+from typing import Any, Generic, TypeVar
+
+import xxhash
+
+from rbxcompose.base.scheduler import ScheduledCallback
+from rbxcompose.bus.goals import Goal, Goals, GoalState
+from rbxcompose.bus.local import GATE_BURST, GOALS, Allowance, Participant
+from rbxcompose.bus.names import ActionNames
+from rbxcompose.bus.services import Client, ServedRequest, Server, Services
+from rbxcompose.bus.topics import Publisher, Subscription, Topics
+from rbxcompose.bus.transport import EXPIRED
+from rbxcompose.msgs.action_msgs import CancelGoal, GoalInfo, GoalStatus, GoalStatusArray
+from rbxcompose.msgs.stamps import to_nanoseconds, to_time
+from rbxcompose.msgs.types import Action, Message
+from rbxcompose.msgs.unique_identifier_msgs import UUID
+from rbxcompose.sdk.bound import Ended, Outcome, Reply
+from rbxcompose.sdk.ports import Qos
+
+STATUS_PERIOD = 0.1  # [s] between two publications of the goals' states during a flood of goals
+LOG_PERIOD = 1.0  # [s] between two log lines during a flood of goals
+LOG_BURST = 10.0  # [s]; the lines allowed in this time may also come all at once
+
+G = TypeVar("G", bound=Message)
+R = TypeVar("R", bound=Message)
+F = TypeVar("F", bound=Message)
+
+
+class ServedGoal(Generic[G, R, F]):
+    """A goal as its server sees it. Once it has ended, or a newer one has replaced it, its methods do nothing."""
+
+    def __init__(self, server: ActionServer[G, R, F], goal: Goal[G, R]) -> None:
+        self._server, self._goal = server, goal
+        self.is_paused = False  # it is to be held in its present state
+
+    @property
+    def request(self) -> G:
+        """Return the goal as it was sent."""
+        return self._goal.request
+
+    @property
+    def cancel_requested(self) -> bool:
+        """Return whether the goal should end soon, by `canceled`."""
+        return self._goal.state is GoalState.CANCELING
+
+    def feedback(self, message: F, /) -> None:
+        """Send the client feedback."""
+        self._server.tell(self._goal, message)
+
+    def succeeded(self, result: R | None = None, /) -> None:
+        """End the goal as succeeded; without a result, send its zero value."""
+        self._server.end(self._goal, GoalState.SUCCEEDED, result)
+
+    def aborted(self, reason: str = "", result: R | None = None, /) -> None:
+        """End the goal as aborted and log the reason."""
+        self._server.end(self._goal, GoalState.ABORTED, result, reason)
+
+    def canceled(self, result: R | None = None, /) -> None:
+        """End the goal as canceled, at the request of its client or of a stop."""
+        self._server.end(self._goal, GoalState.CANCELED, result)
+
+
+class ActionServer(Generic[G, R, F]):
+    """Carries out one goal at a time. `accept` returns why it refuses a goal, or nothing."""
+
+    def __init__(
+        self,
+        topics: Topics,
+        services: Services,
+        node: Participant,
+        name: str,
+        action: type[Action[G, R, F]],
+        accept: Callable[[G], str],
+        *,
+        waits: bool = False,
+    ) -> None:
+        """With `waits`, hold goals back until the node is open."""
+        names = ActionNames.of(name)
+        self.current: ServedGoal[G, R, F] | None = None  # the goal to carry out; a newer one replaces it
+        self.began: Callable[[], None] = lambda: None  # called when there is a goal to carry out
+        self._name, self._action, self._accept = name, action, accept
+        self._process, self._owner = node.process, node.owner
+        self._goals: Goals[G, R] = Goals()
+        self._asked: dict[bytes, list[ServedRequest[Any, Any]]] = {}  # result requests, by unfinished goal
+        self._may_tell = Allowance(1 / STATUS_PERIOD, GATE_BURST)
+        self._will_tell: ScheduledCallback | None = None
+        self._may_log, self._unlogged = Allowance(1 / LOG_PERIOD, LOG_BURST), 0
+        self._will_log: ScheduledCallback | None = None
+        self._feedback = Publisher(topics, node, names.feedback, action.FeedbackMessage, Qos.STATE)
+        self._status = Publisher(topics, node, names.status, GoalStatusArray, Qos.LATCHED)
+        self._servers: list[Server[Any, Any]] = [
+            Server(services, node, names.cancel_goal, CancelGoal, self._on_cancel, rate=GOALS),
+            Server(services, node, names.get_result, action.GetResult, self._on_get_result),
+            Server(
+                services,
+                node,
+                names.send_goal,
+                action.SendGoal,
+                self._on_send,
+                self._on_client_left,
+                waits=waits,
+                rate=GOALS,
+            ),
+        ]
+
+    def cancel_all(self) -> None:
+        """Request the cancellation of the current goal."""
+        self._goals.cancel()
+        self._tell_status()
+
+    def tell(self, goal: Goal[G, R], message: F) -> None:
+        """Publish feedback on a goal that has not ended."""
+        if goal is self._goals.current:
+            self._feedback(self._action.FeedbackMessage(goal_id=UUID(goal.id), feedback=message))
+
+    def end(self, goal: Goal[G, R], state: GoalState, result: R | None, reason: str = "") -> None:
+        """End a goal that has not ended and answer all requests for its result."""
+        if not self._goals.end(goal, state, self._action.Result() if result is None else result, self._now):
+            return
+        self.current = None
+        if reason:
+            self._log(f"a goal was aborted: {reason}")
+        self._tell_status()
+        for request in self._asked.pop(goal.id, []):
+            self._reply_result(request, goal)
+
+    def close(self) -> None:
+        """Withdraw the server; its goal ends as aborted, and its clients learn that the server is gone."""
+        if self._goals.current is not None:
+            # The result is not sent, so that the client does not mistake this for a failure of the goal itself.
+            self._goals.end(self._goals.current, GoalState.ABORTED, self._action.Result(), self._now)
+            self._publish_status()
+        for timer in (self._will_tell, self._will_log):
+            if timer is not None:
+                timer.cancel()
+        self.current = None
+        while self._servers:
+            self._servers.pop().close()
+        self._status.close()
+        self._feedback.close()
+
+    @property
+    def _now(self) -> float:
+        return self._process.clock.now()
+
+    def _log(self, text: str) -> None:
+        if self._may_log.takes(self._now):
+            self._process.log(self._owner, f"{self._name}: {text}")
+            return
+        self._unlogged += 1
+        if self._will_log is None:
+            due = self._process.scheduler.now + LOG_PERIOD
+            self._will_log = self._process.scheduler.at(due, self._owner, self._log_rest)
+
+    def _log_rest(self) -> None:
+        """Report how much of a flood was not logged."""
+        self._process.log(self._owner, f"{self._name}: {self._unlogged} more goals were refused, aborted or replaced")
+        self._unlogged, self._will_log = 0, None
+
+    def _on_send(self, request: ServedRequest[Any, Any]) -> None:
+        response, id_ = self._action.SendGoal.Response, request.message.goal_id.uuid
+        self._goals.forget(self._now)
+        reason = self._accept(request.message.goal) if self._goals.find(id_) is None else "it was sent before"
+        if reason:
+            self._log(f"a goal was refused: {reason}")
+            request.reply(response(accepted=False))
+            return
+        if self._goals.current is not None:
+            self._replace(self._goals.current)
+        goal: Goal[G, R] = Goal(id_, request.message.goal, request.client, self._process.clock.stamp())
+        self._goals.accept(goal)
+        self.current = ServedGoal(self, goal)
+        self.began()
+        self._tell_status()
+        request.reply(response(accepted=True, stamp=to_time(goal.accepted)))
+
+    def _replace(self, goal: Goal[G, R]) -> None:
+        if goal.state is GoalState.CANCELING:
+            self.end(goal, GoalState.CANCELED, None)
+        else:
+            self.end(goal, GoalState.ABORTED, None, "replaced by a newer goal")
+
+    def _on_cancel(self, request: ServedRequest[CancelGoal.Request, CancelGoal.Response]) -> None:
+        info = request.message.goal_info
+        code, goals = self._goals.cancel(info.goal_id.uuid, to_nanoseconds(info.stamp))
+        self._tell_status()
+        request.reply(CancelGoal.Response(return_code=code, goals_canceling=tuple(map(_info, goals))))
+
+    def _on_get_result(self, request: ServedRequest[Any, Any]) -> None:
+        self._goals.forget(self._now)
+        goal = self._goals.find(request.message.goal_id.uuid)
+        if goal is None:
+            request.reply(self._action.GetResult.Response(status=GoalState.UNKNOWN, result=self._action.Result()))
+        elif goal.state.is_end:
+            self._reply_result(request, goal)
+        else:
+            self._asked.setdefault(goal.id, []).append(request)
+
+    def _on_client_left(self, client: bytes) -> None:
+        if self._goals.cancel_from(client):
+            self._log("its goal is cancelled: the client is gone")
+            self._tell_status()
+
+    def _reply_result(self, request: ServedRequest[Any, Any], goal: Goal[G, R]) -> None:
+        request.reply(self._action.GetResult.Response(status=goal.state, result=goal.result))
+
+    def _tell_status(self) -> None:
+        """Publish the states of all goals: immediately, or a little later during a flood of goals."""
+        if self._will_tell is None:
+            if self._may_tell.takes(self._now):
+                self._publish_status()
+            else:
+                due = self._process.scheduler.now + STATUS_PERIOD
+                self._will_tell = self._process.scheduler.at(due, self._owner, self._publish_status)
+
+    def _publish_status(self) -> None:
+        self._will_tell = None
+        statuses = (GoalStatus(goal_info=_info(goal), status=goal.state) for goal in self._goals)
+        self._status(GoalStatusArray(status_list=tuple(statuses)))
+
+
+def _info(goal: Goal[Any, Any]) -> GoalInfo:
+    return GoalInfo(goal_id=UUID(goal.id), stamp=to_time(goal.accepted))
+
+
+OUTCOMES = {
+    GoalState.SUCCEEDED: Outcome.SUCCEEDED,
+    GoalState.CANCELED: Outcome.CANCELED,
+    GoalState.ABORTED: Outcome.ABORTED,
+}
+
+
+class SentGoal(Generic[R]):
+    """A goal as its client sees it."""
+
+    def __init__(self, client: ActionClient[Any, R, Any], id: bytes, then: Callable[[Ended[R]], None]) -> None:
+        self.id = id
+        self._client, self._then = client, then
+        self._is_accepted = False
+        self._is_unwanted = False
+
+    def cancel(self) -> None:
+        """Ask the server to end the goal; `Ended` still follows."""
+        self._is_unwanted = True
+        if self._is_accepted:
+            self._client.ask_to_cancel(self.id)
+
+    def answered(self, reply: Reply[Any]) -> None:
+        """Receive whether the server accepted the goal."""
+        if reply.response is None:
+            self._client.ask_to_cancel(self.id)  # the answer may only be late, and the goal accepted
+            self._end(Ended(Outcome.LOST, message=reply.error))
+        elif not reply.response.accepted:
+            self._end(Ended(Outcome.REJECTED, message="the server refused it"))
+        else:
+            self._is_accepted = True
+            self._client.ask_for_result(self)
+            if self._is_unwanted:
+                self._client.ask_to_cancel(self.id)
+
+    def resulted(self, reply: Reply[Any]) -> None:
+        """Receive how the goal ended."""
+        if reply.error == EXPIRED:
+            self._client.ask_for_result(self)  # a goal may take longer than any request may
+        elif reply.response is None:
+            self._end(Ended(Outcome.LOST, message=reply.error))
+        elif reply.response.status in OUTCOMES:
+            self._end(Ended(OUTCOMES[reply.response.status], reply.response.result))
+        else:
+            self._end(Ended(Outcome.LOST, message="the server does not know it"))
+
+    def _end(self, ended: Ended[R]) -> None:
+        self._client.forget(self.id)
+        self._then(ended)
+
+
+class ActionClient(Generic[G, R, F]):
+    """Sends goals to an action server."""
+
+    def __init__(
+        self, topics: Topics, services: Services, node: Participant, name: str, action: type[Action[G, R, F]]
+    ) -> None:
+        names = ActionNames.of(name)
+        self._action = action
+        self._ids = count(1)
+        self._listeners: dict[bytes, Callable[[F], None]] = {}  # feedback callbacks, by goal
+        self._feedback = Subscription(
+            topics, node, names.feedback, action.FeedbackMessage, Qos.STATE, self._on_feedback, listens=False
+        )
+        self._feedback.is_wanted = lambda: bool(self._listeners)  # many clients never use feedback
+        self._send: Client[Any, Any] = Client(services, node, names.send_goal, action.SendGoal)
+        self._cancel = Client(services, node, names.cancel_goal, CancelGoal)
+        self._result: Client[Any, Any] = Client(services, node, names.get_result, action.GetResult)
+
+    @property
+    def is_available(self) -> bool:
+        """Return whether a server is known."""
+        return self._send.is_available and self._cancel.is_available and self._result.is_available
+
+    def watch(self, changed: Callable[[bool], None]) -> None:
+        """Call `changed` when a server appears, and when the last one is gone."""
+        self._send.watch(changed)  # a server declares this service last
+
+    def __call__(
+        self, goal: G, then: Callable[[Ended[R]], None], feedback: Callable[[F], None] | None = None, /
+    ) -> SentGoal[R]:
+        """Send `goal`; `then` receives its end exactly once."""
+        # Unique among all clients, yet the same in every run on a stepped clock.
+        id_ = xxhash.xxh3_128_digest(self._send.gid + next(self._ids).to_bytes(8, "little"))
+        sent: SentGoal[R] = SentGoal(self, id_, then)
+        if feedback is not None:
+            self._listeners[id_] = feedback
+            self._feedback.listen()
+        self._send(self._action.SendGoal.Request(goal_id=UUID(id_), goal=goal), sent.answered)
+        return sent
+
+    def ask_for_result(self, goal: SentGoal[R]) -> None:
+        """Wait for the end of a goal, however long it takes."""
+        self._result(self._action.GetResult.Request(goal_id=UUID(goal.id)), goal.resulted, timeout=math.inf)
+
+    def ask_to_cancel(self, id: bytes) -> None:
+        """Request the cancellation of a goal; its result will show whether it could still be cancelled."""
+        self._cancel(CancelGoal.Request(goal_info=GoalInfo(goal_id=UUID(id))), lambda reply: None)
+
+    def forget(self, id: bytes) -> None:
+        """Stop listening to feedback on a goal."""
+        self._listeners.pop(id, None)
+
+    def close(self) -> None:
+        """Withdraw the client; the server cancels its goals."""
+        self._feedback.close()
+        for client in (self._send, self._cancel, self._result):
+            client.close()
+
+    def _on_feedback(self, message: Any) -> None:
+        listener = self._listeners.get(message.goal_id.uuid)
+        if listener is not None:
+            listener(message.feedback)

@@ -1,1 +1,0 @@
-"""Types of buses of servos, one file each."""

@@ -1,1 +1,0 @@
-"""Rules about the whole robot, one file each."""

@@ -1,1 +1,0 @@
-"""What `arm` does without a robot that runs."""

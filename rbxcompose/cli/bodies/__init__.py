@@ -1,1 +1,0 @@
-"""The actions of `body`, one file each, and what they share."""

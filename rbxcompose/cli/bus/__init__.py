@@ -1,1 +1,0 @@
-"""The bus as a visitor sees it: topics, services, actions and their messages."""

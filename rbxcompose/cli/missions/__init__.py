@@ -1,1 +1,0 @@
-"""Missions: their pictures, live or from files, their logs, and their exploration."""

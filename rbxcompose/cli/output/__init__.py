@@ -1,1 +1,0 @@
-"""The output of commands: answers on stdout, errors on stderr."""

@@ -1,1 +1,0 @@
-"""What the verbs of `param` do with the settings of a robot that runs."""

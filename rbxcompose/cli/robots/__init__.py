@@ -1,1 +1,0 @@
-"""Running robots: which one is addressed, requests to it, watching it, and changing it."""

@@ -1,1 +1,0 @@
-"""What verbs do with the file of a system."""

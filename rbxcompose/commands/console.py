@@ -1,0 +1,142 @@
+"""The output of commands: answers go to stdout, errors to stderr.
+
+With `--json`, stdout has JSON in any case: errors without an answer are one document, too, besides the text on stderr.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import re
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import field
+from typing import Any, NoReturn, TextIO
+
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.findings import Finding, Report, Severity, Sources
+from rbxcompose.base.printable import plain
+from rbxcompose.commands.formats.text import render_text
+
+FINDINGS, USAGE = 1, 2  # exit codes
+
+
+@dataclass(slots=True)
+class Output:
+    """The output of one command so far: whether its answer has begun, else what is wrong."""
+
+    has_begun: bool = False
+    misuse: str = ""
+    findings: list[Finding] = field(default_factory=list)
+    sources: dict[str, str] = field(default_factory=dict)
+
+    def note(self, report: Report, sources: Sources) -> None:
+        """Keep reported findings."""
+        self.findings.extend(report)
+        self.sources.update(sources)
+
+    @property
+    def error(self) -> str:
+        """Return what is wrong in one line; empty if nothing is."""
+        errors = (finding.message for finding in Report(self.findings) if finding.severity is Severity.ERROR)
+        return self.misuse or next(errors, "")
+
+    def data(self) -> dict[str, object]:
+        """Return what is wrong, for JSON."""
+        from rbxcompose.commands.formats.json_ import as_data  # only needed for JSON
+
+        return {"error": self.error, "findings": [as_data(finding, self.sources) for finding in Report(self.findings)]}
+
+
+_commands = [Output()]  # the running command is last; no thread-local variable, since all of its threads report
+
+
+def output() -> Output:
+    """Return the output of the running command."""
+    return _commands[-1]
+
+
+@contextmanager
+def answered(in_json: bool) -> Iterator[None]:
+    """Run a command; with `in_json`, write what is wrong to stdout if nothing else was written there."""
+    _commands.append(Output())
+    try:
+        yield
+    finally:
+        told = _commands.pop()
+        if in_json and told.error and not told.has_begun:
+            sys.stdout.write(f"{json.dumps(told.data())}\n")
+
+
+def misused(verb: str, problem: str) -> int:
+    """Report wrong usage of a command, and return the exit code for it."""
+    output().misuse = problem
+    sys.stderr.write(f"rbxcompose {verb}: {problem}\n")
+    return USAGE
+
+
+def has_colour(stream: TextIO) -> bool:
+    """Return whether to use colours: on a terminal, unless `NO_COLOR` is set."""
+    return stream.isatty() and not os.environ.get("NO_COLOR")
+
+
+def good(text: str) -> str:
+    """Return a line of good news, green where stdout shows colours."""
+    return f"\x1b[32m{text}\x1b[0m" if has_colour(sys.stdout) else text
+
+
+def tell(text: str) -> None:
+    """Write lines to stdout and flush."""
+    output().has_begun = True
+    sys.stdout.write(f"{text}\n")
+    sys.stdout.flush()
+
+
+def tell_report(report: Report, sources: Sources) -> None:
+    """Write all findings to stderr."""
+    output().note(report, sources)
+    sys.stderr.write(render_text(report, sources, has_colour(sys.stderr)))
+    sys.stderr.flush()
+
+
+def refuse(finding: Finding) -> int:
+    """Write one finding to stderr and return the exit code for it."""
+    report = Report()
+    report.add(finding)
+    tell_report(report, {})
+    return FINDINGS
+
+
+class Parser(argparse.ArgumentParser):
+    """Parses the words after a verb; what it refuses is noted as well.
+
+    A quantity below zero, `-90deg`, is a value and not an option.
+    """
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self._negative_number_matcher = re.compile(r"-\.?\d")  # by itself, it knows only numbers without a unit
+
+    def error(self, message: str) -> NoReturn:
+        """Note the error, report it with the usage, and end the command."""
+        output().misuse = message
+        super().error(message)
+
+
+class NotDoneError(Exception):
+    """Raised with the finding when it is unclear which robot is addressed, or none is up."""
+
+    def __init__(self, finding: Finding) -> None:
+        super().__init__(finding.message)
+        self.finding = finding
+
+
+def table(rows: Sequence[Sequence[str]]) -> str:
+    """Return rows of cells as lines in aligned columns; make foreign names safe for a terminal."""
+    cells = [[plain(cell) for cell in row] for row in rows]
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    return "\n".join(
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in cells
+    )

@@ -1,0 +1,310 @@
+"""A visitor on a bus: a session for the duration of one command, with a loop of its own; and what it lists there."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import selectors
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict
+from functools import partial
+from types import FrameType, TracebackType
+from typing import TYPE_CHECKING, Any, Self
+
+import zenoh
+
+from rbxcompose.base.clock import MonotonicClock
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.findings import kind
+from rbxcompose.base.scheduler import Scheduler
+from rbxcompose.bus.graph import Graph, GraphEnd, GraphName, WireType, find
+from rbxcompose.bus.local import Inbox
+from rbxcompose.bus.names import Attachment, data_key, decode_attachment
+from rbxcompose.bus.tokens import SPACE
+from rbxcompose.bus.transport import Arrival
+from rbxcompose.bus.zenoh_session import open_client, open_peer
+from rbxcompose.bus.zenoh_transport import ZenohTransport
+from rbxcompose.commands.console import NotDoneError, refuse, table, tell
+from rbxcompose.commands.lookup import BusPlace, add_bus_options, find_place
+from rbxcompose.commands.options import (
+    Subcommand,
+    add_actions,
+    add_json_option,
+    add_ls_options,
+    add_system_options,
+    add_timeout_option,
+    argument,
+)
+from rbxcompose.runtime.process_group.connection import CallbackInbox
+from rbxcompose.sdk.ports import Qos
+
+if TYPE_CHECKING:
+    from rbxcompose.bus.bus import Bus
+
+NAME = "_rbxcompose"  # node name; tools do not list names that begin with `_`
+LONGEST_QUEUE = 1000  # messages waiting to be shown
+PATIENCE = 2.0  # [s] to wait for an answer of the router
+_EACH = zenoh.ConsolidationMode.NONE
+_PAUSE = 0.01  # [s] between two looks for the router
+NO_HASHES = "TypeHashNotSupported"  # ROS 2 Humble writes this in place of a hash
+NO_ROUTER = kind("RBX9020")
+
+
+@dataclass(frozen=True, slots=True)
+class HeardMessage:
+    """A message as it arrived: its time [s of the guest's clock], its type, and its bytes."""
+
+    time: float
+    kind: WireType
+    arrival: Arrival
+
+    @property
+    def sender(self) -> bytes:
+        """Return the GID of the sender, or nothing if the message has none."""
+        return self._attachment.gid
+
+    @property
+    def stamp(self) -> int:
+        """Return the time of sending by the sender's clock [ns], or 0 if the message has none."""
+        return self._attachment.stamp
+
+    @property
+    def _attachment(self) -> Attachment:
+        try:
+            return decode_attachment(self.arrival.attachment)
+        except ValueError:
+            return Attachment(0, 0, b"")
+
+
+class Guest:
+    """Lists who is on the bus, listens, and provides a `Bus` for sending."""
+
+    def __init__(self, place: BusPlace, *, stays: bool = False) -> None:
+        """Join the bus: briefly through its router, or to stay, with direct links to all others.
+
+        A guest that stays loses nothing when the router is restarted.
+
+        Raises:
+            NotDoneError: if no router answers.
+        """
+        self.clock = MonotonicClock()
+        self._session = self._lasting(place.router) if stays else _short(place.router)
+        self.domain, self.scheduler = place.domain, Scheduler()
+        self.is_interrupted = False
+        self._inbox = CallbackInbox()
+        self.transport = ZenohTransport(self._session, self._inbox.put)
+        self._bus: Bus | None = None
+        self._queues: list[Inbox[HeardMessage]] = []
+        self._selector = selectors.SelectSelector()  # unlike other selectors, it can wait for less than a millisecond
+        self._selector.register(self._inbox, selectors.EVENT_READ, lambda: None)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        (self._bus or self.transport).close()
+        self._selector.close()
+        self._inbox.close()
+
+    def graph(self) -> Graph:
+        """Return the graph of all participants at this moment."""
+        replies: Iterator[zenoh.Reply] = iter(
+            self._session.liveliness().get(f"{SPACE}/{self.domain}/**", timeout=PATIENCE)
+        )
+        return Graph.of(str(reply.ok.key_expr) for reply in replies if reply.ok is not None)
+
+    def ask(self, key: str, seconds: float) -> list[bytes]:
+        """Return all answers to a query at a key within `seconds`."""
+        replies: Iterator[zenoh.Reply] = iter(
+            self._session.get(key, target=zenoh.QueryTarget.ALL, consolidation=_EACH, timeout=seconds)
+        )
+        return [reply.ok.payload.to_bytes() for reply in replies if reply.ok is not None]
+
+    def bus(self, kind: WireType | None = None) -> Bus:
+        """Return the bus for sending, in the wire profile of those who use this `kind`; the same one each time."""
+        from rbxcompose.bus.bus import Bus  # this import takes as long as all else that a list needs
+
+        if self._bus is None:
+            wire = "humble" if kind is not None and kind.hash == NO_HASHES else "jazzy"
+            self._bus = Bus(
+                self.scheduler, self.clock, domain=self.domain, wire=wire, transport=self.transport, log=_complain
+            )
+        return self._bus
+
+    def listen(self, topic: GraphName, heard: Callable[[HeardMessage], None]) -> None:
+        """Pass each message of a topic to `heard`, undecoded; if latched, also messages sent before."""
+        is_latched = any(end.qos is not None and end.qos.is_transient_local for end in topic.givers)
+        queue: Inbox[HeardMessage] = Inbox(NAME, LONGEST_QUEUE, heard, self.scheduler.post)
+        self._queues.append(queue)
+        for wire_type in topic.kinds:
+            if wire_type.type.count("/") == 2:
+                key = data_key(self.domain, topic.name, wire_type.type, wire_type.hash)
+                self.transport.subscribe(key, Qos.LATCHED if is_latched else Qos.EVENT, self._arrived(queue, wire_type))
+
+    @property
+    def dropped(self) -> int:
+        """Return how many messages came too fast to be passed on."""
+        return sum(queue.dropped for queue in self._queues)
+
+    def watch(self, descriptor: int, ready: Callable[[], None]) -> None:
+        """Call `ready` when there is something to read."""
+        self._selector.register(descriptor, selectors.EVENT_READ, ready)
+
+    def run(self, until: Callable[[], bool], timeout: float = math.inf) -> bool:
+        """Run the loop until `until` holds or `timeout` [s] has passed; return whether it holds."""
+        deadline = self.clock.now() + timeout
+        while True:
+            self.scheduler.advance(self.clock.now())
+            if until():
+                return True
+            now, due = self.clock.now(), self.scheduler.next_due()
+            if now >= deadline:
+                return False
+            pause = min(deadline, math.inf if due is None else due) - now
+            for key, _ in self._selector.select(None if pause == math.inf else max(0.0, pause)):
+                key.data()
+            self._inbox.drain(self.scheduler)
+
+    @contextmanager
+    def interruptible(self, interrupted: Callable[[], None] = lambda: None) -> Iterator[None]:
+        """Let an interrupt, or the end of the terminal, call `interrupted` in the loop instead of ending the process.
+
+        A second one ends the process.
+        """
+        numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+        before = {number: signal.getsignal(number) for number in numbers}
+
+        def note(number: int, frame: FrameType | None) -> None:
+            self.is_interrupted = True
+            signal.signal(number, before[signal.Signals(number)])
+            self._inbox.put(NAME, interrupted)
+
+        for number in numbers:
+            signal.signal(number, note)
+        try:
+            yield
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+    def _lasting(self, router: str) -> zenoh.Session:
+        try:
+            session = open_peer(router)
+        except zenoh.ZError as error:  # a router that is not there yet is no error
+            raise NotDoneError(NO_ROUTER.at(None, f"'{router}' is not a router endpoint")) from error
+        deadline = self.clock.now() + PATIENCE
+        while not session.info.routers_zid():
+            if self.clock.now() > deadline:
+                session.close()  # type: ignore[no-untyped-call]
+                raise NotDoneError(NO_ROUTER.at(None, f"no router answers at {router}"))
+            time.sleep(_PAUSE)
+        return session
+
+    def _arrived(self, queue: Inbox[HeardMessage], kind: WireType) -> Callable[[Arrival], None]:
+        # In a thread of the transport: a message is stamped when it arrives, not when it is shown.
+        return lambda arrival: queue.put(HeardMessage(self.clock.now(), kind, arrival), self.transport.wake)
+
+
+def _short(router: str) -> zenoh.Session:
+    try:
+        return open_client(router)
+    except OSError as error:
+        raise NotDoneError(NO_ROUTER.at(None, error.strerror or str(error))) from error
+
+
+def _complain(owner: str, text: str) -> None:
+    sys.stderr.write(f"{text}\n")
+
+
+Do = Callable[[Guest, argparse.Namespace], int]
+NO_NAME = kind("RBX9022")
+NOBODY = kind("RBX9025")
+SAID_NO = kind("RBX9026")
+
+
+def visit(arguments: argparse.Namespace, do: Callable[[Guest], int]) -> int:
+    """Join the chosen bus, run `do` there, and return the exit code."""
+    try:
+        with Guest(find_place(arguments)) as guest:
+            return do(guest)
+    except NotDoneError as error:
+        return refuse(error.finding)
+
+
+def wanted(names: Sequence[GraphName], name: str, what: str) -> GraphName:
+    """Return the topic, service or action of that name.
+
+    Raises:
+        NotDoneError: if there is none.
+    """
+    found = find(names, name)
+    if found is None:
+        words = f"there is no {what} '{name}'"
+        raise NotDoneError(NO_NAME.misspelt(None, words, name, [graph_name.name for graph_name in names], f"{what}s"))
+    return found
+
+
+def tell_list(names: Sequence[GraphName], ends: tuple[str, str], arguments: argparse.Namespace) -> int:
+    """List names with their types and the counts of both `ends`; hidden names only with `--all`."""
+    listed = [name for name in names if arguments.all or not name.is_hidden]
+    if arguments.json:
+        tell(json.dumps([_counted(name, ends) for name in listed]))
+        return 0
+    rows = [
+        (
+            graph_name.name,
+            ", ".join(graph_name.types),
+            str(len(graph_name.givers)),
+            str(len(graph_name.takers)),
+            graph_name.clash and f"! {graph_name.clash}",
+        )
+        for graph_name in listed
+    ]
+    tell(table([("name", "type", *ends, ""), *rows]))
+    return 0
+
+
+def described(graph_name: GraphName, ends: tuple[str, str]) -> dict[str, Any]:
+    """Return all that is known about a name, for JSON."""
+    return {
+        "name": graph_name.name,
+        "types": graph_name.types,
+        "clash": graph_name.clash,
+        ends[0]: [_end(end) for end in graph_name.givers],
+        ends[1]: [_end(end) for end in graph_name.takers],
+    }
+
+
+def add_server_verbs(
+    parser: argparse.ArgumentParser, noun: str, verb: tuple[str, str], content: str, example: str, do: Sequence[Do]
+) -> None:
+    """Declare the subcommands of services or actions: `ls`, and a `verb` with its help, which sends a `content`.
+
+    `do` has the functions that carry them out, in this order.
+    """
+    named = argument("name", metavar=noun.upper(), help=f"its name, such as {example}")
+    words = "YAML; missing fields are zero"
+    written = argument("content", metavar=content.upper(), nargs="?", default="", help=words)
+    sent = (named, written, partial(add_timeout_option, default="5s"), add_json_option)
+    actions = (
+        Subcommand("ls", f"list the {noun}s with their types", do[0], (add_ls_options,)),
+        Subcommand(*verb, do[1], sent),
+    )
+    add_actions(parser, actions, add_bus_options, add_system_options)
+
+
+def _counted(graph_name: GraphName, ends: tuple[str, str]) -> dict[str, Any]:
+    counts = {ends[0]: len(graph_name.givers), ends[1]: len(graph_name.takers)}
+    return {"name": graph_name.name, "types": graph_name.types, "clash": graph_name.clash, **counts}
+
+
+def _end(end: GraphEnd) -> dict[str, Any]:
+    qos = None if end.qos is None else asdict(end.qos)
+    return {"node": end.node, "type": end.kind.type, "hash": end.kind.hash, "gid": end.gid.hex(), "qos": qos}

@@ -1,0 +1,439 @@
+"""Run a verb on the hosts of a system, and merge their answers."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shlex
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING, Any
+
+from rbxcompose import __version__
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.findings import Finding, kind
+from rbxcompose.base.printable import plain
+from rbxcompose.commands.console import FINDINGS, NotDoneError, refuse, tell, tell_report
+from rbxcompose.commands.lookup import find_robot
+from rbxcompose.commands.options import BUS, EACH, system_and_robot
+
+if TYPE_CHECKING:  # verbs that may be for a system import this module, most often for a robot
+    from rbxcompose.compiler.systems.bundle import Bundle
+    from rbxcompose.compiler.systems.model import PlacedRobot, System
+    from rbxcompose.manifest.system_file import HostModel
+
+UNREACHED = kind("RBX6113")
+OTHER_VERSION = kind("RBX6114")
+WHICH = kind("RBX6121")
+NOBODY_THERE = kind("RBX6122")
+AT_ONCE = 16  # commands whose answers are awaited, so that a fleet does not need a machine of its own
+CONNECT = 10  # [s] to reach a host
+INTERRUPTED = 130
+_LOOK = 0.05  # [s] between two looks at what runs
+_ENDINGS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+SSH_FAILED = 255  # exit code of ssh, if it fails itself
+_OF_SYSTEM = ("--ssh-config", "--profile")
+_FOR_ONE = ("watch", "echo", "hz", "pub", "call", "send", "static")  # they last, or are meant for one
+_UNPACK = """set -e
+d="${XDG_CACHE_HOME:-$HOME/.cache}/rbxcompose/systems/DIGEST"
+if [ -d "$d" ]; then cat > /dev/null
+else t="$d.$$"; mkdir -p "$t"; tar -xf - -C "$t"; mv "$t" "$d" 2> /dev/null || rm -rf "$t"; fi
+printf 'folder %s\\n' "$d"
+COMMAND --version
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Remote:
+    """A host, as a place to run commands; without `ssh` in its model, it is this machine."""
+
+    name: str
+    model: HostModel
+    config: Path | None = None  # of ssh, instead of the user's
+
+    @property
+    def is_here(self) -> bool:
+        """Return whether it is this machine."""
+        return self.model.ssh is None
+
+    def rbxcompose(self, words: Sequence[str], *, folder: str = "", has_terminal: bool = False) -> list[str]:
+        """Return the command that runs rbxcompose there; with a terminal, it ends when the connection does."""
+        if self.is_here:
+            return [sys.executable, "-m", "rbxcompose", *words]
+        command = f"NO_COLOR=1 exec {shlex.join([self.model.command, *words])}"  # its lines stand behind ours
+        return self.ssh(f"cd {shlex.quote(folder)} && {command}" if folder else command, has_terminal=has_terminal)
+
+    def ssh(self, script: str, *, has_terminal: bool = False) -> list[str]:
+        """Return the command that runs a script of the shell there."""
+        own = ["-F", str(self.config)] if self.config else []
+        settings = ("BatchMode=yes", f"ConnectTimeout={CONNECT}", "ServerAliveInterval=5", "LogLevel=ERROR")
+        options = [word for setting in settings for word in ("-o", setting)]
+        return ["ssh", *own, *options, "-tt" if has_terminal else "-T", "--", self.model.ssh or "", script]
+
+
+def send(remote: Remote, bundle: Bundle) -> str | Finding:
+    """Bring a bundle to a host, unless it has it already; return its folder there."""
+    script = _UNPACK.replace("DIGEST", bundle.digest).replace("COMMAND", shlex.quote(remote.model.command))
+    try:
+        done = subprocess.run(remote.ssh(script), input=bundle.archive, capture_output=True, check=False)
+    except OSError as error:
+        return UNREACHED.at(None, f"'{remote.name}' cannot be reached: ssh cannot run: {error.strerror}")
+    told = done.stdout.decode(errors="replace").splitlines()
+    folder = next((line.removeprefix("folder ") for line in told if line.startswith("folder ")), "")
+    if not folder:
+        return UNREACHED.at(None, f"'{remote.name}' cannot be reached: {_last(done.stderr)}")
+    version = next((line.removeprefix("rbxcompose ") for line in told if line.startswith("rbxcompose ")), "")
+    if done.returncode or version != __version__:
+        found = f"rbxcompose {plain(version)}" if version else f"no rbxcompose that runs: {_last(done.stderr)}"
+        return OTHER_VERSION.at(None, f"'{remote.name}' has {found}; this machine has {__version__}")
+    return folder
+
+
+def _last(stderr: bytes) -> str:
+    lines = stderr.decode(errors="replace").strip().splitlines()
+    return plain(lines[-1]) if lines else "no reason is told"
+
+
+def send_all(remotes: Iterable[Remote], bundle: Bundle) -> dict[str, str | Finding]:
+    """Bring a bundle to all hosts at once; return its folder on each, or why it is not there."""
+    away = [remote for remote in remotes if not remote.is_here]
+    with ThreadPoolExecutor() as pool:
+        return dict(
+            zip((remote.name for remote in away), pool.map(lambda remote: send(remote, bundle), away), strict=True)
+        )
+
+
+class Running:
+    """A command on a host whose output is shown line by line, each with the name of the host."""
+
+    def __init__(self, label: str, command: Sequence[str], *, shows: bool = True) -> None:
+        self._label, self._shows = label, shows
+        self._process = subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            errors="replace",
+            start_new_session=True,  # an interrupt is for us, who pass it on
+        )
+        self.lines: list[str] = []
+        self._thread = threading.Thread(target=self._read, daemon=True)
+        self._thread.start()
+
+    def _read(self) -> None:
+        for line in self._process.stdout or ():
+            self.lines.append(text := line.rstrip("\r\n"))
+            if self._shows:
+                tell(f"{self._label} | {plain(text)}")
+        if self._process.stdout is not None:
+            self._process.stdout.close()
+
+    def poll(self) -> int | None:
+        """Return the exit code if it has ended."""
+        return self._process.poll()
+
+    def wait(self) -> int:
+        """Wait for its end and return the exit code."""
+        code = self._process.wait()
+        self._thread.join()
+        return code
+
+    @property
+    def answer(self) -> Any:
+        """Return the last line that is JSON, as data; None if there is none. Others are told beside it."""
+        for line in reversed(self.lines):
+            with suppress(ValueError):
+                return json.loads(line)
+        return None
+
+    def end(self) -> None:
+        """Ask it to end: a command over ssh loses its terminal, which brings what it runs down."""
+        if self._process.poll() is None:
+            self._process.terminate()
+
+
+def on_all(commands: Mapping[str, Sequence[str]]) -> dict[str, Running]:
+    """Run commands, each by its label, some at once, and wait for all; nothing is shown."""
+
+    def run(label: str) -> Running:
+        running = Running(label, commands[label], shows=False)
+        running.wait()
+        return running
+
+    with ThreadPoolExecutor(AT_ONCE) as pool:
+        return dict(zip(commands, pool.map(run, commands), strict=True))
+
+
+Shares = Mapping[tuple[str, str], Remote]  # by host and robot
+
+
+def shares_of(system: System, config: Path | None) -> Shares:
+    """Return where each share runs; `config` is that of ssh."""
+    from rbxcompose.compiler.systems.share import hosts_of
+
+    remotes = {name: Remote(name, host, config) for name, host in system.hosts.items()}
+    return {(host, robot.name): remotes[host] for robot in system.robots.values() for host in hosts_of(system, robot)}
+
+
+def is_reachable(system: System) -> bool:
+    """Return whether each host can be told from the others; if not, tell why."""
+    here = [name for name, host in system.hosts.items() if host.ssh is None]
+    if len(here) > 1:
+        message = f"'{here[0]}' and '{here[1]}' have no 'ssh', and only one of them can be this machine"
+        refuse(UNREACHED.at(None, message, help=f"give the others 'ssh', or use --host {here[0]} where a verb has it"))
+    return len(here) <= 1
+
+
+def compiled(path: str, arguments: argparse.Namespace) -> System | None:
+    """Return a system without errors; None after telling them. Its warnings are for `check` and `up`."""
+    from rbxcompose.compiler.systems.reader import compile_system
+
+    system = compile_system(path, environment=os.environ, profiles=arguments.profile)
+    if system.report.has_errors:
+        tell_report(system.report, system.sources)
+        return None
+    return system if is_reachable(system) else None
+
+
+def every_share(path: str, arguments: argparse.Namespace) -> Shares | None:
+    """Return where each share of a system runs; None after telling its errors."""
+    system = compiled(path, arguments)
+    return None if system is None else shares_of(system, arguments.ssh_config)
+
+
+def reached(shares: Shares, bundle: Bundle, *, needs_all: bool = True) -> dict[str, str] | None:
+    """Bring the files to all hosts and return their folders there; None after telling which host has not got them.
+
+    One that is `optional` is told, and left out; so are all unless it `needs_all`.
+    """
+    folders, is_complete = dict[str, str](), True
+    optional = {share.name for share in shares.values() if share.model.optional}
+    for name, found in send_all({share.name: share for share in shares.values()}.values(), bundle).items():
+        if isinstance(found, str):
+            folders[name] = found
+        elif name in optional:
+            tell(f"without '{name}', which is optional: {found.message}")
+        else:
+            is_complete = False
+            refuse(found)
+    return folders if is_complete or not needs_all else None
+
+
+def label_of(shares: Shares, host: str, robot: str) -> str:
+    """Return what stands before the lines of a share: its host, and its robot if there are several."""
+    several = len({name for _, name in shares}) > 1
+    labels = [f"{text} {other}" if several else text for text, other in shares]
+    return f"{host} {robot}".ljust(max(map(len, labels))) if several else host.ljust(max(map(len, labels)))
+
+
+def follow_commands(commands: Mapping[str, Sequence[str]], optional: Collection[str] = ()) -> int:
+    """Run commands at once and show what they print; if one fails, end the others. Return the exit code.
+
+    Those of the labels that are `optional` may fail.
+    """
+    interrupts: list[int] = []
+
+    def note(number: int, frame: FrameType | None) -> None:
+        interrupts.append(number)
+
+    before = {number: signal.signal(number, note) for number in _ENDINGS}
+    try:
+        running = [Running(label, command) for label, command in commands.items()]
+        needed = [one for label, one in zip(commands, running, strict=True) if label not in optional]
+        while any(item.poll() is None for item in running):
+            if interrupts or any(item.poll() for item in needed):
+                for one in running:
+                    one.end()
+            time.sleep(_LOOK)
+        for one in running:
+            one.wait()
+        codes = [item.wait() for item in needed]
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    failed = [code for code in codes if code > 0]
+    return INTERRUPTED if interrupts else min(failed, default=0)
+
+
+def follow_all(shares: Shares, words: Callable[[str], Sequence[str]]) -> int:
+    """Run a verb for each share, and show each line as it comes."""
+    return follow_commands(
+        {
+            label_of(shares, host, robot): remote.rbxcompose(words(robot), has_terminal=True)
+            for (host, robot), remote in shares.items()
+        }
+    )
+
+
+def ask_all(shares: Shares, words: Callable[[str], Sequence[str]], *, in_json: bool, tolerates: str = "") -> int:
+    """Run a verb for each share, and show what each says; return the highest exit code.
+
+    A finding of the code that it `tolerates` does not count if the verb succeeds on another host.
+    """
+    done = on_all({f"{host} {robot}": share.rbxcompose(words(robot)) for (host, robot), share in shares.items()})
+    codes = {label: abs(entry.wait()) for label, entry in done.items()}
+    if tolerates and 0 in codes.values():
+        done = {label: entry for label, entry in done.items() if not any(tolerates in line for line in entry.lines)}
+    if in_json:
+        tell(json.dumps({"hosts": [_data(label, entry) for label, entry in done.items()]}))
+    else:
+        tell(
+            "\n\n".join(
+                "\n".join([f"{label}:", *(f"  {line}" for line in entry.lines)]) for label, entry in done.items()
+            )
+        )
+    return max(codes[label] for label in done)
+
+
+def _data(label: str, one: Running) -> dict[str, object]:
+    host, _, robot = label.partition(" ")
+    is_one = len(one.lines) == 1 or one.wait() != 0  # what failed has told people, too
+    answer = one.answer if is_one else None
+    answer = {"text": "\n".join(one.lines)} if answer is None else answer
+    return {"host": host, "robot": robot, "exit_code": one.wait(), "answer": answer}
+
+
+@dataclass(frozen=True, slots=True)
+class SystemCommand:
+    """A command for robots of a system: the shares that can answer it, and its words for them."""
+
+    system: System
+    path: str
+    robots: Sequence[str]
+    shares: Shares
+    words: Sequence[str]
+    written: str  # in the words, for the robot
+    arguments: argparse.Namespace
+
+    def words_for(self, robot: str) -> list[str]:
+        """Return the words with a robot in place of what was written for it."""
+        told, option = self.written, f"--robot={self.written}"
+        return [robot if word == told else f"--robot={robot}" if word == option else word for word in self.words]
+
+    def refuse(self, message: str) -> int:
+        """Tell that one robot has to be named, and return the exit code."""
+        names = " or ".join(f"{self.path}:{robot}" for robot in self.robots)
+        return refuse(WHICH.at(None, message, help=f"--robot {names}"))
+
+    def run(self, verb: object) -> int:
+        """Run it where it can be answered, and return the exit code.
+
+        A verb that needs more than the same words there has `run_on_system(command) -> int | None`.
+        """
+        own: Callable[[SystemCommand], int | None] = getattr(verb, "run_on_system", lambda command: None)
+        if (exit_code := own(self)) is not None:
+            return exit_code
+        action = getattr(self.arguments, "action", "")
+        if len(self.shares) == 1:
+            ((_, robot), remote), *_ = self.shares.items()
+            return _run_there(remote, self.words_for(robot))
+        if action in _FOR_ONE or getattr(self.arguments, "follow", False):
+            return self.refuse(f"'{action}' is for one robot")
+        return ask_all(self.shares, self.words_for, in_json=getattr(self.arguments, "json", False))
+
+
+def forward(verb: object, written: str, where: str, words: Sequence[str], arguments: argparse.Namespace) -> int:
+    """Run the words of a command on the hosts that can answer it; `where` is the `ON_SYSTEM` of its verb."""
+    path, name = system_and_robot(written) or (written, "")
+    system = compiled(path, arguments)
+    if system is None:
+        return FINDINGS
+    if name and name not in system.robots:
+        return refuse(WHICH.misspelt(None, f"the system has no robot '{name}'", name, system.robots, "robots"))
+    robots = [robot for robot in system.robots.values() if name in ("", robot.name)]
+    chosen = choose(system, robots, where, arguments)
+    if isinstance(chosen, Finding):
+        return refuse(chosen)
+    return SystemCommand(
+        system, path, [robot.name for robot in robots], chosen, list(_for_there(words)), written, arguments
+    ).run(verb)
+
+
+def choose(
+    system: System, robots: Sequence[PlacedRobot], where: str, arguments: argparse.Namespace
+) -> Shares | Finding:
+    """Return the shares of robots that can answer, for an `ON_SYSTEM`."""
+    from rbxcompose.compiler.systems.share import hosts_of
+
+    every, chosen = shares_of(system, arguments.ssh_config), dict[tuple[str, str], Remote]()
+    for robot in robots:
+        hosts = hosts_of(system, robot)
+        if where == BUS:
+            found = _reachable({host: every[host, robot.name] for host in hosts}, robot.name)
+            if isinstance(found, Finding):
+                return found
+            hosts = [found]
+        elif where != EACH:
+            hosts = answering(robot, where)
+        chosen |= {(host, robot.name): every[host, robot.name] for host in hosts}
+    names = ", ".join(placed_robot.name for placed_robot in robots)
+    return chosen or NOBODY_THERE.at(None, f"{names}: no component of type '{where}'")
+
+
+def answering(robot: PlacedRobot, about: str) -> list[str]:
+    """Return the hosts of a robot with a component that answers requests about something."""
+    from rbxcompose.sdk.registry import component_type
+
+    def answers(type_: str) -> bool:
+        return any(request.about == about for request in component_type(type_).requests().types.values())
+
+    return list(
+        dict.fromkeys(robot.hosts[instance.name] for instance in robot.plan.instances if answers(instance.type))
+    )
+
+
+def _reachable(remotes: dict[str, Remote], robot: str) -> str | Finding:
+    """Return a host that reaches the bus of a robot: this machine, else the first one that ssh reaches."""
+    problems: list[str] = []
+    for host, remote in sorted(remotes.items(), key=lambda item: not item[1].is_here):
+        if remote.is_here:
+            try:
+                find_robot(robot)
+                return host
+            except NotDoneError as error:
+                problems.append(f"'{host}': {error.finding.message}")
+                continue
+        done = subprocess.run(remote.ssh("true"), capture_output=True, text=True, errors="replace", check=False)
+        if done.returncode == 0:
+            if problems:
+                sys.stderr.write(f"{'; '.join(problems)}; asking '{host}'\n")
+            return host
+        problems.append(f"'{host}' cannot be reached: {done.stderr.strip()}")
+    return UNREACHED.at(None, "; ".join(problems))
+
+
+def _run_there(remote: Remote, words: Sequence[str]) -> int:
+    """Run a command on a host with the terminal of this one; an interrupt is for the command."""
+
+    def leave(number: int, frame: FrameType | None) -> None:
+        """Leave it to the command, which gets it, too."""
+
+    has_terminal = sys.stdin.isatty() and sys.stdout.isatty()
+    before = signal.signal(signal.SIGINT, leave)
+    try:
+        code = subprocess.run(remote.rbxcompose(words, has_terminal=has_terminal), check=False).returncode
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if code == SSH_FAILED and not remote.is_here:
+        return refuse(UNREACHED.at(None, f"'{remote.name}' cannot be reached: ssh tells why"))
+    return code if code >= 0 else 128 - code
+
+
+def _for_there(words: Sequence[str]) -> Iterator[str]:
+    """Yield words without the options that are for the system."""
+    rest = iter(words)
+    for word in rest:
+        if word in _OF_SYSTEM:
+            next(rest, None)
+        elif not word.startswith(tuple(f"{text}=" for text in _OF_SYSTEM)):
+            yield word

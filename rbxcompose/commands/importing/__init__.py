@@ -1,0 +1,1 @@
+"""Files of other programs as located trees, and manifests made from them."""

@@ -1,0 +1,81 @@
+"""What an importer is, and how it is found: one file in `importing/importers/`, declared by one decorator."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import field
+
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.findings import Finding, Report, Severity, kind
+from rbxcompose.base.plugins import LEFT_OUT, BrokenPluginError, Plugins
+from rbxcompose.commands.importing.foreign_files import ForeignFile
+
+NOT_CARRIED_OVER = kind("RBX2230", Severity.WARNING)
+OTHER_PROGRAM = kind("RBX2231")
+DISAGREES = kind("RBX2232")
+
+NOTHING_LEFT = kind("RBX2238")
+
+PLUGINS = Plugins("importer", "importers")
+
+
+@dataclass(frozen=True, slots=True)
+class ImportedFiles:
+    """The text of a manifest, empty if nothing could be read, and the files beside it by name."""
+
+    text: str
+    beside: Mapping[str, str] = field(default_factory=dict)
+
+
+Import = Callable[[Sequence[ForeignFile], str, Report], str | ImportedFiles]
+"""Files, the robot's name, where findings go -> the text of a manifest, or it with files beside it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Importer:
+    """How the files of one program are imported; `about` says in half a sentence what they are."""
+
+    name: str
+    about: str
+    run: Import
+
+
+_IMPORTERS: dict[str, Importer] = {}  # those that have been imported, by name
+
+
+def importer(name: str, about: str) -> Callable[[Import], Import]:
+    """Declare the function that imports the files of a program, under the name of its module."""
+
+    def declare(run: Import) -> Import:
+        _IMPORTERS[name] = Importer(name, about, run)
+        return run
+
+    return declare
+
+
+def importers() -> dict[str, Importer]:
+    """Return all importers that work, by name."""
+    return {name: _IMPORTERS[name] for name in PLUGINS.names() if not _problem(name) and name in _IMPORTERS}
+
+
+def imported(program: str, files: Sequence[ForeignFile], name: str, report: Report) -> ImportedFiles:
+    """Return a manifest with what files of a program have; empty, after a finding, if it is nothing."""
+    run = importers()[program].run(files, name, report) if files else ""
+    made = run if isinstance(run, ImportedFiles) else ImportedFiles(run)
+    if not made.text and not report.has_errors:
+        report.add(NOTHING_LEFT.at(None, "nothing of these files could be imported, so no manifest is written"))
+    return made
+
+
+def broken_importers() -> list[Finding]:
+    """Return a finding for each importer of another package that is left out."""
+    return [LEFT_OUT.at(None, told) for name in sorted(PLUGINS.third_party) if (told := _problem(name))]
+
+
+def _problem(name: str) -> str:
+    """Load an importer; return why it is left out, or nothing."""
+    try:
+        PLUGINS.load(name)
+    except BrokenPluginError as error:
+        return str(error)
+    return PLUGINS.overshadowed(name) if name not in PLUGINS.shipped else ""

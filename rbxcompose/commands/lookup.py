@@ -1,0 +1,184 @@
+"""Find the robot that a command addresses, or its bus; ask it, and show its answer."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+from collections.abc import Iterable
+from contextlib import suppress
+from typing import TypeVar
+
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.findings import Finding, kind, suggest
+from rbxcompose.base.requests import Command, Refused, Request
+from rbxcompose.commands.console import NotDoneError, refuse, tell
+from rbxcompose.commands.options import add_system_options
+from rbxcompose.runtime.control import ANSWER, NoAnswerError, ask
+from rbxcompose.runtime.folder import BrokenStateError, RobotFolder, RobotState, UnsafeFolderError, all_folders
+from rbxcompose.runtime.requests import RobotStatus
+
+A = TypeVar("A")
+ALREADY_UP = kind("RBX9001")
+NOT_UP = kind("RBX9002")
+WHICH = kind("RBX9003")
+REFUSED = kind("RBX9004")
+NO_ANSWER = kind("RBX9005")
+UNSAFE = kind("RBX9006")
+
+
+def add_robot_option(parser: argparse.ArgumentParser) -> None:
+    """Declare `--robot NAME`."""
+    parser.add_argument("--robot", metavar="NAME", help="the robot, if several are up")
+
+
+def find_robot(wanted: str | None) -> RobotFolder:
+    """Return the folder of the robot with a given name or path, or of the only one.
+
+    Raises:
+        NotDoneError: if there is none or more than one.
+    """
+    found = {folder.path.name: folder for folder in robots_up()}
+    if wanted is None:
+        return _only(found)
+    if wanted in found:
+        return found[wanted]
+    files = {_file_of(folder): folder for folder in found.values()}
+    for path in _possible_files(wanted):
+        if path in files:
+            return files[path]
+    raise NotDoneError(NOT_UP.at(None, f"no robot '{wanted}' is up", help=suggest(wanted, found, "robots that are up")))
+
+
+def robots_up() -> list[RobotFolder]:
+    """Return the folders of all robots that are up or were left behind.
+
+    Raises:
+        NotDoneError: if another user could have put something there.
+    """
+    try:
+        return all_folders()
+    except UnsafeFolderError as error:
+        raise NotDoneError(UNSAFE.at(None, str(error))) from error
+
+
+def _only(found: dict[str, RobotFolder]) -> RobotFolder:
+    if not found:
+        raise NotDoneError(NOT_UP.at(None, "no robot is up", help="start one with 'rbxcompose up PATH'"))
+    if len(found) > 1:
+        names = ", ".join(found)
+        raise NotDoneError(WHICH.at(None, f"several robots are up: {names}", help="name one with '--robot NAME'"))
+    return next(iter(found.values()))
+
+
+def _file_of(folder: RobotFolder) -> str:
+    state = known_state(folder)
+    return state.file if state else ""
+
+
+def _possible_files(path: str) -> Iterable[str]:
+    yield os.path.realpath(path)
+    yield os.path.realpath(os.path.join(path, "robot.yaml"))
+
+
+def known_state(folder: RobotFolder) -> RobotState | None:
+    """Return the state from the robot's folder or, if that file is gone or broken, from its supervisor; else None."""
+    with suppress(BrokenStateError):
+        if (state := folder.read_state()) is not None:
+            return state
+    try:
+        return ask(folder, RobotStatus())
+    except (NoAnswerError, Refused):
+        return None
+
+
+def answer_of(folder: RobotFolder, request: Request[A], *, timeout: float = ANSWER) -> A:
+    """Return a robot's answer to a request, which may take `timeout` [s].
+
+    Raises:
+        NotDoneError: if it refuses or does not answer.
+    """
+    name = folder.path.name
+    try:
+        return ask(folder, request, timeout=timeout)
+    except Refused as refusal:
+        raise NotDoneError(REFUSED.at(None, f"'{name}' refuses: {refusal}")) from refusal
+    except NoAnswerError as error:
+        raise NotDoneError(no_answer(folder)) from error
+
+
+def no_answer(folder: RobotFolder) -> Finding:
+    """Return the finding that a robot does not answer, with the reason if its state has one."""
+    name, state = folder.path.name, known_state(folder)
+    why = ""
+    if state is not None and not state.is_supervised:
+        why = ": its supervisor has died, so it brakes and ends"
+    elif state is not None and state.supervisor.is_stopped:
+        why = ": its supervisor is suspended"
+    return NO_ANSWER.at(
+        None, f"'{name}' does not answer{why}", help=f"'rbxcompose down {name}' ends what is left of it"
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class BusPlace:
+    """A Zenoh endpoint (`tcp/127.0.0.1:7447`) and a ROS domain."""
+
+    router: str
+    domain: int = 0
+
+
+def add_bus_options(parser: argparse.ArgumentParser) -> None:
+    """Declare `--robot NAME`, `--router ENDPOINT` and `--domain N`."""
+    add_robot_option(parser)
+    parser.add_argument("--router", metavar="ENDPOINT", help="another bus, by its Zenoh router: tcp/192.168.1.7:7447")
+    parser.add_argument("--domain", type=int, metavar="N", help="the ROS domain (default: that of the robot, or 0)")
+
+
+def find_place(arguments: argparse.Namespace) -> BusPlace:
+    """Return the place that the options name.
+
+    Raises:
+        NotDoneError: if no robot is found, or it has no router.
+    """
+    if arguments.router is not None:
+        return BusPlace(arguments.router, arguments.domain or 0)
+    found = place_of(find_robot(arguments.robot))
+    return found if arguments.domain is None else BusPlace(found.router, arguments.domain)
+
+
+def place_of(folder: RobotFolder) -> BusPlace:
+    """Return the place of a robot's own bus.
+
+    Raises:
+        NotDoneError: if it has no router.
+    """
+    state = known_state(folder)
+    if state is not None and not state.is_supervised:
+        raise NotDoneError(no_answer(folder))  # its router is gone, too, or about to go
+    if state is None or state.router is None:
+        raise NotDoneError(NO_ANSWER.at(None, f"'{folder.path.name}' has no known router"))
+    return BusPlace(state.router, state.domain)
+
+
+def add_asking_options(parser: argparse.ArgumentParser) -> None:
+    """Declare `--robot NAME`, which may be a robot of a system, and `--json`."""
+    add_robot_option(parser)
+    add_system_options(parser)
+    parser.add_argument("--json", action="store_true", help="answer in JSON")
+
+
+def pass_on(arguments: argparse.Namespace, command: Command) -> int:
+    """Send a command, print the answer, return the exit code."""
+    try:
+        folder = find_robot(arguments.robot)
+        answer = answer_of(folder, command)
+    except NotDoneError as error:
+        return refuse(error.finding)
+    show_answer(arguments, folder, answer)
+    return 0
+
+
+def show_answer(arguments: argparse.Namespace, folder: RobotFolder, answer: str) -> None:
+    """Print a robot's answer."""
+    tell(json.dumps({"robot": folder.path.name, "answer": answer}) if arguments.json else answer)

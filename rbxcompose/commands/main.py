@@ -1,0 +1,83 @@
+"""The command `rbxcompose`: finds the verb's file and runs it. Each file in a folder `commands` of a room is one verb.
+
+A verb's module has `add_arguments(parser)` and `run(arguments) -> exit code`; the first line of its docstring is its
+help. Only the verb in use is imported, and for help only what help needs.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from typing import Any, NoReturn
+
+import rbxcompose
+from rbxcompose.base.garbage_collection import collect_rarely
+from rbxcompose.commands.verbs import about, load, module_of, parser_of, verbs
+
+USAGE, INTERRUPTED = 2, 130
+_ABOUT = "Docker Compose for robots: YAML in, a checked and running robot out."
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command and return its exit code: 0 fine, 1 findings, 2 wrong usage, 3 and 4 of `up`, 130 interrupted."""
+    if arguments is None:
+        signal.signal(signal.SIGINT, _interrupted)
+        collect_rarely()
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    if not words or words[0] in ("-h", "--help", "help"):
+        sys.stdout.write(_help())
+        return 0 if words else USAGE
+    if words[0] == "--version":
+        sys.stdout.write(f"rbxcompose {rbxcompose.__version__}\n")
+        return 0
+    if words[0] == "__complete":  # the query of the scripts of `completion`
+        return int(import_module(module_of("completion")).complete(words[1:]))
+    if words[0] not in verbs():
+        from rbxcompose.base.findings import suggest
+
+        hint = suggest(words[0], verbs(), "commands")
+        sys.stderr.write(f"rbxcompose: there is no command {words[0]!r}; {hint}\n")
+        return USAGE
+    return _run(words[0], words[1:])
+
+
+def _interrupted(number: int, frame: object) -> NoReturn:
+    # Immediately and silently, even in the middle of an import; `up` itself notifies its robot.
+    os._exit(INTERRUPTED)
+
+
+def _run(name: str, words: Sequence[str]) -> int:
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # else pydantic searches all packages for plugins
+    from rbxcompose.commands.console import answered
+
+    try:
+        verb = load(name)
+        with answered(in_json="--json" in words):
+            arguments = parser_of(name, verb).parse_args(words)
+            if (where := getattr(verb, "ON_SYSTEM", "")) and (system := _system_of(arguments, where)):
+                from rbxcompose.commands.hosts import forward  # only needed for systems
+
+                return forward(verb, system, where, [name, *words], arguments)
+            return verb.run(arguments)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # so that the flush at exit has somewhere to go
+        return 1
+
+
+def _system_of(arguments: Any, where: str) -> str:
+    """Return the argument that names a system, or a robot of one; empty if there is none."""
+    from rbxcompose.commands.options import EACH, system_and_robot
+
+    written = arguments.robot if "robot" in arguments else None
+    written = written or (arguments.path if where == EACH and "path" in arguments else None)
+    return written if written and system_and_robot(written) else ""
+
+
+def _help() -> str:
+    width = max(len(name) for name in verbs())
+    lines = [f"  {name:<{width}}  {about(name)}" for name in verbs()]
+    usage = "usage: rbxcompose COMMAND ...  (COMMAND --help says more)"
+    return "\n".join([usage, "", _ABOUT, "", *lines]) + "\n"

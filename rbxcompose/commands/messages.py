@@ -1,0 +1,300 @@
+"""Messages on the command line: read from YAML with places, shown as YAML or JSON, sent and received."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import yaml
+
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.findings import Finding, Report, Span, kind
+from rbxcompose.base.printable import FORBIDDEN
+from rbxcompose.bus.graph import GraphName, WireType, find
+from rbxcompose.bus.names import name_problem
+from rbxcompose.commands.console import NotDoneError, refuse, tell, tell_report
+from rbxcompose.commands.guest import NAME, NO_NAME, NOBODY, SAID_NO, Guest, HeardMessage, wanted
+from rbxcompose.manifest.reader import read_text
+from rbxcompose.manifest.scalars import plain_value
+from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode, key_span, value_span
+from rbxcompose.msgs import registry
+from rbxcompose.msgs.cdr import CdrError, decode
+from rbxcompose.msgs.plain import KeyPath, from_plain, to_plain
+from rbxcompose.msgs.types import Interface, Message
+from rbxcompose.sdk.bound import Ended, Outcome, Reply
+from rbxcompose.sdk.ports import Qos
+
+NO_TYPE = kind("RBX9021")
+MOST_SHOWN = 128  # values of a list that text shows; JSON shows all
+_SHOWN = "MESSAGE"  # name of the message text in findings
+M = TypeVar("M", bound=Message)
+T = TypeVar("T", bound=Interface)
+
+
+@dataclass(frozen=True, slots=True)
+class _Places:
+    """Source positions within a tree."""
+
+    root: TreeNode
+
+    def key(self, path: KeyPath) -> Span:
+        """Return the position of a key."""
+        return key_span(self.root, path)
+
+    def value(self, path: KeyPath) -> Span:
+        """Return the position of a value."""
+        return value_span(self.root, path)
+
+
+def message_from(message: type[M], text: str) -> M | None:
+    """Read a message from YAML; an empty text means all defaults. On mistakes, report them and return None."""
+    if not text.strip():
+        return message()
+    root, findings = read_text(text, _SHOWN)
+    made: M | None = None
+    if root is not None and not findings:
+        made, findings = from_plain(message, _data(root), _Places(root))
+    if findings:
+        report = Report()
+        report.extend(findings)
+        tell_report(report, {_SHOWN: text})
+        return None
+    return made
+
+
+def _data(node: TreeNode) -> object:
+    match node:
+        case ScalarNode():
+            return plain_value(node)
+        case MappingNode(entries=entries):
+            return {name: _data(entry.value) for name, entry in entries.items()}
+    return [_data(item) for item in node.items]
+
+
+def to_text(data: object) -> str:
+    """Return plain data as YAML that could be read back; only long lists are cut."""
+    shown = yaml.safe_dump(_cut(data), sort_keys=False, default_flow_style=None, width=math.inf, allow_unicode=True)
+    return FORBIDDEN.sub("?", str(shown)).removesuffix("\n...\n").rstrip("\n")
+
+
+def to_json(data: object) -> str:
+    """Return plain data as one line of JSON, with null for numbers that are not finite."""
+    return json.dumps(_finite(data), ensure_ascii=True)
+
+
+def shown(data: object, as_json: bool) -> str:
+    """Return plain data as JSON or as text."""
+    return to_json(data) if as_json else to_text(data)
+
+
+def message_type(name: str) -> type[Message]:
+    """Return the message type of that name.
+
+    Raises:
+        NotDoneError: if there is none.
+    """
+    return _known(name, "msg", registry.message)
+
+
+def type_of(
+    one: WireType,
+    category: str,
+    look: Callable[[str], type[T]],
+    hash_of: Callable[[type[T]], str] = lambda found: found.HASH,
+) -> type[T]:
+    """Return our class of a type that others on the bus use; `hash_of` gives its hash on the bus.
+
+    Raises:
+        NotDoneError: if we lack the type or define it differently.
+    """
+    found = _known(one.type, category, look)
+    if one.hash.startswith("RIHS01_") and one.hash != hash_of(found):
+        words = f"the bus has another definition of '{one.type}' ({one.hash}) than this program ({hash_of(found)})"
+        raise NotDoneError(NO_TYPE.at(None, words))
+    return found
+
+
+def _known(name: str, category: str, look: Callable[[str], type[T]]) -> type[T]:
+    try:
+        return look(name)
+    except KeyError:
+        full = registry.full_name(name, category)
+        words = f"unknown type '{full}'"
+        raise NotDoneError(NO_TYPE.misspelt(None, words, full, registry.names(category), "known types")) from None
+
+
+def _cut(data: Any) -> Any:
+    if isinstance(data, dict):
+        return {name: _cut(value) for name, value in data.items()}
+    if isinstance(data, list):
+        rest = len(data) - MOST_SHOWN
+        return [_cut(one) for one in data[:MOST_SHOWN]] + ([f"... and {rest} more"] if rest > 0 else [])
+    return data
+
+
+def _finite(data: Any) -> Any:
+    if isinstance(data, dict):
+        return {name: _finite(value) for name, value in data.items()}
+    if isinstance(data, list):
+        return [_finite(item) for item in data]
+    return None if isinstance(data, float) and not math.isfinite(data) else data
+
+
+class EchoReader:
+    """Decodes the messages of a topic; it counts those it cannot read and reports each such type once."""
+
+    def __init__(self, topic: GraphName) -> None:
+        self.malformed = 0
+        self._types: dict[WireType, type[Message]] = {}
+        for wire_type in topic.kinds:
+            try:
+                self._types[wire_type] = type_of(wire_type, "msg", registry.message)
+            except NotDoneError as error:
+                refuse(error.finding)
+        self.is_useless = not self._types
+
+    def read(self, heard: HeardMessage) -> Message | None:
+        """Return the message, or None if it cannot be read."""
+        if heard.kind not in self._types:
+            return None
+        try:
+            return decode(self._types[heard.kind], heard.arrival.payload)
+        except CdrError as error:
+            self.malformed += 1
+            if self.malformed == 1:
+                sys.stderr.write(f"left out: {error}\n")
+            return None
+
+
+_PERIOD = 1.0  # [s] between two notices about messages left out
+
+
+class _Echo:
+    """Prints messages until there are enough."""
+
+    def __init__(self, topic: GraphName, arguments: argparse.Namespace) -> None:
+        self.reader = EchoReader(topic)
+        self._arguments, self._count = arguments, 0
+
+    @property
+    def is_over(self) -> bool:
+        """Return whether enough has been printed."""
+        return self._arguments.count is not None and self._count >= self._arguments.count
+
+    def heard(self, heard: HeardMessage) -> None:
+        """Print a message, unless it is one too many."""
+        message = None if self.is_over else self.reader.read(heard)
+        if message is not None:
+            self._count += 1
+            text = shown(to_plain(message), self._arguments.json)
+            tell(text if self._arguments.json else f"{text}\n---")
+
+
+def echo(guest: Guest, arguments: argparse.Namespace) -> int:
+    """Print the messages of a topic."""
+    topic = wanted(guest.graph().topics, arguments.topic, "topic")
+    told = _Echo(topic, arguments)
+    if told.reader.is_useless:
+        return 1
+    guest.listen(topic, told.heard)
+    dropped = 0
+    while not guest.run(lambda: told.is_over, _PERIOD):
+        if guest.dropped > dropped:
+            sys.stderr.write(f"left out: {guest.dropped - dropped} messages, which came too fast to show\n")
+            dropped = guest.dropped
+    return 0
+
+
+def publish(guest: Guest, arguments: argparse.Namespace) -> int:
+    """Publish a message as soon as there is a subscriber, and report how often."""
+    message = message_type(arguments.type)
+    made = message_from(message, arguments.message)
+    if made is None:
+        return 1
+    name = f"/{arguments.topic.lstrip('/')}"
+    if problem := name_problem(name):
+        return refuse(NO_NAME.at(None, problem))
+    topic = find(guest.graph().topics, name)
+    of_type = [kind for kind in (topic.kinds if topic else ()) if kind.type == message.TYPE]
+    publisher = guest.bus(of_type[0] if of_type else None).publisher(NAME, name, message, Qos.EVENT)
+    if not guest.run(lambda: publisher.has_match, arguments.timeout):
+        raise NotDoneError(_nobody(topic, name, message, of_type))
+    most = arguments.count or (math.inf if arguments.rate else 1)
+    sent = 0
+    with guest.interruptible():
+        while sent < most and not guest.is_interrupted:
+            publisher(made)
+            sent += 1
+            if sent < most:
+                guest.run(lambda: guest.is_interrupted, 1 / (arguments.rate or 1.0))
+    tell(to_json({"topic": name, "type": message.TYPE, "sent": sent}) if arguments.json else f"{name}: {sent} sent")
+    return 0
+
+
+def _nobody(topic: GraphName | None, name: str, message: type[Message], of_type: list[WireType]) -> Finding:
+    if topic is None or not topic.takers:
+        return NOBODY.at(None, f"nothing subscribes to '{name}'")
+    others = ", ".join(topic.types)
+    if not of_type:
+        return NOBODY.at(None, f"'{name}' is not of type {message.TYPE}, but {others}")
+    return NOBODY.at(None, f"the subscribers of '{name}' have another definition of {message.TYPE}")
+
+
+def call(guest: Guest, arguments: argparse.Namespace) -> int:
+    """Send a request and print the response."""
+    found = wanted([name for name in guest.graph().services if name.givers], arguments.name, "service")
+    kind = found.kinds[0]
+    service = type_of(kind, "srv", registry.service)
+    request = message_from(service.Request, arguments.content)
+    if request is None:
+        return 1
+    client = guest.bus(kind).client(NAME, found.name, service)
+    if not guest.run(lambda: client.is_available, arguments.timeout):
+        return refuse(NOBODY.at(None, f"the server of '{found.name}' cannot be reached"))
+    replies: list[Reply[Any]] = []
+    client(request, replies.append, timeout=arguments.timeout)
+    guest.run(lambda: bool(replies))
+    if replies[0].response is None:
+        return refuse(SAID_NO.at(None, f"'{found.name}': {replies[0].error}"))
+    tell(shown(to_plain(replies[0].response), arguments.json))
+    return 0
+
+
+_INTERRUPTED = 130
+
+
+def send(guest: Guest, arguments: argparse.Namespace) -> int:
+    """Send a goal and print its feedback and its result."""
+    found = wanted([name for name in guest.graph().actions if name.givers], arguments.name, "action")
+    action = type_of(found.kinds[0], "action", registry.action, lambda found: found.SendGoal.HASH)
+    goal = message_from(action.Goal, arguments.content)
+    if goal is None:
+        return 1
+    client = guest.bus(found.kinds[0]).action_client(NAME, found.name, action)
+    if not guest.run(lambda: client.is_available, arguments.timeout):
+        return refuse(NOBODY.at(None, f"the server of '{found.name}' cannot be reached"))
+    ends: list[Ended[Any]] = []
+    sent = client(goal, ends.append, lambda feedback: _tell("feedback", feedback, arguments.json))
+    with guest.interruptible(sent.cancel):
+        guest.run(lambda: bool(ends))
+    return _end(ends[0], found.name, guest.is_interrupted, arguments.json)
+
+
+def _end(ended: Ended[Any], name: str, is_interrupted: bool, as_json: bool) -> int:
+    if ended.result is not None:
+        _tell("result", ended.result, as_json)
+    if is_interrupted:
+        return _INTERRUPTED
+    if ended.outcome is Outcome.SUCCEEDED:
+        return 0
+    message = getattr(ended.result, "error_msg", "") or ended.message
+    return refuse(SAID_NO.at(None, f"'{name}': {ended.outcome}{message and f', {message}'}"))
+
+
+def _tell(what: str, message: Message, as_json: bool) -> None:
+    data = {what: to_plain(message)}
+    tell(to_json(data) if as_json else to_text(data))

@@ -1,0 +1,220 @@
+"""New files from answers and templates: all of them or none, never over an existing one."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from contextlib import ExitStack, suppress
+from pathlib import Path
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+from rbxcompose.base.config import Place
+from rbxcompose.base.findings import Finding, kind
+from rbxcompose.base.printable import FORBIDDEN, plain
+from rbxcompose.base.units import ANGLE, LENGTH, UnitError, format_quantity, to_si
+from rbxcompose.manifest.files import shown_name
+
+LONGEST_NAME = 60  # characters
+LONGEST_TEXT = 200
+FARTHEST = 100.0  # [m] from the origin of `map`; a person should plan a longer tour
+
+NAME = kind("RBX9102")
+ANSWER = kind("RBX9103")
+
+_NAME = re.compile(r"[a-z][a-z0-9_]*")
+_YAML_WORDS = frozenset({"true", "false", "null"})  # as YAML values these are not texts
+
+
+class AnswerError(Exception):
+    """Raised with the finding on an answer that cannot be used."""
+
+    def __init__(self, finding: Finding) -> None:
+        super().__init__(finding.message)
+        self.finding = finding
+
+
+def read_name(text: str, what: str, taken: Collection[str] = ()) -> str:
+    """Return a name for `what` ("the robot").
+
+    Raises:
+        AnswerError: if it is no valid name, or one of `taken`.
+    """
+    shown = plain(text, LONGEST_NAME)
+    if not _NAME.fullmatch(text) or len(text) > LONGEST_NAME:
+        raise AnswerError(NAME.at(None, f"'{shown}' cannot be the name of {what}", help=_better(text)))
+    if text in _YAML_WORDS or text in taken:
+        raise AnswerError(NAME.at(None, f"'{shown}' cannot be the name of {what}, it is taken", help="choose another"))
+    return text
+
+
+def _better(text: str) -> str:
+    made = name_like(text)
+    return f"did you mean '{made}'?" if made else "a name has lower-case letters, digits and underscores"
+
+
+def name_like(text: str) -> str:
+    """Return the name that is most like a text, empty if there is none."""
+    return re.sub(r"[^a-z0-9]+", "_", text.lower()).lstrip("_0123456789").rstrip("_")[:LONGEST_NAME]
+
+
+def read_text(text: str) -> str:
+    """Return a sentence.
+
+    Raises:
+        AnswerError: if it is empty, longer than a line, or has characters that no manifest may have.
+    """
+    text = text.strip()
+    if not text or len(text) > LONGEST_TEXT or FORBIDDEN.search(text) or set(text) & {"\t", "\n"}:
+        why = f"a sentence on one line is needed, of at most {LONGEST_TEXT} characters"
+        raise AnswerError(ANSWER.at(None, f"'{plain(text, 40)}' cannot be used", help=why))
+    return text
+
+
+def read_yes(text: str) -> bool:
+    """Return whether the answer is yes.
+
+    Raises:
+        AnswerError: if it is neither yes nor no.
+    """
+    word = text.strip().lower()
+    if word and ("yes".startswith(word) or "no".startswith(word)):
+        return word.startswith("y")
+    raise AnswerError(ANSWER.at(None, f"'{plain(text, 40)}' is neither yes nor no"))
+
+
+def read_place(text: str, taken: Collection[str] = ()) -> Place:
+    """Return the place that is written as `NAME=X,Y` or `NAME=X,Y,HEADING`, such as `table=2 m,50 cm,90 deg`.
+
+    Raises:
+        AnswerError: if it has another form, if the name is one of `taken`, or if it is too far away.
+    """
+    name, equals, pose = text.partition("=")
+    numbers = [number.strip() for number in pose.split(",")]
+    if not equals or len(numbers) not in (2, 3):
+        help_text = "write NAME=X,Y or NAME=X,Y,HEADING, such as 'table=2 m,50 cm,90 deg'"
+        raise AnswerError(ANSWER.at(None, f"'{plain(text, 40)}' is not a place", help=help_text))
+    name = read_name(name.strip(), "a place", taken)
+    try:
+        x, y = to_si(numbers[0], LENGTH), to_si(numbers[1], LENGTH)
+        heading = to_si(numbers[2], ANGLE) if len(numbers) > 2 else 0.0
+    except UnitError as error:
+        detail = f" ({error.detail})" if error.detail else ""
+        message = f"the place '{name}': a number {error.message}{detail}"
+        raise AnswerError(ANSWER.at(None, message, help=error.help)) from None
+    if max(abs(x), abs(y)) > FARTHEST:
+        help_text = f"use places within {FARTHEST:.0f} m, and move it in the file"
+        raise AnswerError(ANSWER.at(None, f"the place '{name}' is very far away", help=help_text))
+    return Place(name, x, y, heading)
+
+
+EXISTS = kind("RBX9101")
+NOT_WRITTEN = kind("RBX9104")
+
+
+def taken(folder: Path, names: Iterable[str]) -> Finding | None:
+    """Return the finding about the first of some paths below `folder` that exists, before work is spent on them."""
+    return next((_exists(folder / name) for name in names if os.path.lexists(folder / name)), None)
+
+
+def _exists(path: Path) -> Finding:
+    return EXISTS.at(
+        None,
+        f"'{plain(shown_name(path))}' already exists; nothing was written",
+        help="choose another name, or another folder with '--into'",
+    )
+
+
+def write_new(folder: Path, files: Mapping[str, str]) -> Finding | None:
+    """Write texts by their paths below `folder`; if that fails, leave nothing behind and return the reason."""
+    try:
+        with ExitStack() as undo:
+            waiting = [_prepare(folder / name, text, undo) for name, text in files.items()]
+            for temporary, path in waiting:
+                os.link(temporary, path)  # unlike a rename, it fails if the file exists
+                undo.callback(path.unlink)
+            undo.pop_all()
+    except FileExistsError as error:
+        return _exists(Path(error.filename2 or error.filename))
+    except OSError as error:
+        message = f"'{plain(str(error.filename or folder))}' cannot be written: {error.strerror}"
+        return NOT_WRITTEN.at(None, message, help="nothing was written")
+    for temporary, _ in waiting:
+        with suppress(OSError):  # everything is written; one more name of it does no harm
+            temporary.unlink()
+    return None
+
+
+def _prepare(path: Path, text: str, undo: ExitStack) -> tuple[Path, Path]:
+    """Write the text to a temporary file beside its destination."""
+    if os.path.lexists(path):
+        raise FileExistsError(0, "", str(path))
+    for folder in _missing_folders(path):
+        folder.mkdir(exist_ok=True)
+        undo.callback(_remove_if_empty, folder)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    with temporary.open("x", encoding="utf-8", newline="\n") as file:
+        undo.callback(temporary.unlink)
+        file.write(text)
+        file.flush()
+        os.fsync(file.fileno())
+    return temporary, path
+
+
+def _missing_folders(path: Path) -> Iterator[Path]:
+    yield from reversed([folder for folder in path.parents if not folder.exists()])
+
+
+def _remove_if_empty(folder: Path) -> None:
+    with suppress(OSError):  # somebody else has put a file into it
+        folder.rmdir()
+
+
+_PLAIN_TEXT = re.compile(r"[A-Za-z][A-Za-z0-9 ,.()/'-]*")
+_WORDS = frozenset({"true", "false", "null"})
+
+
+def render(template: str, **answers: object) -> str:
+    """Return the text of a template of this package with the answers filled in.
+
+    Raises:
+        jinja2.UndefinedError: if the template names an answer that is not given.
+    """
+    return _ENVIRONMENT.get_template(template).render(answers)
+
+
+def yaml_text(text: str) -> str:
+    """Return a text as a YAML scalar of a Robot or Mission file: in quotes where needed, with dollars doubled."""
+    text = text.replace("$", "$$")
+    if _PLAIN_TEXT.fullmatch(text) and text.lower() not in _WORDS:
+        return text
+    return json.dumps(text, ensure_ascii=False)
+
+
+def yaml_pose(place: Place) -> str:
+    """Return a pose as written after the name of a place."""
+    x, y = format_quantity(place.x, LENGTH), format_quantity(place.y, LENGTH)
+    return f"{{x: {x}, y: {y}, heading: {format_quantity(place.heading, ANGLE)}}}"
+
+
+def class_name(name: str) -> str:
+    """Return a name in the style of Python classes."""
+    return "".join(word.capitalize() for word in name.split("_"))
+
+
+def _environment() -> Environment:
+    made = Environment(
+        loader=FileSystemLoader(Path(__file__).parent / "templates"),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,  # noqa: S701 - it writes YAML and Python, which have no HTML to escape
+    )
+    made.filters |= {"yaml_text": yaml_text, "yaml_pose": yaml_pose, "class_name": class_name}
+    return made
+
+
+_ENVIRONMENT = _environment()

@@ -1,0 +1,159 @@
+"""Options and arguments that verbs share; apart from what carries them out, which takes longer to import."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.files import open_regular
+from rbxcompose.base.units import FREQUENCY, TIME, Dimension, UnitError, to_si
+from rbxcompose.commands.console import NotDoneError, refuse
+
+EACH, BUS = "each host", "bus"
+"""What a verb may have as `ON_SYSTEM`: where it runs for a robot of a system. On each host of the robot, or on any one
+that reaches its bus; any other word is the type of the component that answers."""
+
+Declare = Callable[[argparse.ArgumentParser], object]  # declares some arguments
+
+
+@dataclass(frozen=True, slots=True)
+class Subcommand:
+    """A subcommand: its name, its help, what carries it out, and its arguments in their order in the help."""
+
+    name: str
+    help: str
+    do: Callable[..., int]
+    declares: tuple[Declare, ...] = ()
+    about: str | None = None  # the longer help of the subcommand itself
+
+
+def argument(*names: str, **options: Any) -> Declare:
+    """Return what declares one argument, as `add_argument` takes it."""
+    return lambda parser: parser.add_argument(*names, **options)
+
+
+def add_actions(
+    parser: argparse.ArgumentParser, actions: Iterable[Subcommand], *common: Declare, metavar: str = ""
+) -> None:
+    """Declare subcommands, each with its own arguments and then the `common` ones; `metavar` names them all."""
+    made = parser.add_subparsers(dest="action", required=True)
+    for subcommand in actions:
+        action = made.add_parser(subcommand.name, help=subcommand.help, description=subcommand.about)
+        for declare in (*subcommand.declares, *common):
+            declare(action)
+        action.set_defaults(do=subcommand.do)
+    made.metavar = metavar or "|".join(made.choices)
+
+
+def run_action(arguments: argparse.Namespace, *before: object) -> int:
+    """Carry out the chosen subcommand with what stands `before` its arguments; return the exit code."""
+    do: Callable[..., int] = arguments.do
+    try:
+        return do(*before, arguments)
+    except NotDoneError as error:
+        return refuse(error.finding)
+
+
+def add_system_options(parser: argparse.ArgumentParser, *, has_profile: bool = False) -> None:
+    """Declare what verbs need for the hosts of a system; a verb with layers of robots has `--profile` already."""
+    if not has_profile:
+        parser.add_argument(
+            "--profile", action="append", default=[], metavar="P", help="of a system: apply this profile"
+        )
+    parser.add_argument("--ssh-config", metavar="FILE", help="of a system: ssh's configuration, instead of the user's")
+
+
+_KIND = re.compile(rb"^kind:[ \t]*['\"]?(\w+)", re.MULTILINE)
+_HEAD = 4096  # bytes at the start of a file that contain its kind
+
+
+def kind_of(path: Path) -> str:
+    """Return the kind that a manifest names; empty if it names none or cannot be read."""
+    try:
+        with open_regular(path) as file:
+            found = _KIND.search(file.read(_HEAD))
+    except OSError:
+        return ""
+    return found[1].decode() if found else ""
+
+
+def is_system(written: str) -> bool:
+    """Return whether a command-line path names the file of a system."""
+    return Path(written).is_file() and kind_of(Path(written)) == "System"
+
+
+def system_and_robot(written: str) -> tuple[str, str] | None:
+    """Return the system's file and the robot that `FILE` or `FILE:ROBOT` names; without a robot, all are meant."""
+    if is_system(written):
+        return written, ""
+    path, _, robot = written.rpartition(":")
+    return (path, robot) if path and is_system(path) else None
+
+
+def add_ls_options(parser: argparse.ArgumentParser) -> None:
+    """Declare `--all` and `--json`."""
+    parser.add_argument("-a", "--all", action="store_true", help="also hidden ones, such as parts of actions")
+    add_json_option(parser)
+
+
+def add_json_option(parser: argparse.ArgumentParser) -> None:
+    """Declare `--json`."""
+    parser.add_argument("--json", action="store_true", help="answer in JSON, one line per answer")
+
+
+def add_timeout_option(parser: argparse.ArgumentParser, default: str) -> None:
+    """Declare `--timeout 5s`."""
+    words = f"how long to wait for the other side (default: {default})"
+    parser.add_argument("--timeout", type=seconds, default=seconds(default), metavar="T", help=words)
+
+
+def add_count_options(parser: argparse.ArgumentParser) -> None:
+    """Declare `--once` and `-n`."""
+    counts = parser.add_mutually_exclusive_group()
+    counts.add_argument("--once", dest="count", action="store_const", const=1, help="end after one")
+    counts.add_argument("-n", "--count", type=count, metavar="N", help="end after this many")
+
+
+def seconds(text: str) -> float:
+    """Read `30s` or `2 min` [s]."""
+    return _positive(text, TIME)
+
+
+def hertz(text: str) -> float:
+    """Read `10Hz` [Hz]."""
+    return _positive(text, FREQUENCY)
+
+
+def positive(dimension: Dimension) -> Callable[[str], float]:
+    """Return a reader of positive quantities of this dimension [SI]."""
+    return lambda text: _positive(text, dimension)
+
+
+def signed(dimension: Dimension) -> Callable[[str], float]:
+    """Return a reader of quantities of this dimension [SI], which may be below zero."""
+    return lambda text: _quantity(text, dimension)
+
+
+def count(text: str) -> int:
+    """Read a whole number of at least 1."""
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number above 0")
+    return int(text)
+
+
+def _positive(text: str, dimension: Dimension) -> float:
+    value = _quantity(text, dimension)
+    if value <= 0:
+        raise argparse.ArgumentTypeError("must be above zero")
+    return value
+
+
+def _quantity(text: str, dimension: Dimension) -> float:
+    try:
+        return to_si(text, dimension)
+    except UnitError as error:
+        raise argparse.ArgumentTypeError(": ".join(filter(None, (str(error), error.detail, error.help)))) from error

@@ -1,0 +1,196 @@
+"""The robots that a verb is about: by file, by folder, or the only one here; and the layers put over them."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import field
+from pathlib import Path
+from typing import TypedDict
+
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.findings import Finding, Severity, Span, kind
+from rbxcompose.commands.console import NotDoneError, refuse
+from rbxcompose.commands.options import kind_of
+from rbxcompose.compiler.compile import Compilation, compile_robot
+from rbxcompose.manifest.files import PREFIX, ROBOT_FILE, find, project_of, shown_name
+from rbxcompose.manifest.section import SYSTEM, TEST
+from rbxcompose.runtime.folder import ChosenLayers
+
+UNUSED = kind(
+    "RBX9007",
+    Severity.WARNING,
+)
+_USE = "name it in a robot ('missions:', 'include:')"
+_MANIFESTS = ("*.yaml", "*.yml")
+_ROBOTS, _SYSTEMS = "robots", "systems"
+
+
+@dataclass(slots=True)
+class Targets:
+    """What to check: `robots`, `tests` of missions, `systems`; and `users`, but only if they use one of `files`."""
+
+    robots: list[str] = field(default_factory=list)
+    users: list[str] = field(default_factory=list)
+    files: list[str] = field(default_factory=list)
+    tests: list[str] = field(default_factory=list)
+    systems: list[str] = field(default_factory=list)
+
+    def unused(self, read: Iterable[str]) -> Iterator[Finding]:
+        """Yield a finding for each of `files` that is not among the `read` names."""
+        known = set(read)
+        for file in self.files:
+            if file not in known:
+                message, how = f"no robot of the project uses '{file}'", _USE
+                if kind_of(Path(file)) == "Overlay":
+                    message = f"'{file}' is an overlay, and does not say for which robot"
+                    how = f"name the robot, too: 'rbxcompose check ROBOT -f {file}'"
+                yield UNUSED.at(Span(file, 1, 1, 1, 2), message, help=how)
+
+
+def targets(paths: Iterable[str]) -> Targets:
+    """Return the targets that command-line paths name.
+
+    A path is a robot's file or folder, `rbx:robots/NAME`, a folder with robots or else tests below it, or any other
+    manifest, which means the robots of its project that use it.
+    """
+    out = Targets()
+    for written in paths:
+        path = Path(written)
+        if written.startswith(PREFIX) or not path.exists():
+            out.robots.append(written)
+        elif path.is_dir():
+            robots = [written] if (path / ROBOT_FILE).exists() else robots_below(path)
+            tests = [] if robots else tests_below(path)
+            out.tests += tests
+            systems = systems_of(path)
+            out.systems += systems
+            out.robots += robots if robots or tests or systems else [written]
+        elif kind_of(path) in ("Robot", ""):
+            out.robots.append(written)
+        elif kind_of(path) == TEST:
+            out.tests.append(written)
+        elif kind_of(path) == SYSTEM:
+            out.systems.append(written)
+        else:
+            out.files.append(shown_name(path.resolve()))
+            out.users += robots_below(project_of(path))
+    out.robots = list(dict.fromkeys(out.robots))
+    out.users = [user for user in dict.fromkeys(out.users) if user not in out.robots]
+    return out
+
+
+def robots_below(folder: Path) -> list[str]:
+    """Return the robot files of a project, or of a folder of robots; at most two folders deep."""
+    base = folder / _ROBOTS if (folder / _ROBOTS).is_dir() else folder
+    files = (path for depth in ("", "*/", "*/*/") for pattern in _MANIFESTS for path in base.glob(depth + pattern))
+    return sorted(shown_name(path.resolve()) for path in files if kind_of(path) == "Robot")
+
+
+def systems_of(folder: Path) -> list[str]:
+    """Return the systems of a project, or of a folder of systems."""
+    base = folder / _SYSTEMS if (folder / _SYSTEMS).is_dir() else folder
+    files = (path for pattern in _MANIFESTS for path in base.glob(pattern))
+    return sorted(shown_name(path.resolve()) for path in files if kind_of(path) == SYSTEM)
+
+
+def systems_here() -> list[str]:
+    """Return the systems of the project around the current folder."""
+    return systems_of(Path())
+
+
+def tests_below(folder: Path) -> list[str]:
+    """Return the tests of missions in a folder, at any depth."""
+    files = (path for pattern in _MANIFESTS for path in folder.rglob(pattern))
+    return sorted(shown_name(path.resolve()) for path in files if kind_of(path) == TEST)
+
+
+def projects_of(paths: Iterable[str]) -> list[Path]:
+    """Return the project folders of robots; files that ship with the package belong to no project."""
+    files = [find(path) for path in paths if not path.startswith(PREFIX)]
+    return list(dict.fromkeys(project_of(file) for file in files if isinstance(file, Path)))
+
+
+UNNAMED = kind("RBX9031")
+_MOST = 5  # robots that are listed
+_ABOUT = "the robot's file, its folder, or rbx:robots/NAME of the library; without it, the only one"
+
+
+def add_path_argument(parser: argparse.ArgumentParser) -> None:
+    """Declare the robot's path, which may be left out."""
+    parser.add_argument("path", nargs="?", metavar="PATH", help=_ABOUT)
+
+
+def robot_path(written: str | None, *, may_run: bool = True) -> str | None:
+    """Return the path of the robot that is meant; None after telling that this is not clear.
+
+    With `may_run`, the only robot that is up is meant if the folder has none.
+    """
+    try:
+        return written if written is not None else only_path(may_run=may_run)
+    except NotDoneError as error:
+        refuse(error.finding)
+        return None
+
+
+def only_path(*, may_run: bool) -> str:
+    """Return the path of the only robot here.
+
+    Raises:
+        NotDoneError: if there is none or more than one.
+    """
+    from rbxcompose.commands.lookup import find_robot, known_state, robots_up  # `check` asks no robot that runs
+
+    here = [ROBOT_FILE] if Path(ROBOT_FILE).is_file() else robots_below(Path())
+    if len(here) == 1:
+        return here[0]
+    if may_run and len(robots_up()) == 1 and (state := known_state(find_robot(None))) is not None:
+        return state.file
+    more = f" and {len(here) - _MOST} more" if len(here) > _MOST else ""
+    words = f"this folder has several robots: {', '.join(here[:_MOST])}{more}" if here else "this folder has no robot"
+    raise NotDoneError(UNNAMED.at(None, f"no robot is named, and {words}", help="give the path of one"))
+
+
+class Layers(TypedDict):
+    """The arguments of `compile_robot` besides the robot's file."""
+
+    profiles: Sequence[str]
+    overlays: Sequence[str]
+    sets: Sequence[str]
+    real: bool
+    environment: Mapping[str, str]
+
+
+def add_layer_options(parser: argparse.ArgumentParser) -> None:
+    """Declare `--profile`, `-f`, `--set` and `--real`."""
+    parser.add_argument("--profile", action="append", default=[], metavar="P", help="apply this profile")
+    parser.add_argument(
+        "-f", "--file", action="append", default=[], dest="overlays", metavar="FILE", help="apply this overlay"
+    )
+    parser.add_argument("--set", action="append", default=[], dest="sets", metavar="K=V", help="change one value")
+    parser.add_argument("--real", action="store_true", help="use the real devices; without it, they are simulated")
+
+
+def layers_of(arguments: argparse.Namespace) -> Layers:
+    """Return all layers that a command puts over the robot's file."""
+    return {
+        "profiles": arguments.profile,
+        "overlays": arguments.overlays,
+        "sets": arguments.sets,
+        "real": arguments.real,
+        "environment": os.environ,
+    }
+
+
+def chosen_layers(arguments: argparse.Namespace) -> ChosenLayers:
+    """Return the same layers for the robot to remember; from any folder they mean the same files."""
+    overlays = tuple(
+        overlay if overlay.startswith(PREFIX) else os.path.abspath(overlay) for overlay in arguments.overlays
+    )
+    return ChosenLayers(tuple(arguments.profile), overlays, tuple(arguments.sets), arguments.real)
+
+
+def compiled(robot: str, arguments: argparse.Namespace) -> Compilation:
+    """Compile a robot with all layers that a command puts over its file."""
+    return compile_robot(robot, **layers_of(arguments))

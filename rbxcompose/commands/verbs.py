@@ -1,0 +1,63 @@
+"""The verbs: found by the names of their files, and imported only when needed.
+
+The file of a verb that is a word of Python ends in an underscore, which is not part of the verb's name.
+"""
+
+from __future__ import annotations
+
+import importlib
+import keyword
+from typing import TYPE_CHECKING, Protocol, cast
+
+from rbxcompose.base.rooms import file_of, modules_of
+
+if TYPE_CHECKING:  # a verb that does not run costs no imports
+    import argparse
+
+
+FOLDER = "commands"
+"""In which a room has its verbs."""
+
+
+class Verb(Protocol):
+    """The contents of a verb's module."""
+
+    __doc__: str | None
+
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """Declare options and arguments."""
+        ...
+
+    def run(self, arguments: argparse.Namespace) -> int:
+        """Run the verb and return the exit code."""
+        ...
+
+
+def verbs() -> list[str]:
+    """Return the names of all verbs, sorted."""
+    return sorted(name.removesuffix("_") for name in modules_of(FOLDER))
+
+
+def module_of(verb: str) -> str:
+    """Return the name of a verb's module."""
+    return modules_of(FOLDER)[f"{verb}_" if keyword.iskeyword(verb) else verb]
+
+
+def about(verb: str) -> str:
+    """Return the first line of a verb's docstring, read from its text: importing all verbs would take too long."""
+    with open(file_of(module_of(verb)), encoding="utf-8") as file:
+        return file.readline().strip().strip('"')
+
+
+def load(verb: str) -> Verb:
+    """Import a verb."""
+    return cast(Verb, importlib.import_module(module_of(verb)))
+
+
+def parser_of(name: str, verb: Verb) -> argparse.ArgumentParser:
+    """Return the parser of a verb."""
+    from rbxcompose.commands.console import Parser  # help does not need it
+
+    parser = Parser(f"rbxcompose {name}", description=verb.__doc__ or "", allow_abbrev=False)
+    verb.add_arguments(parser)
+    return parser

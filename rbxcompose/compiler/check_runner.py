@@ -1,0 +1,130 @@
+"""Checks: rules about the whole robot, one file each in `checks/`, declared by one decorator."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from rbxcompose.base.findings import Finding, Report, Severity
+from rbxcompose.base.plugins import LEFT_OUT, BrokenPluginError, Plugins
+from rbxcompose.base.printable import plain
+from rbxcompose.base.rules import OUR_CODES, Rule, declared
+from rbxcompose.compiler.model.doubts import Doubts, doubts_of
+from rbxcompose.compiler.model.robot import Robot
+from rbxcompose.manifest.walk import TWICE
+from rbxcompose.missions.analysis.check_runner import rule_findings
+from rbxcompose.missions.analysis.examined import Examined
+
+Check = Rule[Robot]
+Find = Callable[[Robot], Iterable[Finding]]
+
+PLUGINS = Plugins("check", "checks")
+_CODE = re.compile(r"[A-Z]+\d+")
+
+
+CHECKS: dict[str, Check] = {}  # every check that has been imported, by code
+
+
+def check(
+    code: str,
+    severity: Severity = Severity.ERROR,
+    *,
+    is_fixable: bool = False,
+    closed: tuple[str, ...] | None = None,
+) -> Callable[[Find], Check]:
+    """Declare a rule under its code.
+
+    Codes that begin with `RBX` are those of this project; others start with their own word (`LAMP01`). `closed` is what
+    the rule takes for known, see `Rule`.
+
+    Raises:
+        ValueError: if it has no docstring, or its code is taken, malformed or reserved.
+    """
+
+    def declare(find: Find) -> Check:
+        if not _CODE.fullmatch(code):
+            raise ValueError(f"'{code}' is not a code: a code is capital letters followed by digits")
+        if _is_foreign(find) and code.startswith(OUR_CODES):
+            raise ValueError(f"the code {code} starts with {OUR_CODES}, which is reserved for this project")
+        CHECKS[code] = declared(find, code, severity, is_fixable, closed)
+        return CHECKS[code]
+
+    return declare
+
+
+def all_checks() -> list[Check]:
+    """Import every check, except broken ones of other packages, and return them by code."""
+    PLUGINS.load_shipped()
+    for name in PLUGINS.third_party:
+        _problem(name)
+    return [CHECKS[code] for code in sorted(CHECKS)]
+
+
+def broken_checks() -> list[Finding]:
+    """Return a finding for each check of another package that is left out."""
+    return [LEFT_OUT.at(None, problem) for name in sorted(PLUGINS.third_party) if (problem := _problem(name))]
+
+
+def _problem(name: str) -> str:
+    """Import a check of another package; return why it is left out, or nothing."""
+    if any(rule.find.__name__ == name and not _is_foreign(rule.find) for rule in CHECKS.values()):
+        return PLUGINS.left_out(name)
+    try:
+        PLUGINS.load_foreign(name)
+    except BrokenPluginError as error:
+        return str(error)
+    return ""
+
+
+def run_checks(robot: Robot, report: Report) -> None:
+    """Add the findings of the checks on missions and on the robot.
+
+    Rules that conclude from what is there come first, then errors that conclude from what is not there, then warnings:
+    each only if what it takes for known is known, in spite of the errors before it. A finding that rests on something
+    in doubt may only follow from an error, so it is left out. A mission with a key that is written twice is not
+    checked: half of something in it was not read.
+    """
+    halves = {finding.span.file for finding in report if finding.code == TWICE.code and finding.span}
+    programs = (mission.program for mission in robot.missions.values())
+    missions = [Examined(program, robot.names) for program in programs if program.file not in halves]
+    checks = all_checks()
+    for turn in range(_TURNS):
+        doubts = doubts_of(robot.manifest, report)
+
+        def tells(rule: Rule[Any], turn: int = turn, doubts: Doubts = doubts) -> bool:
+            return _turn(rule) == turn and not doubts.bar(rule.relies_on)
+
+        found: list[tuple[Rule[Any], Finding]] = []
+        for mission in missions:
+            found += rule_findings(mission, tells)
+        found += [(one, finding) for one in checks if tells(one) for finding in _found(one, robot)]
+        report.extend(finding for rule, finding in found if not doubts.touch(finding, rule.relies_on))
+    report.extend(broken_checks())
+
+
+_TURNS = 3
+
+
+def _turn(rule: Rule[Any]) -> int:
+    """Return when a rule has its turn: a later one is silent where earlier ones have found errors."""
+    return _TURNS - 1 if rule.severity is Severity.WARNING else int(bool(rule.relies_on))
+
+
+def _found(one: Check, robot: Robot) -> list[Finding]:
+    """Return the findings of a check. If one of another package raises an error, the rest still run."""
+    if not _is_foreign(one.find):
+        return list(one(robot))
+    try:
+        return list(one(robot))
+    except Exception as error:  # third-party code may raise anything
+        reason = plain(f"{type(error).__name__}: {error}")
+        return [LEFT_OUT.at(None, f"the check {one.code} of '{_package(one.find)}' has failed: {reason}")]
+
+
+def _is_foreign(find: Find) -> bool:
+    return _package(find) != _package(declared)
+
+
+def _package(find: Callable[..., Any]) -> str:
+    return find.__module__.partition(".")[0]

@@ -1,0 +1,1 @@
+"""Rules about the whole robot that belong to no domain."""

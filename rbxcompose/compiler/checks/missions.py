@@ -1,0 +1,354 @@
+"""Rules about missions that need the whole robot."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator
+from pathlib import Path
+
+from rbxcompose.base.config import MISSION as START_MISSION_MISSIONS
+from rbxcompose.base.expressions.tree import (
+    Expression,
+    ExpressionError,
+    ExpressionNode,
+    FunctionCall,
+    Index,
+    Junction,
+    Not,
+    Number,
+    Variable,
+    new_names,
+    walk,
+)
+from rbxcompose.base.expressions.types import FLAG, TypeKind
+from rbxcompose.base.expressions.values import Value
+from rbxcompose.base.findings import Finding, Related, Severity, Span, suggest
+from rbxcompose.base.rules import MISSIONS, OWN, WIRING
+from rbxcompose.base.units import TIME, format_quantity
+from rbxcompose.compiler.check_runner import check
+from rbxcompose.compiler.composition.robot_file import MISSION
+from rbxcompose.compiler.model.robot import Robot, RobotMission
+from rbxcompose.domains.power.charge import blamed, constants, decided, ways_of
+from rbxcompose.manifest.files import files_named
+from rbxcompose.manifest.reader import read_file
+from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, at
+from rbxcompose.missions.analysis.bounds import Bounds, Known, truth
+from rbxcompose.missions.analysis.effects import replaced, written
+from rbxcompose.missions.analysis.facts import Constants, place_in_text
+from rbxcompose.missions.analysis.travel_times import too_short
+from rbxcompose.missions.language.asked import expression_of, inner_span
+from rbxcompose.missions.program.program import END, Interrupt, MissionNode, Program
+
+
+@check("RBX4123", Severity.WARNING, closed=(MISSIONS,))
+def always_holds(robot: Robot) -> Iterator[Finding]:
+    """A condition always holds."""
+    for mission in robot.missions.values():
+        for asked, holds in decided(robot, mission):
+            if holds is True:
+                span, related = blamed(robot, mission, asked)
+                yield always_holds.at(
+                    span,
+                    f"the condition '{asked.expression.text}' always holds",
+                    help="compare with a level that makes a difference",
+                    related=related,
+                )
+
+
+_LEVEL = "compare with a level that can be reached"
+
+
+@check("RBX4122", closed=(OWN,))
+def never_holds(robot: Robot) -> Iterator[Finding]:
+    """A condition can never hold."""
+    for mission in robot.missions.values():
+        for asked, holds in decided(robot, mission):
+            if holds is False:
+                span, related = blamed(robot, mission, asked)
+                yield never_holds.at(
+                    span,
+                    f"the condition '{asked.expression.text}' can never hold",
+                    help=_cure(asked.expression),
+                    related=related,
+                )
+
+
+def _cure(expression: Expression) -> str:
+    tree = expression.tree
+    is_contrary = isinstance(tree, Junction) and all(truth(operand, {}) is None for operand in tree.operands)
+    return "its parts contradict each other: join them by 'or', or change a limit" if is_contrary else _LEVEL
+
+
+@check("RBX4132", Severity.WARNING, closed=(MISSIONS,))
+def beyond_list(robot: Robot) -> Iterator[Finding]:
+    """A list item that does not exist."""
+    for mission in robot.missions.values():
+        known = constants(mission)
+        for scalar, expression in _expressions(mission.program):
+            if any(isinstance(tree, FunctionCall) and tree.function == "count" for tree, _ in walk(expression.tree)):
+                continue  # the expression checks how long the list is before it takes the item
+            for tree, _ in walk(expression.tree):
+                match tree:
+                    case Index(of=Variable(name=name), index=Number(value=index)):
+                        items, datum = known.get(name), mission.program.data.get(name)
+                        if datum and isinstance(items, list | tuple) and index >= len(items):
+                            yield beyond_list.at(
+                                inner_span(scalar, tree.start, tree.end),
+                                f"'${name}' has no item {index:.0f}: "
+                                + (f"its last is {len(items) - 1}" if items else "it is empty"),
+                                help="items are counted from 0",
+                                related=[Related(datum.span, "the list")],
+                            )
+
+
+def _expressions(program: Program) -> Iterator[tuple[ScalarNode, Expression]]:
+    """Yield all expressions of a mission, the arguments of its skills included."""
+    yield from ((asked.scalar, asked.expression) for _, asked in program.asked())
+    for node in program.nodes:
+        for argument in node.step.arguments:
+            if isinstance(argument.value, ScalarNode):
+                try:
+                    yield argument.value, expression_of(argument.value)
+                except ExpressionError:
+                    continue  # reported where missions are read
+
+
+@check("RBX4131", closed=("places",))
+def place_in_data(robot: Robot) -> Iterator[Finding]:
+    """The data of a mission name a place that the robot does not know."""
+    places = robot.manifest.places
+    for mission in robot.missions.values():
+        program, known = mission.program, {**_shortened(mission.program), **constants(mission)}
+        wrong = {name: _without(value, places) for name, value in known.items() if name in program.data}
+        for node, name in _goals(robot, program):
+            for text, datum in _texts(program, node, name, wrong):
+                yield place_in_data.at(
+                    _place_of(program, datum, text),
+                    f"there is no place '{text}', which '{node.skill}' gets from '${name}'",
+                    help=suggest(text, places, "places of this robot"),
+                    related=[Related(node.span, "used here")],
+                )
+
+
+def _shortened(program: Program) -> Constants:
+    """Return the data that only ever lose items: what remains of them was there from the start."""
+    names = (written(program) & program.data.keys()) - replaced(program)
+    return {name: program.data[name].value for name in names}
+
+
+def _without(value: Value, places: Collection[str]) -> Value:
+    """Return the texts of a datum that are no places: a list is read once, however many loops are over it."""
+    if isinstance(value, list | tuple | dict):
+        return [text for text in value if isinstance(text, str) and text not in places]
+    return value if isinstance(value, str) and value not in places else None
+
+
+def _place_of(program: Program, datum: str, text: str) -> Span:
+    """Return the place of a text in a datum, or that of the datum's name if the text is not found."""
+    match at(program.root, ("data", datum)):
+        case MappingNode(entries=entries) if text in entries:
+            return entries[text].key.span
+        case SequenceNode(items=items):
+            spans = (item.span for item in items if isinstance(item, ScalarNode) and item.text == text)
+            return next(spans, program.data[datum].span)
+        case ScalarNode(span=span):
+            return span
+    return program.data[datum].span
+
+
+def _goals(robot: Robot, program: Program) -> Iterator[tuple[MissionNode, str]]:
+    """Yield each node whose skill takes a pose from a plain `$name`, with that name."""
+    for node in program.nodes:
+        skill = robot.skills[node.skill].skill if node.skill in robot.skills else None
+        for argument in node.step.arguments if skill else ():
+            wanted = skill.arguments.get(argument.name or skill.main) if skill else None
+            if wanted is None or wanted.kind is not TypeKind.POSE or not isinstance(argument.value, ScalarNode):
+                continue
+            try:
+                tree = expression_of(argument.value).tree
+            except ExpressionError:
+                continue
+            if isinstance(tree, Variable):
+                yield node, tree.name
+
+
+def _texts(program: Program, node: MissionNode, name: str, known: Constants) -> Iterator[tuple[str, str]]:
+    """Yield the texts that `$name` can be at a node, each with the datum that contains it."""
+    above = node
+    while above.parent is not None:
+        above = program.nodes[above.parent]
+        if above.item == name:
+            items = above.step.items or ()
+            listed = items.tree.name if not isinstance(items, tuple) and isinstance(items.tree, Variable) else ""
+            found = known.get(listed)
+            texts = found if isinstance(found, list | tuple | dict) else ()
+            yield from ((text, listed) for text in texts if isinstance(text, str))
+            return
+    found = known.get(name)
+    if isinstance(found, str):
+        yield found, name
+
+
+_ITS_OWN = ("new", "age")  # their answers depend on when the interrupt acted last
+
+
+@check("RBX4184", Severity.WARNING, closed=())
+def shadowed_interrupt(robot: Robot) -> Iterator[Finding]:
+    """An interrupt cannot cut in, because an earlier one always does first."""
+    for mission in robot.missions.values():
+        known = bounds_of(mission)
+        for index, later in enumerate(mission.program.interrupts):
+            for earlier in mission.program.interrupts[:index]:
+                if _keeps_out(robot, mission.program, earlier, later, known):
+                    acts = "never acts" if earlier.afterwards == END else "waits until its reaction is done"
+                    yield shadowed_interrupt.at(
+                        later.when.scalar.span,
+                        f"'{earlier.name}' comes first and holds whenever this does, so '{later.name}' {acts}",
+                        help=f"put '{later.name}' before '{earlier.name}': the first one that holds wins",
+                        related=[Related(earlier.when.scalar.span, "it holds as well")],
+                    )
+                    break
+
+
+def bounds_of(mission: RobotMission) -> Known:
+    """Return the bounds of the numbers of a mission that nothing changes."""
+    numbers = {name: value for name, value in constants(mission).items() if isinstance(value, float)}
+    return {name: Bounds(value, value) for name, value in numbers.items()}
+
+
+def _keeps_out(robot: Robot, program: Program, earlier: Interrupt, later: Interrupt, known: Known) -> bool:
+    expression, other = earlier.when.expression, later.when.expression
+    if expression.text == other.text or _is_its_own(robot, expression) or _is_its_own(robot, other):
+        return False  # RBX4171 tells two equal ones
+    if truth(expression.tree, known) is not None or truth(other.tree, known) is not None:
+        return False  # decided by itself, which others tell
+    takes_time = earlier.root is not None and any(below.step.waits for below in program.below(earlier.root))
+    return (takes_time or earlier.afterwards == END) and implies(other, expression, known)
+
+
+def _is_its_own(robot: Robot, expression: Expression) -> bool:
+    calls = (part for part, _ in walk(expression.tree) if isinstance(part, FunctionCall))
+    names = {name.name for name in expression.names}
+    return any(call.function in _ITS_OWN for call in calls) or bool(names & robot.names.events)
+
+
+def implies(narrow: Expression, wide: Expression, known: Known) -> bool:
+    """Return whether one condition surely holds whenever another one does."""
+    all_of, any_of = _parts(narrow.tree, "and"), _parts(wide.tree, "or")
+    if {narrow.text[node.start : node.end] for node in all_of} & {wide.text[node.start : node.end] for node in any_of}:
+        return True
+    start, end = narrow.tree.start, narrow.tree.end
+    return truth(Junction(start, end, "and", (*all_of, Not(start, end, wide.tree))), known) is False
+
+
+def _parts(tree: ExpressionNode, operator: str) -> tuple[ExpressionNode, ...]:
+    return tree.operands if isinstance(tree, Junction) and tree.operator == operator else (tree,)
+
+
+@check("RBX4181", Severity.WARNING, closed=(WIRING,))
+def stale_event(robot: Robot) -> Iterator[Finding]:
+    """An old message would end a wait at once."""
+    doubtful = [name for name in robot.values if _may_be_stale(robot, name)]
+    for mission in robot.missions.values() if doubtful else ():
+        own = {*mission.program.data, *mission.program.inputs}
+        for node in mission.program.nodes:
+            for asked in node.asked if node.step.only_asks else ():
+                wanted = _wanted(asked.expression) if asked.is_watched else ()
+                for name in (name for name in wanted if name in doubtful and name not in own):
+                    doubtful.remove(name)
+                    place = Related(robot.key("values", name), "the value")
+                    message = f"the last message of '${name}' ends this wait, however old it is"
+                    help_text = f"write 'event: true' at the value '{name}', or 'event: false' if it tells a state"
+                    yield stale_event.at(asked.scalar.span, message, help=help_text, related=[place])
+
+
+def _may_be_stale(robot: Robot, name: str) -> bool:
+    """Return whether a value is a flag from outside whose nature is not told."""
+    entry, source = robot.manifest.values[name], robot.values[name]
+    is_outside = entry.topic is not None and source.topic not in robot.writers
+    return is_outside and source.type == FLAG and entry.event is None
+
+
+def _wanted(condition: Expression) -> list[str]:
+    """Return the flags whose last messages may make a condition hold."""
+    tree, fresh = condition.tree, new_names(condition)
+    operands = tree.operands if isinstance(tree, Junction) else (tree,)
+    return [operand.name for operand in operands if isinstance(operand, Variable) and operand.name not in fresh]
+
+
+_ENDING = ".yaml"
+
+
+@check("RBX3009", is_fixable=True)
+def start_mission(robot: Robot) -> Iterator[Finding]:
+    """`start:` names a mission that the robot does not have."""
+    start = robot.manifest.start
+    if (
+        start is None
+        or start in robot.manifest.missions
+        or robot.manifest.contents.may_have(START_MISSION_MISSIONS, start)
+    ):
+        return
+    place = robot.value("start")
+    message = f"the robot has no mission '{start}' to start"
+    if files := _files((place, robot.value("name")), start):
+        help_text = f"add '{start}: {files[0]}' below 'missions:'"
+        yield start_mission.at(place, message, help=help_text)
+        return
+    yield start_mission.misspelt(place, message, start, robot.manifest.missions, "missions of this robot")
+
+
+def _files(places: Iterable[Span], start: str) -> list[str]:
+    """Return the project's mission files of this name, as the first existing file of `places` has to write them."""
+    writer = next(
+        (path for place in places if (path := Path(place.file)).is_file()), None
+    )  # `--set` and the library: none
+    found = files_named(f"{start}{_ENDING}", writer) if writer else []
+    return [text for text in found if writer and _is_mission(writer.resolve().parent / text)]
+
+
+def _is_mission(file: Path) -> bool:
+    root, _ = read_file(file, str(file), {})
+    written = root.get("kind") if isinstance(root, MappingNode) else None
+    return isinstance(written, ScalarNode) and written.text == MISSION
+
+
+@check("RBX4129", Severity.WARNING, closed=(OWN,))
+def unread_name(robot: Robot) -> Iterator[Finding]:
+    """A mission never reads one of its inputs or data."""
+    seen = set()
+    for mission in robot.missions.values():
+        program = mission.program
+        if program.file in seen:
+            continue  # shares its file with another mission
+        seen.add(program.file)
+        read = program.reads
+        for node in program.nodes:
+            kept = node.saved
+            if kept and kept.text not in read:
+                message = f"the mission '{program.name}' never reads what it keeps as '{kept.text}'"
+                help_text = f"remove 'save', or write '${kept.text}' where it belongs"
+                yield unread_name.at(kept.span, message, help=help_text)
+        for what, names in (("input", program.inputs), ("datum", program.data)):
+            for name in names:
+                if name not in read:
+                    yield unread_name.at(
+                        names[name].span,
+                        f"the mission '{program.name}' never reads its {what} '{name}'",
+                        help=f"remove it, or write '${name}' where it belongs",
+                    )
+
+
+@check("RBX4168", Severity.WARNING)
+def hurried_rounds(robot: Robot) -> Iterator[Finding]:
+    """The rounds of a loop take longer than the time between their starts."""
+    for mission in robot.missions.values():
+        if (ways := ways_of(robot, mission)) is None:
+            continue
+        list(too_short(ways, constants(mission)))  # consumed for its side effect: it walks the whole mission
+        for one in ways.late.values():
+            takes, given = (format_quantity(round(time, 2), TIME) for time in (one.needs, one.given))
+            yield hurried_rounds.at(
+                place_in_text(one.node, one.node.step.lasts),
+                f"each round takes at least {takes}, but one is to begin every {given}",
+                help=f"make it longer than {takes}, or remove it",
+            )

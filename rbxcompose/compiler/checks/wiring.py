@@ -1,0 +1,452 @@
+"""Rules about wires: ports, topics, types, servers, and the order in which components start."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from itertools import groupby
+
+from rbxcompose.base.findings import Finding, Related, Severity, suggest
+from rbxcompose.base.rules import NAMES, WIRING
+from rbxcompose.compiler.check_runner import check
+from rbxcompose.compiler.composition.robot_manifest import IncludedPart
+from rbxcompose.compiler.model.build import MISSION
+from rbxcompose.compiler.model.flow import is_written
+from rbxcompose.compiler.model.instances import answers, cycle_of, part_of, shared_names
+from rbxcompose.compiler.model.robot import PortEnd, Robot, RobotComponent, resolve
+from rbxcompose.domains.muxes.checks import missing
+from rbxcompose.manifest.tree import at
+from rbxcompose.missions.analysis.effects import published
+from rbxcompose.msgs.definitions import parse_type
+from rbxcompose.sdk.capabilities import Drives, Forwards, RunsMissions
+from rbxcompose.sdk.ports import Calls, CallsAction, In, Looks, Out, Qos, Serves, ServesAction, ServesTopic
+from rbxcompose.sdk.registry import types_with
+
+
+@check("RBX3007", is_fixable=True)
+def connected_port(robot: Robot) -> Iterator[Finding]:
+    """`connect:` names a port that the component does not have."""
+    for name, entry in robot.manifest.components.items():
+        if name not in robot.components:
+            continue
+        ports = [end.name for end in robot.components[name].ends if not isinstance(end.port, Looks)]
+        for port in entry.options.connect:
+            if port not in ports:
+                yield connected_port.misspelt(
+                    robot.key("components", name, "connect", port),
+                    f"'{name}' has no port '{port}'",
+                    port,
+                    ports,
+                    "its ports",
+                    taken=entry.options.connect,
+                )
+
+
+SERVED_BY = {Calls: Serves, CallsAction: ServesAction, In: Out}
+
+
+@check("RBX3010", Severity.WARNING, closed=(WIRING, NAMES))
+def needed_port(robot: Robot) -> Iterator[Finding]:
+    """A component needs something that nothing in the robot provides."""
+    given = {(type(end.port), end.topic) for end in robot.ends}
+    lost = {end.type_name for ends in robot.writers.values() for end in ends if is_unheard(robot, end)}
+    for component in robot.components.values():
+        if component.declared(RunsMissions):
+            continue  # its values may come from outside, and its skills are those that exist
+        needed = [
+            end for end in component.ends if type(end.port) in SERVED_BY and not getattr(end.port, "is_open", False)
+        ]
+        missing = [end for end in needed if (SERVED_BY[type(end.port)], end.topic) not in given]
+        missing = [end for end in missing if end.topic not in robot.outside.names]
+        # A command without a subscriber is reported at its publisher.
+        ends = [end for end in missing if not (_is_command(end) and end.type_name in lost)]
+        if ends:
+            yield _finding(robot, component, ends)
+
+
+def is_unheard(robot: Robot, end: PortEnd) -> bool:
+    """Return whether this end publishes commands that nothing receives."""
+    return isinstance(end.port, Out) and end.port.qos is Qos.COMMAND and end.topic not in robot.readers
+
+
+def _is_command(end: PortEnd) -> bool:
+    return isinstance(end.port, In) and end.port.qos is Qos.COMMAND
+
+
+def _finding(robot: Robot, component: RobotComponent, ends: list[PortEnd]) -> Finding:
+    names = " and ".join(f"'{end.topic}'" for end in ends)
+    near = [(end, other) for end in ends for other in robot.ends if _fits(end, other)]
+    fix = robot.connection((end, other.topic.strip("/")) for end, other in near)
+    return needed_port.at(
+        robot.end_span(ends[0]),
+        f"'{component.name}' needs {names}, which nothing in the robot provides",
+        help=f"connect it: {fix}" if fix else f"add the component that provides it{_such_as(ends)}",
+        related=[Related(robot.end_span(other), f"'{other.topic}' is of this type") for _, other in near],
+    )
+
+
+def _such_as(ends: list[PortEnd]) -> str:
+    """Return the types of components that could provide all of this, as words that follow; empty without any."""
+    found = [types_with(SERVED_BY[type(end.port)], end.topic.rpartition("/")[-1], end.type_name) for end in ends]
+    both = [name for name in found[0] if all(name in names for names in found)]
+    return f", such as one of the type {' or '.join(map(repr, both))}" if both else ""
+
+
+def _fits(end: PortEnd, other: PortEnd) -> bool:
+    is_another = other.instance != end.instance  # a component that subscribes to itself receives nothing
+    return is_another and type(other.port) is SERVED_BY[type(end.port)] and other.type_name == end.type_name
+
+
+TYPE = "message"  # the setting of those whose type is chosen
+
+
+@check("RBX3002", closed=(WIRING,))
+def one_topic_two_types(robot: Robot) -> Iterator[Finding]:
+    """Two ports of one topic have different types."""
+    taken = {
+        (resolve(f"{mux}/{name}", robot.manifest.bus.namespace or ""), mux_input.source.partition(".")[0])
+        for mux, entry in robot.manifest.muxes.items()
+        for name, mux_input in entry.inputs.items()
+        if mux_input.source  # a type that does not fit there is reported where the mux names its source
+    }
+    ends = [end for end in robot.ends if not isinstance(end.port, Looks) and (end.topic, end.instance) not in taken]
+    for topic, group in groupby(sorted(ends, key=lambda end: end.topic), key=lambda end: end.topic):
+        first, *others = sorted(group, key=robot.end_span)
+        for other in others:
+            if other.type_name == first.type_name:
+                continue
+            if other.instance == first.instance and first.instance in robot.manifest.muxes:
+                yield _name_used_twice(robot, first.instance, topic.rpartition("/")[-1])
+            else:
+                yield one_topic_two_types.at(
+                    robot.end_span(other),
+                    f"'{topic}' is {first.type_name} for '{first.instance}', "
+                    f"but {other.type_name} for '{other.instance}'",
+                    label=f"its port '{other.name}'",
+                    help=_cure(robot, first, other),
+                    related=[Related(robot.end_span(first), f"its port '{first.name}'")],
+                )
+
+
+def _cure(robot: Robot, *ends: PortEnd) -> str:
+    """Return what helps: another type for the one whose type is a setting, else another topic."""
+    for end, wanted in zip(ends, (ends[1], ends[0]), strict=True):
+        if is_written(robot, robot.components[end.instance], TYPE):
+            return f"write '{TYPE}: {wanted.type_name.replace('/msg/', '/')}' in '{end.instance}', or another topic"
+    return "give one of them another topic with 'connect:'"
+
+
+def _name_used_twice(robot: Robot, mux: str, name: str) -> Finding:
+    """Return the finding for a mux that has an input and a lock of the same name, and so on one topic."""
+    return one_topic_two_types.at(
+        robot.key("muxes", mux, "locks", name),
+        f"mux '{mux}' uses the name '{name}' twice, for an input and for a lock: both are the topic '{mux}/{name}'",
+        label="the lock",
+        help="give the lock a name of its own",
+        related=[Related(robot.key("muxes", mux, "inputs", name), "the input")],
+    )
+
+
+_STATES = (Qos.STATE, Qos.LATCHED)
+
+
+@check("RBX3015", Severity.WARNING, closed=(WIRING, NAMES))
+def two_publishers(robot: Robot) -> Iterator[Finding]:
+    """Two components write numbers on one topic."""
+    for topic, ends in robot.writers.items():
+        nameless = [end for end in ends if _is_nameless(end)]
+        first = nameless[0].instance if nameless else ""
+        for other in nameless:
+            if other.instance == first:
+                continue
+            own = f"{other.name}: {other.instance}/{other.name}"
+            yield two_publishers.at(
+                robot.component_span(other.instance),
+                f"'{other.instance}' and '{first}' both write on '{topic}', and nobody can tell whose it is",
+                help=f"give one of them another topic: 'connect: {{{own}}}'",
+                related=[Related(robot.component_span(first), "and this one")],
+            )
+
+
+def _is_nameless(end: PortEnd) -> bool:
+    """Return whether messages with a state are bare values: no header, frame or name in them tells whose it is."""
+    port = end.port
+    if not isinstance(port, Out) or port.qos not in _STATES or end.instance == MISSION or port.interface is None:
+        return False
+    types = [parse_type(field) for field in port.interface.FIELDS.values()]
+    return bool(types) and not any(
+        field_type.is_message or field_type.base in ("string", "wstring") for field_type in types
+    )
+
+
+@check("RBX3008", closed=(WIRING,))
+def two_servers(robot: Robot) -> Iterator[Finding]:
+    """Two components serve the same service or action."""
+    first: dict[str, str] = {}
+    instances: dict[tuple[str, str], tuple[IncludedPart, IncludedPart]] = {}
+    for end in robot.ends:
+        if not answers(end):
+            continue
+        other = first.setdefault(end.topic, end.instance)
+        parts = (part_of(robot, end.instance), part_of(robot, other))
+        if other == end.instance:
+            continue
+        if parts[0] and parts[1] and parts[0].name != parts[1].name:
+            instances.setdefault((parts[0].name, parts[1].name), (parts[0], parts[1]))
+        else:
+            yield two_servers.at(
+                robot.component_span(end.instance),
+                f"'{end.instance}' and '{other}' both serve '{end.topic}'",
+                label="this one",
+                help=f"give one of them names of its own: 'connect: {{{_own_names(robot, end, other)}}}'",
+                related=[Related(robot.component_span(other), "and this one")],
+            )
+    for part, earlier in instances.values():
+        yield _of_instances(robot, part, earlier)
+
+
+def _of_instances(robot: Robot, part: IncludedPart, earlier: IncludedPart) -> Finding:
+    """Return the finding for two instances that serve the same, with names for all that both of them have."""
+    shared = shared_names(robot, part, earlier)
+    served = sorted({end.topic for end in robot.ends if answers(end)} & shared.keys())
+    # A skill is called by the last word of its topic, so that one needs to differ.
+    renamed = {
+        name: f"{name}_{part.name}" if topic in served else f"{part.name}/{name}" for topic, name in shared.items()
+    }
+    names = ", ".join(f"{name}: {new}" for name, new in renamed.items())
+    return two_servers.at(
+        part.span,
+        f"the instances '{part.name}' and '{earlier.name}' both serve {' and '.join(map(repr, served))}",
+        help=f"give one of them names of its own: 'connect: {{{names}}}'",
+        related=[Related(earlier.span, f"the instance '{earlier.name}'")],
+    )
+
+
+def _own_names(robot: Robot, end: PortEnd, other: str) -> str:
+    """Return what to write below `connect` for all that both instances write or serve."""
+    theirs = {port_end.topic for port_end in robot.components[other].ends if _tells(port_end)}
+    both = (
+        port_end for port_end in robot.components[end.instance].ends if port_end.topic in theirs and _tells(port_end)
+    )
+    return ", ".join(f"{port_end.name}: {end.instance}/{port_end.name}" for port_end in both)
+
+
+def _tells(end: PortEnd) -> bool:
+    return isinstance(end.port, Out) or answers(end)
+
+
+@check("RBX3024", closed=(WIRING,))
+def two_skills(robot: Robot) -> Iterator[Finding]:
+    """Two actions are the same skill."""
+    first: dict[str, PortEnd] = {}
+    for end in robot.ends:
+        if not isinstance(end.port, ServesAction | ServesTopic) or not (skill := end.skill):
+            continue
+        other = first.setdefault(skill, end)
+        if other.topic != end.topic:
+            yield two_skills.at(
+                robot.end_span(end),
+                f"'{end.topic}' and '{other.topic}' are both the skill '{skill}'",
+                help=f"give one of them another last word: 'connect: {{{end.name}: {skill}_{end.instance}}}'",
+                related=[Related(robot.end_span(other), f"that of '{other.instance}'")],
+            )
+
+
+@check("RBX3001", closed=(WIRING, NAMES))
+def two_writers(robot: Robot) -> Iterator[Finding]:
+    """Two components write commands on one topic without a mux."""
+    commands = sorted(commands_of(robot), key=lambda end: end.topic)
+    for topic, ends in groupby(commands, key=lambda end: end.topic):
+        mux = robot.manifest.muxes.get(topic.strip("/"))
+        if mux and any(mux_input.source and missing(robot, mux_input.source) for mux_input in mux.inputs.values()):
+            continue  # the mux was to take one of them, and its mistake is reported at its own place
+        writers = sorted(ends, key=lambda end: (end.instance == MISSION, robot.component_span(end.instance)))
+        first, *others = writers
+        related = [Related(robot.component_span(first.instance), "and this one")]
+        for other in others:
+            if other.instance == MISSION:
+                yield from _by_missions(robot, other, first, related)
+                continue
+            yield two_writers.at(
+                robot.component_span(other.instance),
+                f"'{other.instance}' and '{first.instance}' both write commands on '{topic}'",
+                label="this one",
+                help=_remedy(robot, topic, writers, (first.instance, other.instance)),
+                related=related,
+            )
+
+
+def commands_of(robot: Robot) -> Iterator[PortEnd]:
+    """Yield the ends that publish what somebody is commanded by, whatever they call it themselves."""
+    commanded = {(end.topic, end.type_name) for end in robot.ends if isinstance(end.port, In) and is_command(end)}
+    for end in robot.ends:
+        if isinstance(end.port, Out) and (is_command(end) or (end.topic, end.type_name) in commanded):
+            yield end
+
+
+def is_command(end: PortEnd) -> bool:
+    """Return whether the messages at this end are commands."""
+    return isinstance(end.port, In | Out) and end.port.qos is Qos.COMMAND
+
+
+def _by_missions(robot: Robot, end: PortEnd, writer: PortEnd, related: list[Related]) -> Iterator[Finding]:
+    """Yield a finding for each place where a mission publishes beside a component."""
+    forwards = robot.components[writer.instance].declared(Forwards)
+    free = [topic for forward in forwards for topic in _open_inputs(robot, writer.instance, forward)]
+    example = "give it an input, such as 'mission: {priority: 5, timeout: 0.5 s}', and publish there"
+    put = f"publish on an open input of the mux: {', '.join(free)}" if free else example
+    for mission in robot.missions.values():
+        for message in (template for node in mission.program.nodes for template in published(node)):
+            if resolve(message.target.text, robot.manifest.bus.namespace or "") == end.topic:
+                text = f"this mission and '{writer.instance}' both write commands on '{end.topic}'"
+                help_text = put if forwards else _new_mux(end.topic)
+                yield two_writers.at(message.target.span, text, help=help_text, related=related)
+
+
+def _open_inputs(robot: Robot, mux: str, forwards: Forwards) -> list[str]:
+    """Return the topics of a mux on which nothing in the robot publishes yet."""
+    ends = [end for end in robot.components[mux].ends if end.name in forwards.inputs]
+    return [end.port.topic for end in ends if not robot.writers.get(end.topic)]
+
+
+def _remedy(robot: Robot, topic: str, writers: Iterable[PortEnd], both: tuple[str, str]) -> str:
+    """Return how to combine two of the writers: in the mux that is also a writer, or else in a new one."""
+    mux = next((writer.instance for writer in writers if robot.components[writer.instance].declared(Forwards)), None)
+    if mux is None:
+        return _new_mux(topic)
+    missing = " and ".join(f"'from: {name}'" for name in both if name != mux)
+    return f"the mux '{mux}' has to decide: give it an input {missing}"
+
+
+def _new_mux(topic: str) -> str:
+    return f"put both into a mux: 'muxes: {{{topic.strip('/')}: ...}}' with an input 'from:' each"
+
+
+@check("RBX3016", Severity.WARNING, closed=())
+def own_component(robot: Robot) -> Iterator[Finding]:
+    """A component is listed that a section runs by itself."""
+    for component in robot.components.values():
+        if component.path[:1] == ("components",) and component.cls.made_by:
+            yield own_component.at(
+                robot.value(*component.path, "type"),
+                f"'{component.name}' of the type '{component.type_name}' does not belong under 'components'",
+                help="remove it. " + component.cls.made_by.replace("`", "'"),
+            )
+
+
+@check("RBX3006", is_fixable=True, closed=(NAMES,))
+def start_order(robot: Robot) -> Iterator[Finding]:
+    """`starts_after:` names no component, or forms a circle."""
+    after = {name: component.starts_after for name, component in robot.components.items()}
+    for name, component in robot.components.items():
+        for index, other in enumerate(component.starts_after):
+            if other not in robot.components and other not in robot.written:
+                yield start_order.misspelt(
+                    robot.value(*component.path, "starts_after", index),
+                    f"'{name}' starts after a component that the robot does not have: '{other}'",
+                    other,
+                    robot.components,
+                    "components of this robot",
+                )
+    if cycle := cycle_of(after):
+        yield start_order.at(
+            robot.value(*robot.components[cycle[0]].path, "starts_after"),
+            f"the start order forms a circle: {' after '.join([*cycle, cycle[0]])}",
+            help="remove one of them",
+        )
+
+
+WAITING = "topics that wait for such commands"
+_MOST_SHOWN = 8  # subscribers that are pointed at
+
+
+@check("RBX3011", Severity.WARNING, closed=(WIRING, NAMES))
+def unheard_command(robot: Robot) -> Iterator[Finding]:
+    """Commands are published on a topic without a subscriber."""
+    waiting: dict[str, list[PortEnd]] = {}  # by the type of their messages
+    for port_end in (one for topic, ends in robot.readers.items() if topic not in robot.writers for one in ends):
+        waiting.setdefault(port_end.type_name, []).append(port_end)
+    for end in robot.ends:
+        if is_unheard(robot, end):
+            starving = [other for other in waiting.get(end.type_name, ()) if other.instance != end.instance]
+            topics = [one.topic.strip("/") for one in starving]
+            yield unheard_command.at(
+                robot.end_span(end),
+                f"nothing subscribes to the commands of '{end.instance}' on '{end.topic}'",
+                help=_unheard_command_cure(robot, end, starving)
+                or suggest(end.topic.strip("/"), topics, WAITING)
+                or _unheard_command_such_as(end),
+                related=[Related(robot.end_span(one), f"listens to '{one.topic}'") for one in starving[:_MOST_SHOWN]],
+            )
+
+
+def _unheard_command_such_as(end: PortEnd) -> str:
+    found = types_with(In, end.topic.rpartition("/")[-1], end.type_name)
+    return (
+        f"add the component that follows them, such as one of the type {' or '.join(map(repr, found))}" if found else ""
+    )
+
+
+def _unheard_command_cure(robot: Robot, end: PortEnd, starving: list[PortEnd]) -> str:
+    """Return what to do if the only one that waits was connected to another topic than its own."""
+    bases = [base.end(drives.commands) for base, drives in robot.declared(Drives)]
+    elsewhere = [base for base in bases if base and base.type_name == end.type_name and base.topic != end.topic]
+    if len(starving or elsewhere) != 1:
+        return ""
+    [one] = starving or elsewhere
+    connect = (*robot.components[one.instance].path, "connect", one.name)
+    if at(robot.manifest.root, connect) is None:
+        return ""
+    topic = end.topic.strip("/")
+    cure = f"let '{one.instance}' listen to '{topic}': write '{one.name}: {topic}' below its 'connect', or remove that"
+    past = [writer.instance for writer in robot.writers.get(one.topic, ()) if writer.instance != end.instance]
+    if end.instance in robot.manifest.muxes and past:
+        cure += f"; and let '{end.instance}' have an input with 'from: {past[0]}', which commands past it now"
+    return cure
+
+
+@check("RBX3120", Severity.WARNING, closed=())
+def unlike_classes(robot: Robot) -> Iterator[Finding]:
+    """A port reads messages of another QoS class than they are published in."""
+    for topic, readers in robot.readers.items():
+        writers = robot.writers.get(topic, [])
+        for reader in readers:
+            if is_command(reader) and len(writers) > 1:
+                continue  # that there are two is told, and the worse mistake
+            for writer in writers:
+                mine, theirs = reader.port, writer.port
+                if not isinstance(mine, In) or not isinstance(theirs, Out) or reader.type_name != writer.type_name:
+                    continue
+                if mine.qos is not theirs.qos:
+                    yield unlike_classes.at(
+                        robot.end_span(reader),
+                        f"'{reader.instance}' reads '{topic}' as {mine.qos.value}, "
+                        f"and '{writer.instance}' publishes it as {theirs.qos.value}",
+                        label=f"its port '{reader.name}'",
+                        help="give both ports the same 'qos'",
+                        related=[Related(robot.end_span(writer), f"its port '{writer.name}'")],
+                    )
+
+
+@check("RBX3023", closed=(WIRING,))
+def instance_topics(robot: Robot) -> Iterator[Finding]:
+    """Two instances of a part publish on the same topic."""
+    first: dict[tuple[str, str], str] = {}  # file and topic -> instance
+    for part in robot.manifest.parts.values():
+        told = {
+            end.topic: end.port.topic
+            for name in part.components & robot.components.keys()
+            for end in robot.components[name].ends
+            if isinstance(end.port, Out) and not is_command(end)
+        }
+        for topic, short in sorted(told.items()):
+            other = robot.manifest.parts[first.setdefault((part.file, topic), part.name)]
+            if other is part or short.startswith("/"):
+                continue
+            shared = shared_names(robot, part, other)
+            if not any(end.topic in shared for end in robot.ends if answers(end)):  # else it is told with those
+                yield instance_topics.at(
+                    part.span,
+                    f"the instances '{part.name}' and '{other.name}' of one part both publish on '{topic}'",
+                    help=f"give one of them another topic: 'connect: {{{short}: {part.name}/{short}}}'",
+                    related=[Related(other.span, f"the instance '{other.name}'")],
+                )

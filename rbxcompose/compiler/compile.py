@@ -1,0 +1,164 @@
+"""The compiler: the only place that knows the order of the stages. It reads like a table of contents."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence, Set
+from dataclasses import field, replace
+from pathlib import Path
+from types import MappingProxyType
+
+from rbxcompose.base.config import Config
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.findings import Related, Report, Severity, Span, kind, one_compile
+from rbxcompose.compiler.check_runner import run_checks
+from rbxcompose.compiler.composition.overlay import SET
+from rbxcompose.compiler.composition.robot_file import load_robot
+from rbxcompose.compiler.model.build import build_robot, with_missions
+from rbxcompose.compiler.model.removals import blamed
+from rbxcompose.compiler.model.robot import NOTHING, Outside, Robot
+from rbxcompose.compiler.plan.build import build_plan
+from rbxcompose.compiler.plan.model import Plan
+from rbxcompose.manifest.files import PROFILE
+from rbxcompose.manifest.reader import ParsedText, Texts
+from rbxcompose.manifest.tree import LEAST_STEPS, PROFILE_STEPS, STEP_BYTES, STEP_VALUES
+
+NOT_TRIED = kind("RBX7003", Severity.WARNING)
+
+
+@dataclass(slots=True)
+class Compilation:
+    """The result: a plan unless there are errors, the findings, and the texts that they point into.
+
+    The robot is as complete as its files could be read.
+    """
+
+    robot: Robot | None = None
+    plan: Plan | None = None
+    report: Report = field(default_factory=Report)
+    sources: dict[str, str] = field(default_factory=dict)
+
+
+@one_compile()
+def compile_robot(
+    path: str,
+    *,
+    profiles: Sequence[str] = (),
+    overlays: Sequence[str] = (),
+    sets: Sequence[str] = (),
+    real: bool = False,
+    environment: Mapping[str, str],
+    unsaved: Mapping[Path, str] = MappingProxyType({}),
+    outside: Outside = NOTHING,
+) -> Compilation:
+    """Compile a robot's file (a path, a folder with a `robot.yaml`, or `rbx:...`) and report all its mistakes.
+
+    `overlays` are files that change it. `unsaved` are texts from an editor, by the real path of the file that each
+    replaces. `outside` is what it has of other robots. If no profile was chosen, each profile is tried as
+    well, so that a broken one is found before it is used.
+    """
+
+    parsed: dict[tuple[str, str], ParsedText] = {}  # a profile changes no text
+
+    def compiled(chosen: Sequence[str]) -> Compilation:
+        out = Compilation(sources=Texts(unsaved, parsed))
+        manifest = load_robot(
+            path,
+            profiles=chosen,
+            overlays=overlays,
+            sets=sets,
+            sim=not real,
+            environment=environment,
+            report=out.report,
+            sources=out.sources,
+        )
+        if manifest is None:
+            return out
+        out.robot = build_robot(
+            manifest, environment=environment, report=out.report, sources=out.sources, outside=outside
+        )
+        run_checks(out.robot, out.report)
+        out.report.findings = manifest.inclusions.told(out.report.findings)
+        return out
+
+    out = compiled(profiles)
+    if out.robot is not None and not profiles:
+        steps = sum(len(mission.program.nodes) for mission in out.robot.missions.values())
+        steps = max(LEAST_STEPS, steps + _steps_to_read(out.sources))
+        for number, (name, span) in enumerate(out.robot.manifest.profiles.items(), 1):
+            if number * steps > PROFILE_STEPS:
+                message = f"the profiles from '{name}' on were not tried: it would take too long for this robot"
+                out.report.add(NOT_TRIED.at(span, message, help=f"rbxcompose check --profile {name}"))
+                break
+            _tell_profile(span, compiled([name]), out, {SET, *out.robot.manifest.overlays})
+    if out.robot is not None and not out.report.has_errors:
+        out.plan = build_plan(out.robot)
+    return out
+
+
+def robot_for_mission(out: Compilation, name: str) -> tuple[Robot, Plan] | None:
+    """Return a robot and its plan for one mission; None if anything but its other missions has errors."""
+    if out.robot is None or out.plan is not None:
+        return (out.robot, out.plan) if out.robot is not None and out.plan is not None else None
+    robot, wanted = out.robot, _with_used(out.robot, name)
+    files = {name: entry.path for name, entry in robot.manifest.missions.items()}
+    others = {*files.values()} - {files[name] for name in wanted & files.keys()}
+    errors = [finding.span for finding in out.report if finding.severity is Severity.ERROR]
+    is_elsewhere = all(span is not None and Path(span.file).resolve() in others for span in errors)
+    if not is_elsewhere or not wanted <= robot.missions.keys():
+        return None
+    left = with_missions(robot, wanted)
+    return left, build_plan(left)
+
+
+def _with_used(robot: Robot, name: str) -> set[str]:
+    """Return a mission and those that it uses."""
+    found, waiting = set[str](), [name]
+    while waiting:
+        found.add(text := waiting.pop())
+        nodes = robot.missions[text].program.nodes if text in robot.missions else ()
+        waiting += [node.step.uses.text for node in nodes if node.step.uses and node.step.uses.text not in found]
+    return found
+
+
+def check_settings(robot: Robot, configs: Mapping[str, Config]) -> Report:
+    """Check a compiled robot again, where some components have other configurations, such as those they have now."""
+    components = dict(robot.components)
+    for name, config in configs.items():
+        component = components[name]
+        components[name] = replace(component, config=config, capabilities=component.cls.capabilities(config))
+    report = Report()
+    run_checks(replace(robot, components=components), report)
+    return report
+
+
+def _steps_to_read(sources: Mapping[str, str]) -> int:
+    """Return how many steps of missions take as long as reading the files of a robot once more."""
+    values = sources.total_values if isinstance(sources, Texts) else 0
+    return max(sum(map(len, sources.values())) // STEP_BYTES, values // STEP_VALUES)
+
+
+def _tell_profile(profile: Span, tried: Compilation, out: Compilation, above: Set[str]) -> None:
+    """Add the findings that only a profile causes, in its own text or in the robot's files.
+
+    `above` names the layers that override profiles: their values were chosen without this profile.
+    """
+    known = {(finding.code, finding.span) for finding in out.report}
+    new = [one for one in tried.report if (one.code, one.span) not in known]
+    found = blamed(new, out.robot, tried.robot, profile) if out.robot and tried.robot else new
+    more = tried.sources.keys() - out.sources.keys() - {PROFILE, SET}  # a mission that only this profile has
+    out.sources.update({file: tried.sources[file] for file in sorted(more)})
+    for finding in found:
+        span = finding.span
+        if span is None or span.file not in out.sources or span.file in above:
+            continue
+        inside = next((one for one in finding.related if profile.contains(one.span)), None)
+        if profile.contains(span):
+            out.report.add(finding)
+        elif inside is not None:
+            fine = [] if span.file in more else [Related(span, "without the profile, this is fine")]
+            others = [*fine, *finding.related]
+            related = tuple(other for other in others if other is not inside)
+            out.report.add(replace(finding, span=inside.span, label="", related=related, fix=None))
+        else:
+            related = (*finding.related, Related(profile, "with this profile"))
+            out.report.add(replace(finding, related=related, fix=None))

@@ -1,0 +1,143 @@
+"""A composed robot as YAML that reads back as the same robot."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+from rbxcompose.base.config import FILE, Secret
+from rbxcompose.base.printable import FORBIDDEN, escaped
+from rbxcompose.base.units import UNITS, Dimension, Quantity, UnitError, format_quantity, to_si
+from rbxcompose.compiler.composition.robot_manifest import RobotManifest
+from rbxcompose.compiler.sections.args import args
+from rbxcompose.manifest.files import PREFIX, library_root, project_of, resolve
+from rbxcompose.manifest.registry import sections
+from rbxcompose.manifest.scalars import plain_value
+from rbxcompose.manifest.section import ROBOT
+from rbxcompose.manifest.tree import BROKEN, Entry, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode
+from rbxcompose.manifest.validate import to_plain
+from rbxcompose.manifest.written import rounder_unit
+
+Note = Callable[[KeyPath, TreeNode], str]
+
+_KEY = re.compile(r"[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z0-9_]+)*")
+_PLAIN = re.compile(r"(?!- |-$|---|\.\.\.)[\w./+-](?:[^\n:#]|:(?! |$)|(?<! )#)*(?<! )")
+
+
+def dump_robot(manifest: RobotManifest, note: Note = lambda path, node: "") -> str:
+    """Return a robot as one file, with its parts, profiles, overlays and values merged and filled in.
+
+    It is meant for the folder of the robot's file: file paths are relative to that. `note` gives the
+    comment after a value. Secrets keep their names: `${secret.NAME}`.
+    """
+    return dump(_in_one_file(manifest), note)
+
+
+def dump(root: MappingNode, note: Note = lambda path, node: "") -> str:
+    """Return a filled tree as YAML in block style; `note` gives the comment after a value."""
+    return "".join(f"{line}\n" for line in _mapping(root, (), "", note))
+
+
+def _in_one_file(manifest: RobotManifest) -> MappingNode:
+    """Return the tree with all file paths as the robot's own file would write them."""
+
+    def named(kind: str, node: TreeNode) -> TreeNode:
+        if kind != FILE or not isinstance(node, ScalarNode) or str(to_plain(node)).startswith(PREFIX):
+            return node
+        writer = manifest.contents.documents.writer(node.span, manifest.path)
+        file = resolve(str(to_plain(node)), writer, node.span)
+        return ScalarNode(_path_from(manifest.path, file), node.span) if isinstance(file, Path) else node
+
+    entries = dict(manifest.root.entries)
+    entries.pop(args.name, None)  # their values have been filled in: nothing reads them any more
+    for section in sections(ROBOT):
+        if section.name in entries:
+            key, value = entries[section.name].key, entries[section.name].value
+            entries[section.name] = Entry(key, section.with_references(value, named))
+    return replace(manifest.root, entries=entries)
+
+
+def _path_from(robot: Path, file: Path) -> str:
+    if file.is_relative_to(library_root()) and not file.is_relative_to(project_of(robot)):
+        return PREFIX + file.relative_to(library_root()).as_posix()
+    return os.path.relpath(file, robot.parent)
+
+
+def _lines(node: TreeNode, path: KeyPath, begin: str, indent: str, note: Note) -> Iterator[str]:
+    """Yield the lines of a value; the first follows `begin`, a key or a dash."""
+    comment = note(path, node)
+    behind = f"  # {comment}" if comment else ""
+    match node:
+        case ScalarNode():
+            yield f"{indent}{begin} {_scalar(node)}".rstrip() + behind
+        case MappingNode() if not node.entries:
+            yield f"{indent}{begin} {{}}{behind}"
+        case SequenceNode() if not node.items:
+            yield f"{indent}{begin} []{behind}"
+        case MappingNode():
+            yield f"{indent}{begin}{behind}"
+            yield from _mapping(node, path, f"{indent}  ", note)
+        case SequenceNode(items=items):
+            yield f"{indent}{begin}{behind}"
+            for index, item in enumerate(items):
+                yield from _lines(item, (*path, index), "-", f"{indent}  ", note)
+
+
+def _mapping(node: MappingNode, path: KeyPath, indent: str, note: Note) -> Iterator[str]:
+    for name, entry in node.entries.items():
+        key = name if _KEY.fullmatch(name) else json.dumps(name, ensure_ascii=False)
+        yield from _lines(entry.value, (*path, name), f"{key}:", indent, note)
+
+
+def _scalar(scalar: ScalarNode) -> str:
+    match scalar.filled:
+        case None:
+            return _text(scalar.text.replace("$", "$$"), scalar.plain)
+        case bool():
+            return "true" if scalar.filled else "false"
+        case Quantity(value=value, dimension=dimension):
+            return exact(value, dimension)
+        case int() | float():
+            return repr(scalar.filled)
+        case Secret():
+            return "${secret." + scalar.filled.name + "}"
+    text = scalar.text if scalar.filled is BROKEN else str(scalar.filled).replace("$", "$$")
+    is_word = bool(_KEY.fullmatch(text)) and plain_value(ScalarNode(text, scalar.span)) == text
+    return _text(text, is_word or (scalar.filled is BROKEN and scalar.plain))
+
+
+def _text(text: str, plain: bool) -> str:
+    if plain and (not text or (_PLAIN.fullmatch(text) and not FORBIDDEN.search(text))):
+        return text
+    return escaped(json.dumps(text, ensure_ascii=False))
+
+
+def exact(value: float, dimension: Dimension) -> str:
+    """Return a quantity in its usual or rounder unit, with as many digits as its value needs."""
+    first = rounder_unit(value, dimension)
+    units = [unit for unit in UNITS.values() if unit.dimension == dimension]
+    units.sort(key=lambda unit: (unit.name != first, unit.name))
+    texts = [f"{digits} {unit.name}" for unit in units for digits in _digits(unit.from_si(value))] or [repr(value)]
+    found = next((text for text in texts if _read(text, dimension) == value), None)
+    # Some ratios have no text in percent that is exact to the last bit; a product is.
+    return found or f"${{{value!r} * {format_quantity(1.0, dimension)}}}"
+
+
+def _digits(number: float) -> Iterator[str]:
+    """Yield ways to write a number, the shortest first."""
+    yield f"{number:.6g}"
+    yield f"{number:.15g}"
+    for near in (number, math.nextafter(number, math.inf), math.nextafter(number, -math.inf)):
+        yield repr(near)
+
+
+def _read(text: str, dimension: Dimension) -> float:
+    try:
+        return to_si(text, dimension)
+    except UnitError:
+        return math.inf

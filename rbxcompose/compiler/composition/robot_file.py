@@ -1,0 +1,302 @@
+"""A robot's file from text to `RobotManifest`, section by section."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from rbxcompose.base.config import COMPONENT, Secret
+from rbxcompose.base.findings import Finding, Related, Report, Severity, Span, kind
+from rbxcompose.base.garbage_collection import paused_collection
+from rbxcompose.compiler.composition.includes import included_parts
+from rbxcompose.compiler.composition.layers import INCLUDE, Chosen, Composed, compose_robot, profile_spans
+from rbxcompose.compiler.composition.overlay import NOTHING_TO_CHANGE
+from rbxcompose.compiler.composition.robot_manifest import RobotManifest
+from rbxcompose.compiler.composition.scopes import fill_scopes
+from rbxcompose.manifest.documents import Documents, ManifestHeader
+from rbxcompose.manifest.file_models import file_model
+from rbxcompose.manifest.files import find, project_of, shown_name
+from rbxcompose.manifest.fill import SHOWN_SECRET, fill, names_of
+from rbxcompose.manifest.mission_data import is_moderate
+from rbxcompose.manifest.registry import broken_sections, naming, sections
+from rbxcompose.manifest.secrets import Secrets
+from rbxcompose.manifest.section import ROBOT, Contents, Section, is_empty
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode, at, children, key_span
+from rbxcompose.manifest.validate import MISSING_KEY, UNKNOWN_KEY
+from rbxcompose.manifest.walk import TWICE
+
+
+def without_strayed(root: MappingNode, keys: Container[str], report: Report) -> MappingNode:
+    """Return a tree without keys that are the names of entries of its sections, after a finding for each."""
+    left = dict(root.entries)
+    empty = [
+        section for section in sections(ROBOT) if section.names and (node := root.get(section.name)) and is_empty(node)
+    ]
+    for name, entry in root.entries.items():
+        home = (
+            None
+            if name in keys
+            else next((section for section in sections(ROBOT) if name in section.names_in(root)), None)
+        )
+        if name not in keys and home is None and len(empty) == 1 and isinstance(entry.value, MappingNode):
+            home = empty[0]
+        if home and isinstance(entry.value, MappingNode):
+            del left[name]
+            message = f"'{name}' is {_with_article(home.entry)}, not a section of the file"
+            above = ".".join((home.name, *map(str, home.at)))
+            report.add(UNKNOWN_KEY.at(entry.key.span, message, help=f"write it below '{above}:', one level deeper"))
+    return replace(root, entries=left)
+
+
+def _with_article(word: str) -> str:
+    return f"{'an' if word[:1] in 'aeiou' else 'a'} {word}"
+
+
+UNREAD_ARGUMENT = kind("RBX1209", Severity.WARNING)
+_NAME = re.compile(r"\bargs\.([a-z][a-z0-9_]*)")
+
+
+def unread_arguments(root: MappingNode) -> Iterator[Finding]:
+    """Yield a finding for each argument of a robot's or part's file that no other text of it has."""
+    declared = root.get("args")
+    if not isinstance(declared, MappingNode):
+        return
+    read = frozenset(_read(root))
+    for name, entry in declared.entries.items():
+        if name not in read and isinstance(entry.value, MappingNode):
+            help_text = f"write '${{args.{name}}}' where its value belongs, or remove it"
+            yield UNREAD_ARGUMENT.at(entry.key.span, f"nothing reads the argument '{name}'", help=help_text)
+
+
+def _read(node: TreeNode) -> Iterator[str]:
+    if isinstance(node, ScalarNode):
+        yield from _NAME.findall(node.text) if "args." in node.text else ()
+    for _, below in children(node):
+        yield from _read(below)
+
+
+TAKEN_NAME = kind("RBX1007")
+ALWAYS_THERE = ("transforms", "mission")
+"""Components that every robot runs, beside `diagnostics`."""
+
+RESERVED = ("buses", "actuators", "joints", "controllers", "safety", "devices", "console", "security", "record")
+"""Names of sections that are reserved for later."""
+
+
+def read_sections(
+    root: MappingNode, file: Path, sim: bool, documents: Documents, *, is_whole: bool = True
+) -> RobotManifest:
+    """Return the robot that a composed and filled tree describes, with what could be read of entries with mistakes.
+
+    The tree is not whole if one of the robot's parts could not be read.
+    """
+    documents.report.extend([*broken_sections(), *_shown_secrets(root)])
+    contents = Contents(root, file, documents, sections(), is_simulated=sim, is_whole=is_whole)
+    documents.report.extend(_taken_names(contents))
+    for section in sections(ROBOT):
+        if section.is_composed:
+            contents.of(section)
+    return RobotManifest(
+        name=_text(root, "name"), about=_text(root, "about"), path=file, root=root, is_simulated=sim, contents=contents
+    )
+
+
+def reserved_names() -> frozenset[str]:
+    """Return the names of present and future sections of a robot's file."""
+    return frozenset((*RESERVED, *(section.name for section in sections(ROBOT))))
+
+
+def _text(root: MappingNode, key: str) -> str:
+    value = root.get(key)
+    return value.text if isinstance(value, ScalarNode) else ""
+
+
+def _shown_secrets(root: MappingNode) -> Iterator[Finding]:
+    """Yield a finding for each secret in the header; the header was checked before anything was filled in."""
+    for key in ManifestHeader.model_fields:
+        value = root.get(key)
+        if isinstance(value, ScalarNode) and isinstance(value.filled, Secret):
+            yield SHOWN_SECRET.at(value.span, f"'{key}' cannot hold a secret: everybody sees it")
+
+
+def _taken_names(contents: Contents) -> Iterator[Finding]:
+    """Yield a finding for each name of something that runs that is already taken."""
+    root = contents.root
+    running = list(naming(COMPONENT))
+    for index, section in enumerate(running):
+        for name in () if section.has_topics else _placed_names(contents, section):
+            span = key_span(root, (section.name, *section.at, name))
+            if message := _own_name(name, section):
+                yield TAKEN_NAME.at(span, message)
+            elif found := _other_owner(root, name, section, running[index + 1 :]):
+                message, label, other = found
+                yield TAKEN_NAME.at(span, message, related=[Related(key_span(root, other), label)])
+
+
+def _placed_names(contents: Contents, section: Section[Any, Any]) -> Iterator[str]:
+    """Yield the names in a section, but not those of sections that were indented too far."""
+    named = at(contents.root, (section.name, *section.at))
+    for name, entry in named.entries.items() if isinstance(named, MappingNode) else ():
+        if not contents.is_misplaced(section, entry):
+            yield name
+
+
+def _own_name(name: str, section: Section[Any, Any]) -> str:
+    """Return why a user must not use a name, or nothing."""
+    if name in reserved_names():
+        return f"a {section.entry} cannot be named like the section '{name}'"
+    return f"every robot already runs a component '{name}'" if name in ALWAYS_THERE else ""
+
+
+def _other_owner(
+    root: MappingNode, name: str, section: Section[Any, Any], others: list[Section[Any, Any]]
+) -> tuple[str, str, tuple[str, ...]] | None:
+    """Return the other owner of a name: a message, a label, and its path."""
+    for one in sections(ROBOT):
+        if name in one.brings and one.name in root:
+            return f"the {one.name} already brings a component '{name}'", f"the {one.name}", (one.name,)
+    for other in others:
+        if name in other.names_in(root):
+            words = f"a {section.entry} and a {other.entry} are both named '{name}'"
+            return words, f"the {other.entry}", (other.name, *map(str, other.at), name)
+    return None
+
+
+MISSION = "Mission"
+
+
+@paused_collection()
+def load_robot(
+    path: str | Path,
+    *,
+    report: Report,
+    sources: dict[str, str],
+    profiles: Sequence[str] = (),
+    overlays: Sequence[str] = (),
+    sets: Sequence[str] = (),
+    sim: bool = True,
+    environment: Mapping[str, str] | None = None,
+) -> RobotManifest | None:
+    """Read a robot's file with its parts, profiles, overlays and `--set` changes; mistakes go into `report`.
+
+    Returns None if there is no usable robot, or one of its parts cannot be read; a robot with mistakes is returned as
+    far as it could be read.
+    """
+    file = find(str(path))
+    if isinstance(file, Finding):
+        report.add(file)
+        return None
+    documents = Documents(report, sources)
+    root = documents.read(file, ROBOT)
+    if root is None:
+        return None
+    root = documents.meant(file_model(ROBOT), root)
+    composed = compose_robot(root, file, Chosen(profiles, overlays, sets), documents)
+    manifest = _manifest(composed, file, sim, environment or {}, documents)
+    if manifest is not None:
+        named = (find(overlay) for overlay in overlays)
+        shown = tuple(shown_name(item) for item in named if not isinstance(item, Finding))
+        manifest = replace(manifest, profiles=profile_spans(root), overlays=shown)
+    if not (report.has_errors or profiles):  # a misspelt name may be the one that is not read; a profile may replace it
+        for node in (root, *composed.parts.roots):
+            report.extend(unread_arguments(node))
+    report.findings = composed.parts.inclusions.told(report.findings)
+    return manifest
+
+
+def _manifest(
+    composed: Composed, file: Path, sim: bool, environment: Mapping[str, str], documents: Documents
+) -> RobotManifest | None:
+    keys = file_model(ROBOT)
+    documents.check(keys, without_strayed(composed.root, keys.model_fields, documents.report))
+    names = names_of(_name(composed.root), sim, environment, Secrets(project_of(file), environment))
+    filled = fill_scopes(composed, names)
+    read_so_far = len(documents.report.findings)
+    is_whole = composed.parts.is_complete and not _has_a_section_twice(documents.report, composed.root)
+    manifest = read_sections(filled.root, file, sim, documents, is_whole=is_whole)
+    if not is_whole:
+        _drop_what_may_be_there(documents.report, filled.root, filled.include, read_so_far)
+    return replace(
+        manifest,
+        parts=included_parts(composed.instances),
+        include=filled.include,
+        bounds=filled.bounds,
+        history=composed.history,
+        files=documents.files,
+        inclusions=composed.parts.inclusions,
+    )
+
+
+def _has_a_section_twice(report: Report, root: MappingNode) -> bool:
+    """Return whether a file has a section with names twice, so that what stands in the second one is not read."""
+    words = {entry.key.span for entry in root.entries.values() if isinstance(entry.value, ScalarNode)}
+    twice = (
+        finding
+        for finding in report.findings
+        if finding.code == TWICE.code and finding.span is not None and finding.span.column == 1
+    )
+    return any(words.isdisjoint(other.span for other in finding.related) for finding in twice)
+
+
+def _drop_what_may_be_there(report: Report, root: MappingNode, given: MappingNode, start: int) -> None:
+    """Remove the findings about entries that may only change what could not be read: what a part brings, for example.
+
+    `start` is the number of findings from before the sections were read.
+    """
+    prefixes = tuple(f"{name}_" for name, _ in _entries(given, INCLUDE))
+    changing = [
+        entry
+        for section in sections(ROBOT)
+        for name, entry in _entries(root, section.name)
+        if section.has_topics or name.startswith(prefixes) or not prefixes
+    ]
+    spans = [span for entry in changing for span in (entry.key.span, entry.value.span)]
+
+    def stays(finding: Finding) -> bool:
+        return finding.code != MISSING_KEY.code or not any(
+            finding.span and span.contains(finding.span) for span in spans
+        )
+
+    before, after = report.findings[:start], report.findings[start:]
+    report.findings = [
+        *(finding for finding in before if finding.code != NOTHING_TO_CHANGE.code),
+        *filter(stays, after),
+    ]
+
+
+def _entries(root: MappingNode, section: str) -> Iterable[tuple[str, Entry]]:
+    there = root.get(section)
+    return there.entries.items() if isinstance(there, MappingNode) else ()
+
+
+@paused_collection()
+def read_mission(
+    path: Path,
+    *,
+    robot: str,
+    report: Report,
+    sources: dict[str, str],
+    sim: bool = True,
+    environment: Mapping[str, str] | None = None,
+    span: Span | None = None,
+) -> MappingNode | None:
+    """Read a mission's file, check its header and fill in `${...}`; its body stays as nodes.
+
+    `span` is the place that names the file.
+    """
+    documents = Documents(report, sources)
+    root = documents.read(path, MISSION, span)
+    if root is None:
+        return None
+    header = {name: entry for name, entry in root.entries.items() if name in ManifestHeader.model_fields}
+    documents.check(ManifestHeader, replace(root, entries=header))
+    filled = fill(root, names_of(robot, sim, environment or {}), report, runs=True)
+    return filled if is_moderate(filled.get("data"), "datum", report) else None
+
+
+def _name(root: MappingNode) -> str:
+    name = root.get("name")
+    return name.text if isinstance(name, ScalarNode) else ""

@@ -1,0 +1,1 @@
+"""What `up` must do: instances in start order, their process groups and wires."""

@@ -1,0 +1,82 @@
+"""Schemas of entries that name their type, components and controllers: one per type, from its configuration."""
+
+from __future__ import annotations
+
+import inspect
+import textwrap
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from rbxcompose.compiler.schema.scalars import DEFINITIONS, Schema
+from rbxcompose.compiler.schema.settle import opened, schemas_of
+from rbxcompose.domains.servos.controller import controller_names, controller_type
+from rbxcompose.manifest.reader import read_text
+from rbxcompose.manifest.section import ComponentOptions
+from rbxcompose.manifest.tree import MappingNode
+from rbxcompose.manifest.validate import to_plain
+from rbxcompose.sdk.registry import component_type
+
+TYPE = "type"
+COMPONENT, CONTROLLER = "component_", "controller_"  # prefixes of the definition of a type
+_EXAMPLE = "Example:"
+
+
+def component_schemas(types: Iterable[str]) -> tuple[Schema, dict[str, Schema]]:
+    """Return the schema of one entry of `components`, and the definitions that it needs: one for each type."""
+    classes = {name: component_type(name) for name in sorted(types)}
+    wanted: dict[str, Any] = {name: cls.config_type() for name, cls in classes.items()}
+    schemas, definitions = schemas_of({**wanted, "": ComponentOptions})
+    options = opened(schemas.pop(""), definitions)["properties"]
+    for name, schema in schemas.items():
+        own = opened(schema, definitions)
+        definitions[f"{COMPONENT}{name}"] = {
+            "description": _about(classes[name]),
+            "type": "object",
+            "properties": {TYPE: True, **own.get("properties", {}), **dict.fromkeys(options, True)},
+            "required": [TYPE, *own.get("required", [])],
+            "additionalProperties": False,
+            "examples": examples_of(classes[name]),
+        }
+    definitions[TYPE] = _word(classes)
+    word = {"anyOf": [{"$ref": f"{DEFINITIONS}{TYPE}"}], "description": "What runs: the name of a component type."}
+    about = "What runs under this name: its `type`, and the configuration of that type."
+    return {"description": about, **_entry(COMPONENT, word, classes, options)}, definitions
+
+
+def controller_schemas() -> tuple[Schema, dict[str, Schema]]:
+    """Return the schema of one entry of `controllers`, and the definitions that it needs: one for each type."""
+    classes = {name: controller_type(name) for name in controller_names()}
+    schemas, definitions = schemas_of({name: cls.config_type() for name, cls in classes.items()})
+    for name, schema in schemas.items():
+        definitions[f"{CONTROLLER}{name}"] = {**opened(schema, definitions), "description": _about(classes[name])}
+    about = "How it leads its joints: the name of a type of controllers."
+    definitions["type_of_controller"] = {"type": "string", **_word(classes)}
+    word = {"$ref": f"{DEFINITIONS}type_of_controller", "description": about}
+    return _entry(CONTROLLER, word, classes, {}), definitions
+
+
+def _entry(prefix: str, word: Schema, types: Iterable[str], options: Mapping[str, Any]) -> Schema:
+    chosen = [
+        {
+            "if": {"properties": {TYPE: {"const": name}}, "required": [TYPE]},
+            "then": {"$ref": f"{DEFINITIONS}{prefix}{name}"},
+        }
+        for name in types
+    ]
+    return {"type": "object", "required": [TYPE], "properties": {TYPE: word, **options}, "allOf": chosen}
+
+
+def _word(classes: Mapping[str, type[Any]]) -> Schema:
+    return {"enum": [*classes], "enumDescriptions": [_about(cls) for cls in classes.values()]}
+
+
+def _about(cls: type[Any]) -> str:
+    """Return the description of a type: its docstring up to the example, as one paragraph."""
+    return " ".join((inspect.getdoc(cls) or "").partition(_EXAMPLE)[0].split())
+
+
+def examples_of(cls: type[Any]) -> list[object]:
+    """Return the configurations that a type's docstring shows."""
+    text = textwrap.dedent((inspect.getdoc(cls) or "").partition(_EXAMPLE)[2])
+    node, _ = read_text(text, cls.__name__) if text.strip() else (None, [])
+    return [to_plain(entry.value) for entry in node.entries.values()] if isinstance(node, MappingNode) else []

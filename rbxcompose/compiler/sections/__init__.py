@@ -1,0 +1,1 @@
+"""Sections of a manifest that belong to no domain, a file each."""

@@ -1,0 +1,166 @@
+"""A system after reading: its hosts, its robots with the host of each component, and why."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import field
+from functools import cached_property
+from pathlib import Path
+
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.findings import Report, Span
+from rbxcompose.compiler.model.robot import Robot
+from rbxcompose.compiler.plan.model import Plan
+from rbxcompose.compiler.systems.traffic import Crossing, TopicEnd, crossings, ends_of
+from rbxcompose.manifest.system_file import HostModel, LinkModel, SystemRobotModel
+from rbxcompose.manifest.tree import MappingNode, value_span
+
+
+@dataclass(frozen=True, slots=True)
+class HostOffer:
+    """What placement knows of a host."""
+
+    labels: frozenset[str] = frozenset()
+    devices: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True, slots=True)
+class Wishes:
+    """What a robot wants: `on` is a host or a label for all, `place` for a component or a part by its name."""
+
+    on: str | None = None
+    place: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Placement:
+    """A component on a host, and why in words."""
+
+    component: str
+    host: str
+    reason: str
+
+
+def hosts_called(name: str, hosts: Mapping[str, HostOffer]) -> list[str]:
+    """Return the host of this name, else all that have it as a label."""
+    return [name] if name in hosts else [host for host, facts in hosts.items() if name in facts.labels]
+
+
+def place(
+    components: Iterable[str],
+    hosts: Mapping[str, HostOffer],
+    wishes: Wishes,
+    parts: Mapping[str, Collection[str]],
+    devices: Mapping[str, Collection[str]],
+) -> dict[str, Placement]:
+    """Place each component on exactly one host; there is at least one, and each wish names one.
+
+    A wish for the component itself counts most, then that for the smallest part with it, then the host that its
+    devices are connected to, then `on`. `parts` are the components of each part, `devices` those that each opens.
+    """
+    found: dict[str, Placement] = {}
+    open_ = list(components)
+    for name in open_:
+        if wanted := _wish_of(name, wishes.place, parts):
+            key, called = wanted
+            found[name] = _chosen(name, called, hosts, found, "placed there" if key == name else f"of part '{key}'")
+    for name in open_:
+        if name not in found and (there := _hosts_with(devices.get(name, ()), hosts)):
+            found[name] = Placement(name, there[0], f"has {' and '.join(sorted(devices[name]))}")
+    for name in open_:
+        if name in found:
+            continue
+        if wishes.on is not None:
+            found[name] = _chosen(name, wishes.on, hosts, found, "the robot's host")
+        elif len(hosts) == 1:
+            found[name] = Placement(name, next(iter(hosts)), "the only host")
+        else:
+            found[name] = Placement(name, _main_host(hosts, found), "has most of the robot")
+    return {name: found[name] for name in open_}
+
+
+def _wish_of(name: str, wishes: Mapping[str, str], parts: Mapping[str, Collection[str]]) -> tuple[str, str] | None:
+    """Return the key of the wish that counts for a component, and what it calls."""
+    if name in wishes:
+        return name, wishes[name]
+    around = [part for part in wishes if name in parts.get(part, ())]
+    return min(((part, wishes[part]) for part in around), key=lambda pair: (len(parts[pair[0]]), pair), default=None)
+
+
+def _chosen(
+    name: str, called: str, hosts: Mapping[str, HostOffer], found: Mapping[str, Placement], reason: str
+) -> Placement:
+    """Return the place on the host of this name; of several with this label, on the one that has least to run."""
+    candidates = hosts_called(called, hosts)
+    if called in hosts:
+        return Placement(name, called, reason)
+    load = Counter(placement.host for placement in found.values())
+    host = min(candidates, key=lambda candidate: load[candidate])  # the first one, if several are equal
+    return Placement(name, host, f"{reason}, by label '{called}'")
+
+
+def _hosts_with(devices: Collection[str], hosts: Mapping[str, HostOffer]) -> list[str]:
+    """Return the hosts that all these devices are connected to; none if there are no devices."""
+    return [name for name, facts in hosts.items() if devices and facts.devices.issuperset(devices)]
+
+
+def _main_host(hosts: Mapping[str, HostOffer], found: Mapping[str, Placement]) -> str:
+    load = Counter(placement.host for placement in found.values())
+    return max(hosts, key=lambda name: load[name])
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedRobot:
+    """A robot of a system: its plan as if it ran on one host, and where each component runs."""
+
+    name: str
+    entry: str  # its key in the system's file; of several instances, the same
+    model: SystemRobotModel
+    robot: Robot
+    plan: Plan
+    placed: Mapping[str, Placement]
+    link_port: int
+    share_port: int
+    version: str  # of rbxcompose and the texts that it was compiled from
+
+    @cached_property
+    def hosts(self) -> Mapping[str, str]:
+        """Return the host of each component."""
+        return {name: placement.host for name, placement in self.placed.items()}
+
+    @cached_property
+    def crossings(self) -> tuple[Crossing, ...]:
+        """Return what crosses between its hosts."""
+        return tuple(crossings(self.plan, self.hosts))
+
+    @cached_property
+    def ends(self) -> tuple[TopicEnd, ...]:
+        """Return all ends of its components."""
+        return tuple(ends_of(self.plan, self.hosts))
+
+    @property
+    def labels(self) -> frozenset[str]:
+        """Return what it may be called by, with others: its name, that of its instances, and its labels."""
+        return frozenset({self.name, self.entry, *self.model.labels})
+
+    def span(self, root: MappingNode, *keys: str | int) -> Span:
+        """Return the place of a value of its entry in the system's file."""
+        return value_span(root, ("robots", self.entry, *keys))
+
+
+@dataclass(slots=True)
+class System:
+    """The result of compiling a system; with errors in the report, robots may be missing."""
+
+    path: Path | None = None
+    name: str = ""
+    root: MappingNode = field(default_factory=MappingNode)
+    security: str = "none"
+    hosts: Mapping[str, HostModel] = field(default_factory=dict)
+    links: Mapping[str, LinkModel] = field(default_factory=dict)
+    robots: dict[str, PlacedRobot] = field(default_factory=dict)
+    report: Report = field(default_factory=Report)
+    sources: dict[str, str] = field(default_factory=dict)
+    profiles: tuple[str, ...] = ()  # those that were chosen
+    known_profiles: tuple[str, ...] = ()

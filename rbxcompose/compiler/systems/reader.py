@@ -1,0 +1,304 @@
+"""Compiles a system: reads its file, compiles its robots, places their components, and checks the whole."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import field, replace
+from pathlib import Path
+from typing import Any
+
+from rbxcompose import __version__
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.findings import Finding, Span
+from rbxcompose.compiler.compile import Compilation, compile_robot
+from rbxcompose.compiler.composition.layers import chosen_profiles
+from rbxcompose.compiler.composition.overlay import compose, settled
+from rbxcompose.compiler.model.robot import NOTHING, Outside, Robot, RobotComponent
+from rbxcompose.compiler.model.robot import resolve as absolute
+from rbxcompose.compiler.model.skills import served_skills
+from rbxcompose.compiler.plan.model import Plan
+from rbxcompose.compiler.systems import codes
+from rbxcompose.compiler.systems.certificates import NO_SECURITY
+from rbxcompose.compiler.systems.exchange import shared_name
+from rbxcompose.compiler.systems.model import HostOffer, PlacedRobot, System, Wishes, hosts_called, place
+from rbxcompose.compiler.systems.rules import system_findings
+from rbxcompose.manifest.documents import Documents
+from rbxcompose.manifest.files import PREFIX, PROFILE, find, resolve, shown_name
+from rbxcompose.manifest.fill import fill, names_of
+from rbxcompose.manifest.section import SYSTEM, help_with_names
+from rbxcompose.manifest.system_file import LINKS, PROFILES, SECTIONS, SystemFile, SystemRobotModel
+from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, key_span, value_span
+from rbxcompose.manifest.validate import MISSING_KEY, WRONG_TYPE, label_of, validate
+from rbxcompose.missions.sources import SkillWay
+from rbxcompose.sdk.capabilities import ConnectedBy
+from rbxcompose.sdk.ports import Serves
+
+
+def served_outside(components: Mapping[str, RobotComponent], robot: str, names: Mapping[str, str]) -> Outside:
+    """Return the services and actions of a robot as others have them; `names` are those that they have for its own.
+
+    A goal of another robot cannot be held, only cancelled and sent again, and takes a part of that robot.
+    """
+    ends = [end for component in components.values() for end in component.ends if end.topic in names]
+    services = {names[end.topic]: end.type_name for end in ends if isinstance(end.port, Serves)}
+    sources = [skill for skill in served_skills(components) if skill.topic in names and skill.way is not SkillWay.TOPIC]
+    skills = [
+        replace(
+            source,
+            topic=names[source.topic],
+            skill=replace(
+                source.skill,
+                name=f"{robot}/{source.skill.name}",
+                pausable=False,
+                claims=source.skill.claims and f"{robot}/{source.skill.claims}",
+            ),
+        )
+        for source in sources
+    ]
+    return Outside(frozenset(names.values()), services, tuple(skills))
+
+
+def joined(parts: Iterable[Outside]) -> Outside:
+    """Return all of it."""
+    every = list(parts)
+    return Outside(
+        frozenset(name for part in every for name in part.names),
+        {name: type_ for part in every for name, type_ in part.services.items()},
+        tuple(skill for part in every for skill in part.skills),
+    )
+
+
+_PORTS, _APART = 65536, 1000  # all ports; from a robot's links to what it shares
+
+
+def compile_system(
+    path: str, *, environment: Mapping[str, str], real: bool = False, profiles: Sequence[str] = ()
+) -> System:
+    """Compile the file of a system with these of its profiles; report all its mistakes, and those of its robots."""
+    out = System(profiles=tuple(profiles))
+    file = find(path)
+    if isinstance(file, Finding):
+        out.report.add(file)
+        return out
+    documents = Documents(out.report, out.sources)
+    root = documents.read(file, SYSTEM)
+    if root is None:
+        return out
+    out.root = root = documents.meant(SystemFile, root)
+    documents.check(SystemFile, root)
+    out.root = root = _with_profiles(root, out, documents)
+    out.root = root = fill(root, names_of(_text(root, "name"), not real, environment), out.report)
+    out.path, out.name, out.security = file, _text(root, "name"), _text(root, "security") or NO_SECURITY
+    sections = {key: _section(key, model, out) for key, model in SECTIONS.items()}
+    if sections["hosts"] is None or sections["robots"] is None:
+        return out
+    out.hosts = sections["hosts"]
+    if "links" in root:
+        out.links = validate(LINKS["links"], root.entries["links"].value, ("links",), out.report) or {}
+    members = list(_members(sections["robots"], out))
+    seen: dict[str, _Member] = {}
+    for member in members:
+        if (other := seen.setdefault(member.name, member)) is not member:
+            span = key_span(out.root, ("robots", max(member.entry, other.entry, key=len)))
+            message = f"'{other.entry}' and '{member.entry}' both make a robot '{member.name}'"
+            out.report.add(codes.SAME_NAME.at(span, message, help="give one of them another name"))
+    compiling = _Compiling(out, environment, real)
+    compiling.outside = joined(compiling.given(one) for one in members)
+    for member in members:
+        if (robot := _placed_robot(member, out, compiling)) is not None:
+            out.robots[member.name] = robot
+    if len(out.robots) == len(members):
+        out.report.extend(system_findings(out))
+    return out
+
+
+@dataclass(frozen=True, slots=True)
+class _Member:
+    """A robot of a system: its name, its key in the file, and what stands there."""
+
+    name: str
+    entry: str
+    model: SystemRobotModel
+
+
+def _members(robots: Mapping[str, SystemRobotModel], out: System) -> Iterator[_Member]:
+    """Yield each robot; those of several instances take the hosts of a label in turn."""
+    facts = {key: HostOffer(frozenset(host.labels)) for key, host in out.hosts.items()}
+
+    def turned(called: str, number: int) -> str:
+        found = hosts_called(called, facts)
+        return found[number % len(found)] if found else called
+
+    for entry, model in robots.items():
+        if model.instances == 1:
+            yield _Member(entry, entry, model)
+            continue
+        for number in range(model.instances):
+            own = {
+                "on": turned(model.on, number) if model.on else None,
+                "place": {key: turned(called, number) for key, called in model.place.items()},
+                "link_port": model.link_port + number if model.link_port else None,
+                "share_port": model.share_port + number if model.share_port else None,
+            }
+            yield _Member(f"{entry}_{number + 1}", entry, model.model_copy(update=own))
+
+
+def _with_profiles(root: MappingNode, out: System, documents: Documents) -> MappingNode:
+    """Return a system without its profiles, changed by those that were chosen, in the order of the command."""
+    there = root.get("profiles")
+    own = replace(root, entries={key: entry for key, entry in root.entries.items() if key != "profiles"})
+    if there is not None and validate(PROFILES["profiles"], there, ("profiles",), out.report) is None:
+        return own
+    named = there.entries if isinstance(there, MappingNode) else {}
+    out.known_profiles = tuple(named)
+    overlays = [(node, f"profile '{name}'") for name, node in chosen_profiles(out.profiles, named, "system", documents)]
+    return compose(settled(own, out.report), overlays, out.report) if overlays else own
+
+
+def _text(root: MappingNode, key: str) -> str:
+    value = root.get(key)
+    return value.text if isinstance(value, ScalarNode) else ""
+
+
+def _section(key: str, model: Any, out: System) -> Any:
+    node = out.root.get(key)
+    if not isinstance(node, MappingNode) or not node.entries:
+        span = key_span(out.root, (key,)) if key in out.root else out.root.span
+        if isinstance(node, SequenceNode) and node.items:
+            message = f"'{key}' must be a map with a name for each entry"
+            out.report.add(WRONG_TYPE.at(span, message, label=label_of(node), help=help_with_names(node)))
+            return None
+        what = "the machines" if key == "hosts" else "the robots and where they run"
+        out.report.add(MISSING_KEY.at(span, f"a system needs '{key}': {what}"))
+        return None
+    return validate(model, node, (key,), out.report)
+
+
+@dataclass(slots=True)
+class _Compiling:
+    """Compiles robots, each file with each profile once; `outside` is what robots of the system share."""
+
+    out: System
+    environment: Mapping[str, str]
+    real: bool
+    outside: Outside = NOTHING
+    done: dict[tuple[str, str | None], Compilation] = field(default_factory=dict)
+    alone: dict[tuple[str, str | None], Robot | None] = field(default_factory=dict)
+
+    def given(self, member: _Member) -> Outside:
+        """Return what a robot shares; one that others may call is compiled for that, without what they share."""
+        model = member.model
+        file = self._file(member.entry, model) if model.callers else None
+        if not isinstance(file, str):
+            return Outside(frozenset(shared_name(member.name, text) for text in model.share))
+        if (file, model.profile) not in self.alone:
+            self.alone[file, model.profile] = self._compile(file, model.profile, NOTHING).robot
+        robot = self.alone[file, model.profile]
+        space = robot.manifest.bus.namespace or "" if robot else ""
+        names = {absolute(text, space): shared_name(member.name, text) for text in model.share}
+        return served_outside(robot.components if robot else {}, member.name, names)
+
+    def _file(self, entry: str, model: SystemRobotModel) -> str | Finding:
+        """Return the file of a robot as findings show it."""
+        span = value_span(self.out.root, ("robots", entry, "robot"))
+        file = model.robot if model.robot.startswith(PREFIX) else resolve(model.robot, self.out.path or Path(), span)
+        return file if isinstance(file, str | Finding) else shown_name(file)
+
+    def _compile(self, file: str, profile: str | None, outside: Outside) -> Compilation:
+        profiles = [profile] if profile else []
+        return compile_robot(file, profiles=profiles, real=self.real, environment=self.environment, outside=outside)
+
+    def robot(self, entry: str, model: SystemRobotModel) -> Compilation | None:
+        """Return the robot of an entry; None after a finding that there is no such file."""
+        out, span = self.out, value_span(self.out.root, ("robots", entry, "robot"))
+        shown = self._file(entry, model)
+        if isinstance(shown, Finding):
+            out.report.add(shown)
+            return None
+        if (shown, model.profile) not in self.done:
+            at_profile = value_span(out.root, ("robots", entry, "profile"))
+            self.done[shown, model.profile] = self._compiled(shown, model.profile, at_profile)
+        compilation = self.done[shown, model.profile]
+        if compilation.plan is None:
+            message = f"the robot '{shown}' has errors, so the system cannot run it"
+            out.report.add(codes.BROKEN_ROBOT.at(span, message, help="see the findings of the robot"))
+        return compilation
+
+    def _compiled(self, shown: str, profile: str | None, at_profile: Span) -> Compilation:
+        compilation = self._compile(shown, profile, self.outside)
+        self.out.sources.update(compilation.sources)
+        known = {(one.code, one.span, one.message) for one in self.out.report}
+        for finding in compilation.report:
+            told = (
+                replace(finding, span=at_profile)
+                if finding.span is not None and finding.span.file == PROFILE
+                else finding
+            )
+            if (told.code, told.span, told.message) not in known:
+                self.out.report.add(told)
+        return compilation
+
+
+def _placed_robot(member: _Member, out: System, compiling: _Compiling) -> PlacedRobot | None:
+    """Return a robot with its placement; None after findings."""
+    name, entry, model = member.name, member.entry, member.model
+    compilation = compiling.robot(entry, model)
+    robot, plan = (compilation.robot, compilation.plan) if compilation else (None, None)
+    if compilation is None or robot is None or plan is None:
+        return None
+    bus = replace(
+        plan.bus, port=_next_port(plan.bus.port, {placed_robot.plan.bus.port for placed_robot in out.robots.values()})
+    )
+    plan, link_port = replace(plan, robot=name, bus=bus), _link_port(model, plan, out)
+    names = [instance.name for instance in plan.instances]
+    parts = {key: part.components for key, part in robot.manifest.parts.items()}
+    problems = list(_wrong_wishes(entry, model, out, {*names, *parts}))
+    out.report.extend(problems)
+    if problems:
+        return None
+    devices = {component.name: {connected.port.value} for component, connected in robot.declared(ConnectedBy)}
+    facts = {key: HostOffer(frozenset(host.labels), frozenset(host.devices)) for key, host in out.hosts.items()}
+    placed = place(names, facts, Wishes(model.on, model.place), parts, devices)
+    share_port = model.share_port or (link_port + _APART) % _PORTS or _APART
+    version = _version(compilation, out)
+    return PlacedRobot(name, entry, model, robot, plan, placed, link_port, share_port, version)
+
+
+def _wrong_wishes(name: str, model: SystemRobotModel, out: System, known: Iterable[str]) -> Iterator[Finding]:
+    """Yield a finding for each wish that names a host, component or part that does not exist."""
+    labels = {label for host in out.hosts.values() for label in host.labels}
+    facts = {key: HostOffer(frozenset(host.labels)) for key, host in out.hosts.items()}
+    on = {("on",): model.on} if model.on else {}
+    placed = {("place", key): called for key, called in model.place.items()}
+    for keys, called in [*on.items(), *placed.items()]:
+        if not hosts_called(called, facts):
+            span = value_span(out.root, ("robots", name, *keys))
+            message = f"'{called}' is neither a host of this system nor a label of one"
+            yield codes.UNKNOWN_HOST.misspelt(span, message, called, [*out.hosts, *sorted(labels)], "hosts")
+    for key in model.place:
+        if key not in known:
+            span = key_span(out.root, ("robots", name, "place", key))
+            message = f"the robot '{name}' has neither a component nor a part '{key}'"
+            yield codes.NOTHING_TO_PLACE.misspelt(span, message, key, sorted(known), "its components and parts")
+
+
+def _link_port(model: SystemRobotModel, plan: Plan, out: System) -> int:
+    """Return the port of the robot's links: its own, or the next one that no robot before it has."""
+    if model.link_port is not None:
+        return model.link_port
+    taken = {robot.link_port for robot in out.robots.values()}
+    return _next_port(plan.bus.port, taken)
+
+
+def _next_port(first: int, taken: Collection[int]) -> int:
+    """Return a port that no robot has; two robots of a host would else try one after the other."""
+    ports: Iterable[int] = (*range(first, _PORTS), *range(1024, first))
+    return next(port for port in ports if port not in taken)
+
+
+def _version(compilation: Compilation, out: System) -> str:
+    """Return what all hosts of a robot must have in common: the version of rbxcompose, and the texts of its files."""
+    chosen = " ".join(out.profiles).encode()
+    texts = sorted(hashlib.sha256(text.encode()).hexdigest() for text in compilation.sources.values())
+    return f"{__version__} {hashlib.sha256(''.join(texts).encode() + chosen).hexdigest()[:16]}"

@@ -1,1 +1,0 @@
-"""Pure cores of what moves: joints and their limits, trajectories, grippers, bases on wheels."""

@@ -1,1 +1,0 @@
-"""Controllers: what leads joints, one file each."""

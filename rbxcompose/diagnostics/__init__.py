@@ -1,1 +1,0 @@
-"""Pure core of the robot's diagnostics: levels, statuses and the aggregated tree."""

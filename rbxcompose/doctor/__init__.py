@@ -1,1 +1,0 @@
-"""Examines this machine and the robots on it: what keeps them from running well, and what to do about it."""

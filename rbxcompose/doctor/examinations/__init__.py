@@ -1,1 +1,0 @@
-"""Examinations: one file each, named like its function."""

@@ -1,0 +1,1 @@
+"""The domains of a robot: each is a folder with all that belongs to it."""

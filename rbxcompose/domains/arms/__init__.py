@@ -1,0 +1,1 @@
+"""Arms: kinematics, collisions, planning, picking and placing, the planning scene, heads."""

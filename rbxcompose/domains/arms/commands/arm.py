@@ -1,0 +1,484 @@
+"""Try an arm without a robot: where its tip is, how it gets to a pose; or move that of a robot.
+
+A GOAL is a pose of the arm by name, or positions of joints as in a mission: '{elbow_joint: 20 deg}'. Joints that it
+does not name are at rest. Objects of the manifest's scene are there. `go` sends the goal to a robot that runs, whose
+other joints stay where they are. WAY and KEEP are as in missions.
+
+Exit codes: 0 fine, 1 errors found, or no plan, 2 wrong usage.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from functools import partial
+from pathlib import Path
+from time import perf_counter, process_time
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbxcompose.base.findings import suggest
+from rbxcompose.base.geometry import Transform3
+from rbxcompose.base.units import ANGLE, LENGTH
+from rbxcompose.commands.console import NotDoneError, misused, table, tell
+from rbxcompose.commands.guest import Guest, visit, wanted
+from rbxcompose.commands.lookup import add_bus_options
+from rbxcompose.commands.options import (
+    Subcommand,
+    add_actions,
+    add_json_option,
+    add_timeout_option,
+    argument,
+    run_action,
+)
+from rbxcompose.commands.targets import add_layer_options, add_path_argument
+from rbxcompose.domains.arms.arm_config import ArmWorks
+from rbxcompose.domains.arms.command_goals import (
+    NO_MOTION,
+    KeepModel,
+    TraceModel,
+    chosen_arm,
+    chosen_robot,
+    done,
+    keys_of,
+    positions_in,
+    read_joints,
+    read_written,
+    shown,
+    values_of,
+)
+from rbxcompose.domains.arms.command_pictures import add_reach_options, draw_motion, run_reach
+from rbxcompose.domains.arms.command_setup import add_options, run_setup
+from rbxcompose.domains.arms.goals import goal_of
+from rbxcompose.domains.arms.motion.figures import (
+    NO_TRIES,
+    MotionProblem,
+    ProblemError,
+    Tries,
+    call_time,
+    free_pairs,
+    inverse_tries,
+    motion_tries,
+    problem_files,
+    read_problem,
+)
+from rbxcompose.domains.arms.motion.inverse_kinematics import PoseSolutions, PoseTarget
+from rbxcompose.domains.arms.motion.kept import KeptTip
+from rbxcompose.domains.arms.motion.planner import MotionPlan, MotionRequest, Planning
+from rbxcompose.domains.arms.motion.pose_search import Posture, searched
+from rbxcompose.domains.arms.motion.trace_planner import planned_trace
+from rbxcompose.domains.arms.reasons import MotionFailure
+from rbxcompose.domains.arms.sections.arms import ArmOfRobot, arms
+from rbxcompose.manifest.fields import FramePose
+from rbxcompose.msgs.plain import from_plain
+from rbxcompose.msgs.rbxcompose_msgs import MoveArm, TraceArm
+
+T = TypeVar("T")
+M = TypeVar("M", MoveArm.Goal, TraceArm.Goal)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    goal = argument("goal", metavar="GOAL", help="a pose by name, or '{JOINT: POSITION, ...}'")
+    fk_picture = argument("--picture", metavar="FILE", help="draw it among the things of the scene as PNG")
+    words = "draw start, goal (green) and the way of the tip as PNG"
+    picture = argument("--picture", metavar="FILE", help=words)
+    way = argument("way", metavar="WAY", help="as in a mission: '{points: [{x: 5 cm}], relative: true}'")
+    start = argument("--from", dest="start", metavar="GOAL", default="", help="where it begins (default: at rest)")
+    words = "on the way: '{roll: 10 deg, pitch: 10 deg}'"
+    keep = argument("--keep", metavar="KEEP", default="", help=words)
+    arm = argument("--arm", metavar="NAME", help="which one, if there are several")
+    json_ = argument("--json", action="store_true", help="answer in JSON")
+    shared = (add_path_argument, add_layer_options, json_)
+    of_arm = (add_path_argument, arm, add_layer_options, json_)
+    ik = "print positions of joints that bring the tip to a pose (inverse kinematics)"
+    trace = "plan a way of the tip along lines and arcs, or tell how far it gets"
+    setup = "find pairs of links that need not be watched, and write their file"
+    bench = "measure kinematics, and motions, also those of published problems"
+    plan = "plan a motion and tell how long it takes, or why there is none"
+    actions = (
+        Subcommand("ls", "list the arms of a robot with their joints and poses", _ls, shared),
+        Subcommand("fk", "print where the tip is (forward kinematics)", _fk, (goal, fk_picture, *of_arm)),
+        Subcommand("ik", ik, run_inverse, (add_inverse_options, start, *of_arm)),
+        Subcommand("plan", plan, _plan, (goal, picture, start, *of_arm, keep)),
+        Subcommand("trace", trace, _trace, (way, picture, start, *of_arm)),
+        Subcommand("picture", "draw where the tip gets, and how well, as PNG", _picture, (add_reach_options, *of_arm)),
+        Subcommand("bench", bench, _bench, (add_bench_options, *of_arm)),
+        Subcommand("setup", setup, run_setup, (add_options, *shared)),
+        Subcommand("go", "move an arm of a running robot, and print how that ends", run_go, (add_go_options, keep)),
+    )
+    add_actions(parser, actions)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the chosen subcommand."""
+    return run_action(arguments)
+
+
+def _ls(arguments: argparse.Namespace) -> int:
+    robot = chosen_robot(arguments)
+    if robot is None:
+        return 1
+    found = robot.manifest.contents.of(arms)
+    if arguments.json:
+        tell(json.dumps([{"name": name, **_described(arm)} for name, arm in found.items()]))
+    elif not found:
+        tell("this robot has no arms")
+    else:
+        rows = [
+            (name, arm.group.base, arm.group.tip, ", ".join(arm.group.joints), ", ".join(arm.model.poses))
+            for name, arm in found.items()
+        ]
+        tell(table([("name", "base", "tip", "joints", "poses"), *rows]))
+    return 0
+
+
+def _described(robot: ArmOfRobot) -> dict[str, object]:
+    poses = {name: {joint: at.value for joint, at in pose.items()} for name, pose in robot.model.poses.items()}
+    return {"base": robot.group.base, "tip": robot.group.tip, "joints": list(robot.group.joints), "poses": poses}
+
+
+def _bench(arguments: argparse.Namespace) -> int:
+    made = chosen_arm(arguments, is_fast=True)
+    return 1 if made is None else run_bench(arguments, made[1])
+
+
+def _fk(arguments: argparse.Namespace) -> int:
+    made = chosen_arm(arguments)
+    if made is None:
+        return 1
+    robot, works = made
+    values = values_of(works, robot, arguments.goal)
+    if arguments.picture and (failed := draw_motion(arguments, works, values, values, None)):
+        return failed
+    pose = works.kinematics.tip_pose(values)
+    root = works.kinematics.body.root
+    if arguments.json:
+        tell(json.dumps({"frame": root, "position": pose.translation, "rotation": pose.rotation}))
+    else:
+        x, y, z = (f"{value * 100:.2f} cm" for value in pose.translation)
+        turn = ", ".join(f"{value:.4f}" for value in pose.rotation)
+        tell(f"'{robot.group.tip}' in '{root}': x {x}, y {y}, z {z}; rotation (x, y, z, w) {turn}")
+    return 0
+
+
+def _plan(arguments: argparse.Namespace) -> int:
+    made = chosen_arm(arguments)
+    if made is None:
+        return 1
+    robot, works = made
+    start, goal = values_of(works, robot, arguments.start), values_of(works, robot, arguments.goal)
+    keep = goal_of(_goal(MoveArm.Goal, {"keep": read_written(KeepModel, arguments.keep or "{}").message()})).keep
+    if words := keep.mistake(works.kinematics):
+        raise NotDoneError(NO_MOTION.at(None, f"unknown_goal: {words}"))
+    kept = KeptTip(works.kinematics, keep, start, works.planner.checker) if keep.is_about_tip else None
+    request = MotionRequest(start, goal, space=keep.narrowed(works.space), kept=kept)
+    return _tell_plan(works, works.planner.plan(request), arguments, start, goal)
+
+
+def _trace(arguments: argparse.Namespace) -> int:
+    made = chosen_arm(arguments)
+    if made is None:
+        return 1
+    robot, works = made
+    start, goal = values_of(works, robot, arguments.start), goal_of(_goal(TraceArm.Goal, _way(arguments.way)))
+    links, wish = works.kinematics.poses(start), goal.trace
+    words = "" if not goal.frame or goal.frame in links else f"there is no link '{goal.frame}'"
+    if wish is None or (words := words or wish.mistake):
+        raise NotDoneError(NO_MOTION.at(None, f"unknown_goal: {words}"))
+    frame = links[goal.frame] if goal.frame else Transform3()
+    planning = planned_trace(works.kinematics, works.planner, wish, start, frame)
+    return _tell_plan(works, planning, arguments, start)
+
+
+def _picture(arguments: argparse.Namespace) -> int:
+    made = chosen_arm(arguments)
+    return 1 if made is None else run_reach(arguments, made[1], values_of(made[1], made[0], arguments.start))
+
+
+def _way(written: str) -> dict[str, object]:
+    return read_written(TraceModel, written).message()
+
+
+def _goal(message: type[M], data: Mapping[str, object]) -> M:
+    made, findings = from_plain(message, data)
+    if made is None:
+        raise NotDoneError(findings[0])
+    return made
+
+
+def _tell_plan(
+    works: ArmWorks,
+    planning: Planning,
+    arguments: argparse.Namespace,
+    start: NDArray[np.float64],
+    goal: NDArray[np.float64] | None = None,
+) -> int:
+    """Print a plan, and draw it if that is wanted; without a goal, it ends where the plan ends.
+
+    Raises:
+        NotDoneError: if there is none.
+    """
+    began = perf_counter()
+    found = done(planning)
+    took = perf_counter() - began
+    if goal is None:
+        goal = found.waypoints[-1] if isinstance(found, MotionPlan) else start
+    if arguments.picture and (failed := draw_motion(arguments, works, start, goal, found)):
+        return failed
+    if isinstance(found, MotionFailure):
+        raise NotDoneError(NO_MOTION.at(None, f"{found.reason}: {found.text}"))
+    points = [dict(zip(works.space.names, values, strict=True)) for values in found.waypoints.tolist()]
+    duration = found.trajectory.duration if found.trajectory is not None else 0.0
+    if arguments.json:
+        data = {"duration": duration, "waypoints": points, "attempts": found.attempts, "examined": found.examined}
+        origin = {"found_by": found.found_by, "fast_failed": found.fast_failed}
+        tell(json.dumps(data | {"planning_time": took, "fraction": found.share} | origin))
+        return 0
+    by = f"found by {found.found_by}, " if found.found_by else ""
+    words = f"{by}{found.examined} positions examined, attempt {found.attempts}"
+    if found.fast_failed:
+        words += f"; fast: {found.fast_failed}"
+    if found.share < 1.0:
+        words = f"only {found.share:.1%} of the way; {words}"
+    tell(f"a motion of {duration:.2f} s over {len(points)} points, planned in {took * 1000:.0f} ms ({words})")
+    for point in points:
+        tell(f"  {shown(works, point)}")
+    return 0
+
+
+def add_inverse_options(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of `arm ik`."""
+    words = "of the tip: '{x: 20 cm, y: -10 cm, z: 55 cm, yaw: 90 deg}'"
+    parser.add_argument("target", metavar="POSE", help=words)
+    parser.add_argument("--frame", metavar="LINK", default="", help="the link in whose frame it is (default: the root)")
+    counts = parser.add_mutually_exclusive_group()
+    counts.add_argument("--any-orientation", action="store_true", help="only the position counts")
+    counts.add_argument("--any-position", action="store_true", help="only the orientation counts")
+    words = "if it cannot be taken, print the nearest pose that can be, and how far that is from it"
+    parser.add_argument("--approximate", action="store_true", help=words)
+    words = "where joints should rather be, if several positions do (default: as 'kinematics' of the arm says)"
+    parser.add_argument("--prefer", metavar="GOAL", default="", help=words)
+
+
+def run_inverse(arguments: argparse.Namespace) -> int:
+    """Print solutions, the best first.
+
+    Raises:
+        NotDoneError: if there is none, or the arguments ask for nothing that there is.
+    """
+    made = chosen_arm(arguments)
+    if made is None:
+        return 1
+    robot, works = made
+    target = _target(arguments, works, start := values_of(works, robot, arguments.start))
+    found = _found(arguments, works, robot, target, start)
+    each = [dict(zip(works.space.names, values.tolist(), strict=True)) for values in found.free]
+    missed = [target.error(works.kinematics.tip_pose(values)) for values in found.free]
+    if arguments.json:
+        data = {"solutions": each, "colliding": len(found.colliding), "attempts": found.attempts}
+        errors = [{"away": away, "angle": angle} for away, angle in missed]
+        tell(json.dumps(data | {"approximate": found.is_approximate, "errors": errors}))
+        return 0 if each else 1
+    for number, (solution, off) in enumerate(zip(each, missed, strict=True), 1):
+        words = f" (approximate, {_far(*off)} from it)" if found.is_approximate else ""
+        tell(f"solution {number}{words}: {shown(works, solution)}")
+    if each:
+        return 0
+    words = f"goal_out_of_reach: the tip got within {_far(*found.nearest)} of it"
+    if found.colliding:
+        words = f"goal_in_collision: all {len(found.colliding)} solutions collide"
+    raise NotDoneError(NO_MOTION.at(None, words))
+
+
+def _target(arguments: argparse.Namespace, works: ArmWorks, start: NDArray[Any]) -> PoseTarget:
+    """Return the pose that is asked for, in the frame of the root."""
+    links, pose = works.kinematics.poses(start), read_written(FramePose, arguments.target).to_transform()
+    if arguments.frame and arguments.frame not in links:
+        message = f"there is no link '{arguments.frame}'; {suggest(arguments.frame, links, 'links')}"
+        raise NotDoneError(NO_MOTION.at(None, message))
+    return PoseTarget(
+        links[arguments.frame].compose(pose) if arguments.frame else pose,
+        arguments.any_orientation,
+        works.solver.tolerance,
+        works.solver.angle_tolerance,
+        arguments.any_position,
+        arguments.approximate,
+    )
+
+
+def _found(
+    arguments: argparse.Namespace, works: ArmWorks, robot: ArmOfRobot, target: PoseTarget, start: NDArray[Any]
+) -> PoseSolutions:
+    solver, began = works.solver, perf_counter()
+    prefer = arguments.prefer or solver.prefer
+    return done(
+        searched(
+            works.kinematics,
+            works.space,
+            target,
+            start,
+            works.planner.checker.is_free,
+            seed=works.planner.settings.seed,
+            posture=Posture.of(works.space.names, positions_in(works, robot, prefer)) if prefer else None,
+            restarts=solver.restarts,
+            is_late=lambda: perf_counter() - began >= solver.time,
+        )
+    )
+
+
+def _far(away: float, angle: float) -> str:
+    return f"{away * 100:.1f} cm and {math.degrees(angle):.1f} deg"
+
+
+_WAY = "points"  # the key of a way; all others are joints
+
+
+def add_go_options(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of `arm go`."""
+    parser.add_argument("arm", metavar="ARM", help="the arm")
+    words = "a pose by name, '{JOINT: POSITION, ...}', or a way of the tip: '{points: [{x: 5 cm}]}'"
+    parser.add_argument("goal", metavar="GOAL", help=words)
+    add_timeout_option(parser, "5s")
+    add_json_option(parser)
+    add_bus_options(parser)
+
+
+def run_go(arguments: argparse.Namespace) -> int:
+    """Send the goal, and print how it ends."""
+    from rbxcompose.commands.messages import send  # the imports for messages would slow down the others
+
+    is_way = _WAY in keys_of(arguments.goal)
+    if is_way and arguments.keep:
+        return misused("arm go", "--keep is not for a way of the tip: 'keep_orientation' is a key of that")
+    way = read_written(TraceModel, arguments.goal).message() if is_way else None
+    arguments.name = f"{arguments.arm}/{'trace' if is_way else 'move'}"
+
+    def do(guest: Guest) -> int:
+        arguments.content = json.dumps(_move(guest, arguments) if way is None else way)
+        return send(guest, arguments)
+
+    return visit(arguments, do)
+
+
+def _move(guest: Guest, arguments: argparse.Namespace) -> dict[str, Any]:
+    """Return a goal of `MoveArm`.
+
+    Raises:
+        NotDoneError: if it is none, or nothing tells which joints turn and which slide.
+    """
+    keep = read_written(KeepModel, arguments.keep or "{}").message()
+    if not arguments.goal.startswith("{"):
+        return {"pose": arguments.goal, "keep": keep}
+    from rbxcompose.domains.body.live_body import DESCRIPTION, described, described_body
+
+    action = wanted([name for name in guest.graph().actions if name.givers], arguments.name, "action")
+    namespace = action.name.removesuffix(f"/{arguments.name.lstrip('/')}")
+    body = described_body(guest, described(guest, f"{namespace}/{DESCRIPTION}"), arguments.timeout)
+    dimensions = {joint.name: LENGTH if joint.slides else ANGLE for joint in body.moving}
+    positions = read_joints(arguments.goal, dimensions)
+    return {"joints": list(positions), "positions": list(positions.values()), "keep": keep}
+
+
+COUNT, MOST, SEED, SHOWN = 100, 100_000, 3, 3
+HEAD = ("what", "solved", "median", "p95", "length", "collide")
+
+
+def add_bench_options(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `arm bench`."""
+    words = "poses, motions, and problems of each scenario (default: 100)"
+    parser.add_argument("--count", type=_count, default=COUNT, metavar="N", help=words)
+    words = "published problems: SCENARIO/scene0001.yaml with SCENARIO/request0001.yaml, as MotionBenchMaker has them"
+    parser.add_argument("--problems", type=Path, metavar="FOLDER", help=words)
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or not 0 < len(text) <= len(str(MOST)) or not 0 < int(text) <= MOST:
+        raise argparse.ArgumentTypeError(f"must be a whole number from 1 to {MOST}, not '{text}'")
+    return int(text)
+
+
+def run_bench(arguments: argparse.Namespace, works: ArmWorks) -> int:
+    """Measure, and print the figures; return 1 if a plan collides by the second examination."""
+    problems = list[MotionProblem]()
+    if arguments.problems is not None:
+        try:
+            files = problem_files(arguments.problems, arguments.count)
+            problems = [read_problem(*file, works.kinematics.body.root) for file in files]
+            for each in problems:
+                _prove_fit(works, each)
+        except ProblemError as error:
+            return misused("arm bench", str(error))
+    kinematics, clock = works.kinematics, process_time
+    samples = works.space.samples(arguments.count, SEED)
+    rest = np.array([kinematics.body.joints[name].rest for name in works.space.names])
+    calls = {
+        "forward kinematics": call_time(partial(kinematics.tip, with_jacobian=False), samples, clock),
+        "Jacobian": call_time(partial(kinematics.tip, with_jacobian=True), samples, clock),
+    }
+    tries = {
+        "inverse kinematics": inverse_tries(kinematics, works.space, works.solver, rest, samples, clock),
+        "random motions": _motions(works, arguments.count),
+    }
+    for scenario, found in _solved(works, problems):
+        tries[scenario] = tries.get(scenario, NO_TRIES).with_(found)
+    is_fast = kinematics.compiled is not None
+    if arguments.json:
+        data = {name: _data(entry) for name, entry in tries.items()}
+        tell(json.dumps({"compiled": is_fast, "calls": calls, "tries": data}))
+    else:
+        how = "compiled by numba" if is_fast else "not compiled: pip install 'rbxcompose[fast]' makes it faster"
+        tell(f"{len(works.space.joints)} joints, inverse kinematics {how}; times are those of the processor")
+        rows = [(name, "", f"{1e6 * took:.1f} us", "", "", "") for name, took in calls.items()]
+        tell(table([HEAD, *rows, *(_row(name, entry) for name, entry in tries.items())]))
+        for name, one in tries.items():
+            for reason, count in Counter(one.failures).most_common(SHOWN):
+                tell(
+                    f"not solved in {name}, {count} times: {reason}" if count > 1 else f"not solved in {name}: {reason}"
+                )
+    return 1 if any(entry.colliding for entry in tries.values()) else 0
+
+
+def _motions(works: ArmWorks, count: int) -> Tries:
+    second = works.second_checker(works.objects)
+    return motion_tries(works.planner, free_pairs(works.planner, count, SEED), second.is_free_along, process_time)
+
+
+def _solved(works: ArmWorks, problems: list[MotionProblem]) -> Iterator[tuple[str, Tries]]:
+    """Yield what became of each problem, with its scenario."""
+    names = works.space.names
+    for problem in problems:
+        others = {name: at for name, at in problem.start.items() if name not in names}
+        works.kinematics.place(others)
+        works.place_objects(problem.objects)
+        second = works.second_checker(problem.objects, others)
+        start, goal = (np.array([at[name] for name in names]) for at in (problem.start, problem.goal))
+        yield problem.scenario, motion_tries(works.planner, [(start, goal)], second.is_free_along, process_time)
+
+
+def _prove_fit(works: ArmWorks, problem: MotionProblem) -> None:
+    """Raise if a problem is about another arm.
+
+    Raises:
+        ProblemError: with what it lacks.
+    """
+    for at, word in ((problem.start, "start"), (problem.goal, "goal")):
+        if lacking := [name for name in works.space.names if name not in at]:
+            raise ProblemError(f"{word} {problem.scenario}/{problem.name} does not say where '{lacking[0]}' is")
+
+
+def _row(name: str, one: Tries) -> tuple[str, ...]:
+    times = [f"{1e3 * took:.3g} ms" if one.times else "" for took in (one.median, one.p95)]
+    ways = (f"{one.length:.2f} rad", f"{one.colliding}") if one.lengths else ("", "")
+    return (name, f"{one.solved} of {one.count}", *times, *ways)
+
+
+def _data(one: Tries) -> dict[str, object]:
+    figures = {"median": one.median, "p95": one.p95, "length": one.length}
+    known = {name: value for name, value in figures.items() if math.isfinite(value)}
+    return {"count": one.count, "solved": one.solved, **known, "colliding": one.colliding}

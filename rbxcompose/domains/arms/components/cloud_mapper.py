@@ -1,0 +1,239 @@
+"""What a sensor of distances sees, as a thing that arms plan around."""
+
+from __future__ import annotations
+
+from collections import deque
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from rbxcompose.base.geometry import Transform3, rotate
+from rbxcompose.domains.arms.motion.clouds import CloudError, SeenCells, SpaceFilter, points_of
+from rbxcompose.domains.arms.motion.collisions import readers_of
+from rbxcompose.domains.arms.motion.scene import PlacedObject
+from rbxcompose.domains.arms.motion.scene_messages import object_message, placed_object
+from rbxcompose.domains.body.model import Geometry
+from rbxcompose.domains.body.urdf import body_of
+from rbxcompose.msgs.rbxcompose_msgs import SceneObject, SceneObjects
+from rbxcompose.msgs.sensor_msgs import JointState, PointCloud2
+from rbxcompose.msgs.stamps import NANOSECONDS, to_nanoseconds
+from rbxcompose.sdk import (
+    Capability,
+    Component,
+    Config,
+    In,
+    Length,
+    Level,
+    Looks,
+    NeedsExtra,
+    Out,
+    Port,
+    Setting,
+    component,
+)
+from rbxcompose.sdk.updater import TaskStatus
+
+Array = NDArray[np.float64]
+CLOUD = "cloud"  # the port
+LARGEST = 64_000_000  # [bytes] of a cloud
+OLDEST, EARLIEST = 1.0, 0.2  # [s] by which the stamp of a cloud may be behind and ahead of now
+MOST_CELLS = 50_000  # of an octree; more would make each examination of a motion slow
+KNOWN = 200  # messages about joints that are remembered
+SOON = 1e-3  # [s]
+_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+class CloudMapperConfig(Config):
+    """Which clouds, and what is made of them; lengths in [m], times in [s]."""
+
+    name: str
+    """Name of the thing in the scene."""
+    topic: str
+    """The topic of the clouds."""
+    urdf: str
+    """Text of the URDF of the body."""
+    meshes: dict[str, str] = {}
+    """Files of meshes by their names in the URDF."""
+    range: Length = Field(1.5, gt=0)
+    """How far from the sensor points count."""
+    nearest: Length = Field(0.0, ge=0)
+    """Nearer points do not count."""
+    cell: Length = Field(0.02, ge=0.005, le=0.5)
+    """Side of a cell of the octree."""
+    least: int = Field(1, ge=1)
+    """How many points of one cloud a cell must have."""
+    padding: Length = Field(0.03, ge=0)
+    """Points nearer to the robot or to known things are taken for these."""
+    forget: float = Field(5.0, gt=0)
+    """How long a cell stays in which clouds show nothing any more."""
+    rate: float = Field(2.0, gt=0, le=30)
+    """How many clouds a second are used [Hz]."""
+    frame: str = ""
+    """The frame in which cells stay where they are; without it the root of the body."""
+    frames: tuple[str, ...] = ()
+    """Frames outside of the body in which clouds may be."""
+
+
+@component("cloud_mapper")
+class CloudMapper(Component[CloudMapperConfig]):
+    """Turns clouds of points into an octree of the planning scene, without the robot itself and things that are known.
+
+    Example:
+        camera: {type: cloud_mapper, name: camera, topic: points, urdf: '<robot name="a"><link name="base"/></robot>'}
+    """
+
+    made_by = "Each entry of `scene: {clouds: ...}` runs one."
+    process = "clouds"
+    blocking = True
+    joint_states = In(JointState, "joint_states", is_open=True)
+    scene = In(SceneObjects, "scene", qos="latched")
+
+    @classmethod
+    def ports(cls, config: CloudMapperConfig) -> dict[str, Port[Any]]:
+        """Return the ports: clouds, the octree, and a look at each frame outside of the body."""
+        root = body_of(config.urdf).root
+        clouds = In(
+            PointCloud2, config.topic, qos="bulk", is_open=True, max_rate=max(1.0, 2 * config.rate), max_size=LARGEST
+        )
+        looks = {_look(frame): Looks(source=frame, target=root).named(_look(frame)) for frame in _outside(config)}
+        cells: Out[SceneObjects] = Out(SceneObjects, f"scene/{config.name}", qos="latched")
+        return super().ports(config) | {CLOUD: clouds.named(CLOUD), "cells": cells.named("cells"), **looks}
+
+    @classmethod
+    def capabilities(cls, config: CloudMapperConfig) -> tuple[Capability, ...]:
+        """Declare what it imports."""
+        needed = ("coal", *readers_of(config.meshes.values()))
+        return tuple(NeedsExtra(Setting(module), Setting("arm")) for module in needed)
+
+    def configure(self) -> None:
+        """Measure the body."""
+        config = self.config
+        self.body = body_of(config.urdf)
+        self.filter = SpaceFilter(self.body, {name: Path(path) for name, path in config.meshes.items()})
+        self.seen = SeenCells(config.cell, config.forget)
+        self.joints: deque[tuple[int, dict[str, float]]] = deque(maxlen=KNOWN)  # with stamps [ns]
+        self.used_at, self.heard_at = -np.inf, -np.inf
+        self.problem, self.told = "", "nothing has come yet"
+        self.add_diagnostic("clouds", self.health)
+
+    def on_joint_states(self, message: JointState) -> None:
+        """Note where joints are."""
+        before = self.joints[-1][1] if self.joints else {}
+        stamp = to_nanoseconds(message.header.stamp) or self.stamp
+        self.joints.append((stamp, {**before, **dict(zip(message.name, message.position.tolist(), strict=False))}))
+
+    def on_scene(self, message: SceneObjects) -> None:
+        """Leave out points of things that are known from now on."""
+        found = map(placed_object, message.objects)
+        there = [object_ for object_ in found if object_.name != self.config.name and object_.link in self.body.links]
+        try:
+            self.filter.place(there)
+        except ValueError as error:
+            self.warn(f"points of things that are known are not left out: {error}")
+
+    def received(self, port: str, message: PointCloud2) -> None:
+        """Use a cloud, if it is time for one."""
+        if port != CLOUD or self.now - self.used_at < 1.0 / self.config.rate - SOON:
+            return
+        self.used_at = self.now
+        try:
+            count = self.use(message)
+        except (CloudError, LookupError) as error:
+            self.tell(f"a cloud is not used: {error}")
+            return
+        self.heard_at = self.now
+        self.told = f"{count:,} points, {len(self.seen):,} cells"
+        self.tell(f"{len(self.seen):,} cells, and {MOST_CELLS:,} may be: use larger ones" if self.is_crowded else "")
+
+    @property
+    def is_crowded(self) -> bool:
+        """Return whether there are too many cells."""
+        return len(self.seen) > MOST_CELLS
+
+    def tell(self, problem: str) -> None:
+        """Log a problem once, and its end."""
+        if problem and not self.problem:
+            self.warn(problem)
+        elif self.problem and not problem:
+            self.info(f"clouds are used again: {self.told}")
+        self.problem = problem
+
+    def health(self, now: float) -> TaskStatus:
+        """Return how it stands."""
+        silence = now - self.heard_at
+        problem = self.problem
+        if not problem and silence > max(2.0 / self.config.rate, OLDEST):
+            problem = f"no cloud for {silence:.0f} s: what was seen last stays" if self.heard_at >= 0 else self.told
+        return TaskStatus(Level.WARN if problem else Level.OK, problem or self.told)
+
+    def use(self, message: PointCloud2) -> int:
+        """See what a cloud shows, and tell the scene; return how many points counted.
+
+        Raises:
+            CloudError: if it cannot be used.
+            LookupError: if its frame has no transform at its time.
+        """
+        points = points_of(message)
+        stamp = to_nanoseconds(message.header.stamp) or self.stamp
+        age = (self.stamp - stamp) / NANOSECONDS
+        if not -EARLIEST <= age <= OLDEST:
+            raise CloudError(f"its stamp is {abs(age):.1f} s {'old' if age > 0 else 'in the future'}")
+        poses = self.body.poses(self.joints_at(stamp))
+        sensor = self.pose_of(message.header.frame_id, poses, stamp)
+        away = np.einsum("ij,ij->i", points, points)
+        points = points[(away <= self.config.range**2) & (away >= self.config.nearest**2)]
+        kept = self.pose_of(self.config.frame, poses, stamp)
+        middles = self.seen.found(_moved(kept.inverse().compose(sensor), points), self.config.least)
+        own = self.filter.within(_moved(kept, middles), poses, self.config.padding + self.config.cell / 2)
+        if self.seen.see(middles[~own], stamp / NANOSECONDS):
+            self.publish()
+        return len(points)
+
+    def joints_at(self, stamp: int) -> dict[str, float]:
+        """Return where joints were at a time."""
+        if not self.joints:
+            if self.body.moving:
+                raise CloudError("nothing has reported where joints are, so that the robot would be taken for a thing")
+            return {}
+        return min(islice(reversed(self.joints), KNOWN), key=lambda joint: abs(joint[0] - stamp))[1]
+
+    def pose_of(self, frame: str, poses: dict[str, Transform3], stamp: int) -> Transform3:
+        """Return a frame in that of the root."""
+        if not frame or frame in poses:
+            return poses[frame or self.body.root]
+        if _look(frame) not in self.bound:
+            raise CloudError(f"'{frame}' is no link of the body, and none of the 'frames' of the scene")
+        found: Transform3 = self.bound[_look(frame)].transform(at=stamp)
+        return found
+
+    def publish(self) -> None:
+        """Tell the scene all cells; those farthest from the frame are left out if there are too many."""
+        name, link = self.config.name, self.config.frame or self.body.root
+        middles = self.seen.middles()
+        if self.is_crowded:
+            middles = middles[np.argsort(np.einsum("ij,ij->i", middles, middles))[:MOST_CELLS]]
+        one = SceneObject(name=name, link=link)  # without shapes, it is gone
+        if len(middles):
+            side = self.config.cell
+            x, y, z = (np.round(middles.mean(axis=0) / side) * side).tolist()
+            shape = Geometry("octree", (side,), points=tuple((middles - (x, y, z)).ravel().tolist()))
+            one = object_message(PlacedObject(name, shape, link, Transform3((x, y, z))))
+        self.bound["cells"](SceneObjects(objects=(one,)))
+
+
+def _outside(config: CloudMapperConfig) -> tuple[str, ...]:
+    links = body_of(config.urdf).links
+    return tuple(frame for frame in dict.fromkeys((*config.frames, config.frame)) if frame and frame not in links)
+
+
+def _moved(pose: Transform3, points: Array) -> Array:
+    turn = np.array([rotate(pose.rotation, axis) for axis in _AXES])
+    return np.asarray(points @ turn + pose.translation)
+
+
+def _look(frame: str) -> str:
+    return f"in_{frame}"

@@ -1,0 +1,160 @@
+"""Goals of arms: in missions, as far as the text shows them, and from messages to what tasks take."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from typing import Any
+
+from rbxcompose.base.geometry import Quaternion, Transform3, quaternion_from_rpy
+from rbxcompose.base.units import ANGLE, LENGTH, RATIO, SPEED
+from rbxcompose.domains.arms.motion.arm_task import ArmGoal, ArmTask
+from rbxcompose.domains.arms.motion.inverse_kinematics import SOLVER, PoseTarget, SolverSettings
+from rbxcompose.domains.arms.motion.kept import ANGLE as SIGHT_ANGLE
+from rbxcompose.domains.arms.motion.kept import RADIUS, Keep, KeptSight
+from rbxcompose.domains.arms.motion.parametrisation import Trajectory
+from rbxcompose.domains.arms.motion.trace_planner import ANY_SPEED, TraceWish, WayPoint
+from rbxcompose.msgs.control_msgs import FollowJointTrajectory
+from rbxcompose.msgs.fields import Measures
+from rbxcompose.msgs.moveit_msgs import ExecuteTrajectory, MoveGroup
+from rbxcompose.msgs.rbxcompose_msgs import (
+    MoveArm,
+    PathConstraints,
+    PickObject,
+    PlaceObject,
+    ReachPose,
+    Sight,
+    TipPoint,
+    TraceArm,
+)
+from rbxcompose.msgs.stamps import to_duration
+from rbxcompose.msgs.trajectory_msgs import JointTrajectory, JointTrajectoryPoint
+
+POSE_MEASURES = {**dict.fromkeys(("x", "y", "z"), LENGTH), **dict.fromkeys(("roll", "pitch", "yaw"), ANGLE)}
+SIGHT_MEASURES: Measures = {**dict.fromkeys(("x", "y", "z", "radius"), LENGTH), "angle": ANGLE}
+KEEP_MEASURES: Measures = {**POSE_MEASURES, "joints": {"lower": None, "upper": None}, "sight": SIGHT_MEASURES}
+SHARES = {"speed": RATIO, "acceleration": RATIO}
+MOVE_MEASURES: Measures = {**SHARES, "tolerance": ANGLE, "keep": KEEP_MEASURES}
+REACH_MEASURES: Measures = {
+    **POSE_MEASURES,
+    **SHARES,
+    "tolerance": LENGTH,
+    "angle_tolerance": ANGLE,
+    "keep": KEEP_MEASURES,
+}
+TRACE_MEASURES: Measures = {
+    "points": POSE_MEASURES,
+    "speed": SPEED,
+    "acceleration": RATIO,
+    "blend": LENGTH,
+    "least": RATIO,
+}
+ACTIONS = (MoveArm, ReachPose, TraceArm, PickObject, PlaceObject, MoveGroup, ExecuteTrajectory)
+STATES = {"planning": "PLANNING", "moving": "MONITOR"}  # as clients of MoveIt know stages
+ArmMessage = MoveArm.Goal | ReachPose.Goal | TraceArm.Goal
+
+
+def action_of(message: Any) -> Any:
+    """Return the action that a goal belongs to."""
+    return next(action for action in ACTIONS if isinstance(message, action.Goal))
+
+
+def feedback_of(message: Any, stage: str) -> Any:
+    """Return what the client of a goal is told of its stage."""
+    action = action_of(message)
+    if action in (MoveGroup, ExecuteTrajectory):
+        return action.Feedback(state=STATES.get(stage, stage))
+    return action.Feedback(stage=stage)
+
+
+def follow_goal(names: tuple[str, ...], trajectory: Trajectory) -> FollowJointTrajectory.Goal:
+    """Return a trajectory as its controller takes it; where the arm is now is not among its points."""
+    rows = zip(trajectory.times[1:].tolist(), trajectory.positions[1:], trajectory.velocities[1:], strict=True)
+    points = tuple(
+        JointTrajectoryPoint(positions=positions, velocities=velocities, time_from_start=to_duration(time))
+        for time, positions, velocities in rows
+    )
+    return FollowJointTrajectory.Goal(trajectory=JointTrajectory(joint_names=names, points=points))
+
+
+def goal_of(message: ArmMessage, solver: SolverSettings = SOLVER) -> ArmGoal:
+    """Return a goal as the task takes it: a share, a speed or a tolerance of 0 is the usual one, that of the solver."""
+    acceleration = message.acceleration or 1.0
+    if isinstance(message, TraceArm.Goal):
+        wish = TraceWish(
+            tuple(map(_point, message.points)),
+            message.relative,
+            message.keep_orientation,
+            message.any_orientation,
+            message.speed or ANY_SPEED,
+            message.blend,
+            message.least or 1.0,
+            acceleration,
+        )
+        return ArmGoal(trace=wish, frame=message.frame, acceleration=acceleration)
+    ask = partial(
+        ArmGoal,
+        speed=message.speed or 1.0,
+        acceleration=acceleration,
+        keep=_keep(message.keep),
+        replans=message.replan,
+    )
+    if isinstance(message, MoveArm.Goal):
+        positions = dict(zip(message.joints, message.positions.tolist(), strict=False))
+        return ask(message.remembered or message.pose, positions, tolerance=message.tolerance)
+    target = PoseTarget(
+        Transform3((message.x, message.y, message.z), _turn(message)),
+        message.any_orientation,
+        message.tolerance or solver.tolerance,
+        message.angle_tolerance or solver.angle_tolerance,
+        message.any_position,
+        message.approximate,
+    )
+    return ask(target=target, frame=message.frame, prefer=message.prefer)
+
+
+def ended_as(message: Any, task: ArmTask) -> Any:
+    """Return the result of a goal, whose action is one of those that such a task carries out."""
+    failed, missed = task.failure, task.missed
+    words: dict[str, Any] = {"outcome": failed.reason, "message": failed.text} if failed is not None else {}
+    if isinstance(message, TraceArm.Goal):
+        words["fraction"] = task.share
+    if isinstance(message, ReachPose.Goal) and failed is None and missed is not None:
+        text = f"approximate: the tip is {missed[0] * 100:.1f} cm and {math.degrees(missed[1]):.1f} deg from the pose"
+        words = {"message": text, "approximate": True, "away": missed[0], "angle": missed[1]}
+    return action_of(message).Result(**words)
+
+
+def _keep(message: PathConstraints) -> Keep:
+    x, y, z = (_range(one.tolist()) for one in (message.x, message.y, message.z))
+    joints = {joint.name: (joint.lower, joint.upper) for joint in message.joints}
+    sight = _sight(message.sight)
+    return Keep((message.roll, message.pitch, message.yaw), (x, y, z), joints, message.frame, sight)
+
+
+def _sight(message: Sight) -> KeptSight | None:
+    """Return what is to be seen; None if nothing is asked for."""
+    if message == Sight():
+        return None
+    return KeptSight(
+        message.sensor,
+        message.target,
+        (message.x, message.y, message.z),
+        message.radius or RADIUS,
+        message.angle or SIGHT_ANGLE,
+        message.along,
+        tuple(message.through),
+    )
+
+
+def _range(numbers: list[float]) -> tuple[float, float] | None:
+    """Return a range; one that does not consist of two numbers goes nowhere."""
+    return None if not numbers else (numbers[0], numbers[1]) if len(numbers) == 2 else (math.nan, math.nan)
+
+
+def _point(message: TipPoint) -> WayPoint:
+    return WayPoint(Transform3((message.x, message.y, message.z), _turn(message)), message.via)
+
+
+def _turn(message: ReachPose.Goal | TipPoint) -> Quaternion:
+    return quaternion_from_rpy(message.roll, message.pitch, message.yaw)

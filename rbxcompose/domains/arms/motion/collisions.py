@@ -1,0 +1,474 @@
+"""Whether an arm collides: with the body that carries it, with itself, and with objects."""
+
+from __future__ import annotations
+
+import atexit
+import gc
+from collections.abc import Callable, Collection, Generator, Iterable, Mapping
+from copy import copy
+from importlib import import_module
+from itertools import chain, combinations, product
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.geometry import Transform3
+from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
+from rbxcompose.domains.arms.motion.groups import JointSpace, moved_links
+from rbxcompose.domains.arms.motion.octree_files import read_cells
+from rbxcompose.domains.arms.motion.parametrisation import toppra
+from rbxcompose.domains.arms.motion.scene import PairDistance, PlacedObject
+from rbxcompose.domains.body.link_pairs import LinkPair, pair_of
+from rbxcompose.domains.body.meshes import read_mesh
+from rbxcompose.domains.body.model import Body, Geometry
+
+Array = NDArray[np.float64]
+Coal = Any  # of an extra, without types
+STL = ".stl"
+"""The ending of meshes that coal reads rightly; those of others may have pieces, whose corners it confuses."""
+_READERS = ("trimesh", "collada")
+
+
+def readers_of(files: Iterable[str]) -> tuple[str, ...]:
+    """Return the modules beside coal that read some files of meshes."""
+    return () if all(file.lower().endswith(STL) for file in files) else _READERS
+
+
+class Shapes:
+    """Shapes for coal, each made once; `meshes` are the files of meshes by their names."""
+
+    def __init__(self, meshes: Mapping[str, Path]) -> None:
+        self._meshes = meshes
+        self._made: dict[Geometry, Coal] = {}
+
+    def of(self, geometry: Geometry) -> Coal:
+        """Return a shape.
+
+        Raises:
+            ModuleNotFoundError: without the extra `arm`.
+            ValueError: if it is a mesh that cannot be read.
+        """
+        if geometry not in self._made:
+            self._made[geometry] = coal_shape(geometry, self._meshes)
+        return self._made[geometry]
+
+    def keep(self, wanted: Iterable[Geometry]) -> None:
+        """Forget all other shapes: those of clouds of points are large, and come again and again."""
+        kept = set(wanted)
+        self._made = {geometry: made for geometry, made in self._made.items() if geometry in kept}
+
+
+def coal_shape(geometry: Geometry, meshes: Mapping[str, Path]) -> Coal:
+    """Return a shape for coal; a mesh that `meshes` does not name is a file of this name.
+
+    Raises:
+        ModuleNotFoundError: without the extra `arm`.
+        ValueError: if its file cannot be read.
+    """
+    import coal
+
+    match geometry.kind:
+        case "box":
+            return coal.Box(*geometry.size)
+        case "sphere":
+            return coal.Sphere(*geometry.size)
+        case "cylinder":
+            return coal.Cylinder(*geometry.size)
+        case "cone":
+            return coal.Cone(*geometry.size)
+        case "capsule":
+            return coal.Capsule(*geometry.size)
+        case "plane":
+            return coal.Halfspace(np.array(geometry.size[:3]), -geometry.size[3])
+        case "octree":
+            cells, side = np.array(geometry.points).reshape(-1, 3), geometry.size[0]
+            return coal.makeOctree(*(read_cells(Path(geometry.file), side) if geometry.file else (cells, side)))
+    scale = np.array(geometry.size or (1.0, 1.0, 1.0))
+    if geometry.points:
+        return _triangles(np.array(geometry.points).reshape(-1, 3) * scale, geometry.triangles)
+    return _from_file(meshes.get(geometry.file, Path(geometry.file)), geometry.file, scale)
+
+
+def _from_file(path: Path, name: str, scale: Array) -> Coal:
+    import coal
+
+    if not path.is_file():
+        raise ValueError(f"the mesh '{name}' cannot be read: there is no such file")
+    if path.suffix.lower() != STL:
+        return _of_pieces(path, name, scale)
+    try:
+        loaded = coal.MeshLoader().load(str(path), scale)
+    except (ValueError, RuntimeError) as error:  # its text is about coal's own files
+        raise ValueError(f"the mesh '{name}' cannot be read: it is none") from error
+    _prove_finite(np.asarray(loaded.vertices()), name)
+    loaded.computeLocalAABB()
+    return loaded
+
+
+def _of_pieces(path: Path, name: str, scale: Array) -> Coal:
+    for module in _READERS:
+        import_module(module)  # a missing one would be told as a broken file
+    solid = read_mesh(path, name)
+    _prove_finite(solid.vertices, name)
+    return _triangles(solid.vertices * scale, solid.faces)
+
+
+def _prove_finite(corners: Array, name: str) -> None:
+    if not np.isfinite(corners).all():
+        raise ValueError(f"the mesh '{name}' cannot be read: a corner of it is no finite point")
+
+
+def _triangles(corners: Array, triangles: ArrayLike) -> Coal:
+    import coal
+
+    faces = np.asarray(triangles, dtype=np.int64).reshape(-1, 3)
+    made = coal.BVHModelOBBRSS()
+    made.beginModel(len(faces), len(corners))
+    made.addVertices(corners)
+    made.addTriangles(faces)
+    made.endModel()
+    made.computeLocalAABB()
+    return made
+
+
+SAMPLES, SEED = 200, 1
+
+
+def unavoidable_pairs(samples: Array, colliding: Callable[[Array], Collection[LinkPair]]) -> frozenset[LinkPair]:
+    """Return the pairs that collide at all of some positions, of shape (count, n): nobody could avoid that."""
+    found: frozenset[LinkPair] | None = None
+    for values in samples:
+        here = frozenset(colliding(values))
+        found = here if found is None else found & here
+        if not found:
+            break
+    return found or frozenset()
+
+
+TOUCH = 1e-4
+"""[m] by which shapes of the body may be within each other: those of a servo and its bracket touch, and whether faces
+that touch collide is decided by rounding."""
+FLAT = 1e-9  # [m], the thickness of the box around a mesh that is flat
+MOST_PAIRS = 5_000  # of shapes, whose distances are told
+_GEOM, _BVH = "OT_GEOM", "OT_BVH"  # coal's kinds of shapes
+
+
+class Checker(Protocol):
+    """Whether positions of an arm's joints, of shape (n,), collide."""
+
+    def is_free(self, values: Array) -> bool:
+        """Return whether nothing collides."""
+        ...
+
+    def colliding(self, values: Array) -> list[LinkPair]:
+        """Return all pairs that collide."""
+        ...
+
+    def without(self, pairs: Collection[LinkPair]) -> Checker:
+        """Return a checker that does not watch some pairs."""
+        ...
+
+    def in_the_way(self, values: Array, shape: Geometry, at: Transform3, ignored: Collection[str]) -> list[str]:
+        """Return the links and objects but those `ignored` that a shape, at a pose in the root's frame, is within."""
+        ...
+
+
+@runtime_checkable
+class SearchingChecker(Checker, Protocol):
+    """One that examines many positions at once, and can search a way by itself."""
+
+    def first_bad(self, points: Array) -> int | None:
+        """Return the first of some positions, of shape (m, n), where something collides; None if there is none."""
+        ...
+
+    def prepare(self, space: JointSpace) -> None:
+        """Do at once what would delay the first motion."""
+        ...
+
+    def ways(
+        self, space: JointSpace, start: Array, goal: Array, *, seed: int, resolution: float, simplify: bool
+    ) -> Generator[int, None, Array | str]:
+        """Search a way; return its points, of shape (m, n), or why there is none. Yield how many were examined."""
+        ...
+
+
+def told(pairs: Collection[LinkPair], most: int = 3) -> str:
+    """Return pairs in words."""
+    words = [f"'{first}' and '{second}'" for first, second in list(pairs)[:most]]
+    return "; ".join(words) + (f"; and {len(pairs) - most} more pairs" if len(pairs) > most else "")
+
+
+def adjacent_pairs(body: Body) -> frozenset[LinkPair]:
+    """Return the links that a joint connects, also if frames without a shape are fixed between it and the upper one."""
+    found = set()
+    for joint in body.joints.values():
+        link = joint.parent
+        while not body.links[link].collisions and link in body.joint_above and not body.joint_above[link].moves:
+            link = body.joint_above[link].parent
+        found.add(pair_of(link, joint.child))
+    return frozenset(found)
+
+
+@dataclass(frozen=True, slots=True)
+class CheckedPart:
+    """A shape that is examined: with which link it moves, where it is in the link's frame, and as coal has it."""
+
+    geometry: Geometry
+    link: str
+    origin: Transform3
+    coal: Coal
+
+
+class MeshChecker:
+    """Examines the collision shapes of the body as they are, by coal and its tree of bounding boxes.
+
+    Pairs that the arm does not move relative to each other, and those in `allowed`, do not count. Links keep away from
+    objects by the `paddings` [m] of both. One thread at a time may use it.
+    """
+
+    def __init__(
+        self,
+        model: ArmKinematics,
+        meshes: Mapping[str, Path],
+        allowed: Collection[LinkPair] = frozenset(),
+        objects: Iterable[PlacedObject] = (),
+        paddings: Mapping[str, float] = MappingProxyType({}),
+        shapes: Shapes | None = None,
+        *,
+        is_rigid: bool = False,
+    ) -> None:
+        """Build it; `meshes` are the files of meshes by their names in the URDF, `shapes` those that were read before.
+
+        With `is_rigid`, it examines only the pairs that it would else leave out since nothing moves between them.
+
+        Raises:
+            ModuleNotFoundError: without Pinocchio.
+            ValueError: if a mesh cannot be read.
+        """
+        import pinocchio
+
+        self._pinocchio, self._model = pinocchio, model
+        self._geometry: Any = pinocchio.GeometryModel()
+        self._owners: list[str] = []
+        self._parts: list[CheckedPart] = []
+        self._kinds: list[str] = []  # coal's kind of each shape
+        self._moved = dict(moved_links(model.body, model.group.joints))
+        self._paddings = dict(paddings)
+        known = shapes if shapes is not None else Shapes(meshes)
+        for link in model.body.links.values():
+            for shape in link.collisions:
+                self._add(link.name, link.name, known, shape.geometry, shape.origin)
+        touching, there = set(allowed), tuple(objects)
+        self._objects = {object_.name for object_ in there}
+        for placed_object in there:
+            self._moved[placed_object.name], self._paddings[placed_object.name] = (
+                self._moved[placed_object.link],
+                placed_object.padding,
+            )
+            for piece in placed_object.all_pieces:
+                self._add(placed_object.name, placed_object.link, known, piece.shape, piece.pose)
+            touching |= {
+                pair_of(placed_object.name, other) for other in (*placed_object.touches, *placed_object.touches_objects)
+            }
+        self._pair(touching, is_rigid)
+        self._prepare()
+
+    def is_free(self, values: Array) -> bool:
+        """Return whether nothing collides."""
+        whole, find = self._model.whole, self._pinocchio.computeCollisions
+        if find(whole.model, whole.data, self._manager, self._model.q(values), True):
+            return False
+        check = self._pinocchio.computeCollision
+        return not any(check(self._geometry, self._data, index) for index in self._apart)
+
+    def colliding(self, values: Array) -> list[LinkPair]:
+        """Return all pairs that collide, without the help of the tree."""
+        whole = self._model.whole
+        self._pinocchio.computeCollisions(
+            whole.model, whole.data, self._geometry, self._data, self._model.q(values), False
+        )
+        found = (
+            pair_of(self._owners[pair.first], self._owners[pair.second])
+            for pair, result in zip(self._geometry.collisionPairs, self._data.collisionResults, strict=True)
+            if result.isCollision()
+        )
+        return list(dict.fromkeys(found))
+
+    def in_the_way(self, values: Array, shape: Geometry, at: Transform3, ignored: Collection[str]) -> list[str]:
+        """Return the links and objects but those `ignored` that a shape, at a pose in the root's frame, is within."""
+        import coal
+
+        whole, placed = self._model.whole, coal_shape(shape, {})
+        self._pinocchio.updateGeometryPlacements(
+            whole.model, whole.data, self._geometry, self._data, self._model.q(values)
+        )
+        x, y, z, w = at.rotation
+        there = coal.Transform3s(coal.Quaternion(w, x, y, z), np.array(at.translation))
+        found = dict[str, None]()
+        for index, owner in enumerate(self._owners):
+            if owner in ignored or owner in found:
+                continue
+            own, result = self._data.oMg[index], coal.CollisionResult()
+            other = coal.Transform3s(own.rotation, own.translation)
+            geometry = self._geometry.geometryObjects[index].geometry
+            if coal.collide(geometry, other, placed, there, coal.CollisionRequest(), result):
+                found[owner] = None
+        return list(found)
+
+    @property
+    def watched(self) -> frozenset[str]:
+        """Return the links and objects that belong to a pair."""
+        return frozenset(
+            self._owners[name] for pair in self._geometry.collisionPairs for name in (pair.first, pair.second)
+        )
+
+    def pairs(self, values: Array, between: Collection[str] = ()) -> tuple[PairDistance, ...]:
+        """Return the distances of the pairs with all of `between`: what collides first, then the nearest.
+
+        Of very many pairs only those that collide are told. How deep meshes are within each other is an estimate of
+        coal's. One distance is computed at a time, so that other threads run: meshes take milliseconds.
+        """
+        colliding, found = set(self.colliding(values)), dict[LinkPair, float]()
+        wanted = [
+            (index, owners)
+            for index, pair in enumerate(self._geometry.collisionPairs)
+            if set(between) <= set(owners := pair_of(self._owners[pair.first], self._owners[pair.second]))
+        ]
+        if len(wanted) > MOST_PAIRS:
+            wanted = [(index, owners) for index, owners in wanted if owners in colliding]
+        for index, owners in wanted:
+            result = self._pinocchio.computeDistance(self._geometry, self._data, index)
+            distance = float(result.min_distance)
+            found[owners] = min(distance, found.get(owners, distance))
+        each = (PairDistance(*owners, distance, owners in colliding) for owners, distance in found.items())
+        return tuple(sorted(each, key=lambda pair_distance: (not pair_distance.collides, pair_distance.distance)))
+
+    def without(self, pairs: Collection[LinkPair]) -> MeshChecker:
+        """Return a checker of the same shapes that does not watch some pairs."""
+        made = copy(self)
+        made._geometry = self._geometry.copy()
+        made._geometry.removeAllCollisionPairs()
+        for pair in self._geometry.collisionPairs:
+            if pair_of(self._owners[pair.first], self._owners[pair.second]) not in pairs:
+                made._geometry.addCollisionPair(self._pinocchio.CollisionPair(pair.first, pair.second))
+        made._prepare()
+        return made
+
+    @property
+    def watched_pairs(self) -> set[LinkPair]:
+        """Return the pairs that it examines."""
+        pairs = self._geometry.collisionPairs
+        return {pair_of(self._owners[pair.first], self._owners[pair.second]) for pair in pairs}
+
+    @property
+    def kinematics(self) -> ArmKinematics:
+        """Return the body."""
+        return self._model
+
+    @property
+    def parts(self) -> list[CheckedPart]:
+        """Return all shapes, in the order in which `watched_parts` counts them."""
+        return self._parts
+
+    @property
+    def watched_parts(self) -> list[tuple[int, int, float]]:
+        """Return the pairs of shapes that it examines, and how far they must be from each other [m]."""
+        margins = (request.security_margin for request in self._data.collisionRequests)
+        return [
+            (pair.first, pair.second, margin)
+            for pair, margin in zip(self._geometry.collisionPairs, margins, strict=True)
+        ]
+
+    def collides(self, values: Array, pairs: Iterable[int]) -> bool:
+        """Return whether one of some pairs collides, by their places in `watched_parts`."""
+        whole, check = self._model.whole, self._pinocchio.computeCollision
+        self._pinocchio.updateGeometryPlacements(
+            whole.model, whole.data, self._geometry, self._data, self._model.q(values)
+        )
+        return any(check(self._geometry, self._data, pair) for pair in pairs)
+
+    def _prepare(self) -> None:
+        self._data = self._geometry.createData()
+        # Pairs with a plane, of which the tree overlooks some that are inclined or keep a distance; and
+        # with a flat mesh, since it takes boxes without a thickness for empty.
+        self._apart: list[int] = []
+        # Asking coal for each pair takes long.
+        overlooked = [self._is_overlooked(one) for one in range(len(self._owners))]
+        requests = zip(self._data.collisionRequests, self._geometry.collisionPairs, strict=True)
+        for index, (request, pair) in enumerate(requests):
+            first, second = pair.first, pair.second
+            request.security_margin = self._margin(first, second)
+            if overlooked[first] or overlooked[second]:
+                self._apart.append(index)
+        self._manager = self._pinocchio.BroadPhaseManager_DynamicAABBTreeCollisionManager(
+            self._model.whole.model, self._geometry, self._data
+        )
+
+    def _add(self, owner: str, link: str, known: Shapes, geometry: Geometry, origin: Transform3) -> None:
+        frame = self._model.whole.model.frames[self._model.whole.frames[link]]
+        placement = frame.placement * self._pinocchio.XYZQUATToSE3(
+            np.array((*origin.translation, *origin.rotation), dtype=float)
+        )
+        name = f"{owner}_{len(self._owners)}"
+        self._owners.append(owner)
+        self._parts.append(CheckedPart(geometry, link, origin, shape := known.of(geometry)))
+        self._kinds.append(str(shape.getObjectType()))
+        self._geometry.addGeometryObject(
+            self._pinocchio.GeometryObject(name, frame.parentJoint, frame.parentFrame, placement, shape)
+        )
+
+    def _pair(self, allowed: Collection[LinkPair], is_rigid: bool) -> None:
+        """Watch all pairs that the arm moves relative to each other; most of a large scene does not move at all."""
+        together: dict[frozenset[str], list[int]] = {}
+        for index, owner in enumerate(self._owners):
+            together.setdefault(self._moved[owner], []).append(index)
+        if is_rigid:
+            pairs = chain.from_iterable(combinations(numbers, 2) for numbers in together.values())
+        else:
+            pairs = chain.from_iterable(product(*groups) for groups in combinations(together.values(), 2))
+        for first, second in pairs:
+            text, other = self._owners[first], self._owners[second]
+            if text != other and pair_of(text, other) not in allowed:
+                pair = self._pinocchio.CollisionPair(min(first, second), max(first, second))
+                self._geometry.addCollisionPair(pair)
+
+    def _is_overlooked(self, shape: int) -> bool:
+        geometry = self._geometry.geometryObjects[shape].geometry
+        if self._kinds[shape] != _BVH:
+            return str(geometry.getNodeType()) == "GEOM_HALFSPACE"
+        return bool(np.min(geometry.aabb_local.max_ - geometry.aabb_local.min_) < FLAT)
+
+    def _margin(self, first: int, second: int) -> float:
+        """Return how far two shapes keep from each other [m]; coal lets meshes be within nothing but meshes."""
+        name, other, kind = self._owners[first], self._owners[second], self._kinds[first]
+        is_of_body = name not in self._objects and other not in self._objects
+        margin = -TOUCH + (0.0 if is_of_body else self._paddings.get(name, 0.0) + self._paddings.get(other, 0.0))
+        return margin if kind == self._kinds[second] and kind in (_GEOM, _BVH) else max(margin, 0.0)
+
+
+def load_libraries() -> None:
+    """Import what planning needs, which takes seconds and should not delay the first goal.
+
+    Raises:
+        ModuleNotFoundError: if the extra `arm` is not installed.
+    """
+    atexit.unregister(gc.freeze)  # without a last collection at the exit, OMPL prints all that it had
+    import_module("ompl.geometric")
+    toppra()
+
+
+def always_colliding(
+    kinematics: ArmKinematics, space: JointSpace, meshes: Mapping[str, Path]
+) -> tuple[frozenset[LinkPair], frozenset[LinkPair]]:
+    """Return the links that a joint connects, and further pairs that collide wherever the arm is.
+
+    Raises:
+        ValueError: if a mesh cannot be read.
+    """
+    adjacent = adjacent_pairs(kinematics.body)
+    checker = MeshChecker(kinematics, meshes, adjacent)
+    return adjacent, unavoidable_pairs(space.samples(SAMPLES, SEED), checker.colliding)

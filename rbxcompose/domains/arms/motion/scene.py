@@ -1,0 +1,281 @@
+"""The planning scene: things around the robot, which arms must not hit, and things that they hold."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import replace
+
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.geometry import Transform3
+from rbxcompose.domains.body.model import Body, Geometry
+
+SIZES: Mapping[str, tuple[str, ...]] = {
+    "box": ("x", "y", "z"),
+    "cylinder": ("radius", "length"),
+    "cone": ("radius", "length"),
+    "sphere": ("radius",),
+    "plane": ("a", "b", "c", "d"),
+    "mesh": ("scale along x", "y", "z"),
+    "octree": ("side of a cell",),
+}
+"""What the numbers of each shape's size mean. A plane is all that is below ax + by + cz + d = 0."""
+LEAST, GREATEST = 1e-4, 100.0
+"""[m] that a length may have: smaller things would slip through between examined positions, larger ones are planes."""
+MOST_POINTS = 200_000
+"""Corners of a mesh, or cells of an octree."""
+PLANE, MESH, OCTREE = "plane", "mesh", "octree"
+FIXED = (PLANE, OCTREE)
+"""Shapes that no link carries."""
+
+
+def mistake_in_shape(shape: Geometry) -> str:
+    """Return why a shape cannot be in the scene, nothing if it can."""
+    names = SIZES.get(shape.kind)
+    if names is None:
+        return f"'{shape.kind}' is no shape: {', '.join(SIZES)}"
+    if len(shape.size) != len(names):
+        return f"the size of a {shape.kind} is {', '.join(names)}"
+    if not all(map(math.isfinite, (*shape.size, *shape.points))):
+        return f"a number of its {shape.kind} is not finite"
+    if shape.kind == PLANE:
+        return "" if abs(math.hypot(*shape.size[:3]) - 1.0) <= 0.01 else "the length of its normal is not 1"
+    if shape.kind in (MESH, OCTREE):
+        return _mistake_in_points(shape)
+    if wrong := [size for size in shape.size if not LEAST <= size <= GREATEST]:
+        return f"a length of its {shape.kind} is {wrong[0]:g} m: it is at least {LEAST:g} m and at most {GREATEST:g} m"
+    return ""
+
+
+def _mistake_in_points(shape: Geometry) -> str:
+    if shape.kind == MESH and 0.0 in shape.size:
+        return "a scale of its mesh is 0"
+    if shape.kind == OCTREE and not 1e-3 <= shape.size[0] <= 1.0:
+        return f"a cell of its octree is {shape.size[0]:g} m wide: from 1 mm to 1 m"
+    if shape.file:
+        return ""
+    count, rest = divmod(len(shape.points), 3)
+    if not count or rest:
+        return f"its {shape.kind} has no points"
+    if count > MOST_POINTS:
+        return f"its {shape.kind} has {count:,} points, and may have {MOST_POINTS:,}"
+    if shape.kind == MESH:
+        if not shape.triangles or len(shape.triangles) % 3:
+            return "its mesh has no triangles"
+        if not 0 <= min(shape.triangles) <= max(shape.triangles) < count:
+            return "a triangle of its mesh has a corner that there is not"
+    extent = max(map(abs, shape.points)) * (max(map(abs, shape.size)) if shape.kind == MESH else 1.0)
+    return "" if extent <= GREATEST else f"its {shape.kind} reaches {extent:g} m far: at most {GREATEST:g} m"
+
+
+MOST_SHAPES = 1_000
+"""More would make each change of the scene take seconds: many small things are one octree."""
+MOST_PADDING = 1.0  # [m]
+LONGEST_NAME = 200
+FARTHEST = 10_000.0  # [m] from its frame
+Colour = tuple[float, float, float, float]
+
+
+class SceneError(ValueError):
+    """Raised for a change of the scene that cannot be, with the reason."""
+
+
+@dataclass(frozen=True, slots=True)
+class ScenePiece:
+    """A shape of an object, and its pose in the object's frame."""
+
+    shape: Geometry
+    pose: Transform3
+
+
+@dataclass(frozen=True, slots=True)
+class PlacedObject:
+    """A thing that moves with a link of the body, at a pose in its frame; it may touch some links.
+
+    `link` may be a frame outside of the body, such as `map`. `pieces` are further shapes, `colour` is red, green, blue
+    and opacity from 0 to 1, `padding` [m] how far all else keeps from it.
+    """
+
+    name: str
+    shape: Geometry
+    link: str
+    pose: Transform3
+    touches: tuple[str, ...] = ()
+    touches_objects: tuple[str, ...] = ()
+    pieces: tuple[ScenePiece, ...] = ()
+    colour: Colour | None = None
+    padding: float = 0.0
+    shape_pose: Transform3 = Transform3()
+
+    @property
+    def own_pieces(self) -> tuple[ScenePiece, ...]:
+        """Return all shapes with their poses in the frame of the object."""
+        return ScenePiece(self.shape, self.shape_pose), *self.pieces
+
+    @property
+    def all_pieces(self) -> Iterator[ScenePiece]:
+        """Yield all shapes with their poses in the frame of the link."""
+        for piece in self.own_pieces:
+            yield ScenePiece(piece.shape, self.pose.compose(piece.pose))
+
+
+@dataclass(frozen=True, slots=True)
+class PairDistance:
+    """Two links or objects, and the distance between them [m], below 0 if they are within each other."""
+
+    first: str
+    second: str
+    distance: float
+    collides: bool
+    """Whether they are nearer than they may be, with all paddings."""
+
+
+def mistake_in(placed_object: PlacedObject, body: Body, frames: Collection[str] = ()) -> str:
+    """Return why an object cannot be in the scene, nothing if it can; `frames` are those outside of the body."""
+    for piece in placed_object.own_pieces:
+        if wrong := mistake_in_shape(piece.shape) or _mistake_in_pose(piece.pose):
+            return wrong
+    if wrong := _mistake_in_pose(placed_object.pose):
+        return wrong
+    if not 0.0 <= placed_object.padding <= MOST_PADDING:
+        return f"its padding is {placed_object.padding:g} m: from 0 to {MOST_PADDING:g} m"
+    if placed_object.colour is not None and not all(0.0 <= share <= 1.0 for share in placed_object.colour):
+        return "the parts of its colour are from 0 to 1"
+    if placed_object.link not in body.links and placed_object.link not in frames:
+        outer = f"; frames outside of the body: {', '.join(sorted(frames))}" if frames else ""
+        return f"there is no link '{placed_object.link}'{outer}"
+    if unknown := [link for link in placed_object.touches if link not in body.links]:
+        return f"there is no link '{unknown[0]}'"
+    if (
+        not placed_object.name.isprintable()
+        or placed_object.name != placed_object.name.strip()
+        or not 0 < len(placed_object.name) <= LONGEST_NAME
+    ):
+        return f"a name has 1 to {LONGEST_NAME} letters, in one line, and no space at its ends"
+    if placed_object.name in body.links:
+        return f"'{placed_object.name}' is a link of the body"
+    return _mistake_in_carrying(placed_object, placed_object.link, body) if placed_object.link in body.links else ""
+
+
+def _mistake_in_carrying(placed_object: PlacedObject, link: str, body: Body) -> str:
+    fixed = [piece.shape.kind for piece in placed_object.all_pieces if piece.shape.kind in FIXED]
+    return f"no link that moves can carry its {fixed[0]}" if fixed and link not in body.still else ""
+
+
+def _mistake_in_pose(pose: Transform3) -> str:
+    if not all(map(math.isfinite, (*pose.translation, *pose.rotation))):
+        return "its pose is not finite"
+    if abs(math.hypot(*pose.rotation) - 1.0) > 0.01:
+        return "its orientation is no rotation"
+    away = math.hypot(*pose.translation)
+    return f"it is {away:g} m away from its frame: at most {FARTHEST:g} m" if away > FARTHEST else ""
+
+
+def settled(placed_object: PlacedObject, body: Body) -> PlacedObject:
+    """Return an object that is in the frame of the root if that of its link never moves."""
+    at = body.still.get(placed_object.link) if placed_object.link != body.root else None
+    return placed_object if at is None else replace(placed_object, link=body.root, pose=at.compose(placed_object.pose))
+
+
+class PlanningScene:
+    """Objects by name. Poses of links and of `frames` outside of the body are those in the frame of its root."""
+
+    def __init__(self, body: Body, objects: Iterable[PlacedObject] = (), frames: Collection[str] = ()) -> None:
+        self.body, self.frames = body, frames
+        self.objects: dict[str, PlacedObject] = {}
+        self._stood_in: dict[str, str] = {}  # frames outside of the body in which held objects were
+        for placed_object in objects:
+            self.add(placed_object)
+
+    def add(self, placed_object: PlacedObject) -> None:
+        """Put an object into the scene.
+
+        Raises:
+            SceneError: if it is there, or cannot be.
+        """
+        if placed_object.name in self.objects:
+            raise SceneError(f"there is an object '{placed_object.name}' already")
+        self.put(placed_object)
+
+    def put(self, placed_object: PlacedObject) -> None:
+        """Put an object into the scene, in the place of the one that has its name.
+
+        Raises:
+            SceneError: if it cannot be.
+        """
+        if mistake := mistake_in(placed_object, self.body, self.frames):
+            raise SceneError(mistake)
+        others = (len(each.own_pieces) for each in self.objects.values() if each.name != placed_object.name)
+        if len(placed_object.own_pieces) + sum(others) > MOST_SHAPES:
+            raise SceneError(f"there would be more than {MOST_SHAPES:,} shapes")
+        self.objects[placed_object.name] = placed_object
+
+    def remove(self, name: str) -> None:
+        """Take an object out of the scene.
+
+        Raises:
+            SceneError: if it is not there.
+        """
+        del self.objects[self._there(name).name]
+
+    def attach(self, name: str, link: str, touches: Iterable[str], links: Mapping[str, Transform3]) -> None:
+        """Let an object move with a link from now on; it stays where it is.
+
+        It may touch `touches`; without any, the link itself and all that the link carries.
+
+        Raises:
+            SceneError: if there is no such object or link, or if its frame has no pose.
+        """
+        placed_object = self._there(name)
+        unknown = [each for each in (link, *touches) if each not in self.body.links]
+        if unknown:
+            raise SceneError(f"there is no link '{unknown[0]}'")
+        if mistake := _mistake_in_carrying(placed_object, link, self.body):
+            raise SceneError(mistake)
+        pose = links[link].inverse().compose(self._pose(placed_object, links))
+        if placed_object.link not in self.body.links:
+            self._stood_in[name] = placed_object.link
+        allowed = tuple(touches) or (link, *self._carried(link))
+        self.objects[name] = replace(placed_object, link=link, pose=pose, touches=allowed)
+
+    def detach(self, name: str, links: Mapping[str, Transform3]) -> None:
+        """Let an object stay where it is, in the frame in which it stood or in the body's root; it may touch nothing.
+
+        Raises:
+            SceneError: if there is no such object, or if its frame has no pose.
+        """
+        placed_object = self._there(name)
+        frame, pose = self._stood_in.pop(name, self.body.root), self._pose(placed_object, links)
+        if frame in links and frame != self.body.root:
+            pose = links[frame].inverse().compose(pose)
+        else:
+            frame = self.body.root
+        self.objects[name] = replace(placed_object, link=frame, pose=pose, touches=())
+
+    def on_body(self, poses: Mapping[str, Transform3]) -> tuple[PlacedObject, ...]:
+        """Return all objects in the frames of links that move, and those of all other frames in that of the root.
+
+        Raises:
+            SceneError: if such a frame has no pose.
+        """
+        return tuple(
+            settled(placed_object, self.body)
+            if placed_object.link in self.body.links
+            else replace(placed_object, link=self.body.root, pose=self._pose(placed_object, poses))
+            for placed_object in self.objects.values()
+        )
+
+    def _pose(self, placed_object: PlacedObject, poses: Mapping[str, Transform3]) -> Transform3:
+        if placed_object.link not in poses:
+            raise SceneError(f"nothing tells where '{placed_object.link}' is, the frame of '{placed_object.name}'")
+        return poses[placed_object.link].compose(placed_object.pose)
+
+    def _there(self, name: str) -> PlacedObject:
+        if name not in self.objects:
+            there = ", ".join(self.objects) or "none"
+            raise SceneError(f"there is no object '{name}' in the scene; there: {there}")
+        return self.objects[name]
+
+    def _carried(self, link: str) -> list[str]:
+        children = [joint.child for joint in self.body.joints_below[link]]
+        return [name for child in children for name in (child, *self._carried(child))]

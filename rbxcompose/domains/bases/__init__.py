@@ -1,0 +1,1 @@
+"""Bases: wheels, driving to places, emergency stop."""

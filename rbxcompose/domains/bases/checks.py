@@ -1,0 +1,324 @@
+"""Rules about bases: speeds, wheels, brakes, and where the base is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.findings import Finding, FindingKind, Related, Severity
+from rbxcompose.base.rules import NAMES, WIRING
+from rbxcompose.base.units import ANGULAR_SPEED, LENGTH, SPEED, TIME, Dimension, format_quantity
+from rbxcompose.compiler.check_runner import check
+from rbxcompose.compiler.model.flow import OTHER_TYPE, Drive, MessageFlow, is_written, period_of, setting_span
+from rbxcompose.compiler.model.robot import PortEnd, Robot
+from rbxcompose.domains.bases.body_wheels import BodyWheel, differs, rolling_bases
+from rbxcompose.domains.power.charge import constants
+from rbxcompose.domains.servos.sections.joints import joints
+from rbxcompose.missions.analysis.effects import published
+from rbxcompose.missions.analysis.facts import number_of
+from rbxcompose.missions.program.machines import TemplateShape, WrittenValue
+from rbxcompose.msgs.geometry_msgs import Twist
+from rbxcompose.sdk.capabilities import Drives, Setting, WritesFrame
+from rbxcompose.sdk.ports import Looks
+
+
+@check("RBX3503", Severity.WARNING, closed=(WIRING, NAMES))
+def clamped_speed(robot: Robot) -> Iterator[Finding]:
+    """A component drives faster than its base can."""
+    for excess in excesses(robot):
+        if not excess.is_absurd:
+            yield excess.finding(robot, clamped_speed, f"can do {excess.shown(excess.limit)} at most")
+
+
+@dataclass(frozen=True, slots=True)
+class Excess:
+    """A setting of a component that exceeds the limit of the base it drives."""
+
+    drive: Drive
+    wanted: Setting[float]
+    limit: Setting[float]
+    dimension: Dimension
+
+    @property
+    def is_absurd(self) -> bool:
+        """Return whether the base ignores such commands instead of clamping them."""
+        factor = self.drive.drives.drops_above
+        return factor is not None and self.wanted.value > factor.value * self.limit.value
+
+    def shown(self, setting: Setting[float]) -> str:
+        """Return the value of one of the settings, formatted for people."""
+        return format_quantity(setting.value, self.dimension)
+
+    @property
+    def times(self) -> str:
+        """Return, in words, the multiple of its limit up to which the base accepts commands."""
+        factor = self.drive.drives.drops_above
+        return "twice" if factor is None or factor.value == 2.0 else f"{factor.value:g} times"
+
+    @property
+    def remedy(self) -> str:
+        """Return how to correct it."""
+        if self.wanted.field:
+            return f"make '{self.wanted.field}' of '{self.drive.driver.name}' at most {self.shown(self.limit)}"
+        if self.limit.field:
+            return f"make '{self.limit.field}' of '{self.drive.base.name}' at least {self.shown(self.wanted)}"
+        return OTHER_TYPE
+
+    def finding(self, robot: Robot, kind: FindingKind, what: str) -> Finding:
+        """Return the finding; `what` says how the base reacts."""
+        driver, base, name = self.drive.driver, self.drive.base, self.limit.field
+        there = (base, name)
+        span, limit = setting_span(robot, (driver, self.wanted.field), there), setting_span(robot, there)
+        return kind.at(
+            span,
+            f"'{driver.name}' drives at {self.shown(self.wanted)}, but its base '{base.name}' {what}",
+            help=self.remedy,
+            related=[Related(limit, f"'{name}' of the base" if name else "the base")] if limit != span else [],
+        )
+
+
+def excesses(robot: Robot) -> Iterator[Excess]:
+    """Yield the speeds and turn rates that exceed the limits of the base they drive."""
+    for drive in MessageFlow(robot).drives():
+        wants, has = drive.commands, drive.drives
+        speeds = (wants.max_speed, has.max_speed, SPEED), (wants.max_turn_rate, has.max_turn_rate, ANGULAR_SPEED)
+        for wanted, limit, dimension in speeds:
+            if wanted and limit and wanted.value > limit.value:
+                yield Excess(drive, wanted, limit, dimension)
+
+
+@check("RBX3501")
+def command_timeout(robot: Robot) -> Iterator[Finding]:
+    """A base brakes between two commands."""
+    flow = MessageFlow(robot)
+    for base, drives in robot.declared(Drives):
+        allowed = drives.stops_after
+        for source in flow.fed_by(base, drives.commands) if allowed else ():
+            period = period_of(robot.components[source.instance])
+            if allowed and period is not None and allowed.value <= period:
+                yield command_timeout.at(
+                    setting_span(robot, (base, allowed.field)),
+                    f"'{base.name}' brakes before '{source.instance}' sends its next command",
+                    label=f"it sends every {format_quantity(period, TIME)}",
+                    help=f"make it several times as long: '{format_quantity(10 * period, TIME)}'"
+                    if allowed.field
+                    else OTHER_TYPE,
+                    related=[Related(robot.component_span(source.instance), "sends the commands")],
+                )
+
+
+LONGEST = 10.0  # [s]: commands come many times a second
+FARTHEST = 2.0  # [m] driven blind; the usual 0.5 s are that far at 4 m/s only
+
+
+@check("RBX3509", Severity.WARNING, closed=())
+def late_brake(robot: Robot) -> Iterator[Finding]:
+    """A base goes on long after the last command."""
+    for base, drives in robot.declared(Drives):
+        allowed = drives.stops_after
+        is_chosen = allowed is not None and is_written(robot, base, allowed.field)
+        blind = allowed.value * drives.max_speed.value if allowed and drives.max_speed and is_chosen else 0.0
+        if allowed and (allowed.value > LONGEST or blind > FARTHEST):
+            shown = "without end" if math.isinf(allowed.value) else f"for {format_quantity(allowed.value, TIME)}"
+            if 0.0 < blind < math.inf:
+                shown += f", {format_quantity(blind, LENGTH)} at full speed,"
+            yield late_brake.at(
+                setting_span(robot, (base, allowed.field)),
+                f"'{base.name}' goes on {shown} after its last command",
+                help="a few times the time between two commands is enough, such as '0.5 s'"
+                if allowed.field
+                else OTHER_TYPE,
+            )
+
+
+@check("RBX2282", Severity.WARNING, closed=(WIRING,))
+def wheel_sides(robot: Robot) -> Iterator[Finding]:
+    """A wheel is on the other side, or turns backwards."""
+    for base in rolling_bases(robot):
+        component, left = base.component, base.left
+        if base.wheel_distance < 0.0:
+            yield wheel_sides.at(
+                setting_span(robot, (component, left.setting.field)),
+                f"in the body, the left wheel '{left.joint.name}' is to the right of '{base.right.joint.name}'",
+                help="exchange 'left' and 'right'",
+                related=[Related(left.joint.span, "the wheel")],
+            )
+        for wheel in base.wheels:
+            if wheel.axis[1] < 0.0:
+                yield wheel_sides.at(
+                    setting_span(robot, (component, wheel.setting.field)),
+                    f"the axis of '{wheel.joint.name}' points to the right: its positive direction is backwards",
+                    help="turn the axis round in the URDF; if it runs backwards then, change 'invert' of its actuator",
+                    related=[Related(wheel.joint.axis_span or wheel.joint.span, "the axis")],
+                )
+
+
+ROUNDING = 1e-3  # of a speed
+
+
+@check("RBX2283", Severity.WARNING, closed=(WIRING,))
+def wheel_speed(robot: Robot) -> Iterator[Finding]:
+    """A base is to be faster than its wheels can turn."""
+    for base in rolling_bases(robot):
+        rolls, slowest = base.rolls, min(base.wheels, key=lambda wheel: _limit(robot, wheel))
+        limit = _limit(robot, slowest)
+        if rolls.wheel_radius is None or math.isinf(limit) or base.has_other_radius:
+            continue  # with the right radius, which RBX2281 asks for, the speeds are others, too
+        fastest = limit * rolls.wheel_radius.value
+        for drives in base.component.declared(Drives):
+            rate = fastest / (rolls.wheel_distance.value / 2.0)
+            speeds: list[tuple[Setting[float] | None, float, Dimension]] = [
+                (drives.max_speed, fastest, SPEED),
+                (drives.max_turn_rate, rate, ANGULAR_SPEED),
+            ]
+            for setting, most, dimension in speeds:
+                if setting and setting.value > most * (1.0 + ROUNDING):
+                    wanted, can = format_quantity(setting.value, dimension), format_quantity(most, dimension)
+                    turning = format_quantity(limit, ANGULAR_SPEED)
+                    yield wheel_speed.at(
+                        setting_span(robot, (base.component, setting.field)),
+                        f"it is to reach {wanted}, and its wheels, which turn at {turning} at most, reach {can}",
+                        help=f"make it at most {can}",
+                        related=[Related(slowest.joint.span, "the wheel")],
+                    )
+
+
+def _limit(robot: Robot, wheel: BodyWheel) -> float:
+    """Return how fast a wheel may turn [rad/s], infinite if nothing limits it."""
+    driven, limits = robot.manifest.contents.of(joints).get(wheel.joint.name), wheel.joint.limits
+    own = driven.limits.velocity.value if driven and driven.limits.velocity else math.inf
+    return min(own, limits.velocity if limits and limits.velocity is not None else math.inf)
+
+
+@check("RBX2281", Severity.WARNING, closed=(WIRING,))
+def wheels_of_body(robot: Robot) -> Iterator[Finding]:
+    """The wheels of a base are others than those of its body."""
+    for base in rolling_bases(robot):
+        rolls, left = base.rolls, base.left
+        lengths = [("wheels are %s apart", rolls.wheel_distance, abs(base.wheel_distance))]
+        if rolls.wheel_radius and left.radius is not None:
+            lengths.append(("wheels have a radius of %s", rolls.wheel_radius, left.radius))
+        for words, setting, length in lengths:
+            if differs(setting, length):
+                wanted, there = format_quantity(setting.value, LENGTH), format_quantity(length, LENGTH)
+                yield wheels_of_body.at(
+                    setting_span(robot, (base.component, setting.field)),
+                    f"the {words % wanted}, in the body {there}",
+                    help="measure them, and correct the one that is wrong",
+                    related=[Related(left.joint.span, "the left wheel")],
+                )
+
+
+@check("RBX3013", closed=(WIRING,))
+def two_bases(robot: Robot) -> Iterator[Finding]:
+    """Two bases follow the same commands."""
+    for topic, ends in robot.readers.items():
+        bases = [end for end in ends if _moves(robot, end)]
+        for other in bases[1:]:
+            yield two_bases.at(
+                robot.entry_span(other.instance, other.name),
+                f"'{other.instance}' and '{bases[0].instance}' are both bases that follow '{topic}'",
+                label="this one",
+                help="a robot has one base: remove one of them",
+                related=[Related(robot.entry_span(bases[0].instance, bases[0].name), "and this one")],
+            )
+
+
+def _moves(robot: Robot, end: PortEnd) -> bool:
+    """Return whether commands received at this end move the robot."""
+    return any(end.name == drives.commands for drives in robot.components[end.instance].declared(Drives))
+
+
+@check("RBX2286", Severity.WARNING, closed=(WIRING, NAMES))
+def unplaced_base(robot: Robot) -> Iterator[Finding]:
+    """Somebody looks up where the robot is, and nobody tells."""
+    description, bases = robot.manifest.body, robot.declared(Drives)
+    if description is None or not description.body.links or not bases:
+        return
+    links, root = description.body.links, description.body.root
+    placed = {frame.child.value for _, frame in robot.declared(WritesFrame)}
+    if root in placed or any(base.declared(WritesFrame) for base, _ in bases):
+        return  # a base that moves another frame is told as RBX2019
+    base, drives = bases[0]
+    for component in robot.components.values():
+        for port in (end.port for end in component.ends):
+            if isinstance(port, Looks) and port.source in links and port.target not in links:
+                yield unplaced_base.at(
+                    robot.entry_span(base.name, drives.commands),
+                    f"nobody tells where '{port.source}' is in '{port.target}', and '{component.name}' looks it up",
+                    help="let the base publish its frame, or add what localises the robot",
+                    related=[Related(robot.entry_span(component.name), "it looks it up")],
+                )
+                return
+
+
+@check("RBX2352", Severity.WARNING, closed=(WIRING, NAMES))
+def untold_frame(robot: Robot) -> Iterator[Finding]:
+    """Nobody tells where the robot is in the frame of its virtual joint."""
+    description = robot.manifest.body
+    if description is None or description.virtual is None or description.virtual.kind == "fixed":
+        return
+    joint, root = description.virtual, description.body.root
+    above = {frame.child.value: frame.parent.value for _, frame in robot.declared(WritesFrame)}
+    told, link = dict[str, None](), root
+    while (link := above.get(link, "")) and link not in told:
+        told[link] = None
+    if joint.frame not in told:
+        names = " or ".join(f"'frame: {name}'" for name in told)
+        yield untold_frame.at(
+            joint.frame_span,
+            f"nobody tells where '{root}' is in '{joint.frame}'",
+            help=f"write {names}" if told else "write 'type: fixed' if it stands still, or add what localises it",
+            related=[Related(description.body.links[root].span, "the root of the body")],
+        )
+
+
+_FIELDS = {("linear", "x"): ("max_speed", SPEED, "m/s"), ("angular", "z"): ("max_turn_rate", ANGULAR_SPEED, "rad/s")}
+
+
+@check("RBX4172", closed=(WIRING, NAMES))
+def dropped_message(robot: Robot) -> Iterator[Finding]:
+    """A mission publishes a velocity that the base ignores."""
+    limits = {key: _dropped_above(robot, name) for key, (name, _, _) in _FIELDS.items()}
+    for mission in robot.missions.values() if not all(map(math.isinf, limits.values())) else ():
+        sent = (message for node in mission.program.nodes for message in published(node))
+        for message in sent:
+            topic = robot.topics.get(message.target.text)
+            for (outer, inner), limit in limits.items() if topic and topic.message == Twist.TYPE else ():
+                written = _at(_at(message.body, outer), inner)
+                value = _number(written, constants(mission))
+                if isinstance(written, WrittenValue) and value is not None and abs(value) > limit:
+                    _, dimension, unit = _FIELDS[outer, inner]
+                    most, is_turn = format_quantity(limit, dimension, unit), dimension is ANGULAR_SPEED
+                    yield dropped_message.at(
+                        written.scalar.span,
+                        f"the base ignores commands above {most}, and this is {value:g} {unit}",
+                        help=f"for {value:g} deg/s, write {math.radians(value):.3g}" if is_turn else "",
+                    )
+
+
+def _dropped_above(robot: Robot, name: str) -> float:
+    """Return above which velocity every base ignores a command, infinite if one does not."""
+    found = [math.inf]
+    for _, drives in robot.declared(Drives):
+        limit: Setting[float] | None = getattr(drives, name)
+        found.append(limit.value * drives.drops_above.value if limit and drives.drops_above else math.inf)
+    return max(found[1:], default=math.inf)
+
+
+def _at(shape: TemplateShape | None, key: str) -> TemplateShape | None:
+    return shape.get(key) if isinstance(shape, Mapping) else None
+
+
+def _number(shape: TemplateShape | None, known: Mapping[str, object]) -> float | None:
+    return number_of(shape.expression, known) if isinstance(shape, WrittenValue) else None
+
+
+@check("RBX3504")
+def absurd_speed(robot: Robot) -> Iterator[Finding]:
+    """A component drives so fast that its base drops the commands."""
+    for excess in excesses(robot):
+        if excess.is_absurd:
+            drops = f"drops commands above {excess.times} its limit of {excess.shown(excess.limit)}"
+            yield excess.finding(robot, absurd_speed, drops)

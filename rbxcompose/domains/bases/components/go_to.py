@@ -1,0 +1,161 @@
+"""Driving to a pose without a map of obstacles."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import partial
+from typing import Annotated
+
+from pydantic import Field
+
+from rbxcompose.base.geometry import AT_REST, Pose2, Velocity2, yaw_of
+from rbxcompose.domains.bases.driving import GoToCore, GoToSettings, least_time
+from rbxcompose.msgs.geometry_msgs import PoseStamped, Twist, Vector3
+from rbxcompose.msgs.nav2_msgs import NavigateToPose
+from rbxcompose.sdk import (
+    Angle,
+    AngularSpeed,
+    Capability,
+    CommandsMotion,
+    Component,
+    Config,
+    Drives,
+    Length,
+    Live,
+    Looks,
+    Navigates,
+    Out,
+    ServedGoal,
+    ServesAction,
+    Setting,
+    Speed,
+    component,
+)
+
+MAP = "map"
+FARTHEST = 100_000.0  # [m] from the origin; no map is as large
+
+
+class GoToConfig(Config):
+    """How to drive."""
+
+    speed: Annotated[Speed, Live()] = Field(0.3, gt=0)
+    """Largest speed forwards."""
+    turn_rate: Annotated[AngularSpeed, Live()] = Field(math.radians(60), gt=0)
+    """Largest turn rate."""
+    tolerance: Annotated[Length, Live()] = Field(0.05, gt=0)
+    """How far from the goal the base may end."""
+    heading_tolerance: Annotated[Angle, Live()] = Field(math.radians(3), gt=0)
+    """How far from the goal's heading it may end."""
+
+
+@component("go_to")
+class GoTo(Component[GoToConfig]):
+    """Drives to a pose in `map`: turns to it, drives straight, turns to its heading.
+
+    Example:
+        go_to: {type: go_to, speed: 0.3 m/s}
+    """
+
+    rate = 20.0
+    steps_for_goals = True
+    cmd_vel = Out(Twist, "cmd_vel", qos="command")
+    pose = Looks(source="base_footprint", target=MAP)
+    go_to = ServesAction(NavigateToPose, "go_to", claims="base")
+
+    @classmethod
+    def capabilities(cls, config: GoToConfig) -> tuple[Capability, ...]:
+        """Declare how fast it drives and how near it comes."""
+        speed, turn_rate = Setting(config.speed, "speed"), Setting(config.turn_rate, "turn_rate")
+        tolerance = Setting(config.tolerance, "tolerance")
+        return CommandsMotion("cmd_vel", speed, turn_rate), Navigates(
+            "go_to", tolerance, least_time=partial(fastest, settings_of(config))
+        )
+
+    def configure(self) -> None:
+        """Build the core."""
+        self.core = GoToCore(settings_of(self.config))
+        self.driving: object = None  # the goal that the core drives to
+
+    def reconfigure(self, old: GoToConfig) -> None:
+        """Continue to the current goal with the new settings."""
+        self.core.settings = settings_of(self.config)
+
+    def accept_go_to(self, goal: NavigateToPose.Goal) -> str:
+        """Refuse a goal in another frame, or one that is no valid pose."""
+        frame, at = goal.pose.header.frame_id, goal.pose.pose.position
+        if frame not in ("", MAP):
+            return f"a goal must be given in '{MAP}', not in '{frame}'"
+        if not (math.isfinite(at.x) and math.isfinite(at.y)):
+            return "the goal is not a finite pose"
+        return "" if math.hypot(at.x, at.y) <= FARTHEST else f"the goal is farther than {FARTHEST / 1000:g} km away"
+
+    def step(self, dt: float) -> None:
+        """Continue towards the goal."""
+        goal = self.go_to.current
+        if goal is None:
+            self.driving = None
+            return
+        pose = self.pose.now()
+        if goal.cancel_requested:
+            self.drive(AT_REST)
+            goal.canceled()
+        elif pose is None:
+            self.drive(AT_REST)
+            goal.aborted(f"the position of the base is unknown in '{MAP}'")
+        else:
+            self.follow(goal, pose, dt)
+
+    def follow(
+        self,
+        goal: ServedGoal[NavigateToPose.Goal, NavigateToPose.Result, NavigateToPose.Feedback],
+        pose: Pose2,
+        dt: float,
+    ) -> None:
+        """Command the base for one cycle and report the remaining distance."""
+        if goal is not self.driving:
+            self.driving = goal
+            self.core.start(pose_of(goal.request.pose))
+        velocity, done = self.core.update(pose, dt)
+        self.drive(velocity)
+        if done:
+            goal.succeeded()
+        elif self.core.stuck:
+            self.drive(AT_REST)
+            goal.aborted("the base gets no closer")
+        else:
+            goal.feedback(NavigateToPose.Feedback(distance_remaining=self.core.distance))
+
+    def hold(self) -> None:
+        """Command a halt: no step follows while robot time stands still."""
+        if self.driving is not None:
+            self.drive(AT_REST)
+
+    def drive(self, velocity: Velocity2) -> None:
+        """Publish a velocity."""
+        self.cmd_vel(Twist(linear=Vector3(x=velocity.linear), angular=Vector3(z=velocity.angular)))
+
+
+def fastest(settings: GoToSettings, start: Pose2, goal: Pose2, base: Drives | None) -> float:
+    """Return the least time of a drive on a base [s]."""
+    limits = (base.max_speed, base.max_turn_rate, base.acceleration, base.turn_acceleration) if base else (None,) * 4
+    speed, turn_rate, acceleration, turn_acceleration = (limit.value if limit else math.inf for limit in limits)
+    settings = replace(settings, speed=min(speed, settings.speed), turn_rate=min(turn_rate, settings.turn_rate))
+    return least_time(start, goal, settings, acceleration=acceleration, turn_acceleration=turn_acceleration)
+
+
+def settings_of(config: GoToConfig) -> GoToSettings:
+    """Return the settings of the core."""
+    return GoToSettings(
+        speed=config.speed,
+        turn_rate=config.turn_rate,
+        distance_tolerance=config.tolerance,
+        heading_tolerance=config.heading_tolerance,
+    )
+
+
+def pose_of(message: PoseStamped) -> Pose2:
+    """Return the planar pose of a pose message."""
+    at, turn = message.pose.position, message.pose.orientation
+    return Pose2(at.x, at.y, yaw_of((turn.x, turn.y, turn.z, turn.w)))

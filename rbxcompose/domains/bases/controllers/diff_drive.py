@@ -1,0 +1,291 @@
+"""A base on two driven wheels."""
+
+from __future__ import annotations
+
+import math
+from types import MappingProxyType
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from rbxcompose.base.config import AngularJerk, Config, Jerk, JointName, LinkName
+from rbxcompose.base.geometry import Transform3, Velocity2
+from rbxcompose.domains.bases.wheels import ABSURD, BaseLimits, OdometryPolicy, WheelDrive, WheelGeometry, WheelOdometry
+from rbxcompose.domains.servos.controller import ControlledJoint, Controller, ControllerConfig, controller
+from rbxcompose.manifest.fields import TopicName
+from rbxcompose.msgs import geometry_msgs as geometry
+from rbxcompose.msgs.nav_msgs import Odometry
+from rbxcompose.msgs.stamps import to_time
+from rbxcompose.msgs.std_msgs import Header
+from rbxcompose.msgs.tf2_msgs import TFMessage
+from rbxcompose.sdk import (
+    Acceleration,
+    AngularAcceleration,
+    AngularSpeed,
+    Capability,
+    Drives,
+    In,
+    Length,
+    Out,
+    Port,
+    RollsOn,
+    Setting,
+    Speed,
+    Time,
+    WritesFrame,
+)
+
+AVERAGED = 0.1  # [s], over which velocities are told
+JUMP = 2.0  # times the largest speed of a wheel: a servo that has started again counts from elsewhere
+STALE = 3.0  # cycles after which nobody knows where a wheel is
+UNKNOWN = 1e6  # variance of what wheels cannot tell: height, roll, pitch
+PLANAR = (0, 1, 5)  # x, y, and the turn about z, of the six that a covariance has
+
+
+class OdometryConfig(Config):
+    """What is told of the way of the base."""
+
+    topic: TopicName = "odom"
+    """Where poses and velocities are published."""
+    frame: str = "odom"
+    """The frame in which the poses are."""
+    child: LinkName = "base_footprint"
+    """The link of the body that moves with the base."""
+    tf: bool = True
+    """Whether its pose is also among the frames; not, if something else places it."""
+    variance_per_metre: float = Field(1e-4, gt=0)
+    """How uncertain the way of a wheel becomes [m^2/m]."""
+
+
+class DiffDriveConfig(ControllerConfig):
+    """Leads the two wheels of a base."""
+
+    type: Literal["diff_drive"] = "diff_drive"
+    """How it leads its joints."""
+    left: JointName
+    """The joint of the left wheel; forwards is positive."""
+    right: JointName
+    """The joint of the right wheel; forwards is positive."""
+    wheel_radius: Length | None = Field(None, gt=0)
+    """Radius of the wheels."""
+    ticks_per_metre: float | None = Field(None, gt=0)
+    """Ticks of a wheel's servo for each metre of way, instead of a radius."""
+    wheel_distance: Length = Field(gt=0)
+    """Between the points where the wheels touch the ground."""
+    commands: TopicName = "cmd_vel"
+    """The topic of its commands."""
+    command_timeout: Time = Field(0.5, ge=0)
+    """The base brakes when no command arrives for this long; 0 is never."""
+    max_speed: Speed = Field(0.5, gt=0)
+    """Largest speed, forwards and backwards."""
+    max_turn_rate: AngularSpeed = Field(math.pi / 2, gt=0)
+    """Largest turn rate."""
+    acceleration: Acceleration = Field(1.0, gt=0)
+    """Acceleration when speeding up and braking."""
+    turn_acceleration: AngularAcceleration = Field(3.0, gt=0)
+    """Acceleration when starting and stopping to turn."""
+    jerk: Jerk | None = Field(None, gt=0)
+    """Largest change of the acceleration."""
+    turn_jerk: AngularJerk | None = Field(None, gt=0)
+    """Largest change of the acceleration of a turn."""
+    odometry: OdometryConfig = OdometryConfig()
+    """What is told of its way."""
+
+    @property
+    def claimed(self) -> tuple[str, ...]:
+        """Return the joints that it leads."""
+        return self.left, self.right
+
+
+@controller("diff_drive")
+class DiffDriveController(Controller[DiffDriveConfig]):
+    """Drives a base on two wheels by `cmd_vel`, and tells its way by `odom` and among the frames.
+
+    What is too fast is slowed down as a whole, so that the curvature is kept. Without commands, at a stop, or when a
+    wheel fails, the base brakes within its limits. Its wheels have no torque before the first command.
+
+    Example:
+        wheels: {type: diff_drive, left: left_wheel, right: right_wheel, wheel_radius: 4 cm, wheel_distance: 26 cm}
+    """
+
+    interface = "velocity"
+    kinds = frozenset({"continuous"})
+    topics = MappingProxyType({"commands": "commands", "odometry": "odometry.topic"})
+
+    @classmethod
+    def ports(cls, name: str, config: DiffDriveConfig) -> dict[str, Port[Any]]:
+        """Return its commands, and what it tells."""
+        told = config.odometry
+        ports: dict[str, Port[Any]] = {
+            "commands": In(geometry.Twist, config.commands, qos="command"),
+            "odometry": Out(Odometry, told.topic),
+        }
+        return {**ports, "tf": Out(TFMessage, "/tf")} if told.tf else ports
+
+    @classmethod
+    def capabilities(cls, name: str, config: DiffDriveConfig) -> tuple[Capability, ...]:
+        """Declare its limits, its wheels and the frame that it moves."""
+        told, timeout = config.odometry, config.command_timeout
+        base = Drives(
+            "commands",
+            "odometry",
+            max_speed=Setting(config.max_speed, "max_speed"),
+            max_turn_rate=Setting(config.max_turn_rate, "max_turn_rate"),
+            drops_above=Setting(ABSURD),
+            stops_after=Setting(timeout or math.inf, "command_timeout"),
+            acceleration=Setting(config.acceleration, "acceleration"),
+            turn_acceleration=Setting(config.turn_acceleration, "turn_acceleration"),
+        )
+        radius = config.wheel_radius
+        wheels = RollsOn(
+            Setting(config.left, "left"),
+            Setting(config.right, "right"),
+            Setting(config.wheel_distance, "wheel_distance"),
+            Setting(radius, "wheel_radius") if radius else None,
+            Setting(told.child, "odometry.child"),
+        )
+        frame = WritesFrame("tf", Setting(told.frame, "odometry.frame"), Setting(told.child, "odometry.child"))
+        if config.start == "inactive":
+            return (wheels,)  # another one drives, which may have the same commands and frames
+        return (base, wheels, frame) if told.tf else (base, wheels)
+
+    @classmethod
+    def mistake(cls, config: DiffDriveConfig) -> tuple[str, str] | None:
+        """Return what contradicts itself."""
+        if config.left == config.right:
+            return "right", f"'{config.right}' is its left and its right wheel"
+        if config.wheel_radius is None and config.ticks_per_metre is None:
+            return "type", "it needs 'wheel_radius' or 'ticks_per_metre'"
+        if config.wheel_radius is not None and config.ticks_per_metre is not None:
+            return "ticks_per_metre", "it has 'wheel_radius' and 'ticks_per_metre', and only one of them can be right"
+        if config.odometry.frame == config.odometry.child:
+            return "odometry", f"the frame '{config.odometry.frame}' cannot move in itself"
+        return None
+
+    def prepare(self) -> None:
+        """Set up limits and odometry."""
+        config, joints = self.config, self.site.joints
+        self.wheels: tuple[ControlledJoint, ControlledJoint] = (joints[config.left], joints[config.right])
+        tick = self.wheels[0].per_tick
+        radius = config.wheel_radius or 1.0 / ((config.ticks_per_metre or math.nan) * tick)
+        rolling = WheelGeometry.of_radius(radius, config.wheel_distance)
+        limits = BaseLimits(
+            config.max_speed,
+            config.max_turn_rate,
+            config.acceleration,
+            config.turn_acceleration,
+            config.jerk,
+            config.turn_jerk,
+        )
+        own = [wheel.rules.limits for wheel in self.wheels]
+        least = min(
+            (motion_limits.acceleration for motion_limits in own if motion_limits.acceleration is not None),
+            default=math.inf,
+        )
+        self.drive = WheelDrive(
+            rolling,
+            limits.of_wheels(rolling, least),
+            config.command_timeout,
+            min(motion_limits.speed for motion_limits in own),
+        )
+        fastest = rolling.fastest(Velocity2(config.max_speed, config.max_turn_rate)) * radius
+        policy = OdometryPolicy(config.odometry.variance_per_metre, JUMP * fastest, radius * tick, AVERAGED)
+        self.odometry = WheelOdometry(rolling, policy)
+        self.seen = -math.inf  # when both wheels had been measured last [s]
+        self.refused = self.trouble = ""
+
+    @property
+    def leads(self) -> bool:
+        """Return whether the base moves or is about to."""
+        return self.drive.is_commanded or not self.drive.at_rest
+
+    @property
+    def note(self) -> str:
+        """Return why it does not do as it is told."""
+        return self.trouble or self.refused
+
+    def received(self, port: str, message: geometry.Twist) -> None:
+        """Take a command; forwards and the turn count."""
+        before = self.drive.clamped
+        self.drive.wheel_speed = min(wheel.rules.limits.speed for wheel in self.wheels)  # servos may take less
+        refusal = self.drive.command(Velocity2(message.linear.x, message.angular.z), self.site.now)
+        cut = "commands are cut to its limits" if self.drive.clamped > before else ""
+        self.refused = f"a command was refused: {refusal}" if refusal else cut
+
+    def cycle(self, now: float, dt: float) -> None:
+        """Measure the way, and lead the wheels."""
+        self._measure()
+        was_at_rest = self.drive.at_rest
+        if trouble := self._trouble(now, dt):
+            self.trouble = trouble
+            self.drive.brake()
+        elif was_at_rest:
+            self.trouble = ""
+            self.drive.release()
+        speeds = self.drive.step(now, dt)
+        if was_at_rest and self.drive.at_rest:
+            return
+        for wheel, speed in zip(self.wheels, (speeds.left, speeds.right), strict=True):
+            if was_at_rest or wheel.has_torque:
+                wheel.turn(speed)
+        if not was_at_rest and not any(wheel.has_torque for wheel in self.wheels):
+            self.drive.rest()  # they roll as they like
+
+    def halt(self, now: float, reason: str) -> None:
+        """Brake, until the next command."""
+        self.drive.forget()
+
+    def _trouble(self, now: float, dt: float) -> str:
+        """Return why the base cannot drive; empty if it can."""
+        for name, wheel in self.site.joints.items():
+            if wheel.blocked:
+                return f"wheel '{name}': {wheel.blocked}"
+            if now - wheel.measured_at > STALE * dt:
+                return f"wheel '{name}' does not tell where it is"
+            if not self.drive.at_rest and not wheel.has_torque:
+                return f"wheel '{name}' was relaxed"
+        return ""
+
+    def _measure(self) -> None:
+        """Add up the way, unless a wheel is not seen: its way then counts when it is."""
+        left, right = self.wheels
+        seen = min(left.measured_at, right.measured_at)
+        if seen > self.seen:
+            self.seen = seen
+            if reason := self.odometry.update(left.measured.position, right.measured.position, seen):
+                self.site.warn(reason)
+
+    def publish(self) -> None:
+        """Publish where the base is, and how it moves."""
+        told, known = self.config.odometry, self.odometry
+        header = Header(stamp=to_time(self.site.stamp), frame_id=told.frame)
+        at = Transform3.from_pose2(known.pose)
+        x, y, z = at.translation
+        turn = geometry.Quaternion(*at.rotation)
+        pose = geometry.Pose(position=geometry.Point(x, y, z), orientation=turn)
+        velocity = known.velocity
+        twist = geometry.Twist(linear=geometry.Vector3(x=velocity.linear), angular=geometry.Vector3(z=velocity.angular))
+        spread = np.zeros((3, 3))
+        spread[np.ix_((0, 2), (0, 2))] = known.velocity_covariance  # a wheel does not slip sideways
+        self.site.send(
+            "odometry",
+            Odometry(
+                header=header,
+                child_frame_id=told.child,
+                pose=geometry.PoseWithCovariance(pose=pose, covariance=planar(known.covariance)),
+                twist=geometry.TwistWithCovariance(twist=twist, covariance=planar(spread)),
+            ),
+        )
+        if told.tf:
+            placed = geometry.Transform(translation=geometry.Vector3(x, y, z), rotation=turn)
+            link = geometry.TransformStamped(header=header, child_frame_id=told.child, transform=placed)
+            self.site.send("tf", TFMessage(transforms=(link,)))
+
+
+def planar(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the 36 numbers of a covariance of x, y and the turn about z; the others are unknown."""
+    whole = np.diag([UNKNOWN] * 6)
+    whole[np.ix_(PLANAR, PLANAR)] = covariance
+    return whole.ravel()

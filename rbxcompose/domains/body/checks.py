@@ -1,0 +1,122 @@
+"""Rules about frames of the body."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.findings import Finding, Related, Severity, Span, suggest
+from rbxcompose.base.rules import NAMES, WIRING
+from rbxcompose.compiler.check_runner import check
+from rbxcompose.compiler.model.flow import is_written, setting_span
+from rbxcompose.compiler.model.robot import PortEnd, Robot, RobotComponent
+from rbxcompose.domains.body.model import Body
+from rbxcompose.sdk.capabilities import Drives, Setting, WritesFrame
+from rbxcompose.sdk.ports import Looks
+
+
+@check("RBX2019", Severity.WARNING, closed=(WIRING,))
+def frame_of_body(robot: Robot) -> Iterator[Finding]:
+    """A component uses a frame that the body does not have."""
+    description = robot.manifest.body
+    if description is None or not description.body.links:
+        return
+    body = description.body
+    placed = {
+        frame
+        for _, writes_frame in robot.declared(WritesFrame)
+        for frame in (writes_frame.parent.value, writes_frame.child.value)
+    }
+    placed |= {description.virtual.frame} if description.virtual else set()  # RBX2352
+    for component in robot.components.values():
+        for frame in component.declared(WritesFrame) if component.declared(Drives) else ():
+            if frame.child.value not in body.links:
+                message = f"this moves the frame '{frame.child.value}', which the body does not have"
+                mover = robot.entry_span(component.name, frame.transforms)
+                is_own = is_written(robot, component, frame.child.field)
+                place = setting_span(robot, (component, frame.child.field)) if is_own else mover
+                yield _finding(body, place, message, _other_root(body, frame.child))
+        for port in (end.port for end in component.ends):
+            for name in (port.source, port.target) if isinstance(port, Looks) else ():
+                if name not in placed and name not in body.links:
+                    message = f"'{component.name}' looks up the frame '{name}', which nobody places"
+                    help_text = suggest(name, body.links, "its links")
+                    yield _finding(body, robot.entry_span(component.name), message, help_text)
+
+
+def _other_root(body: Body, moved: Setting[str]) -> str:
+    *_, section, key = ("", *moved.field.split("."))
+    named = f"write '{key}: {body.root}' below '{section}', or " if section and key else ""
+    return f"{named}call the root '{moved.value}'"
+
+
+def _finding(body: Body, place: Span, message: str, help_text: str) -> Finding:
+    root = body.links[body.root]
+    root_is = [Related(root.span, f"the root of the body is '{root.name}'")]
+    return frame_of_body.at(place, message, help=help_text, related=root_is)
+
+
+STATIC = "_static"  # suffix of the topic of static transforms; both topics describe one tree
+
+
+@check("RBX3014", Severity.WARNING, closed=(WIRING, NAMES))
+def one_frame_two_writers(robot: Robot) -> Iterator[Finding]:
+    """Two components write the pose of the same frame."""
+    first: dict[tuple[str, str], FrameWriter] = {}
+    for writer in sorted(_writers(robot), key=lambda frame_writer: frame_writer.component.name in robot.written):
+        other = first.setdefault((writer.end.topic.removesuffix(STATIC), writer.frame.child.value), writer)
+        if other.end is not writer.end:
+            name = writer.component.name
+            connection = robot.connection([(writer.end, f"{name}/tf")])
+            remedy = f", or use another topic: {connection}" if connection else ""
+            yield one_frame_two_writers.at(
+                writer.span(robot),
+                f"'{name}' and '{other.component.name}' both write the pose of the frame '{writer.frame.child.value}'",
+                help=_of_body(robot, writer.frame) or f"remove one of them{remedy}",
+                related=list(_related(robot, other)),
+            )
+
+
+def _related(robot: Robot, other: FrameWriter) -> Iterator[Related]:
+    body = robot.manifest.body
+    if other.component.name in robot.written:
+        yield Related(other.span(robot), "the other one")
+    elif body is not None and body.virtual is not None and other.frame.parent.value == body.body.frame:
+        yield Related(body.virtual.frame_span, "the virtual joint")
+
+
+def _of_body(robot: Robot, written: WritesFrame) -> str:
+    """Return what helps if a frame hangs on another one in the body: the root of the body is what moves."""
+    body, child = robot.manifest.body.body if robot.manifest.body else None, written.child
+    if body is not None and body.frame and child.value == body.own_root:
+        moving = f"write 'type: planar' and 'frame: {written.parent.value}' there, or leave it out"
+        return f"the virtual joint of the body fixes it in '{body.frame}': {moving}"
+    if body is None or child.value not in body.joint_above or not child.field:
+        return ""
+    above = body.joint_above[child.value].parent
+    key = child.field.rpartition(".")[-1]
+    return f"it hangs on '{above}' in the body: write '{key}: {body.root}', the root of the body"
+
+
+@dataclass(frozen=True, slots=True)
+class FrameWriter:
+    """A component that writes a frame, and the port it uses for that."""
+
+    component: RobotComponent
+    frame: WritesFrame
+    end: PortEnd
+
+    def span(self, robot: Robot) -> Span:
+        """Return the place of the frame's name if it is written, else that of the entry that brings the component."""
+        component, field = self.component, self.frame.child.field
+        return (
+            setting_span(robot, (component, field))
+            if is_written(robot, component, field)
+            else robot.entry_span(component.name, self.end.name)
+        )
+
+
+def _writers(robot: Robot) -> Iterator[FrameWriter]:
+    for component, frame in robot.declared(WritesFrame):
+        if end := component.end(frame.transforms):
+            yield FrameWriter(component, frame, end)

@@ -1,0 +1,386 @@
+"""Show, check, draw and pose the body of a robot, or of a URDF or xacro file.
+
+Exit codes: 0 fine, 1 errors found, 2 wrong usage.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Callable, Collection, Mapping, Sequence
+from pathlib import Path
+
+from rbxcompose.base.files import replace_file
+from rbxcompose.base.findings import Finding, Report, Severity, Sources, kind
+from rbxcompose.base.printable import plain
+from rbxcompose.commands.console import FINDINGS, has_colour, misused, refuse, table, tell, tell_report
+from rbxcompose.commands.formats.json_ import as_data
+from rbxcompose.commands.formats.text import render_text
+from rbxcompose.commands.layout import NotDrawnError
+from rbxcompose.commands.lookup import add_bus_options
+from rbxcompose.commands.options import (
+    Declare,
+    Subcommand,
+    add_actions,
+    add_json_option,
+    add_timeout_option,
+    argument,
+    run_action,
+    seconds,
+)
+from rbxcompose.domains.body.description import Description
+from rbxcompose.domains.body.files import FORMATS as MESHES
+from rbxcompose.domains.body.live_pose import sliders_of
+from rbxcompose.domains.body.meshes import LEAST_FACES, MissingLibraryError, Scale, SimplifiedMesh, simplify
+from rbxcompose.domains.body.model import Body
+from rbxcompose.domains.body.picture import draw
+from rbxcompose.domains.body.source import (
+    UNKNOWN,
+    DescribedBody,
+    Do,
+    add_source_options,
+    file_of,
+    given_options,
+    no_body,
+    read,
+    reading,
+    used,
+    using,
+    write,
+)
+from rbxcompose.domains.body.text import (
+    FORMATS,
+    JOINTS,
+    LINKS,
+    draw_graph,
+    extent_of,
+    joints_of,
+    links_of,
+    mass_of,
+    tree_of,
+)
+from rbxcompose.manifest.files import find, shown_name
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    out = argument("--out", metavar="FILE", help="write it to this file")
+    words = "lines, or a picture as a graph"
+    form = argument("--format", choices=(TEXT, *FORMATS), default=TEXT, help=words)
+    words = "write it to this file (default of a PDF: NAME.pdf)"
+    out_or_pdf = argument("--out", metavar="FILE", help=words)
+    picture = argument("--out", metavar="FILE", help="the picture (default: NAME.png)")
+    words = "a joint's position, such as '35 deg'; a bare number is in rad or m"
+    joint = argument("--joint", action="append", default=[], metavar="NAME=POSITION", help=words)
+    tree = "show which link hangs on which, by which joint"
+    check = "report what is wrong with the body alone: findings RBX20.., or the errors that keep it from being read"
+    source = add_source_options
+    table: tuple[tuple[str, str, Do, tuple[Declare, ...]], ...] = (
+        ("show", "list links and joints with masses and limits", using(_show), (source,)),
+        ("tree", tree, using(_tree), (source, form, out_or_pdf)),
+        ("check", check, reading(_check), (source, add_json_option)),
+        ("expand", "print the URDF, with nothing of xacro left", using(_expand), (source, out)),
+        ("picture", "draw it as a PNG", using(_picture), (source, picture, joint)),
+        ("simplify", _SIMPLIFY, _run, (_add_simplify_options,)),
+        ("pose", _POSE, _pose, (_add_pose_options,)),
+    )
+    more = {"simplify": _SIMPLIFY_MORE, "pose": _POSE_MORE}
+    add_actions(
+        parser,
+        (
+            Subcommand(
+                name, words, do, own, f"{words[:1].upper()}{words[1:]}.\n\n{more[name]}" if name in more else words
+            )
+            for name, words, do, own in table
+        ),
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the chosen action."""
+    return run_action(arguments)
+
+
+def _show(arguments: argparse.Namespace, description: Description) -> int:
+    body = description.body
+    tell(f"{extent_of(body)}\n")
+    tell(table([LINKS, *links_of(body)]))
+    tell("")
+    tell(table([JOINTS, *joints_of(body)]))
+    return 0
+
+
+TEXT, PDF = "text", "pdf"
+
+
+def _tree(arguments: argparse.Namespace, description: Description) -> int:
+    try:
+        content = _drawn(arguments.format, description)
+    except NotDrawnError as error:
+        return refuse(error.finding)
+    if arguments.out is not None:
+        return write(Path(arguments.out), content)
+    if arguments.format == PDF:
+        return write(file_of(arguments, description, ".pdf"), content)
+    tell(content.decode().rstrip("\n"))
+    return 0
+
+
+def _drawn(form: str, description: Description) -> bytes:
+    if form == TEXT:
+        return "".join(f"{line}\n" for line in tree_of(description.body)).encode()
+    return draw_graph(description.body, form)
+
+
+_FAMILY = "RBX20"  # codes of findings about bodies
+
+
+def _check(arguments: argparse.Namespace, found: DescribedBody) -> int:
+    report = about_body(found, arguments.path)
+    if found.description is None:
+        return _refused(report, found.sources, arguments.json)
+    body = found.description.body
+    if arguments.json:
+        tell(json.dumps(_data(body, report, found.sources), ensure_ascii=False))
+    else:
+        tell(f"{_findings(report, found.sources)}{summary_of(body, report)}")
+    return FINDINGS if report.has_errors else 0
+
+
+def about_body(found: DescribedBody, path: str) -> Report:
+    """Return the findings about the body; if it could not be read for another reason, all errors."""
+    own = Report([finding for finding in found.report if finding.code.startswith(_FAMILY)])
+    if found.description is None and not own.has_errors:
+        own.extend(finding for finding in found.report if finding.severity is Severity.ERROR)
+        if not own.has_errors:
+            own.add(no_body(path))
+    return own
+
+
+def summary_of(body: Body, report: Report) -> str:
+    """Return a line: how large the body is, and how many errors and warnings it has."""
+    errors, warnings = _counts(report)
+    counted = f"{errors} error{'' if errors == 1 else 's'}, {warnings} warning{'' if warnings == 1 else 's'}"
+    return f"{extent_of(body)}: {counted}"
+
+
+def _findings(report: Report, sources: Sources) -> str:
+    """Return the findings as `check` writes them, without its last line: the summary counts them, too."""
+    text = render_text(report, sources, has_colour(sys.stdout))
+    return "".join(text.splitlines(keepends=True)[:-1])
+
+
+def _refused(report: Report, sources: Sources, as_json: bool) -> int:
+    """Tell why there is no body; the document for JSON is written as for any command that fails."""
+    if as_json:
+        tell_report(report, sources)
+    else:
+        tell(render_text(report, sources, has_colour(sys.stdout)).rstrip("\n"))
+    return FINDINGS
+
+
+def _data(body: Body, report: Report, sources: Sources) -> dict[str, object]:
+    errors, warnings = _counts(report)
+    return {
+        "links": len(body.links),
+        "joints": len(body.moving),
+        "mass": mass_of(body),
+        "errors": errors,
+        "warnings": warnings,
+        "findings": [as_data(finding, sources) for finding in report],
+    }
+
+
+def _counts(report: Report) -> tuple[int, int]:
+    errors = sum(finding.severity is Severity.ERROR for finding in report)
+    return errors, sum(1 for _ in report) - errors
+
+
+def _expand(arguments: argparse.Namespace, description: Description) -> int:
+    if arguments.out is None:
+        tell(description.published.rstrip("\n"))
+        return 0
+    return write(Path(arguments.out), description.published.encode())
+
+
+def _picture(arguments: argparse.Namespace, description: Description) -> int:
+    body = description.body
+    try:
+        positions = dict(_position(body, written) for written in arguments.joint)
+        picture = draw(body, positions, description.meshes)
+    except ValueError as error:
+        return misused("body", str(error))
+    except MissingLibraryError as error:
+        return refuse(error.finding)
+    return write(file_of(arguments, description, ".png"), picture)
+
+
+def _position(body: Body, written: str) -> tuple[str, float]:
+    name, _, value = written.partition("=")
+    slider = next((candidate for candidate in sliders_of(body) if candidate.name == name), None)
+    if slider is None:
+        raise ValueError(f"there is no moving joint '{name}': {', '.join(joint.name for joint in body.moving)}")
+    return name, slider.read(value)
+
+
+WOULD_REPLACE = kind("RBX2017")
+_HEAD = ("mesh", "triangles", "bytes", "largest error", "mean error", "file")
+_SIMPLIFY = "write meshes with fewer triangles, as binary STL files, and tell how far they are from the originals"
+_SIMPLIFY_MORE = """\
+The error is the distance from points of the original surface to the nearest point of the simplified one:
+10,000 points, spread evenly with a fixed seed, for the mean, and also up to 10,000 of its corners for the largest. It
+is in millimetres by the scale in the URDF; lengths of a bare STL or OBJ file count as metres. A mesh with many
+borders may keep more triangles than are wanted; the table says so."""
+_RATIO = 0.2
+
+
+def _add_simplify_options(parser: argparse.ArgumentParser) -> None:
+    add_source_options(parser, "; or a mesh: .stl, .obj or .dae")
+    amount = parser.add_mutually_exclusive_group()
+    words = f"how many of the triangles are left, at most 1 (default: {_RATIO}); each mesh keeps at least {LEAST_FACES}"
+    amount.add_argument("--ratio", type=_ratio, default=_RATIO, metavar="R", help=words)
+    amount.add_argument("--faces", type=_faces, metavar="N", help="how many triangles each mesh has at most")
+    parser.add_argument("--mesh", action="append", default=[], metavar="NAME", help="only this mesh of the body")
+    parser.add_argument("--out", required=True, metavar="DIR", help="the folder for the files")
+    parser.add_argument("--force", action="store_true", help="replace files that exist")
+
+
+def _ratio(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0.0 < value <= 1.0:
+        raise argparse.ArgumentTypeError(f"must be above 0 and at most 1, not '{text}'")
+    return value
+
+
+def _faces(text: str) -> int:
+    if not text.isdecimal() or int(text) < LEAST_FACES:
+        raise argparse.ArgumentTypeError(f"must be a whole number of at least {LEAST_FACES}, not '{text}'")
+    return int(text)
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    """Simplify a bare mesh, or those of a body."""
+    if arguments.path is not None and arguments.path.lower().endswith(MESHES):
+        path = find(arguments.path)
+        if isinstance(path, Finding):
+            return refuse(path)
+        if option := next(given_options(arguments), "--mesh" if arguments.mesh else ""):
+            return misused("body", f"{option} is for bodies: PATH is a mesh itself")
+        return _written(arguments, {shown_name(path): path}, {shown_name(path): {UNSCALED}})
+    return read(arguments, lambda same, found: used(same, found, _meshes_of))
+
+
+def _meshes_of(arguments: argparse.Namespace, description: Description) -> int:
+    chosen: dict[str, Path] = {}
+    for wanted in arguments.mesh or description.meshes:
+        found = {name: path for name, path in description.meshes.items() if wanted in (name, path.name)}
+        if not found:
+            message = f"the body has no mesh '{plain(wanted)}'"
+            return refuse(UNKNOWN.misspelt(None, message, wanted, [*description.meshes], "meshes"))
+        chosen |= found
+    if not chosen:
+        return misused("body", "the body has no meshes to simplify")
+    return _written(arguments, chosen, scales_of(description.body, chosen))
+
+
+def _written(arguments: argparse.Namespace, meshes: Mapping[str, Path], scales: Mapping[str, set[Scale]]) -> int:
+    """Simplify the meshes, and write all or, if one of them is not possible, none; return the exit code."""
+    folder = Path(arguments.out)
+    files = {path: folder / name for path, name in file_names(sorted(set(meshes.values()))).items()}
+    if not arguments.force and (there := [file for file in files.values() if file.exists()]):
+        named = ", ".join(f"'{plain(shown_name(file.absolute()))}'" for file in there)
+        return refuse(
+            WOULD_REPLACE.at(None, f"there already is {named}", help="choose another folder, or say '--force'")
+        )
+    try:
+        made = {
+            name: simplify(path, name, scales[name], arguments.faces, arguments.ratio)
+            for name, path in sorted(meshes.items())
+        }
+    except MissingLibraryError as error:
+        return refuse(error.finding)
+    except ValueError as error:
+        return misused("body", str(error))
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, mesh in made.items():
+            replace_file(files[meshes[name]].resolve(), mesh.data)
+    except OSError as error:
+        return misused("body", f"'{folder}' cannot be written: {error.strerror}")
+    tell(table([_HEAD, *(_row(name, mesh, files[meshes[name]]) for name, mesh in made.items())]))
+    return 0
+
+
+def _row(name: str, mesh: SimplifiedMesh, file: Path) -> Sequence[str]:
+    sizes = f"{mesh.bytes[0]} -> {mesh.bytes[1]}"
+    return name, counted(mesh), sizes, _millimetres(mesh.largest), _millimetres(mesh.mean), str(file)
+
+
+def counted(mesh: SimplifiedMesh) -> str:
+    """Return how many triangles there were and are, and whether that is not what was wanted."""
+    before, after = mesh.triangles
+    if mesh.wanted >= before:
+        return f"{before}, copied"
+    return f"{before} -> {after}{f', not {mesh.wanted}' if after > mesh.wanted else ''}"
+
+
+def _millimetres(metres: float) -> str:
+    return f"{metres * 1000:.3g} mm"
+
+
+UNSCALED: Scale = (1.0, 1.0, 1.0)
+_WAYS: Sequence[Callable[[Path], str]] = (
+    lambda path: path.stem,
+    lambda path: f"{path.parent.name}_{path.stem}",
+    lambda path: f"{path.parent.name}_{path.stem}_{path.suffix[1:]}",
+)
+
+
+def file_names(paths: Sequence[Path]) -> dict[Path, str]:
+    """Return a name that ends in `.stl` for each file, all of them different, and the shortest that are."""
+    for way in _WAYS:
+        names = [way(path) for path in paths]
+        if len({name.lower() for name in names}) == len(paths):
+            break
+    else:
+        names = [f"{number}_{path.stem}" for number, path in enumerate(paths, 1)]
+    return {path: f"{name}.stl" for path, name in zip(paths, names, strict=True)}
+
+
+def scales_of(body: Body, names: Collection[str]) -> dict[str, set[Scale]]:
+    """Return the scales of each mesh that a body uses, by its name in the URDF."""
+    found: dict[str, set[Scale]] = {name: set() for name in names}
+    for link in body.links.values():
+        for shape in (*link.visuals, *link.collisions):
+            if shape.geometry.file in found:
+                found[shape.geometry.file].add(shape.geometry.size)
+    return {name: scales or {UNSCALED} for name, scales in found.items()}
+
+
+_POSE = "move the joints of a running robot, by sliders in the terminal or with --joint"
+_POSE_MORE = """\
+It reads `robot_description` from the bus; it publishes `joint_states` ten times a second and at each change.
+
+Sliders: up and down select a joint. Left and right move it by 1 deg or 1 cm, with shift, or page up and down, by ten
+of these. 0, c and r move it to zero, to the centre of its range, or anywhere; Z, C and R do so with all. q quits."""
+
+
+def _add_pose_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("name", nargs="?", metavar="ROBOT|PATH", help="the robot, by name or file")
+    words = "publish this position and end: 0.6 (rad or m), '35 deg', '5 cm'; no terminal is needed"
+    parser.add_argument("--joint", action="append", default=[], metavar="NAME=POSITION", help=words)
+    words = "publish the positions of --joint for this long (default: once)"
+    parser.add_argument("--duration", type=seconds, metavar="T", help=words)
+    parser.add_argument("--topic", metavar="TOPIC", help="the topic with the URDF (default: robot_description)")
+    add_timeout_option(parser, "2s")
+    add_bus_options(parser)
+
+
+def _pose(arguments: argparse.Namespace) -> int:
+    from rbxcompose.domains.body.live_pose import pose  # imports the bus, which no other action needs
+
+    return pose(arguments)

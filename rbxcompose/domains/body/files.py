@@ -1,0 +1,204 @@
+"""Files of bodies: a URDF, or a xacro that expands to one, and the meshes that they name."""
+
+from __future__ import annotations
+
+import re
+import struct
+from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequence
+from dataclasses import field, replace
+from functools import cache
+from pathlib import Path
+
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.files import open_regular
+from rbxcompose.base.findings import Finding, Span, kind
+from rbxcompose.base.printable import plain
+from rbxcompose.domains.body.model import Body
+from rbxcompose.domains.body.xacro import Expanded, XacroFile, expand_all
+from rbxcompose.domains.body.xml_reader import XmlElement, read_urdf
+from rbxcompose.manifest.files import library_root, project_of, shown_name
+from rbxcompose.manifest.reader import read_source
+from rbxcompose.manifest.tree import URDF_BYTES
+
+BAD_MESH = kind("RBX2015")
+LARGEST = 64_000_000  # [bytes]
+_HEAD = 8_192  # [bytes] that are read
+_SHOWN = 200
+_TEXT = {7, 8, 9, 10, 12, 13, 27, *range(32, 256)}
+_ELEMENTS = re.compile(rb"^element\s+\w+\s+(\d{1,20})\s*$", re.MULTILINE)
+
+
+def mesh_mistakes(body: Body, meshes: Mapping[str, Path]) -> Iterator[Finding]:
+    """Yield the shapes whose mesh cannot be read; `meshes` are the files that exist, by their names in the URDF."""
+    problem = cache(mesh_problem)
+    for link in body.links.values():
+        for shape in (*link.visuals, *link.collisions):
+            path = meshes.get(shape.geometry.file)
+            if path is not None and (words := problem(path)):
+                yield BAD_MESH.at(
+                    shape.size_span or shape.span, f"the mesh '{plain(shape.geometry.file, _SHOWN)}' {words}"
+                )
+
+
+def mesh_problem(path: Path, most: int = LARGEST) -> str:
+    """Return why a file can be no mesh of the format that its name says; nothing if it may be one."""
+    try:
+        size = path.stat().st_size
+        with open_regular(path) as file:
+            head = file.read(_HEAD)
+    except OSError as error:
+        return f"cannot be read: {error.strerror}"
+    if size > most:
+        return f"is larger than {most:,} bytes"
+    if size == 0:
+        return "is empty"
+    look = _FORMATS.get(path.suffix.lower())
+    return look(head, size) if look else ""
+
+
+def _stl(head: bytes, size: int) -> str:
+    count = struct.unpack_from("<I", head, 80)[0] if size >= 84 else 0
+    if count and size >= 84 + 50 * count:
+        return ""
+    if head.lstrip().lower().startswith(b"solid"):
+        return "" if b"facet" in head else "has no triangles"
+    if size < 84:
+        return "is no STL file"
+    return f"is no STL file: it has {size:,} bytes and claims {count:,} triangles" if count else "has no triangles"
+
+
+def _collada(head: bytes, size: int) -> str:
+    before, root, _ = head.partition(b"<COLLADA")
+    return "" if root and b"<!DOCTYPE" not in before else "is no COLLADA file, or has a DOCTYPE"
+
+
+def _obj(head: bytes, size: int) -> str:
+    return "" if set(head) <= _TEXT else "is no OBJ file: it is not text"
+
+
+def _ply(head: bytes, size: int) -> str:
+    if not head.startswith(b"ply") or b"end_header" not in head:
+        return "is no PLY file"
+    claimed = sum(map(int, _ELEMENTS.findall(head)))
+    return "" if claimed <= size else f"is no PLY file: it has {size:,} bytes and claims {claimed:,} elements"
+
+
+def _glb(head: bytes, size: int) -> str:
+    return "" if head.startswith(b"glTF") else "is no GLB file"
+
+
+_FORMATS: Mapping[str, Callable[[bytes, int], str]] = {
+    ".stl": _stl,
+    ".dae": _collada,
+    ".obj": _obj,
+    ".ply": _ply,
+    ".glb": _glb,
+}
+"""What looks at the beginning and the size of a file, by the ending of its name."""
+FORMATS = (*_FORMATS,)
+
+
+PACKAGE = "package://"
+LIBRARY = "rbxcompose"
+"""The package of the shipped library, for `$(find rbxcompose)`."""
+
+
+@dataclass(frozen=True, slots=True)
+class BodyFile:
+    """A file that describes a body. `span` is the place that names it; `arguments` are those of a xacro."""
+
+    path: Path
+    span: Span
+    is_xacro: bool = False
+    arguments: Mapping[str, str] = field(default_factory=dict)
+    packages: Mapping[str, Path] = field(default_factory=dict)
+    spans: Mapping[str, Span] = field(default_factory=dict)
+    """Places of the arguments."""
+
+    @property
+    def as_xacro(self) -> XacroFile:
+        """Return what is to be expanded."""
+        packages = {LIBRARY: library_root(), **self.packages}
+        roots = [project_of(self.path), library_root()]
+        return XacroFile(self.path, self.arguments, packages, roots, self.span, self.spans)
+
+    def meshes(self, root: XmlElement) -> dict[str, Path]:
+        """Return the mesh files that exist, by their names in the URDF; they lie in the project or in a package."""
+        found = {name: mesh for name in set(mesh_names(root)) if (mesh := self._mesh(name)) is not None}
+        return {name: mesh for name, mesh in found.items() if self._is_ours(mesh)}
+
+    def meant_meshes(self, root: XmlElement) -> dict[str, str]:
+        """Return, for each mesh that is not there, the name of a file that differs only in its capitals."""
+        missing = set(mesh_names(root)) - self.meshes(root).keys()
+        return {name: near for name in missing if (near := self._in_other_letters(name))}
+
+    def _in_other_letters(self, name: str) -> str:
+        place, _, own = name.rpartition("/")
+        try:
+            beside = self._place(f"{place}/x" if place else "x")
+            files = sorted(beside.parent.iterdir()) if beside and self._is_ours(beside) else []
+        except (OSError, ValueError):
+            return ""
+        near = next((file.name for file in files if file.name.casefold() == own.casefold()), "")
+        return f"{place}/{near}" if near and place else near
+
+    def _is_ours(self, path: Path) -> bool:
+        return any(
+            path.is_relative_to(package) for package in (project_of(self.path), library_root(), *self.packages.values())
+        )
+
+    def _mesh(self, name: str) -> Path | None:
+        try:
+            path = self._place(name)
+            return path if path is not None and path.is_file() else None
+        except (OSError, ValueError):  # a name too long for the system, a zero byte
+            return None
+
+    def _place(self, name: str) -> Path | None:
+        package, _, inside = name.removeprefix(PACKAGE).partition("/")
+        is_packaged = name.startswith(PACKAGE)
+        folder = {LIBRARY: library_root(), **self.packages}.get(package) if is_packaged else self.path.parent
+        return (folder / (inside if is_packaged else name.removeprefix("file://"))).resolve() if folder else None
+
+
+@dataclass(frozen=True, slots=True)
+class ReadFile:
+    """The root and the text of a URDF, and what is to be said about the files that it was made of."""
+
+    root: XmlElement
+    text: str
+    notes: tuple[Finding, ...] = ()
+
+
+def read_files(files: Sequence[BodyFile], sources: MutableMapping[str, str]) -> list[ReadFile | Finding]:
+    """Return the URDF of each file, or why there is none; the texts of all that were read are added to `sources`."""
+    xacros = [file for file in files if file.is_xacro]
+    expansions = iter(expand_all([file.as_xacro for file in xacros]) if xacros else ())
+    return [_expanded(file, *next(expansions), sources) if file.is_xacro else _plain(file, sources) for file in files]
+
+
+def _plain(file: BodyFile, sources: MutableMapping[str, str]) -> ReadFile | Finding:
+    text, findings = read_source(file.path, shown_name(file.path), sources, URDF_BYTES, "a URDF file")
+    if text is None or findings:
+        return replace(findings[0], span=findings[0].span or file.span)
+    root = read_urdf(text, shown_name(file.path))
+    return root if isinstance(root, Finding) else ReadFile(root, text)
+
+
+def _expanded(
+    file: BodyFile, expanded: Expanded | Finding, used: Sequence[Path], sources: MutableMapping[str, str]
+) -> ReadFile | Finding:
+    for path in used:  # so that findings can show their lines
+        read_source(path, shown_name(path), sources, URDF_BYTES, "a xacro file")
+    if isinstance(expanded, Finding):
+        return expanded
+    root = read_urdf(expanded.located, shown_name(file.path))
+    return root if isinstance(root, Finding) else ReadFile(root, expanded.text, expanded.notes)
+
+
+def mesh_names(element: XmlElement) -> Iterator[str]:
+    """Yield the file name of every mesh below an element."""
+    if element.name == "mesh":
+        yield element.attributes.get("filename", "")
+    for child in element.children:
+        yield from mesh_names(child)

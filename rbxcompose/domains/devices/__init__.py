@@ -1,0 +1,1 @@
+"""Devices on USB and serial ports."""

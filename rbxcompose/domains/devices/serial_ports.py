@@ -1,0 +1,269 @@
+"""The serial ports of this machine, what can be wrong with one, and whether a robot can open its own."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import islice
+from pathlib import Path, PurePath
+from typing import ClassVar
+
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.files import read_regular
+from rbxcompose.base.findings import Finding, FindingKind, Severity, Span, kind
+from rbxcompose.base.printable import plain
+from rbxcompose.domains.devices.usb import UsbDevice
+
+_RULE = 'ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{latency_timer}="1"'
+SLOW = 0.001  # [s] of an adapter's latency timer above which it delays every reply
+
+NO_PORT = kind("RBX2201")
+FORBIDDEN = kind("RBX2202")
+BUSY = kind("RBX2203")
+UNFIT = kind("RBX2204")
+LOST = kind("RBX2205")
+NO_USB_DEVICE = kind("RBX2251")
+TWO_USB_DEVICES = kind("RBX2252")
+SLOW_ADAPTER = kind("RBX2206", Severity.WARNING)
+
+
+class PortError(Exception):
+    """Raised when a serial port cannot be used; each cause has its own class, kind of finding and help."""
+
+    kind: ClassVar[FindingKind]
+    help: str = ""
+
+    def __init__(self, path: str, problem: str, help: str = "") -> None:
+        super().__init__(f"{path} {problem}")
+        self.path, self.problem = path, problem
+        self.help = help or self.help
+
+    def finding(self, span: Span | None = None) -> Finding:
+        """Return what to tell a person."""
+        return self.kind.at(span, f"{plain(self.path)} {plain(self.problem)}", help=self.help)
+
+
+class NoPortError(PortError):
+    """Raised when nothing has the name of the port."""
+
+    kind = NO_PORT
+    help = "plug the adapter in, or look for it below /dev/serial/by-id"
+
+
+class ForbiddenPortError(PortError):
+    """Raised when the user may not open the port."""
+
+    kind = FORBIDDEN
+    help = "sudo usermod -aG dialout $USER, then log in again; or a udev rule with MODE and GROUP"
+
+
+class BusyPortError(PortError):
+    """Raised when another program has locked the port."""
+
+    kind = BUSY
+    help = "end the other program: 'rbxcompose ps' shows robots that run"
+
+
+class UnfitPortError(PortError):
+    """Raised when the file is no serial port, or does not have the baud rate."""
+
+    kind = UNFIT
+    help = "name a serial port, and a baud rate of its adapter"
+
+
+class NoDeviceError(PortError):
+    """Raised when the USB device of a port is not connected."""
+
+    kind = NO_USB_DEVICE
+
+
+class DeviceNotUniqueError(PortError):
+    """Raised when more than one port belongs to a USB device as it is named."""
+
+    kind = TWO_USB_DEVICES
+
+
+class LostPortError(PortError):
+    """Raised when an open port has gone."""
+
+    kind = LOST
+    help = "plug the adapter in again"
+
+
+def slow_adapter(path: str, latency: float | None, span: Span | None = None) -> Finding | None:
+    """Return the warning about an adapter whose latency timer [s] is too long, None if it is fine or unknown."""
+    if latency is None or latency <= SLOW:
+        return None
+    words = f"the adapter of {plain(path)} holds replies back for up to {1000 * latency:.0f} ms"
+    timer = f"/sys/bus/usb-serial/devices/{plain(Path(path).resolve().name)}/latency_timer"
+    now = f"echo 1 | sudo tee {timer}"
+    return SLOW_ADAPTER.at(span, words, help=f"{now}; to keep it, in /etc/udev/rules.d/99-servos.rules: {_RULE}")
+
+
+ROOT = Path("/")
+_TTYS = ("*:*/tty/tty*", "*:*/*/tty/tty*")  # below a device: of a modem (ttyACM), of a converter (ttyUSB)
+_LONGEST = 300  # characters of a port as it is shown
+_ONBOARD = ("ttyAMA", "ttyTHS", "ttymxc")
+_LINKS = ("dev/serial/by-id", "dev/serial/by-path", "dev")
+_MOST = 4096  # entries of a folder that are looked at
+_ATTRIBUTE = 4096  # [B], the longest that the kernel shows
+
+
+@dataclass(frozen=True, slots=True)
+class SerialPort:
+    """A serial port: its file, such as `/dev/ttyUSB0`, its names that stay, its USB device, if it is one.
+
+    `driver` is the kernel's, `about` what the device says of itself.
+    """
+
+    path: str
+    names: Sequence[str] = ()
+    device: UsbDevice | None = None
+    driver: str = ""
+    about: str = ""
+
+    @property
+    def shown(self) -> str:
+        """Return it for people: the name to write, and what it is."""
+        name, *_ = [*self.names, self.path]
+        about = [self.path] if self.names else []
+        about += [self.device.shown] if self.device else []
+        return plain(f"{name} ({', '.join(about)})" if about else name, _LONGEST)
+
+    def is_linked(self, name: str) -> bool:
+        """Tell whether a link of this name leads to it, such as the one that a udev rule makes for a device."""
+        return any(
+            PurePath(candidate).parent.name == "dev" and PurePath(candidate).name == name for candidate in self.names
+        )
+
+
+def serial_ports(root: Path = ROOT) -> list[SerialPort]:
+    """Return the serial ports that are connected, by their paths."""
+    found = {port.path: port for port in _usb_ports(root)}
+    names = _names(root)
+    onboard = {str(tty) for prefix in _ONBOARD for tty in (root / "dev").glob(f"{prefix}*") if not tty.is_symlink()}
+    there = {path for path in names if os.path.exists(path)}
+    return [
+        SerialPort(path, names.get(path, ()), port.device, port.driver, port.about)
+        for path in sorted(found.keys() | onboard | there)
+        for port in [found.get(path, SerialPort(path))]
+    ]
+
+
+def _names(root: Path) -> Mapping[str, Sequence[str]]:
+    """Return the links to serial ports by the paths where they lead; those that tell the device come first."""
+    found: dict[str, list[str]] = {}
+    for folder in _LINKS:
+        for link in _entries(root / folder):
+            if target := _target(link, root):
+                found.setdefault(target, []).append(str(link))
+    return found
+
+
+def _entries(folder: Path) -> list[Path]:
+    try:
+        with os.scandir(folder) as entries:
+            return sorted(Path(entry.path) for entry in islice(entries, _MOST) if entry.is_symlink())
+    except OSError:
+        return []  # there is none
+
+
+def _target(link: Path, root: Path) -> str:
+    """Return the path of the serial port where a link leads; empty if it leads elsewhere."""
+    try:
+        target = PurePath(os.readlink(link))
+    except OSError:
+        return ""  # it was unplugged meanwhile
+    if target.parent.name == "pts":
+        return str(target)
+    return str(root / "dev" / target.name) if target.name.startswith("tty") else ""
+
+
+def _usb_ports(root: Path) -> Iterator[SerialPort]:
+    for folder in sorted(islice((root / "sys/bus/usb/devices").glob("*"), _MOST)):
+        vendor, product = _text(folder / "idVendor"), _text(folder / "idProduct")
+        if not vendor or not product:
+            continue
+        about = " ".join(text for key in ("manufacturer", "product") if (text := _text(folder / key)))
+        for tty in sorted(tty for pattern in _TTYS for tty in folder.glob(pattern)):
+            part = folder / tty.relative_to(folder).parts[0]
+            device = UsbDevice(vendor, product, _text(folder / "serial"), folder.name, _number_of(part))
+            yield SerialPort(str(root / "dev" / tty.name), (), device, _driver(part), about)
+
+
+def _number_of(interface: Path) -> int | None:
+    try:
+        return int(_text(interface / "bInterfaceNumber"), 16)
+    except ValueError:
+        return None
+
+
+def _driver(interface: Path) -> str:
+    try:
+        return PurePath(os.readlink(interface / "driver")).name
+    except OSError:
+        return ""
+
+
+def _text(file: Path) -> str:
+    try:
+        return read_regular(file, _ATTRIBUTE).decode(errors="replace").strip()
+    except OSError:
+        return ""  # it has none, or was unplugged meanwhile
+
+
+def port_path(name: str, root: Path = ROOT) -> str:
+    """Return the path of a port by its name, as it is now.
+
+    Raises:
+        NoDeviceError: if it names a device that is not connected.
+        DeviceNotUniqueError: if more than one such device is connected.
+    """
+    wanted = UsbDevice.of(name)
+    return name if wanted is None else port_of(wanted, serial_ports(root)).path
+
+
+def port_of(wanted: UsbDevice, ports: Iterable[SerialPort]) -> SerialPort:
+    """Return the port of a device among those that are connected; raise as `port_path` does.
+
+    What the kernel tells of devices decides. A link with the name of the device (that of a udev rule) decides among
+    several that are meant, and where the kernel tells nothing, as in containers.
+    """
+    ports = list(ports)
+    usb = [port for port in ports if port.device]
+    meant = [port for port in usb if port.device and port.device.is_meant_by(wanted)]
+    linked = [port for port in ports if wanted.name and port.is_linked(wanted.name)]
+    if len(meant) != 1:
+        meant = [port for port in linked if port in meant or not (meant or port.device)] or meant
+    if not meant:
+        raise NoDeviceError(wanted.called, "is not connected", connected(usb, "USB serial port"))
+    if len(meant) > 1:
+        raise DeviceNotUniqueError(wanted.called, f"has {len(meant)} ports", connected(meant, "USB serial port"))
+    return meant[0]
+
+
+def connected(ports: Sequence[SerialPort], what: str) -> str:
+    """Return which ports are connected, for the help of a finding."""
+    if not ports:
+        return f"no {what} is connected: plug the adapter in"
+    return f"connected: {', '.join(port.shown for port in ports)}"
+
+
+def latency_timers(root: Path = ROOT) -> dict[str, float]:
+    """Return the latency timers of FTDI adapters [s], by the paths of their ports."""
+    ports = (str(root / "dev" / folder.name) for folder in (root / "sys/bus/usb-serial/devices").glob("*"))
+    return {port: seconds for port in sorted(ports) if (seconds := latency_of(port, root)) is not None}
+
+
+def latency_of(path: str, root: Path = ROOT) -> float | None:
+    """Return the latency timer of a port's FTDI adapter [s], None if it has none."""
+    name = Path(path).resolve().name
+    for file in (
+        root / "sys/bus/usb-serial/devices" / name / "latency_timer",
+        root / "sys/class/tty" / name / "device/latency_timer",
+    ):
+        try:
+            return int(file.read_text(encoding="ascii")) / 1000
+        except (OSError, ValueError):
+            continue
+    return None

@@ -1,0 +1,1 @@
+"""Diagnostics: the tree of statuses, monitors, thresholds."""

@@ -1,0 +1,1 @@
+"""Muxes: who may command."""

@@ -1,0 +1,387 @@
+"""The command mux."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+from rbxcompose.base.findings import suggest
+from rbxcompose.base.requests import Refused, answers
+from rbxcompose.domains.muxes.account import lock_states, states_of, why
+from rbxcompose.domains.muxes.config import NOBODY, MuxConfig, MuxInputConfig, core_of, handover_limits, source_of
+from rbxcompose.domains.muxes.core import NEVER
+from rbxcompose.domains.muxes.orders import MuxOrders, input_at, noted
+from rbxcompose.domains.muxes.requests import (
+    NONE,
+    AddMuxInput,
+    DeleteMuxInput,
+    LockMuxInputs,
+    LookAtMux,
+    MuxChange,
+    MuxState,
+    ReadMuxChanges,
+    SelectMuxInput,
+    UnlockMuxInputs,
+)
+from rbxcompose.msgs import registry
+from rbxcompose.msgs.fields import is_finite
+from rbxcompose.msgs.std_msgs import Bool, Empty, String
+from rbxcompose.msgs.topic_tools_interfaces import MuxAdd, MuxDelete, MuxList, MuxSelect
+from rbxcompose.msgs.types import Message
+from rbxcompose.sdk import Capability, Component, ComponentNoted, Forwards, In, Level, Out, Port, Serves, component
+
+LOCK = "lock_"  # prefix of the ports of locks
+ANNOUNCED = "announced"  # the port at which it tells who holds the output
+KEPT = 200  # changes that can be read later
+
+
+@component("mux")
+class Mux(Component[MuxConfig]):
+    """Forwards the commands of one source: by priority, by selection, or of who sent last. It never repeats a message.
+
+    The lock `stop` is above all inputs; `rbxcompose stop` latches it and `release` opens it. Who holds the output is
+    announced at `<output>/active`.
+
+    Example:
+        cmd_vel: {type: mux, output: cmd_vel, inputs: {teleop: {priority: 100, timeout: 0.5 s}}}
+    """
+
+    made_by = "There is one for each entry of the section `muxes`."
+
+    @classmethod
+    def ports(cls, config: MuxConfig) -> dict[str, Port[Any]]:
+        """Return the output, one input per source and one per lock, the announcement, and services to select."""
+        message = registry.message(config.message)
+        ports: dict[str, Port[Any]] = {
+            "output": Out(message, config.output, qos="command").named("output"),
+            ANNOUNCED: Out(String, f"{config.output}/{config.announced}", qos="latched").named(ANNOUNCED),
+        }
+        for name, input_config in config.inputs.items():
+            ports[name] = _input(name, config.topic_of(name), config, input_config.max_rate)
+        for name, lock in config.locks.items():
+            kind = Bool if lock.topic else Empty
+            ports[LOCK + name] = In(kind, config.topic_of(name), qos="command", is_open=True).named(LOCK + name)
+        if config.mode == "select":
+            ports |= _services(config.output)
+        return ports
+
+    @classmethod
+    def capabilities(cls, config: MuxConfig) -> tuple[Capability, ...]:
+        """Declare which inputs it forwards."""
+        ranked = sorted(config.inputs, key=lambda name: config.inputs[name].priority, reverse=True)
+        return (Forwards(tuple(ranked), "output"),)
+
+    def configure(self) -> None:
+        """Build the core; a mux restarted while the robot is stopped starts closed."""
+        self.core = core_of(self.config, is_stopped=self.context.is_stopped)
+        self.topics = {name: self.config.topic_of(name) for name in self.config.inputs}
+        self.told: object = None
+        self.announced: str | None = None
+        self.noted = ""
+        self.wakes_at = math.inf  # [s], the first of the wakes to come
+        self.refused: list[str] = []
+        self.broken: set[str] = set()  # inputs whose last message had a number that is none
+        self.heard_at: dict[str, float] = {}  # when an input last sent
+        self.changes: deque[MuxChange] = deque(maxlen=KEPT)
+        self.orders = MuxOrders()
+        self.listening = set(self.config.inputs)
+        self.listen()
+
+    def activate(self) -> None:
+        """Announce who holds, and check that all locks send heartbeats, after each has had time to do so."""
+        if beats := [lock.timeout for lock in self.config.locks.values() if lock.timeout]:
+            self.context.wake_at(self.now + max(beats))
+        self.send(self.core.tick(self.now))
+        self.announce()
+
+    def reconfigure(self, old: MuxConfig) -> None:
+        """Follow other limits of a hand-over."""
+        self.core.bound(*handover_limits(self.config.handover))
+
+    def take_over(self, old: Mux) -> None:
+        """Take over who was sending, what was selected, and what people have locked and added."""
+        for order in old.orders.added.values():
+            if order.input not in self.core.inputs:
+                self.add_input(order)
+                self.orders.keep(order)
+        self.core.take_over(old.core)
+        self.heard_at = old.heard_at
+        self.orders.take_over(old.orders, self.core.inputs)
+        self.changed()
+
+    # Messages
+
+    def received(self, port: str, message: Any) -> None:
+        """Forward a message of who holds the output, or take the message of a lock."""
+        if port in self.topics:
+            self.take(port, message)
+        elif (lock := port.removeprefix(LOCK)) in self.config.locks:
+            if self.config.locks[lock].topic:
+                self.core.flag(lock, message.data, self.now)
+            else:
+                self.core.heartbeat(lock, self.now)
+        self.settle()
+
+    def take(self, name: str, message: Message) -> None:
+        """Forward a message if its input holds the output; drop one with a number that is none, as if never sent."""
+        if not is_finite(message):
+            if name not in self.broken:
+                self.broken.add(name)
+                self.warn(f"input '{name}' sends numbers that are not finite: they are dropped")
+            return
+        self.broken.discard(name)
+        self.heard_at[name] = self.now
+        self.send(self.core.receive(name, message, self.now))
+
+    def wake(self) -> None:
+        """Send the single zero after the last source has ended."""
+        self.wakes_at = math.inf
+        self.send(self.core.tick(self.now))
+        self.settle()
+
+    def stop(self) -> None:
+        """Latch the lock `stop` and send a zero immediately."""
+        self.send(self.core.stop(self.now))
+        self.settle()
+
+    def release(self) -> None:
+        """Open the lock; a source that is still sending must come to rest once."""
+        self.core.release(self.now)
+        self.settle()
+
+    def hold(self) -> None:
+        """Send a zero and let nothing through while robot time stands still."""
+        self.send(self.core.hold(self.now))
+        self.settle()
+
+    def go_on(self) -> None:
+        """Let new messages through."""
+        self.core.resume(self.now)
+        self.settle()
+
+    def brake(self) -> None:
+        """Send a last zero and let nothing through any more."""
+        self.send(self.core.close(self.now))
+        self.settle()
+
+    def send(self, message: Message | None) -> None:
+        """Publish on the output."""
+        if message is not None:
+            self.bound["output"](message)
+
+    # Orders of people
+
+    @answers(LookAtMux)
+    def look(self, request: LookAtMux) -> MuxState:
+        """Return who holds the output and who waits."""
+        core, config, now = self.core, self.config, self.now
+        until = core.live_until(core.active) if core.active is not None else math.inf
+        return MuxState(
+            self.name,
+            config.output,
+            config.message,
+            config.mode,
+            config.profile,
+            now,
+            why(core, now),
+            core.active,
+            until if until < math.inf else None,
+            core.arbiter.selected,
+            states_of(core, self.topics, self.heard_at, now, has_priorities=config.has_priorities),
+            lock_states(core, {name: config.topic_of(name) for name in config.locks}, now),
+        )
+
+    @answers(ReadMuxChanges)
+    def read_changes(self, request: ReadMuxChanges) -> tuple[MuxChange, ...]:
+        """Return what changed after a number."""
+        return tuple(change for change in self.changes if change.number > request.after)
+
+    @answers(SelectMuxInput)
+    def select(self, request: SelectMuxInput) -> str:
+        """Select an input, or none."""
+        if self.config.mode != "select":
+            raise Refused(f"the inputs of '{self.name}' are not selected: its mode is '{self.config.mode}'")
+        name = None if request.input == NONE else self.known(request.input)
+        self.core.select(name, self.now)
+        self.orders.keep(SelectMuxInput(self.name, name or NONE))
+        self.changed()
+        return self.tell(f"'{name}' is selected" if name else "no input is selected")
+
+    @answers(AddMuxInput)
+    def add(self, request: AddMuxInput) -> str:
+        """Add an input."""
+        if any(text and input_at(text, self.topics) is not None for text in (request.input, request.topic)):
+            raise Refused(f"'{self.name}' already has the input '{request.input}'")
+        if request.input == NONE or request.input in self.bound or LOCK + request.input in self.bound:
+            raise Refused(f"'{request.input}' cannot be the name of an input")
+        if self.config.has_priorities and (request.priority is None or request.timeout is None):
+            raise Refused("an input needs a priority and a timeout")
+        self.add_input(request)
+        self.orders.keep(request)
+        self.changed()
+        return self.tell(f"input '{request.input}' takes '{self.topics[request.input]}'")
+
+    @answers(DeleteMuxInput)
+    def delete(self, request: DeleteMuxInput) -> str:
+        """Delete an input."""
+        name = self.known(request.input)
+        if name == self.core.arbiter.selected:
+            raise Refused(f"'{name}' is selected: select another one first")
+        self.core.delete(name, self.now)
+        del self.topics[name]
+        self.orders.keep(DeleteMuxInput(self.name, name))
+        self.changed()
+        return self.tell(f"input '{name}' is gone")
+
+    @answers(LockMuxInputs)
+    def lock(self, request: LockMuxInputs) -> str:
+        """Lock inputs by hand; what they had commanded ends as with any lock."""
+        names = [self.known(name) for name in request.inputs] or list(self.core.inputs)
+        self.core.lock(names, NEVER if request.seconds is None else self.now + request.seconds, self.now)
+        self.orders.keep(LockMuxInputs(self.name, tuple(names), request.seconds))
+        self.send(self.core.tick(self.now))
+        self.changed()
+        limit = "until they are unlocked" if request.seconds is None else f"for {request.seconds:g} s"
+        return self.tell(f"locked by hand {limit}: {', '.join(names)}")
+
+    @answers(UnlockMuxInputs)
+    def unlock(self, request: UnlockMuxInputs) -> str:
+        """End what was locked by hand; an input that still commands motion must come to rest once."""
+        names = [self.known(name) for name in request.inputs] or list(self.core.locks.by_hand)
+        if not (locked := [name for name in names if name in self.core.locks.by_hand]):
+            raise Refused("nothing is locked by hand")
+        self.core.unlock(locked, self.now)
+        self.settle()
+        resting = [name for name in locked if name in self.core.waiting]
+        rest = f"; {' and '.join(resting)} must come to rest once before it moves anything" if resting else ""
+        return self.tell(f"unlocked: {', '.join(locked)}{rest}")
+
+    def on_select(self, request: MuxSelect.Request) -> MuxSelect.Response:
+        """Select an input by its name or topic, as `topic_tools` does."""
+        before = self.core.arbiter.selected
+        done = self.does(lambda: self.select(SelectMuxInput(self.name, request.topic)))
+        return MuxSelect.Response(prev_topic=self.topics.get(before or "", ""), success=done)
+
+    def on_add(self, request: MuxAdd.Request) -> MuxAdd.Response:
+        """Add a topic as an input."""
+        topic = request.topic
+        return MuxAdd.Response(success=self.does(lambda: self.add(AddMuxInput(self.name, topic.strip("/"), topic))))
+
+    def on_delete(self, request: MuxDelete.Request) -> MuxDelete.Response:
+        """Delete an input by its name or topic."""
+        return MuxDelete.Response(success=self.does(lambda: self.delete(DeleteMuxInput(self.name, request.topic))))
+
+    def on_list(self, request: MuxList.Request) -> MuxList.Response:
+        """Return the topics of all inputs."""
+        return MuxList.Response(topics=tuple(self.topics.values()))
+
+    def does(self, order: Callable[[], str]) -> bool:
+        """Carry out an order; a refusal is logged, since the answer has no room for its reason."""
+        try:
+            order()
+        except Refused as refusal:
+            self.warn(str(refusal))
+            return False
+        return True
+
+    # Inputs
+
+    def add_input(self, request: AddMuxInput) -> None:
+        """Add an input to the core."""
+        config = MuxInputConfig(topic=request.topic or None, priority=request.priority or 0, timeout=request.timeout)
+        self.core.add(request.input, source_of(config, self.config), self.now)
+        self.topics[request.input] = request.topic or f"{self.config.output}/{request.input}"
+
+    def known(self, text: str) -> str:
+        """Return the input of this name or topic.
+
+        Raises:
+            Refused: if there is none.
+        """
+        if (name := input_at(text, self.topics)) is None:
+            raise Refused(f"'{self.name}' has no input '{text}'; {suggest(text, self.topics, 'inputs')}")
+        return name
+
+    def listen(self) -> None:
+        """Subscribe to what counts: a lazy mux listens to the selected input alone."""
+        chosen = self.core.arbiter.selected
+        wanted = {name for name in self.topics if name == chosen or not self.config.lazy}
+        for name in self.listening - wanted:
+            self.context.mute(name)
+        for name in wanted - self.listening:
+            input_ = self.config.inputs.get(name)
+            self.context.listen(_input(name, self.topics[name], self.config, input_.max_rate if input_ else None))
+        self.listening = wanted
+
+    # What it tells
+
+    def changed(self) -> None:
+        """Follow an order of a person, now and after a restart."""
+        self.context.repeat(self.orders.all)
+        self.listen()
+        self.settle()
+
+    def tell(self, text: str) -> str:
+        """Log what somebody ordered, and return it as the answer."""
+        self.info(text)
+        return text
+
+    def settle(self) -> None:
+        """Schedule the next deadline, and report changes in which source is let through and which are locked out."""
+        deadline = self.core.next_deadline()
+        if deadline is not None and not self.now <= self.wakes_at <= deadline:  # each message puts off the deadline
+            self.wakes_at = deadline
+            self.context.wake_at(deadline)
+        active = "stop" if self.core.is_stopped else self.core.active
+        locked, refused = self.core.locked_out(self.now), self.core.refused(self.now)
+        text = why(self.core, self.now)
+        if (text, active, locked) != self.told:
+            self.told = text, active, locked
+            level = Level.WARN if locked else Level.OK
+            self.status(level, text, active=active or "none", locked_out=", ".join(locked) or "none")
+            number = self.changes[-1].number + 1 if self.changes else 1
+            self.changes.append(MuxChange(number, self.now, text))
+        if refused and not self.refused:
+            self.warn(f"commands are blocked: {text}")
+        self.refused = refused
+        self.announce()
+        self.note()
+
+    def announce(self) -> None:
+        """Publish who holds the output, if that has changed; in the profile of `topic_tools`, what is selected."""
+        is_selection = self.config.profile == "topic_tools"
+        name = self.core.arbiter.selected if is_selection else self.core.active
+        text = NOBODY.get(self.config.profile, NONE)
+        if name is not None:
+            text = self.topics[name] if is_selection else name
+        if text != self.announced:
+            self.announced = text
+            self.bound[ANNOUNCED](String(data=text))
+
+    def note(self) -> None:
+        """Tell the supervisor what is locked by hand, and forget the orders of locks that have ended."""
+        by_hand = self.core.locks.by_hand
+        if self.orders.forget_locks(by_hand):
+            self.context.repeat(self.orders.all)
+        text = noted(by_hand.items())
+        if text != self.noted:
+            self.noted = text
+            self.context.notify(ComponentNoted(self.name, text))
+
+
+def _input(name: str, topic: str, config: MuxConfig, max_rate: float | None) -> In[Any]:
+    message = registry.message(config.message)
+    return In(message, topic, qos="command", is_open=True, max_rate=max_rate).named(name)
+
+
+def _services(output: str) -> dict[str, Port[Any]]:
+    """Return the services of topic_tools; to select is also a skill of missions."""
+    found: dict[str, Port[Any]] = {
+        "select": Serves(MuxSelect, f"{output}/select", skill=f"select_{output.replace('/', '_')}"),
+        "add": Serves(MuxAdd, f"{output}/add", skill=None),
+        "delete": Serves(MuxDelete, f"{output}/delete", skill=None),
+        "list": Serves(MuxList, f"{output}/list", skill=None),
+    }
+    return {name: port.named(name) for name, port in found.items()}

@@ -1,0 +1,189 @@
+"""The configuration of a mux, and the core that it describes: what each mode and profile makes of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from pydantic import Field
+
+from rbxcompose.base.config import Config, Frequency, Time
+from rbxcompose.domains.muxes.core import (
+    NEVER,
+    RAMPS,
+    VELOCITIES,
+    Arbiter,
+    AsTwistMux,
+    AsYocs,
+    ByLatest,
+    ByPriority,
+    BySelection,
+    LockSource,
+    MuxCore,
+    MuxEndings,
+    MuxSource,
+    Ramp,
+    is_zeroed,
+    rest_of,
+)
+from rbxcompose.domains.muxes.requests import NONE
+from rbxcompose.domains.muxes.words import HIGHEST, HandoverLimits, HoldFirst, MuxEnding, MuxMode, MuxProfile
+from rbxcompose.msgs import registry
+from rbxcompose.msgs.types import Message
+
+ANNOUNCED: Mapping[MuxProfile, str] = {"topic_tools": "selected"}
+ACTIVE = "active"  # the topic below the mux on which it announces who holds the output
+NOBODY: Mapping[MuxProfile, str] = {"yocs": "idle"}
+
+
+class MuxInputConfig(Config):
+    """An input."""
+
+    topic: str | None = None
+    """Its topic, if that is not `<output>/<name>`."""
+    priority: int = 0
+    """The input with the highest priority wins, where priorities count."""
+    timeout: Time | None = Field(None, ge=0)
+    """The input counts as silent after this long without a message."""
+    max_rate: Frequency | None = Field(None, gt=0)
+    """Most messages from one publisher in another process; the rest is dropped and reported. Default: 1000 Hz."""
+    zero_releases: bool = False
+    """Whether its zero lets go of the output at once."""
+
+
+class MuxLockConfig(Config):
+    """A lock."""
+
+    topic: str | None = None
+    """The topic of a flag; without it, it is a heartbeat at `<output>/<name>`."""
+    priority: int | None = None
+    """Inputs with a lower priority are locked; all, where priorities do not count."""
+    timeout: Time | None = Field(None, ge=0)
+    """It engages after this long without a message."""
+
+
+class MuxConfig(Config):
+    """The output, its inputs and locks, and who gets through."""
+
+    output: str
+    """Topic to which the messages of who holds it are forwarded."""
+    message: str = "geometry_msgs/msg/Twist"
+    """ROS name of the message type."""
+    mode: MuxMode = "priority"
+    """Who gets through: the live input with the highest priority, the selected one, or who sent last."""
+    profile: MuxProfile = "default"
+    """Whose rules are followed: ours, or those of a program of ROS."""
+    inputs: dict[str, MuxInputConfig]
+    """Sources by name; each has the topic `<output>/<name>`."""
+    locks: dict[str, MuxLockConfig] = {}
+    """Locks by name. A silent heartbeat, or a flag that is true, locks all inputs of a lower priority."""
+    initial: str | None = None
+    """The input that is selected first, `__none` for none; by default the first one."""
+    lazy: bool = False
+    """Whether only the selected input is subscribed to."""
+    on_idle: MuxEnding | None = None
+    """What follows the last command if no input is live any more; by default a stop, where zero is rest."""
+    on_lock: MuxEnding | None = None
+    """What follows the last command if its input was locked."""
+    handover: HandoverLimits | None = None
+    """How fast the output may grow after another input took over."""
+    zero_stops: bool | None = None
+    """Whether a message of zeros commands rest; by default for velocities."""
+
+    @property
+    def has_priorities(self) -> bool:
+        """Return whether priorities count."""
+        return self.mode == "priority"
+
+    @property
+    def has_rest(self) -> bool:
+        """Return whether a message of zeros commands rest."""
+        return self.message in VELOCITIES if self.zero_stops is None else self.zero_stops
+
+    @property
+    def announced(self) -> str:
+        """Return the word below the output at which it announces who holds it."""
+        return ANNOUNCED.get(self.profile, ACTIVE)
+
+    def topic_of(self, name: str) -> str:
+        """Return the topic of an input or a lock as it is written."""
+        config = self.inputs.get(name) or self.locks.get(name)
+        return (config.topic if config else None) or f"{self.output}/{name}"
+
+
+def core_of(config: MuxConfig, *, is_stopped: bool = False) -> MuxCore[Message]:
+    """Return the core of a mux."""
+    message = registry.message(config.message)
+    rest: dict[str, Any] = {"zero": rest_of(message), "is_zero": is_zeroed} if config.has_rest else {"zero": None}
+    return MuxCore(
+        {name: source_of(input_config, config) for name, input_config in config.inputs.items()},
+        arbiter=arbiter_of(config),
+        locks={name: _lock(lock, config) for name, lock in config.locks.items()},
+        endings=MuxEndings(_wait(config.on_idle, config.profile), _wait(config.on_lock, config.profile)),
+        handover=_ramp(config),
+        stopped=is_stopped,
+        **rest,
+    )
+
+
+def arbiter_of(config: MuxConfig) -> Arbiter:
+    """Return the rule by which the output is given."""
+    if config.mode == "select":
+        first = next(iter(config.inputs), None)
+        return BySelection(first if config.initial is None else None if config.initial == NONE else config.initial)
+    if config.mode == "latest":
+        return ByLatest()
+    made: Mapping[MuxProfile, Callable[[], Arbiter]] = {"twist_mux": AsTwistMux, "yocs": AsYocs}
+    return made.get(config.profile, ByPriority)()
+
+
+def source_of(input_config: MuxInputConfig, config: MuxConfig) -> MuxSource:
+    """Return an input as the core knows it.
+
+    In `twist_mux` an input with the timeout 0 never expires, and masks others before its first message. What is
+    selected by hand needs no timeout: it is live as long as it is selected.
+    """
+    never_ends = input_config.timeout is None or (input_config.timeout == 0 and config.profile == "twist_mux")
+    starts_live = never_ends and (config.mode == "select" or config.profile == "twist_mux")
+    return MuxSource(
+        _priority(input_config.priority, config) if config.has_priorities else 0,
+        NEVER if never_ends or input_config.timeout is None else input_config.timeout,
+        input_config.zero_releases and config.has_rest,
+        starts_live,
+    )
+
+
+def _lock(lock_config: MuxLockConfig, config: MuxConfig) -> LockSource:
+    counts = config.has_priorities and lock_config.priority is not None
+    return LockSource(
+        _priority(lock_config.priority or 0, config) if counts else NEVER,
+        lock_config.timeout or NEVER,
+        is_flag=bool(lock_config.topic),
+    )
+
+
+def _priority(written: int, config: MuxConfig) -> int:
+    return max(0, min(written, HIGHEST)) if config.profile == "twist_mux" else written
+
+
+def _wait(ending: MuxEnding | None, profile: MuxProfile) -> float:
+    """Return how long after the last command the stop follows [s]."""
+    match ending:
+        case HoldFirst(hold=time):
+            return time
+        case None:
+            return 0.0 if profile == "default" else NEVER
+        case _:
+            return 0.0 if ending == "stop" else NEVER
+
+
+def _ramp(config: MuxConfig) -> Ramp[Any] | None:
+    made = RAMPS.get(config.message)
+    return None if made is None or config.handover is None else made(*handover_limits(config.handover))
+
+
+def handover_limits(limits: HandoverLimits | None) -> tuple[float, float]:
+    """Return the limits of a hand-over [m/s^2, rad/s^2]; infinite where there is none."""
+    linear, angular = (limits.linear, limits.angular) if limits else (None, None)
+    return math.inf if linear is None else linear, math.inf if angular is None else angular

@@ -1,0 +1,320 @@
+"""Rules about batteries and charging."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+from rbxcompose.base.expressions.tree import Comparison, Variable
+from rbxcompose.base.findings import Finding, Related, Severity
+from rbxcompose.base.rules import MISSIONS, OWN, WIRING
+from rbxcompose.base.units import LENGTH, RATIO, TIME, format_quantity
+from rbxcompose.compiler.check_runner import check
+from rbxcompose.compiler.checks.missions import bounds_of, implies
+from rbxcompose.compiler.checks.places import far_places
+from rbxcompose.compiler.model.flow import OTHER_TYPE, is_written, setting_span
+from rbxcompose.compiler.model.robot import Robot, RobotComponent, RobotMission
+from rbxcompose.domains.power.charge import (
+    ChargeInterrupt,
+    batteries,
+    blamed,
+    calls,
+    charger_of,
+    constants,
+    navigator_of,
+    ways_of,
+)
+from rbxcompose.missions.analysis.bounds import truth
+from rbxcompose.missions.analysis.facts import goal_place
+from rbxcompose.missions.analysis.travel_times import Ways, distance, too_short
+from rbxcompose.missions.language.asked import Asked
+from rbxcompose.missions.program.answers import NodeFlow
+from rbxcompose.missions.program.program import Interrupt, MissionNode, Program
+from rbxcompose.sdk.capabilities import Charges, Drains, Navigates, Setting, Warns
+
+
+@check("RBX4121")
+def charge_and_call(robot: Robot) -> Iterator[Finding]:
+    """A charge ends below the level that triggers it."""
+    for mission in robot.missions.values():
+        for call in calls(robot, mission):
+            until = call.charges.until
+            if until and until.value < call.level <= 1.0:
+                span, related = blamed(robot, mission, call.interrupt.when)
+                yield charge_and_call.at(
+                    span,
+                    f"the interrupt '{call.interrupt.name}' charges below {format_quantity(call.level, RATIO)}, "
+                    f"but a charge may end at {format_quantity(until.value, RATIO)}",
+                    help="charge at a lower level",
+                    related=related,
+                )
+
+
+@check("RBX4185", Severity.WARNING, closed=(WIRING, MISSIONS, "places"))
+def charge_anywhere(robot: Robot) -> Iterator[Finding]:
+    """A reaction to a low battery charges wherever the robot is."""
+    levels = batteries(robot)
+    for mission in robot.missions.values():
+        program, ways = mission.program, ways_of(robot, mission)
+        if ways is None or not ways.driving.skill:
+            continue
+        list(too_short(ways, constants(mission)))  # consumed for its side effect: it walks the whole mission
+        for interrupt in program.interrupts:
+            tree = interrupt.when.expression.tree
+            is_low = isinstance(tree, Comparison) and isinstance(tree.left, Variable) and tree.left.name in levels
+            below = program.below(interrupt.root) if interrupt.root is not None and is_low else ()
+            if any(_may_move(robot, node) for node in below):
+                continue
+            for node in below:
+                charger, charges = charger_of(robot, node.skill) or (None, None)
+                if charger is None or charges is None or charges.place is None or not _counts(program, node):
+                    continue
+                away = _elsewhere(ways, charges)
+                if away:
+                    dock = charges.place.value.name
+                    yield charge_anywhere.at(
+                        node.span,
+                        f"'{interrupt.name}' charges wherever it cuts in, such as at '{away}': "
+                        f"'{node.skill}' works only at '{dock}'",
+                        help=f"drive to the dock first: '- {ways.driving.skill}: {dock}'",
+                        related=[Related(setting_span(robot, (charger, charges.place.field)), "the dock")],
+                    )
+
+
+def _may_move(robot: Robot, node: MissionNode) -> bool:
+    """Return whether a step may bring the robot to another place, as everything may that is not ours to know."""
+    effects = node.step.effects
+    if node.skill:
+        return charger_of(robot, node.skill) is None or navigator_of(robot, node.skill) is not None
+    return bool(node.step.uses or effects.published or effects.called)
+
+
+def _counts(program: Program, node: MissionNode) -> bool:
+    """Return whether a step is always done in its turn, and its failure is that of the reaction."""
+    mission_node: MissionNode | None = node
+    while mission_node is not None:
+        above = None if mission_node.parent is None else program.nodes[mission_node.parent]
+        if (
+            mission_node.may_be_left_out
+            or mission_node.is_forgiven
+            or (above and above.step.flow is not NodeFlow.IN_TURN)
+        ):
+            return False
+        mission_node = above
+    return True
+
+
+def _elsewhere(ways: Ways, charges: Charges) -> str:
+    """Return a place that the mission drives to and that is out of reach of the charger."""
+    if charges.place is None:
+        return ""
+    dock, reach = charges.place.value, charges.reach.value if charges.reach else 0.0
+    far = (name for name, place in ways.visited.items() if distance(place, dock) > reach + ways.driving.tolerance)
+    return next(far, "")
+
+
+@check("RBX4130", closed=(WIRING, "places"))
+def charge_elsewhere(robot: Robot) -> Iterator[Finding]:
+    """A mission charges where there is no dock."""
+    for mission in robot.missions.values():
+        ways = ways_of(robot, mission)
+        if ways is None:
+            continue
+        list(too_short(ways, constants(mission)))  # consumed for its side effect: it walks the whole mission
+        for number, here in ways.starts_at.items():
+            node = mission.program.nodes[number]
+            charger, charges = charger_of(robot, node.skill) or (None, None)
+            may_fail = node.may_be_left_out or node.is_forgiven
+            if charger is None or charges is None or charges.place is None or may_fail:
+                continue
+            dock = charges.place.value
+            reach = charges.reach.value if charges.reach else 0.0
+            if distance(here, dock) > reach + ways.driving.tolerance:
+                yield charge_elsewhere.at(
+                    node.span,
+                    f"'{node.skill}' works only at '{dock.name}', but here the robot is at '{here.name}'",
+                    help=f"drive to the dock first: '{ways.driving.skill}: {dock.name}'",
+                    related=[Related(setting_span(robot, (charger, charges.place.field)), "the dock of the charger")],
+                )
+
+
+@check("RBX4189", Severity.WARNING, closed=(OWN,))
+def charged_before(robot: Robot) -> Iterator[Finding]:
+    """A loop ends at a level before which the battery is charged."""
+    for mission in robot.missions.values():
+        known = bounds_of(mission)
+        for call in calls(robot, mission):
+            for asked in _ends_of_loops(mission.program, call):
+                tree = asked.expression.tree
+                if truth(tree, known) is None and implies(asked.expression, call.interrupt.when.expression, known):
+                    yield charged_before.at(
+                        asked.scalar.span,
+                        f"'{call.interrupt.name}' charges the battery before this holds: it never ends the loop",
+                        help="end it at a higher level, or by something else",
+                        related=[Related(call.interrupt.when.scalar.span, "it charges at this")],
+                    )
+
+
+def _ends_of_loops(program: Program, call: ChargeInterrupt) -> Iterator[Asked]:
+    for node in program.nodes:
+        if node.children and node not in call.reaction:
+            yield from (asked for asked in node.asked[: node.own] if asked.is_watched)
+
+
+_ABSURD = 1.0  # [m] of a tolerance, which is then what is wrong
+
+
+@check("RBX3505", Severity.WARNING, closed=())
+def charger_reach(robot: Robot) -> Iterator[Finding]:
+    """The robot may stop too far from its dock to be charged."""
+    drivers = [
+        (component, navigates.tolerance) for component, navigates in robot.declared(Navigates) if navigates.tolerance
+    ]
+    if not drivers:
+        return
+    driver, tolerance = min(drivers, key=lambda one: one[1].value)
+    for component, charges in robot.declared(Charges):
+        reach = charges.reach
+        if reach and charges.place and reach.value < tolerance.value:
+            here, there = (component, reach.field), (driver, tolerance.field)
+            changes = [f"'{name}' {how}" for name, how in ((here[1], "larger"), (there[1], "smaller")) if name]
+            both = (there, here) if tolerance.value > _ABSURD else (here, there)
+            yield charger_reach.at(
+                setting_span(robot, *both),
+                f"'{component.name}' charges within {format_quantity(reach.value, LENGTH)} of the dock, "
+                f"but '{driver.name}' may end {format_quantity(tolerance.value, LENGTH)} away from it",
+                help=f"make {', or '.join(changes)}" if changes else OTHER_TYPE,
+                related=[Related(setting_span(robot, there), f"its '{there[1]}'" if there[1] else "drives there")],
+            )
+
+
+@check("RBX4173", Severity.WARNING, closed=(WIRING, MISSIONS))
+def dock_without_charge(robot: Robot) -> Iterator[Finding]:
+    """A reaction to a low battery does not charge at the dock."""
+    levels = batteries(robot)
+    for mission in robot.missions.values():
+        for interrupt in mission.program.interrupts:
+            match interrupt.when.expression.tree:
+                case Comparison(operator="<" | "<=", left=Variable(name=name)) if name in levels:
+                    yield from _of_reaction(robot, mission, interrupt)
+
+
+def _of_reaction(robot: Robot, mission: RobotMission, interrupt: Interrupt) -> Iterator[Finding]:
+    nodes = mission.program.nodes
+    root = nodes[interrupt.root] if interrupt.root is not None else None
+    steps = [nodes[child] for child in root.children] if root and root.step.flow is NodeFlow.IN_TURN else []
+    if root is None or any(step.children or not step.skill for step in steps):
+        return  # more than drives and charges, one after the other
+    drives = [step for step in steps if navigator_of(robot, step.skill)]
+    docks = [drive for drive in drives if _is_dock(robot, mission, drive)]
+    charges = [step for step in steps if charger_of(robot, step.skill)]
+    if docks and charges and charges[0].number < drives[0].number:
+        message = f"'{interrupt.name}' charges before it drives to the dock"
+        related = [Related(docks[0].span, "it drives there only now")]
+        yield dock_without_charge.at(charges[0].span, message, help="exchange these steps", related=related)
+    elif docks and docks[-1] is steps[-1] and not any(charger_of(robot, node.skill) for node in nodes):
+        skills = [name for name in robot.skills if charger_of(robot, name)]
+        message = f"'{interrupt.name}' drives to the dock and does not charge there"
+        yield dock_without_charge.at(docks[-1].span, message, help=f"add the step '- {skills[0]}'")
+
+
+def _is_dock(robot: Robot, mission: RobotMission, node: MissionNode) -> bool:
+    """Return whether a step drives to the place of a charger."""
+    there = goal_place(node, robot.skills[node.skill].skill.main, constants(mission), robot.manifest.places)
+    docks = [charges.place.value.name for _, charges in robot.declared(Charges) if charges.place]
+    return there is not None and there.name in docks
+
+
+_LASTS = "how long a full battery lasts"
+
+
+@check("RBX4124", Severity.WARNING)
+def empty_on_the_way(robot: Robot) -> Iterator[Finding]:
+    """The battery may be empty before the robot reaches its dock."""
+    for mission in robot.missions.values():
+        ways, known = ways_of(robot, mission), constants(mission)
+        if ways is None:
+            continue
+        lost = {place.name for place in far_places(robot)}  # told as RBX3512
+        list(too_short(ways, known))  # consumed for its side effect: it walks the whole mission
+        for call in calls(robot, mission):
+            goals = (
+                goal_place(node, ways.driving.main, known, ways.places)
+                for node in call.reaction
+                if node.skill == ways.driving.skill
+            )
+            dock = next((place for place in goals if place), None)
+            runtime = call.drains.runtime
+            visited = [place for name, place in ways.visited.items() if name not in lost]
+            if dock is None or runtime is None or not visited or dock.name in lost:
+                continue
+            far = max(visited, key=lambda place: ways.between(place, dock))
+            lasts, needs = call.level * runtime.value, ways.between(far, dock)
+            if runtime.value < needs:
+                yield _never_there(robot, call.battery, runtime, f"from '{far.name}' to '{dock.name}'", needs)
+            elif 0 <= lasts < needs:
+                span, related = blamed(robot, mission, call.interrupt.when)
+                yield empty_on_the_way.at(
+                    span,
+                    f"{format_quantity(call.level, RATIO)} last for {format_quantity(round(lasts, 1), TIME)}, but the "
+                    f"way from '{far.name}' to '{dock.name}' takes {format_quantity(round(needs, 1), TIME)}",
+                    help="interrupt earlier",
+                    related=[*related, Related(setting_span(robot, (call.battery, runtime.field)), _LASTS)],
+                )
+
+
+def _never_there(robot: Robot, battery: RobotComponent, runtime: Setting[float], way: str, needs: float) -> Finding:
+    """Return the finding about a battery that even when full is empty before the dock is reached."""
+    lasts, takes = format_quantity(runtime.value, TIME), format_quantity(round(needs, 1), TIME)
+    return empty_on_the_way.at(
+        setting_span(robot, (battery, runtime.field)),
+        f"a full battery lasts for {lasts}, but the way {way} takes {takes}",
+        help=f"make it last longer: several times {takes}",
+    )
+
+
+@check("RBX4160", Severity.WARNING)
+def late_call(robot: Robot) -> Iterator[Finding]:
+    """The battery is in error before the mission charges it."""
+    for mission in robot.missions.values():
+        for call in calls(robot, mission):
+            error = call.drains.error
+            if error and call.level < error.value and is_written(robot, call.battery, error.field):
+                span, related = blamed(robot, mission, call.interrupt.when)
+                level, limit = format_quantity(call.level, RATIO), format_quantity(error.value, RATIO)
+                yield late_call.at(
+                    span,
+                    f"'{mission.name}' charges '{call.battery.name}' below {level}; it is in error below {limit}",
+                    help=f"charge it at {limit} or above, or put its '{error.field or 'error'}' below {level}",
+                    related=[*related, Related(setting_span(robot, (call.battery, error.field)), "its status")],
+                )
+
+
+@check("RBX3502")
+def threshold_order(robot: Robot) -> Iterator[Finding]:
+    """An error is reported before a warning."""
+    for component, drains in robot.declared(Drains):
+        yield from _disorder(robot, component, drains.warn, drains.error, "below", lambda x: format_quantity(x, RATIO))
+    for component, warns in robot.declared(Warns):
+        side = "above" if warns.is_above else "below"
+        yield from _disorder(robot, component, warns.warn, warns.error, side, lambda x: f"{x:g}")
+
+
+def _disorder(
+    robot: Robot,
+    component: RobotComponent,
+    warn: Setting[float] | None,
+    error: Setting[float] | None,
+    side: str,
+    text: Callable[[float], str],
+) -> Iterator[Finding]:
+    if not (warn and error) or (warn.value <= error.value if side == "above" else warn.value >= error.value):
+        return
+    here, there = (component, warn.field), (component, error.field)
+    other = "below" if side == "above" else "above"
+    yield threshold_order.at(
+        setting_span(robot, here, there),
+        f"'{component.name}' can never warn: it is already in error {side} {text(error.value)}, "
+        f"and warns {side} {text(warn.value)}",
+        help=f"'{warn.field or 'warn'}' must be {other} '{error.field or 'error'}'",
+        related=[Related(setting_span(robot, there, here), f"in error {side} this")],
+    )

@@ -1,0 +1,106 @@
+"""The simulated battery."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from rbxcompose.base.levels import Level
+from rbxcompose.domains.power.battery_twin import BatteryCore, BatterySettings
+from rbxcompose.msgs.rbxcompose_msgs import SetBatteryLevel
+from rbxcompose.msgs.std_msgs import Float32
+from rbxcompose.sdk import (
+    Capability,
+    Component,
+    Config,
+    Drains,
+    Live,
+    Out,
+    Ratio,
+    Refused,
+    Serves,
+    Setting,
+    Time,
+    component,
+)
+
+PERCENT = 100.0  # a `battery_level` message counts from 0 to 100
+DIGITS = 6  # of a percentage; further ones are rounding errors, which would put 80 % below 80 %
+
+
+class BatterySimConfig(Config):
+    """How fast the battery drains, and when it warns."""
+
+    runtime: Annotated[Time, Live()] = Field(gt=0)
+    """Time from full to empty."""
+    initial: Ratio = Field(1.0, ge=0, le=1)
+    """Charge at the start."""
+    warn: Annotated[Ratio, Live()] = Field(0.5, ge=0, le=1)
+    """Below this charge its status is WARN."""
+    error: Annotated[Ratio, Live()] = Field(0.2, ge=0, le=1)
+    """Below this charge its status is ERROR."""
+
+
+@component("battery_sim")
+class BatterySim(Component[BatterySimConfig]):
+    """A battery that drains evenly from full to empty over `runtime`; a charger can set its level.
+
+    Example:
+        battery: {type: battery_sim, runtime: 45 s, warn: 50 %, error: 20 %}
+    """
+
+    rate = 1.0
+    process = "world"
+    simulated = True
+    battery_level = Out(Float32, "battery_level", unit="%", rate=rate)
+    set_battery_level = Serves(SetBatteryLevel, "set_battery_level", unit="%")
+
+    @classmethod
+    def capabilities(cls, config: BatterySimConfig) -> tuple[Capability, ...]:
+        """Declare that it is a battery."""
+        runtime = Setting(config.runtime, "runtime")
+        warn, error = Setting(config.warn, "warn"), Setting(config.error, "error")
+        return (Drains("battery_level", runtime, warn, error),)
+
+    def configure(self) -> None:
+        """Fill the battery."""
+        self.core = BatteryCore(settings_of(self.config), self.config.initial)
+        self.told = Level.OK
+
+    def reconfigure(self, old: BatterySimConfig) -> None:
+        """Apply the new runtime and thresholds; the charge stays unchanged."""
+        self.core.settings = settings_of(self.config)
+        self.publish()
+
+    def activate(self) -> None:
+        """Publish the first level immediately, since others wait for it."""
+        self.publish()
+
+    def step(self, dt: float) -> None:
+        """Drain for `dt` [s]."""
+        self.core.step(dt)
+        self.publish()
+
+    def on_set_battery_level(self, request: SetBatteryLevel.Request) -> SetBatteryLevel.Response:
+        """Set the charge, given from 0 to 100; refuse one out of range."""
+        if refusal := self.core.set(request.value / PERCENT):
+            raise Refused(refusal)
+        self.info(f"set to {request.value:.0f} %")
+        self.publish()
+        return SetBatteryLevel.Response()
+
+    def publish(self) -> None:
+        """Publish level and status; log a new status level to the story."""
+        percent = round(self.core.level * PERCENT, DIGITS)
+        level, message = self.core.status
+        self.battery_level(Float32(data=percent))
+        self.status(level, message, level=f"{percent:.1f} %")
+        if level is not self.told:
+            self.context.log(level, f"{message}: {percent:.0f} %")
+            self.told = level
+
+
+def settings_of(config: BatterySimConfig) -> BatterySettings:
+    """Return the settings of the core."""
+    return BatterySettings(runtime=config.runtime, warn=config.warn, error=config.error)

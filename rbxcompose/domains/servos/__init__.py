@@ -1,0 +1,1 @@
+"""Servos: buses, models, joints, controllers, simulated twins."""

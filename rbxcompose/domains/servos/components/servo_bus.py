@@ -1,0 +1,413 @@
+"""Drives the joints that the servos of a bus turn."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from contextlib import ExitStack
+from dataclasses import replace
+from functools import partial
+from typing import Any, Literal
+
+from rbxcompose.base.clock import MonotonicClock
+from rbxcompose.base.requests import Refused, answers
+from rbxcompose.domains.devices.serial_ports import PortError
+from rbxcompose.domains.servos.bus import bus_type
+from rbxcompose.domains.servos.bus_config import ServoBusConfig, drives_of, item_of, joint_ports, mimics_of
+from rbxcompose.domains.servos.bus_line import open_bus
+from rbxcompose.domains.servos.controller import controller_type
+from rbxcompose.domains.servos.controller_manager import (
+    ControllerManager,
+    ControllerSeat,
+    ControllerState,
+    ListControllers,
+    ScaleMotion,
+    SwitchControllers,
+)
+from rbxcompose.domains.servos.joint_drive import JointDrive, PositionDrive
+from rbxcompose.domains.servos.joint_states import Enable, Hold, JointMode, MoveTo
+from rbxcompose.domains.servos.servo_cycle import ServoCycle, ServoItem, prepare, set_up, with_torque
+from rbxcompose.domains.servos.supervision import Periods, Reboots, be_prompt, joint_state, report
+from rbxcompose.domains.servos.twins.fault_script import InjectFault
+from rbxcompose.msgs.rbxcompose_msgs import SetSpeed
+from rbxcompose.msgs.sensor_msgs import JointState
+from rbxcompose.msgs.std_srvs import SetBool, Trigger
+from rbxcompose.sdk import Component, Later, Out, Port, Serves, ServesAction, component
+from rbxcompose.sdk.capabilities import Capability, ConnectedBy, NeedsExtra, OpensPort, Setting, within
+from rbxcompose.sdk.component import Context
+
+GONE = "the bus of servos has gone"
+REOPEN = 0.5  # [s] between attempts to find a port that has gone
+REPORT = 1.0  # [s] between reports to diagnostics
+PUBLISHED = 50.0  # [Hz] of joint states, at most
+
+
+@component("servo_bus")
+class ServoBusDriver(Component[ServoBusConfig]):
+    """Reads and writes the servos of a bus, keeps their joints within limits, and runs controllers that lead them.
+
+    Each joint has a topic `JOINT/command` [rad], and the services `JOINT/relax`, `JOINT/enable`, `JOINT/reboot` and
+    `JOINT/set_speed`; `BUS/relax_all` and `BUS/enable_all` are for all. A joint starts relaxed; the first command
+    switches its torque on, where it is. A servo that has shut down must be rebooted before it takes torque again, in
+    missions by the skill `reboot_JOINT`.
+
+    Example:
+        servos: {type: servo_bus, twin: servo, joints: {pan: {servos: [{id: 1, model: AX-12}]}}}
+    """
+
+    made_by = "Each entry of `buses` runs one."
+    process = "servos"
+    joint_states = Out(JointState, "joint_states")
+
+    @classmethod
+    def ports(cls, config: ServoBusConfig) -> dict[str, Port[Any]]:
+        """Return the ports: for each joint, for all, and those of the controllers."""
+        states = Out(JointState, "joint_states", rate=config.rate / cycles_between(config))
+        found = super().ports(config) | {"joint_states": states} | joint_ports(config)
+        for name, setup in config.controllers.items():
+            ports = controller_type(setup.type).ports(name, setup.config)
+            found |= {f"{name}_{port}": one for port, one in ports.items()}
+        return {name: port.named(name) for name, port in found.items()}
+
+    @classmethod
+    def rest_time(cls, config: ServoBusConfig) -> float:
+        """Return the time that parking may take."""
+        return config.park_time if config.on_shutdown == "park" else super().rest_time(config)
+
+    @classmethod
+    def capabilities(cls, config: ServoBusConfig) -> tuple[Capability, ...]:
+        """Declare what its controllers can do, that servos which speak bytes need the SDK, and real ones their port."""
+        led = (
+            within(capability, f"{name}_", f"controllers.{name}.")
+            for name, each in config.controllers.items()
+            for capability in controller_type(each.type).capabilities(name, each.config)
+        )
+        kind, has_bytes = bus_type(config.kind), config.twin in ("", "pty")
+        packages = (NeedsExtra(Setting(kind.package), Setting(kind.extra)),) if kind.package and has_bytes else ()
+        port = Setting(config.port, "port")
+        ports = () if config.twin else (OpensPort(port),)
+        return (*led, *packages, *((ConnectedBy(port),) if config.port else ()), *ports)
+
+    def __init__(self, name: str, config: ServoBusConfig, context: Context) -> None:
+        """Give the ports of joints and controllers their methods."""
+        super().__init__(name, config, context)
+        orders = ("relax", self.relax), ("enable", self.enable), ("reboot", self.reboot), ("set_speed", self.set_speed)
+        for joint in config.joints:
+            for word, method in orders:
+                setattr(self, f"on_{joint}_{word}", partial(method, joint))
+        self.owners: dict[str, tuple[str, str]] = {}  # the controller of a port, and the port's name there
+        for controller, setup in config.controllers.items():
+            for short, port in controller_type(setup.type).ports(controller, setup.config).items():
+                self.owners[f"{controller}_{short}"] = controller, short
+                if isinstance(port, ServesAction):
+                    setattr(self, f"accept_{controller}_{short}", partial(self.accept, controller, short))
+                elif isinstance(port, Serves):
+                    setattr(self, f"on_{controller}_{short}", partial(self.asked, controller, short))
+
+    def configure(self) -> None:
+        """Open the bus, real or simulated; nothing moves."""
+        config, self.at_end = self.config, ExitStack()
+        self.period = 1.0 / config.rate
+        self.pause = (cycles_between(config) - 0.5) * self.period  # [s] between two joint states, cycles being late
+        self.periods = Periods(self.period)
+        drives, mimics = drives_of(config), mimics_of(config.joints)
+        is_real_time = isinstance(self.context.clock, MonotonicClock)
+        joints = [drive.joint for drive in drives.values()]
+        opened = open_bus(config, joints, lambda: self.now, self.at_end, is_real_time=is_real_time)
+        if opened.note:
+            self.warn(opened.note)
+        self.faults = opened.faults
+        self.cycle = ServoCycle(opened.bus, drives, mimics, config.watchdog, config.thermal.scope == "bus")
+        self.reboots = Reboots(opened.bus, self.prepare)
+        seats = {
+            name: ControllerSeat(self, name, {joint: drives[joint] for joint in controller.config.claimed})
+            for name, controller in config.controllers.items()
+        }
+        self.controllers = ControllerManager(
+            {
+                name: controller_type(controller.type)(name, controller.config, seats[name])
+                for name, controller in config.controllers.items()
+            }
+        )
+        self.is_stopped, self.lost_at = self.context.is_stopped, -math.inf
+        self.told_at, self.published_at = -math.inf, -math.inf
+        self.is_parking = False
+
+    def prepare(self, *drives: JointDrive) -> None:
+        """Set the modes of the servos of some joints, or of all, and of those that controllers use."""
+        bus, config, drives = self.cycle.bus, self.config, drives or tuple(self.cycle.drives.values())
+        told = prepare(bus, [drive.joint for drive in drives], config.watchdog, config.return_delay)
+        for text in (*told, *self.cycle.limit(drives), *set_up(self.cycle.items, bus)):
+            self.info(text)
+
+    def activate(self) -> None:
+        """Begin the cycles; torque that an earlier driver has left on is kept if that is what the end is to be."""
+        try:
+            self.prepare()
+            if self.config.on_shutdown != "relax":
+                for name in self.cycle.drives:
+                    self.start_by(name, "wait")
+                self.keep_torque()
+        except PortError as error:
+            self.lose(error)
+        if self.faults is not None:
+            self.faults.start(self.now)
+        is_real = not self.config.twin and isinstance(self.context.clock, MonotonicClock)
+        if is_real and (reason := be_prompt()):
+            self.info(f"cycles may be late on a busy machine: no real-time priority ({reason})")
+        self.wake()
+
+    def keep_torque(self) -> None:
+        """Let joints hold that have torque, as soon as their servos have told whether they have."""
+        waiting = [drive.joint for drive in self.cycle.drives.values() if drive.policy.on_start == "wait"]
+        for name, is_held in with_torque(self.cycle.bus, waiting).items() if waiting else ():
+            self.start_by(name, "hold" if is_held else self.config.on_start)
+
+    def start_by(self, name: str, how: Literal["relax", "hold", "wait"]) -> None:
+        """Set what a joint does at its first measurement."""
+        drive = self.cycle.drives[name]
+        drive.policy = replace(drive.policy, on_start=how)
+
+    def wake(self) -> None:
+        """Run one cycle, and prepare the next, on a grid."""
+        self.context.wake_at((math.floor(self.now / self.period + 1e-6) + 1) * self.period)
+        if self.faults is not None:
+            self.faults.play(self.now)
+        try:
+            self.run_cycle()
+        except PortError as error:
+            self.lose(error)
+        if self.now - self.told_at >= REPORT:
+            self.told_at = self.now
+            self.tell()
+
+    def run_cycle(self) -> None:
+        """Run the cycle with all active controllers, and publish."""
+        if self.lost_at > -math.inf:
+            if self.now - self.lost_at < REOPEN:
+                return
+            self.cycle.bus.reopen()
+            for drive in self.cycle.drives.values():  # their servos have no torque now, and may be elsewhere
+                self.start_by(drive.joint.name, "relax")
+                drive.relax()
+            self.prepare()
+            self.info("the bus of servos is back")
+            self.lost_at = -math.inf
+        self.keep_torque()
+        self.periods.begin(self.now)
+        if self.is_parking:
+            self.park_the_rest()
+        self.cycle.run(self.now, self.period, () if self.is_parking else self.controllers.leading)
+        self.reboots.step(self.now)
+        while self.cycle.notes:
+            self.info(self.cycle.notes.pop(0))
+        if self.now - self.published_at >= self.pause:
+            self.published_at = self.now
+            self.publish()
+
+    # Controllers
+
+    def accept(self, controller: str, port: str, goal: Any) -> str:
+        """Refuse what moves while the robot is stopped, or its bus has gone; else the controller decides."""
+        return self.objection(controller) or self.controllers.controllers[controller].accept(port, goal)
+
+    def asked(self, controller: str, port: str, request: Any) -> Any:
+        """Pass a request on to a controller."""
+        return self.controllers.controllers[controller].asked(port, request)
+
+    @answers(ListControllers)
+    def listed(self, request: ListControllers) -> tuple[ControllerState, ...]:
+        """Return all controllers."""
+        return tuple(
+            ControllerState(
+                name, controller.type_name, self.controllers.is_active(name), controller.config.claimed, controller.note
+            )
+            for name, controller in self.controllers.controllers.items()
+        )
+
+    @answers(SwitchControllers)
+    def switch(self, request: SwitchControllers) -> str:
+        """Switch controllers, all at once or not at all."""
+        for text in (told := list(self.controllers.switch(request.on, request.off, self.now))):
+            self.info(text)
+        return "; ".join(told) or "nothing changes"
+
+    @answers(ScaleMotion)
+    def scale(self, request: ScaleMotion) -> str:
+        """Let a controller follow its goals slower, or as fast as they ask for."""
+        return self.controllers.set_pace(request.controller, request.share)
+
+    # Joints
+
+    def refusal(self) -> str:
+        """Return why nothing may move now, or nothing."""
+        return "the robot is stopped" if self.is_stopped else GONE if self.lost_at > -math.inf else ""
+
+    def objection(self, controller: str) -> str:
+        """Return why a controller may command nothing now, or nothing."""
+        is_active = self.controllers.is_active(controller)
+        return self.refusal() if is_active else f"controller '{controller}' is not active"
+
+    def item(self, actuator: str, name: str, *, is_read: bool, setup: Mapping[str, int]) -> ServoItem:
+        """Return an item of a servo, which the cycle reads or writes."""
+        found = item_of(self.config, actuator, name, is_read, setup)
+        self.cycle.items.append(found)
+        return found
+
+    def received(self, port: str, message: Any) -> None:
+        """Pass a message on to its controller, or move one joint unless a controller leads it."""
+        if port in self.owners:
+            controller, short = self.owners[port]
+            if not self.objection(controller):
+                self.controllers.controllers[controller].received(short, message)
+            return
+        name = port.removesuffix("_command")
+        leader, drive = self.controllers.leader(name), self.cycle.drives[name]
+        drive.refused = f"controller '{leader}' leads it" if leader else self.refusal()
+        if not drive.refused:
+            drive.ask(MoveTo(message.data))
+
+    def relax(self, name: str, request: Trigger.Request) -> Trigger.Response:
+        """Switch the torque of a joint off, until its next command."""
+        self.let_go(name)
+        return Trigger.Response(success=True)
+
+    def let_go(self, name: str) -> None:
+        """Relax a joint; a controller that leads it ends what it does, or it would have torque again at once."""
+        self.controllers.let_go(name, self.now, f"joint '{name}' was relaxed")
+        self.cycle.drives[name].relax()
+
+    def reboot(self, name: str, request: Trigger.Request) -> Later[Trigger.Response]:
+        """Start the servos of a joint again, which a servo that has shut down needs; then it is relaxed."""
+        response = Later[Trigger.Response]()
+        self.controllers.let_go(name, self.now, f"the servos of joint '{name}' are started again")
+        try:
+            if self.lost_at > -math.inf:
+                raise Refused(GONE)
+            self.reboots.begin(
+                self.cycle.drives[name],
+                self.now,
+                lambda reason: response.reply(Trigger.Response(success=not reason, message=reason)),
+            )
+        except PortError as error:
+            self.lose(error)
+            raise Refused(str(error)) from None
+        return response
+
+    def on_relax_all(self, request: Trigger.Request) -> Trigger.Response:
+        """Relax all joints."""
+        for name in self.cycle.drives:
+            self.let_go(name)
+        return Trigger.Response(success=True)
+
+    def enable(self, name: str, request: SetBool.Request) -> SetBool.Response:
+        """Enable a joint; while it is disabled, it has no torque and commands are refused."""
+        self.cycle.drives[name].ask(Enable(request.data))
+        return SetBool.Response(success=True)
+
+    def on_enable_all(self, request: SetBool.Request) -> SetBool.Response:
+        """Enable all joints, or disable them."""
+        for drive in self.cycle.drives.values():
+            drive.ask(Enable(request.data))
+        return SetBool.Response(success=True)
+
+    def set_speed(self, name: str, request: SetSpeed.Request) -> SetSpeed.Response:
+        """Set how fast a joint moves by single commands, within its limits."""
+        drive = self.cycle.drives[name]
+        if not (math.isfinite(request.speed) and request.speed > 0.0):
+            return SetSpeed.Response(success=False, message=f"a speed of {request.speed} is none")
+        if isinstance(drive, PositionDrive):
+            drive.speed = request.speed
+        fastest = drive.joint.limits.speed
+        clamped = f"its limit is {fastest:g}" if request.speed > fastest else ""
+        return SetSpeed.Response(success=True, message=clamped)
+
+    @answers(InjectFault)
+    def inject(self, request: InjectFault) -> str:
+        """Let something go wrong with simulated servos."""
+        if self.faults is None:
+            raise Refused("real servos have their own faults")
+        return self.faults.inject(request, self.now)
+
+    # What is told
+
+    def publish(self) -> None:
+        """Publish where the joints are, and what controllers know."""
+        if (message := joint_state(self.cycle.drives.values(), self.stamp)) is not None:
+            self.joint_states(message)
+        for controller in self.controllers.leading:
+            controller.publish()
+
+    def tell(self) -> None:
+        """Report to diagnostics."""
+        notes = {name: controller.note for name, controller in self.controllers.controllers.items()}
+        found = report(self.cycle.drives, notes, self.periods, is_lost=self.lost_at > -math.inf)
+        self.status(found.level, found.message, **found.values)
+
+    # Stopping
+
+    def lose(self, error: PortError) -> None:
+        """Remember that the port has gone; trajectories end."""
+        if self.lost_at == -math.inf:
+            self.warn(str(error))
+        self.lost_at = self.now
+        self.periods.pause()
+        self.halt(GONE)
+        self.reboots.fail(GONE)
+
+    def halt(self, reason: str) -> None:
+        """End what all controllers do, and bring the joints to rest."""
+        for controller in self.controllers.active:
+            controller.halt(self.now, reason)
+        for drive in self.cycle.drives.values():
+            if drive.mode is JointMode.ACTIVE and drive.has_torque:
+                drive.ask(Hold())
+
+    @property
+    def is_at_rest(self) -> bool:
+        """Return whether no command moves, and all joints are where they are to be parked."""
+        return all(drive.is_at_rest and not self.is_on_the_way(name) for name, drive in self.cycle.drives.items())
+
+    def is_on_the_way(self, name: str) -> bool:
+        """Return whether a joint has still to be parked."""
+        drive, wanted = self.cycle.drives[name], self.config.park.get(name)
+        if not self.is_parking or wanted is None or not drive.has_torque or self.lost_at > -math.inf:
+            return False
+        return abs(drive.commanded.position - drive.joint.limits.clamped(wanted)) > drive.per_tick
+
+    def stop(self) -> None:
+        """Bring all joints to rest, and refuse what moves them."""
+        self.is_stopped = True
+        self.halt("the robot was stopped")
+
+    def release(self) -> None:
+        """Accept commands again."""
+        self.is_stopped = False
+
+    def brake(self) -> None:
+        """Bring all joints to rest for good; those with torque go where they are parked, if they are."""
+        self.stop()
+        self.is_parking = self.config.on_shutdown == "park"
+        for name, position in self.config.park.items() if self.is_parking else ():
+            if self.cycle.drives[name].has_torque:
+                self.cycle.drives[name].ask(MoveTo(position))
+
+    def park_the_rest(self) -> None:
+        """Move joints on that came to rest on their way, as where replies were lost for a moment."""
+        for name, drive in self.cycle.drives.items():
+            if self.is_on_the_way(name) and drive.is_at_rest:
+                drive.ask(MoveTo(self.config.park[name]))
+
+    def cleanup(self) -> None:
+        """Relax the joints, unless they are to hold, and give the port back."""
+        try:
+            if self.config.on_shutdown != "hold":
+                self.cycle.relax(self.now, self.period)
+        except PortError as error:
+            self.warn(f"the joints could not be relaxed: {error}")
+        self.at_end.close()
+
+
+def cycles_between(config: ServoBusConfig) -> int:
+    """Return after how many cycles joint states are published."""
+    return math.ceil(config.rate / PUBLISHED - 1e-9)

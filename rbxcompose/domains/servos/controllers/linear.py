@@ -1,0 +1,168 @@
+"""Drives a joint that slides up or down."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any, Literal
+
+from pydantic import Field
+
+from rbxcompose.base.config import JointName
+from rbxcompose.base.units import LENGTH, SPEED
+from rbxcompose.domains.servos.controller import Controller, ControllerConfig, controller
+from rbxcompose.domains.servos.lift import LinearMove, LinearPolicy
+from rbxcompose.msgs.control_msgs import SingleJointPosition as Move
+from rbxcompose.msgs.stamps import to_seconds, to_time
+from rbxcompose.msgs.std_msgs import Float64, Header
+from rbxcompose.sdk import BoundsGoals, Capability, In, Length, Port, ServedGoal, ServesAction, Setting, Speed, Time
+
+MEASURES = {"position": LENGTH, "max_velocity": SPEED}
+
+
+class LinearConfig(ControllerConfig):
+    """Leads a joint that slides."""
+
+    type: Literal["linear"] = "linear"
+    """How it leads its joints."""
+    joint: JointName
+    """The joint that it leads."""
+    speed: Speed = Field(gt=0)
+    """How fast it goes."""
+    dead_band: Length = Field(0.01, gt=0, le=0.1)
+    """Within this of the wanted position it has arrived."""
+    stall_after: Time = Field(2.0, gt=0)
+    """Without progress for this long, it gives up."""
+
+    @property
+    def claimed(self) -> tuple[str, ...]:
+        """Return the joint that it leads."""
+        return (self.joint,)
+
+
+@controller("linear")
+class LinearController(Controller[LinearConfig]):
+    """Drives a joint that slides to positions [m] at a set speed: a lift, for example.
+
+    They come on the topic `NAME/command`, or as goals of the action `NAME/move` of ROS, which fail with the reason when
+    the joint is stuck or may not move. It never leaves the limits of the joint.
+
+    Example:
+        lift: {type: linear, joint: lift_joint, speed: 2 cm/s, dead_band: 5 mm}
+    """
+
+    interface = "velocity"
+    kinds = frozenset({"prismatic"})
+
+    @classmethod
+    def ports(cls, name: str, config: LinearConfig) -> dict[str, Port[Any]]:
+        """Return its topic and its action."""
+        return {
+            "command": In(Float64, f"{name}/command", qos="command", is_open=True),
+            "move": ServesAction(Move, f"{name}/move", claims=name, skill=name, measures=MEASURES),
+        }
+
+    @classmethod
+    def capabilities(cls, name: str, config: LinearConfig) -> tuple[Capability, ...]:
+        """Return that it refuses what its joint cannot reach."""
+        led, speed = Setting({"position": config.joint}, "joint"), Setting(config.speed, "speed")
+        return (BoundsGoals("move", joints=led, speed=speed),)
+
+    def prepare(self) -> None:
+        """Set up how it moves."""
+        config = self.config
+        self.joint = self.site.joints[config.joint]
+        self.limits = self.joint.rules.limits
+        self.policy = LinearPolicy(
+            config.speed, config.dead_band, config.stall_after, acceleration=self.limits.acceleration
+        )
+        self.move: LinearMove | None = None
+        self.followed: ServedGoal[Any, Any, Any] | None = None  # the goal to which it moves
+        self.last = ""  # why the last command failed, was changed or refused
+
+    @property
+    def leads(self) -> bool:
+        """Return whether it moves."""
+        return self.move is not None
+
+    @property
+    def note(self) -> str:
+        """Return what became of the last command, unless it was done."""
+        return self.last
+
+    def accept(self, port: str, goal: Move.Goal) -> str:
+        """Refuse what cannot be."""
+        if not math.isfinite(goal.position):
+            return f"the position {goal.position} is not a finite number"
+        if not (math.isfinite(goal.max_velocity) and goal.max_velocity >= 0.0):
+            return f"a velocity of {goal.max_velocity} m/s is none"
+        if self.limits.clamped(goal.position) != goal.position:
+            return f"{goal.position:g} m is outside of {self.limits.least:g} m to {self.limits.greatest:g} m"
+        return ""
+
+    def received(self, port: str, message: Float64) -> None:
+        """Go to a position, the nearest one that is within the limits."""
+        if not math.isfinite(message.data):
+            self.last = f"a command was refused: the position {message.data} is not a finite number"
+            return
+        self._end("a command came")
+        wanted = self.limits.clamped(message.data)
+        self.last = "" if wanted == message.data else f"{message.data:g} m was cut to {wanted:g} m"
+        self._begin(wanted, self.policy, self.site.now)
+
+    def cycle(self, now: float, dt: float) -> None:
+        """Take over the newest goal, or its cancellation, and lead the joint."""
+        self._take(now)
+        if self.move is None:
+            return
+        if self.joint.blocked:
+            self._end(f"joint '{self.config.joint}': {self.joint.blocked}")
+            return
+        velocity = self.move.step(self.joint.measured.position, now, dt)
+        if self.move.is_over:
+            self._end(self.move.failure)
+        else:
+            self.joint.turn(velocity)
+
+    def publish(self) -> None:
+        """Tell how far the goal is."""
+        if self.followed is None or self.move is None:
+            return
+        at, header = self.joint.measured, Header(stamp=to_time(self.site.stamp))
+        error = self.move.wanted - at.position
+        self.followed.feedback(Move.Feedback(header=header, position=at.position, velocity=at.velocity, error=error))
+
+    def halt(self, now: float, reason: str) -> None:
+        """Stop."""
+        self._end(reason)
+
+    def _take(self, now: float) -> None:
+        goal = self.site.goal("move")
+        if goal is not None and goal.cancel_requested:
+            self.move = self.followed = None
+            goal.canceled()
+        elif goal is not None and goal is not self.followed:
+            asked: Move.Goal = goal.request
+            way = abs(asked.position - self.joint.measured.position)
+            speeds = [self.policy.speed]
+            speeds += [asked.max_velocity] if asked.max_velocity > 0.0 else []
+            speeds += [way / least] if way > 0.0 and (least := to_seconds(asked.min_duration)) > 0.0 else []
+            self.followed, self.last = goal, ""
+            self._begin(asked.position, replace(self.policy, speed=min(speeds)), now)
+
+    def _begin(self, wanted: float, policy: LinearPolicy, now: float) -> None:
+        position = self.joint.measured.position
+        if self.joint.blocked or not math.isfinite(position):
+            self.last = f"joint '{self.config.joint}': {self.joint.blocked or 'its position is not known'}"
+            self._end(self.last)
+        else:
+            self.move = LinearMove(policy, wanted, position, now)
+
+    def _end(self, failure: str) -> None:
+        """Stop; without a failure it has arrived."""
+        is_moving, goal = self.move is not None, self.followed
+        self.move = self.followed = None
+        if failure and (is_moving or goal is not None):
+            self.last = failure
+        if goal is not None:
+            goal.aborted(failure) if failure else goal.succeeded()

@@ -1,0 +1,1 @@
+"""Simulated servos that answer as real ones do."""

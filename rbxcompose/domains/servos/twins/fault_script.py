@@ -1,0 +1,106 @@
+"""When which fault begins and ends, for the simulated servos of a bus. Pure but for what it does to them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Protocol
+
+from rbxcompose.base.config import Config
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.requests import Command, Refused
+from rbxcompose.domains.servos.twins.servo_fake import FakeServo
+from rbxcompose.domains.servos.twins.servo_faults import FAULTS, UNPLUG, FaultName, servo_faults
+
+
+@dataclass(frozen=True, slots=True)
+class InjectFault(Command):
+    """Let something go wrong with a simulated joint, or without one with all of its bus, for a time [s] or for good."""
+
+    about = "servo_bus"
+    fault: str
+    joint: str = ""
+    lasts: float | None = None
+
+    @property
+    def words(self) -> str:
+        """Return it as a person would say it."""
+        lasting = "" if self.lasts is None else f" for {self.lasts:g} s"
+        return f"{self.fault} of {self.joint or 'the bus'}{lasting}"
+
+
+class TwinFault(Config):
+    """Something that goes wrong with simulated servos."""
+
+    at: float
+    """When it begins [s]; in a script, counted from the activation."""
+    fault: FaultName
+    """What goes wrong."""
+    joint: str = ""
+    """The joint; without it the bus as a whole."""
+    lasts: float | None = None
+    """How long it lasts [s]; without it for good."""
+
+    def is_present(self, now: float) -> bool:
+        """Return whether it is there at a time [s]."""
+        return self.at <= now and (self.lasts is None or now < self.at + self.lasts)
+
+
+class Plug(Protocol):
+    """What can be unplugged: a port, or a bus without one."""
+
+    def unplug(self) -> None:
+        """Take the port away."""
+        ...
+
+    def replug(self) -> None:
+        """Bring it back."""
+        ...
+
+
+class FaultScript:
+    """Lets faults begin and end: those of a script, whose times count from `start`, and those of requests.
+
+    `servos` are those of each joint.
+    """
+
+    def __init__(self, faults: Iterable[TwinFault], servos: Mapping[str, Sequence[FakeServo]], plug: Plug) -> None:
+        self._script, self._servos, self._plug = tuple(faults), servos, plug
+        self._faults = list(self._script)
+        self._present: list[TwinFault] = []
+
+    def start(self, now: float) -> None:
+        """Let the script begin at a time [s]."""
+        self._faults = [one.model_copy(update={"at": one.at + now}) for one in self._script]
+
+    def inject(self, request: InjectFault, now: float) -> str:
+        """Let a fault begin now [s]; return that it does.
+
+        Raises:
+            Refused: if there is no such fault or joint.
+        """
+        if request.fault != UNPLUG and request.fault not in FAULTS:
+            raise Refused(f"no fault is called '{request.fault}'")
+        if request.joint and (request.joint not in self._servos or request.fault == UNPLUG):
+            raise Refused(f"'{request.joint}' is no joint that can have the fault '{request.fault}'")
+        self._faults.append(TwinFault(at=now, fault=request.fault, joint=request.joint, lasts=request.lasts))
+        return f"{request.words} begins"
+
+    def play(self, now: float) -> None:
+        """Let begin and end what is due at a time [s]."""
+        present = [fault for fault in self._faults if fault.is_present(now)]
+        if present == self._present:
+            return
+        was_out, is_out = (any(twin_fault.fault == UNPLUG for twin_fault in each) for each in (self._present, present))
+        for joint, servos in self._servos.items():
+            before, after = _names(self._present, joint), _names(present, joint)
+            for servo in servos if before != after else ():
+                servo.faults = servo_faults(after)
+        if is_out and not was_out:
+            self._plug.unplug()
+        elif was_out and not is_out:
+            self._plug.replug()
+        self._present = present
+
+
+def _names(faults: Iterable[TwinFault], joint: str) -> list[str]:
+    return [twin_fault.fault for twin_fault in faults if twin_fault.joint in ("", joint) and twin_fault.fault != UNPLUG]

@@ -1,0 +1,152 @@
+"""Simulated servos in place of a bus: as memory, or behind a pseudo-terminal for the driver."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from rbxcompose.domains.devices.serial_ports import LostPortError
+from rbxcompose.domains.servos.bus import FoundServo, ServoReading, ServoStatistics
+from rbxcompose.domains.servos.joint_drive import ServoJoint
+from rbxcompose.domains.servos.twins.servo_fake import FakeServo
+from rbxcompose.domains.servos.twins.servo_line import FakeLine
+from rbxcompose.domains.servos.twins.servo_port import FakePort
+
+PATIENCE = 0.002  # [s] after which a driver gives a reply up
+
+
+class TwinBus:
+    """A bus whose servos answer at once; those whose replies a driver could not use do not."""
+
+    def __init__(self, servos: Iterable[FakeServo], clock: Callable[[], float]) -> None:
+        self.line = FakeLine(servos, clock)
+        self._clock = clock
+        self._statistics = {servo.id: ServoStatistics() for servo in self.line.servos}
+        self._is_out = False
+
+    def unplug(self) -> None:
+        """Take the bus away."""
+        self._is_out = True
+
+    def replug(self) -> None:
+        """Bring it back."""
+        self._is_out = False
+
+    @property
+    def statistics(self) -> Mapping[int, ServoStatistics]:
+        """Return how well each servo answers, by id."""
+        return self._statistics
+
+    def _asked(self, ids: Iterable[int]) -> Iterator[FakeServo]:
+        """Yield the servos of a request; those with power hear it, and obey also if they do not answer."""
+        if self._is_out:
+            raise LostPortError("the simulated bus", "is unplugged")
+        self.line.advance()
+        wanted, now = set(ids), self._clock()
+        for servo in self.line.servos:
+            if servo.id in wanted:
+                if not servo.faults.is_off:
+                    servo.heard = now
+                yield servo
+
+    def _answering(self, ids: Iterable[int]) -> Iterator[FakeServo]:
+        now = self._clock()
+        for servo in self._asked(ids):
+            if self._is_understood(servo):
+                statistics = self._statistics[servo.id]
+                statistics.misses, statistics.last_seen = 0, now
+                yield servo
+
+    def _is_understood(self, servo: FakeServo) -> bool:
+        """Tell whether a driver would understand the reply of a servo; count it if not."""
+        faults = servo.faults
+        is_missing = faults.is_off or faults.is_mute or faults.delay > PATIENCE or faults.id is not None
+        is_spoilt = faults.corrupts or faults.cuts > 0
+        if is_missing or is_spoilt:
+            statistics = self._statistics[servo.id]
+            statistics.misses += 1
+            statistics.timeouts += is_missing
+            statistics.errors += not is_missing
+        return not (is_missing or is_spoilt)
+
+    def ping(self, id: int) -> FoundServo | None:
+        """Return the servo at an id, None if it is silent."""
+        return next(self.scan([id]), None)
+
+    def scan(self, ids: Iterable[int]) -> Iterator[FoundServo]:
+        """Yield the servos that answer."""
+        for servo in self._answering(ids):
+            yield FoundServo(servo.id, servo.model.protocol, servo.model.number, servo.baud)
+
+    def read(self, ids: Sequence[int], items: Sequence[str], *, budget: float | None = None) -> dict[int, ServoReading]:
+        """Return the items of all servos that answered."""
+        found = {}
+        for servo in self._answering(ids):
+            self._statistics[servo.id].reads += 1
+            found[servo.id] = ServoReading({item: servo.get(item) for item in items}, self._clock(), servo.alert)
+        return found
+
+    def write(self, values: Mapping[int, Mapping[str, int]], *, is_confirmed: bool = False) -> set[int]:
+        """Write raw values, by id and item; return the ids that failed."""
+        failed = set(values)
+        for servo in self._asked(values):
+            if servo.faults.is_off:
+                continue
+            items = ((servo.model.item(name), raw) for name, raw in values[servo.id].items())
+            results = [servo.write(item.address, item.encode(raw)) for item, raw in items]
+            if not any(results) and (not is_confirmed or self._is_understood(servo)):
+                failed.discard(servo.id)
+        return failed if is_confirmed else set()
+
+    def reboot(self, id: int) -> bool:
+        """Start a servo again, torque off."""
+        found = list(self._asked([id]))
+        for servo in found:
+            servo.reboot()
+        return any(map(self._is_understood, found))
+
+    def reopen(self, *, is_relaxed: bool = True) -> dict[int, FoundServo | None]:
+        """Return who answers at each id, relaxed."""
+        if is_relaxed:
+            self.write({servo.id: {"torque_enable": 0} for servo in self.line.servos})
+        return {servo.id: self.ping(servo.id) for servo in self.line.servos}
+
+    def close(self) -> None:
+        """Do nothing: there is no port."""
+
+
+def twin_servos(
+    joints: Iterable[ServoJoint], *, is_ideal: bool = False, noise: float = 0.0, seed: int = 0
+) -> dict[str, list[FakeServo]]:
+    """Return simulated servos by joint; `noise` [rad] is the standard deviation of the positions that they measure."""
+    return {
+        joint.name: [
+            FakeServo(servo.model, servo.id, is_ideal=is_ideal, noise=noise / servo.model.per_tick, seed=seed)
+            for servo in joint.servos
+        ]
+        for joint in joints
+    }
+
+
+@contextmanager
+def pseudo_terminal(servos: Iterable[FakeServo]) -> Iterator[FakePort]:
+    """Lend a terminal behind which these servos answer, in real time; its `path` is that of a serial port."""
+    line = FakeLine(servos, time.monotonic)
+    with tempfile.TemporaryDirectory() as folder, FakePort(line, Path(folder) / "servos", has_wire_time=True) as port:
+        yield port
+
+
+@contextmanager
+def twin_of(
+    servos: Mapping[str, Sequence[FakeServo]], clock: Callable[[], float], *, has_bytes: bool
+) -> Iterator[TwinBus | FakePort]:
+    """Lend the servos of some joints as a bus, which moves with a clock, or as a port that takes bytes."""
+    found = [servo for those in servos.values() for servo in those]
+    if not has_bytes:
+        yield TwinBus(found, clock)
+        return
+    with pseudo_terminal(found) as port:
+        yield port

@@ -1,1 +1,0 @@
-"""Systems for programs that keep services alive: systemd, Compose, Kubernetes. One file per program."""

@@ -1,1 +1,0 @@
-"""The expression language of manifests and missions: parsed, checked without values, evaluated with them."""

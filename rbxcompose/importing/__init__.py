@@ -1,1 +1,0 @@
-"""Files of other programs become manifests: what they say, where it stood, and what could not be carried over."""

@@ -1,1 +1,0 @@
-"""Importers, one file each, by the name of the program whose files they read."""

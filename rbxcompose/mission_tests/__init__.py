@@ -1,1 +1,0 @@
-"""Tests of missions: reading, running in virtual time, judging; the paths that no test took; exploration."""

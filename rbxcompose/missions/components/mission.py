@@ -1,0 +1,386 @@
+"""The executive: runs the robot's missions with the actions of other components."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from functools import cached_property
+from typing import Annotated, Any, TypeVar
+
+from pydantic import InstanceOf, WithJsonSchema
+
+from rbxcompose.base.expressions.types import Type
+from rbxcompose.missions.analysis.uses import Using
+from rbxcompose.missions.engine.events import MissionEnded, MissionEvent
+from rbxcompose.missions.engine.logbook import INPUTS, LogRecord
+from rbxcompose.missions.engine.world import POSE, World
+from rbxcompose.missions.execution import missions as broadcast
+from rbxcompose.missions.execution.errands import ENDS, PUBLISHES, VALUE, port_name
+from rbxcompose.missions.execution.mission_run import PATIENCE, MissionRun
+from rbxcompose.missions.execution.missions import RunningMissions
+from rbxcompose.missions.execution.ports import EVENTS, ports_for
+from rbxcompose.missions.execution.requests import (
+    CancelMission,
+    ListedMission,
+    ListMissions,
+    LogPart,
+    LookAtAll,
+    LookAtMission,
+    PauseMission,
+    PictureData,
+    ReadLog,
+    ResumeMission,
+    RunMission,
+    Seen,
+    ShowPicture,
+)
+from rbxcompose.missions.execution.topic_skills import Desks
+from rbxcompose.missions.execution.world import Arrivals, RobotWorld
+from rbxcompose.missions.program.program import Program, RobotNames
+from rbxcompose.missions.program.statuses import IDLE, Result
+from rbxcompose.missions.sources import SkillSource, TopicSource, ValueSource, events_of
+from rbxcompose.msgs.std_msgs import String
+from rbxcompose.sdk import Capability, Component, Config, Level, Place, Port, Refused, RunsMissions, answers, component
+from rbxcompose.sdk.robot_events import MissionOver, MissionWaits
+
+LOOK_AGAIN = 0.1  # [s] between two checks for a pose that has not arrived yet
+NO_INPUTS: Mapping[str, str] = {}
+
+T = TypeVar("T")
+Made = Annotated[InstanceOf[T], WithJsonSchema({"type": "object"})]  # made by the compiler, never by people
+
+
+class MissionConfig(Config):
+    """The robot's missions as the compiler has prepared them."""
+
+    programs: dict[str, Made[Program]] = {}
+    """Missions by name."""
+    start: str | None = None
+    """The mission that starts by itself."""
+    inputs: dict[str, dict[str, Any]] = {}
+    """Values of the inputs, by mission and name."""
+    values: dict[str, Made[ValueSource]] = {}
+    """Where the robot's values come from."""
+    places: dict[str, Made[Place]] = {}
+    """The robot's places."""
+    skills: dict[str, Made[SkillSource]] = {}
+    """The robot's skills."""
+    topics: dict[str, Made[TopicSource]] = {}
+    """The topics on which missions publish."""
+    services: dict[str, str] = {}
+    """The services that missions call, with their ROS types."""
+    settings: dict[str, dict[str, Made[Type]]] = {}
+    """The types of settings that missions change."""
+
+    @property
+    def reads(self) -> frozenset[str]:
+        """Return all names that missions read."""
+        return frozenset[str]().union(*(program.reads for program in self.programs.values()))
+
+    @property
+    def used(self) -> dict[str, SkillSource]:
+        """Return all skills that missions use."""
+        names = {node.skill for program in self.programs.values() for node in program.nodes}
+        return {name: self.skills[name] for name in sorted(names & self.skills.keys())}
+
+    @cached_property
+    def names(self) -> RobotNames:
+        """Return what the robot offers to missions."""
+        broken = Using(self.programs).broken
+        return RobotNames(
+            {name: source.type for name, source in self.values.items()},
+            self.places,
+            {name: source.skill for name, source in self.skills.items()},
+            {name: program for name, program in self.programs.items() if name not in broken},
+            {name: topic.message for name, topic in self.topics.items()},
+            self.services,
+            self.settings,
+            events=events_of(self.values),
+        )
+
+
+@component("mission")
+class Mission(Component[MissionConfig]):
+    """Runs missions; each action of the robot is a skill. One mission starts by itself; people start others beside it.
+
+    It is made of the sections `missions`, `start`, `values` and `places`.
+
+    Example:
+        executive: {type: mission}
+    """
+
+    made_by = "A robot with missions runs one."
+    process = "mission"
+
+    @classmethod
+    def ports(cls, config: MissionConfig) -> dict[str, Port[Any]]:
+        """Return a port for each used value, skill, topic and service, and for the pose if missions read it."""
+        return ports_for(config)
+
+    @classmethod
+    def capabilities(cls, config: MissionConfig) -> tuple[Capability, ...]:
+        """Declare that it is the executive."""
+        return (RunsMissions(),)
+
+    @property
+    def equipment(self) -> MissionConfig:
+        """Return what missions may use."""
+        return self.config
+
+    def configure(self) -> None:
+        """Start with no values and no missions."""
+        self.arrivals, self.desks = Arrivals(self.config.values), Desks(self)
+        self.missions = RunningMissions(self.config, self.world, self.story, self.publish)
+        self.broadcast = broadcast.Broadcast(self.config.programs, self.context.window)
+        self.is_held = False  # stopped before the start; a release alone lets nothing begin
+        self.kept: dict[str, RunMission] = {}  # requests by people that began missions that still run
+        self.shown = ""  # the last reported status
+        self.planned: float | None = None  # the last requested wake [s]
+        self.misfits: set[str] = set()  # values whose messages have another shape
+
+    def world(
+        self, ended: Callable[[int, Result], None], say: Callable[[MissionEvent], None]
+    ) -> tuple[World, RobotWorld]:
+        """Return the world of a mission, and the robot in it; tests wrap the robot in another world."""
+        robot = RobotWorld(self, self.arrivals, self.desks, ended, say)
+        return robot, robot
+
+    def start(self) -> None:
+        """Run the start mission, as soon as every value that it reads has arrived."""
+        if (name := self.config.start) is None:
+            self.show(Level.OK, "no mission to start")
+            return
+        try:
+            run = self.begin(name)
+            if self.is_held and not run.is_paused:
+                self.hold_back(run)
+        except Refused as refusal:  # a person has already begun it
+            self.warn(f"mission {name} does not start: {refusal}")
+
+    def begin(self, name: str, inputs: Mapping[str, str] = NO_INPUTS, state: str = "") -> MissionRun:
+        """Begin a mission; while the robot is stopped, hold it until the resume.
+
+        Raises:
+            Refused: if it cannot run, with the reason.
+        """
+        run = self.missions.run(name, inputs, state)
+        if missing := run.missing():
+            self.info(f"mission {name} waits for {', '.join(missing)}")
+        if self.context.is_stopped:
+            self.hold_back(run)
+        self.look_soon()
+        return run
+
+    def hold_back(self, run: MissionRun) -> None:
+        """Let a mission begin only at the resume."""
+        run.is_paused = True
+        self.tell(f"mission {run.name} is held until it is resumed")
+
+    def received(self, port: str, message: Any) -> None:
+        """Take a value and wake the missions that read it; or take the outcome of an order."""
+        if port.startswith(ENDS):
+            self.desks.told(port, message)
+            return
+        name = port.removeprefix(VALUE)
+        wrong = self.arrivals.take(name, message, self.now)
+        if wrong and name not in self.misfits:
+            self.misfits.add(name)
+            self.warn(f"value {name}: {wrong}")
+        if any(mission.reads(name) for mission in self.missions):
+            self.look_soon()
+
+    def look_soon(self) -> None:
+        """Request a wake at this instant."""
+        self.context.wake_at(self.now)
+
+    def wake(self) -> None:
+        """Do what is due."""
+        if self.planned is not None and self.planned <= self.now:
+            self.planned = None
+        wakes: list[float] = []
+        for mission in self.missions:
+            wakes += self.turn(mission)
+        if wakes:
+            self.plan(min(wakes))
+        self.broadcast.tell(self.missions)
+
+    def turn(self, run: MissionRun) -> list[float]:
+        """Do what is due in a mission; return its next wake [s], if any."""
+        if run.is_paused:
+            run.look(self.now)
+            due = run.next_wake()
+            return [due] if due is not None else []
+        if run.engine.status == IDLE and (missing := run.missing()):
+            return self.wait(run, ", ".join(missing))
+        if run.began is None:
+            self.show(Level.OK, self.running_text())
+        run.tick(self.now)
+        if run.end is not None:
+            self.finish(run.name, run.end)
+        due = run.next_wake()
+        return [due] if due is not None else []
+
+    def wait(self, run: MissionRun, missing: str) -> list[float]:
+        """Report what a mission waits for before it starts; return when to check again [s]."""
+        self.show(Level.OK, f"waiting for {missing}")
+        if run.loses_patience(self.now):
+            text = f"waits for {missing}, which has not arrived for {PATIENCE:g} s"
+            self.warn(f"mission {run.name} {text}")
+            self.context.notify(MissionWaits(run.name, text))
+        return [self.now + LOOK_AGAIN if POSE in missing else run.patient_until or self.now]
+
+    def plan(self, time: float) -> None:
+        """Request a wake, once per time."""
+        if time != self.planned:
+            self.context.wake_at(time)
+        self.planned = time
+
+    @property
+    def occupation(self) -> str:
+        """Return which missions run."""
+        names = [mission.name for mission in self.missions if not mission.is_paused]
+        return f"mission {names[0]} runs" if len(names) == 1 else f"missions {', '.join(names)} run" if names else ""
+
+    @property
+    def claims(self) -> bool:
+        """Return whether a mission uses a skill that claims a part of the robot."""
+        return any(mission.claims for mission in self.missions)
+
+    def take_over(self, old: Mission) -> None:
+        """Stay held if the missions were."""
+        self.is_held = old.is_held  # as the start mission was held
+
+    def finish(self, name: str, end: MissionEnded) -> None:
+        """Report that a mission has ended; after the start mission, the robot may go down."""
+        level = Level.ERROR if end.result == "failure" else Level.WARN if end.doubt else Level.OK
+        self.show(level, ": ".join(filter(None, (name, end.result, end.doubt))))
+        self.keep()
+        if name == self.config.start:
+            self.context.notify(MissionOver(name, end.result, end.words))
+
+    def stop(self) -> None:
+        """Pause all missions; the resume requests their unfinished actions again."""
+        self.is_held = not self.missions.runs
+        for mission in self.missions:
+            if not mission.is_paused:
+                self.hold_running(mission, "stopped")
+
+    def brake(self) -> None:
+        """End all missions: the robot is going down, or another executive takes over."""
+        self.is_held = self.is_held or any(run.is_paused for run in self.missions)
+        for mission in self.missions:
+            mission.abort(self.now)
+        self.broadcast.tell(self.missions)
+
+    # Commands from people
+
+    @answers(RunMission)
+    def run(self, request: RunMission) -> str:
+        """Begin a mission, and restart it after a crash."""
+        self.begin(request.mission, request.inputs, request.start)
+        self.keep(request)
+        return f"mission {request.mission} starts"
+
+    @answers(CancelMission)
+    def cancel(self, request: CancelMission) -> str:
+        """End a mission for good."""
+        run = self.missions.running(request.mission)
+        run.abort(self.now)
+        if run.end is not None:
+            self.finish(run.name, run.end)
+        self.broadcast.tell(self.missions)
+        return f"mission {run.name} cancelled"
+
+    @answers(PauseMission)
+    def pause(self, request: PauseMission) -> str:
+        """Hold a mission."""
+        run = self.missions.running(request.mission, lambda one: not one.is_paused)
+        if run.is_paused:
+            raise Refused(f"mission {run.name} is already paused")
+        return self.hold_running(run, "paused")
+
+    @answers(ResumeMission)
+    def resume(self, request: ResumeMission) -> str:
+        """Resume a mission, unless the robot is held by a stop."""
+        run = self.missions.running(request.mission, lambda one: one.is_paused, "paused")
+        if self.context.is_stopped:
+            raise Refused("the robot is stopped: release it first")
+        if not run.is_paused:
+            raise Refused(f"mission {run.name} is not paused")
+        run.resume(self.now)
+        self.look_soon()
+        return self.tell(f"mission {run.name} resumed")
+
+    @answers(ListMissions)
+    def listed(self, request: ListMissions) -> tuple[ListedMission, ...]:
+        """Return all missions."""
+        return self.missions.listed()
+
+    @answers(ShowPicture)
+    def picture(self, request: ShowPicture) -> PictureData:
+        """Return the picture of a mission."""
+        return self.missions.picture(request.mission)
+
+    @answers(LookAtMission)
+    def look_at(self, request: LookAtMission) -> Seen:
+        """Return the updates of a mission."""
+        return self.missions.seen(request.mission, request.since)
+
+    @answers(LookAtAll)
+    def look_at_all(self, request: LookAtAll) -> Seen:
+        """Return the state of a mission, with its picture."""
+        return {**self.missions.seen(request.mission), "picture": self.missions.picture(request.mission)}
+
+    @answers(ReadLog)
+    def log_part(self, request: ReadLog) -> LogPart:
+        """Return records of the log."""
+        return self.missions.since(request.after)
+
+    def hold_running(self, run: MissionRun, why: str) -> str:
+        """Hold a mission and return the report of it."""
+        run.pause(self.now)
+        self.broadcast.tell(self.missions)
+        return self.tell(f"mission {run.name} {why}")
+
+    def keep(self, begun: RunMission | None = None) -> None:
+        """Let the supervisor repeat, after a crash, the requests by which people began missions that still run."""
+        kept = {**self.kept, **({begun.mission: begun} if begun else {})}
+        still = {name: entry for name, entry in kept.items() if name in self.missions.names}
+        if still != self.kept:
+            self.kept = still
+            self.context.repeat(tuple(still.values()))
+
+    # Reports
+
+    def story(self, mission: str, level: Level, text: str) -> None:
+        """Log a line of a mission's story, with its name if several run."""
+        is_named = len(self.missions.names) > 1 and not text.startswith("mission ")
+        self.context.log(level, f"{mission}: {text}" if is_named else text)
+
+    def publish(self, record: LogRecord) -> None:
+        """Publish a record of the log, unless it only records an input."""
+        if record["event"] not in INPUTS:
+            self.bound[port_name(PUBLISHES, EVENTS)](String(data=json.dumps(record)))
+
+    def running_text(self) -> str:
+        """Return the running missions in words."""
+        return f"running {', '.join(self.missions.names)}"
+
+    def tell(self, text: str) -> str:
+        """Log a text and make it the status."""
+        self.info(text)
+        self.show(Level.OK, text)
+        return text
+
+    def show(self, level: Level, text: str) -> None:
+        """Make a text the status, if it has changed."""
+        if text != self.shown:
+            self.shown = text
+            self.status(level, text)
+
+    def summary(self) -> dict[str, str]:
+        """Return the states of the missions and what they did."""
+        runs = list(self.missions.runs.values())
+        told = "; ".join(f"{run.name}: {run.end.result if run.end else run.state}" for run in runs)
+        skills = "; ".join(text for run in runs if (text := run.story.skills()))
+        return {name: text for name, text in (("mission", told), ("skills", skills)) if text}

@@ -1,0 +1,1 @@
+"""Missions on a running robot."""

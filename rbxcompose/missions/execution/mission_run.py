@@ -1,0 +1,202 @@
+"""One mission that runs: its engine with its world, its story, its log, and what viewers see."""
+
+from __future__ import annotations
+
+import json
+import zlib
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+from rbxcompose.base.expressions.values import NOT_ARRIVED, Value
+from rbxcompose.base.levels import Level
+from rbxcompose.missions.engine import logbook
+from rbxcompose.missions.engine.engine import Engine
+from rbxcompose.missions.engine.events import MissionEnded, MissionEvent, Transition
+from rbxcompose.missions.engine.logbook import LoggedWorld, LogRecord
+from rbxcompose.missions.engine.story import MissionStory
+from rbxcompose.missions.engine.world import PLAIN, POSE, Settings, World
+from rbxcompose.missions.execution.world import RobotWorld
+from rbxcompose.missions.program.program import Program, RobotNames, Skill
+from rbxcompose.missions.program.statuses import IDLE, NAMES, RUNNING, Result
+from rbxcompose.missions.view.replica import Mirror
+
+BLOCK = 200  # records that are packed together, into about a tenth of their memory
+MOST_BLOCKS = 100
+
+
+class LogStore:
+    """Keeps the last `MOST_BLOCKS` blocks of records, so that a long patrol takes no more memory than a short one."""
+
+    def __init__(self) -> None:
+        self.written = 0  # records so far
+        self._packed: deque[bytes] = deque(maxlen=MOST_BLOCKS)
+        self._new: list[LogRecord] = []
+
+    def append(self, record: LogRecord) -> None:
+        """Add a record, which is data for JSON."""
+        self.written += 1
+        self._new.append(record)
+        if len(self._new) == BLOCK:
+            self._packed.append(zlib.compress(json.dumps(self._new).encode()))
+            self._new = []
+
+    def since(self, number: int) -> list[LogRecord]:
+        """Return the records after the first `number`, as far as they are kept."""
+        first = self.written - len(self._new) - BLOCK * len(self._packed)
+        return [record for at, record in enumerate(self._all(max(0, number - first) // BLOCK), first) if at >= number]
+
+    def _all(self, skipped: int) -> Iterator[LogRecord]:
+        """Yield all records; the first `skipped` blocks are not decompressed, and yield empty ones."""
+        for at, block in enumerate(self._packed):
+            yield from ({} for _ in range(BLOCK)) if at < skipped else json.loads(zlib.decompress(block))
+        yield from self._new
+
+
+PATIENCE = 60.0  # [s] between warnings while a mission waits for its first values
+ROUNDING = 1e-6  # [s]
+LAST = 20  # transitions that viewers get
+
+MakeWorld = Callable[[Callable[[int, Result], None], Callable[[MissionEvent], None]], tuple[World, RobotWorld]]
+Tell = Callable[[Level, str], None]
+
+
+class MissionRun:
+    """Runs a mission, with time as an argument; `tell` takes the lines of its story, `write` the records of its log."""
+
+    def __init__(
+        self,
+        program: Program,
+        names: RobotNames,
+        inputs: Mapping[str, Value],
+        make: MakeWorld,
+        tell: Tell,
+        write: logbook.Write,
+        *,
+        name: str,
+        settings: Settings = PLAIN,
+    ) -> None:
+        self.name = name
+        self.is_paused = False
+        self.end: MissionEnded | None = None
+        self.began: float | None = None  # [s] of robot time
+        self.patient_until: float | None = None  # [s] of the next warning while it waits for its first values
+        self.story = MissionStory(name, names.skills)
+        self.transitions: deque[dict[str, Any]] = deque(maxlen=LAST)
+        self._tell, self._now = tell, 0.0
+        world, self.robot = make(self._ended, self._said)
+        self.log = LoggedWorld(world, lambda record: write({"time": self._now, "mission": name, **record}))
+        self.engine = Engine(program, names, inputs, self.log, settings)
+        self.claims = claims_of(self.engine.program, self.engine.robot.skills)  # parts of the robot, exclusively
+        self.mirror = Mirror(self.engine)
+        self._states = (names.values.keys() | {POSE}) - names.events
+        self._inputs, self._settings = inputs, settings
+
+    @property
+    def is_over(self) -> bool:
+        """Return whether it has ended, by itself or not."""
+        return self.end is not None
+
+    @property
+    def state(self) -> str:
+        """Return its state as a word."""
+        if self.end is not None:
+            return self.end.outcome or self.end.result
+        if self.is_paused:
+            return "paused"
+        return "waiting" if self.engine.status == IDLE else NAMES[self.engine.status]
+
+    def missing(self) -> list[str]:
+        """Return the names that it reads and that have no value yet; it does not wait for events."""
+        reads = self.engine.program.reads & self._states
+        return sorted(name for name in reads if self.robot.value(name) is NOT_ARRIVED)
+
+    def loses_patience(self, now: float) -> bool:
+        """Return whether another `PATIENCE` has passed while it waits for its first values."""
+        if self.patient_until is None:
+            self.patient_until = now + PATIENCE
+        if now < self.patient_until - ROUNDING:
+            return False
+        self.patient_until = now + PATIENCE
+        return True
+
+    def reads(self, name: str) -> bool:
+        """Return whether a new value of this name is worth a tick."""
+        return not self.is_over and (self.engine.status == IDLE or name in self.engine.reads())
+
+    def tick(self, now: float) -> None:
+        """Do what is due at `now` [s]."""
+        self._now = now
+        if self.began is None:
+            self.began = now
+            self.log.begin(self._inputs, self._settings)
+        self.robot.look()
+        self._do(logbook.TICK, lambda: self.engine.tick(now), now)
+
+    def next_wake(self) -> float | None:
+        """Return when to tick it next [s]."""
+        if self.is_over:
+            return None
+        due = (self.engine.next_wake(), self.robot.next_look())
+        return min((time for time in due if time is not None), default=None)
+
+    def look(self, now: float) -> None:
+        """Poll the requests that go on while it is paused."""
+        self._now = now
+        self.robot.look()
+
+    def pause(self, now: float) -> None:
+        """Pause it: its timers stop."""
+        self.is_paused = True
+        self._do(logbook.PAUSE, lambda: self.engine.pause(now), now)
+
+    def resume(self, now: float) -> None:
+        """Continue."""
+        self.is_paused = False
+        self._do(logbook.RESUME, lambda: self.engine.resume(now), now)
+
+    def abort(self, now: float) -> None:
+        """End it from outside."""
+        if self.engine.status == RUNNING:
+            self._do(logbook.ABORT, lambda: self.engine.abort(now), now)
+        elif not self.is_over:
+            self._now = now
+            self._said(MissionEnded("halted"))
+
+    def seen(self, since: int = 0) -> dict[str, Any]:
+        """Return what has changed since the version that a viewer has; 0 gives the full state."""
+        more = {"state": self.state, "began": self.began, "transitions": list(self.transitions)}
+        return {"mission": self.name, **self.mirror.look(since), **more}
+
+    def _do(self, what: str, call: Callable[[], object], now: float) -> None:
+        """Call the engine, and log what it read during the call."""
+        self._now = now
+        call()
+        self.log.did(what)
+
+    def _ended(self, leaf: int, result: Result) -> None:
+        self.log.arrived(leaf, result)
+        self.engine.ended(leaf, result)
+
+    def _said(self, event: MissionEvent) -> None:
+        level, text = self.story.tell(event)
+        if isinstance(event, MissionEnded):
+            self.end = event
+        if isinstance(event, Transition):
+            self.transitions.append(
+                {
+                    "time": self._now,
+                    "machine": event.machine,
+                    "state": event.state,
+                    "outcome": event.outcome,
+                    "to": event.to,
+                }
+            )
+        if text:
+            self._tell(level, text)
+
+
+def claims_of(program: Program, skills: Mapping[str, Skill]) -> frozenset[str]:
+    """Return the parts of the robot that the skills of a linked mission need exclusively."""
+    used = {node.skill for node in program.nodes}
+    return frozenset(skills[name].claims for name in used if name in skills and skills[name].claims)

@@ -1,0 +1,202 @@
+"""All missions of a robot: which run, which may start beside them, and what viewers see."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any
+
+from rbxcompose.base.expressions.values import Value
+from rbxcompose.base.findings import suggest
+from rbxcompose.base.levels import Level
+from rbxcompose.base.requests import Query, Refused
+from rbxcompose.missions.engine.inputs import NoSuchState, bind_texts, start_at
+from rbxcompose.missions.engine.logbook import LogRecord
+from rbxcompose.missions.engine.world import Observer, Settings
+from rbxcompose.missions.execution.errands import Equipment
+from rbxcompose.missions.execution.mission_run import LogStore, MakeWorld, MissionRun, claims_of
+from rbxcompose.missions.execution.requests import ListedMission, ListMissions, LogPart, LookAtAll, PictureData, Seen
+from rbxcompose.missions.program.linker import link
+from rbxcompose.missions.program.program import Program
+from rbxcompose.missions.program.statuses import IDLE, NAMES
+from rbxcompose.missions.view.picture import picture_of, picture_to_data
+from rbxcompose.sdk.bound import Window
+
+Told = Callable[[str, Level, str], None]  # mission, level, line of its story
+
+
+class RunningMissions:
+    """The running missions, in the order in which they began, and ended ones until they run again."""
+
+    def __init__(self, equipment: Equipment, make: MakeWorld, tell: Told, publish: Callable[[LogRecord], None]) -> None:
+        self._equipment, self.make, self._tell, self._publish = equipment, make, tell, publish
+        self.observer: Observer | None = None  # of all that begin from now on
+        self.runs: dict[str, MissionRun] = {}
+        self._log = LogStore()
+        self._counts: dict[str, int] = {}
+
+    def __iter__(self) -> Iterator[MissionRun]:
+        """Return the missions that run or are paused."""
+        return (run for run in list(self.runs.values()) if not run.is_over)
+
+    @property
+    def names(self) -> list[str]:
+        """Return the names of the missions that run or are paused."""
+        return [run.name for run in self]
+
+    def run(self, name: str, given: Mapping[str, str], start: str = "") -> MissionRun:
+        """Start a mission with these inputs, as text, in the state `start` of its machines if one is named.
+
+        Raises:
+            Refused: if there is none, an input does not fit, or a running mission needs the same part of the robot.
+        """
+        program = self._program(name)
+        if name in self.names:
+            raise Refused(f"mission {name} is already running")
+        inputs = self._inputs(name, program, given)
+        linked = link(program, self._equipment.names.missions)
+        if clash := self._clash(linked):
+            raise Refused(clash)
+        try:
+            settings = Settings(start_at=start_at(linked, start) if start else {}, observer=self.observer)
+        except NoSuchState as error:
+            raise Refused(str(error)) from error
+        self._counts[name] = self._counts.get(name, 0) + 1
+        number = self._counts[name]
+        self.runs.pop(name, None)
+        self.runs[name] = MissionRun(
+            program,
+            self._equipment.names,
+            inputs,
+            self.make,
+            lambda level, text: self._tell(name, level, text),
+            lambda record: self._write({**record, "run": number}),
+            name=name,
+            settings=settings,
+        )
+        return self.runs[name]
+
+    def seen(self, name: str, since: int = 0) -> Seen:
+        """Return what has changed in a mission since the version that a viewer has; 0 gives the full state.
+
+        Raises:
+            Refused: if it has not been running.
+        """
+        return self._begun(name).seen(since)
+
+    def picture(self, name: str) -> PictureData:
+        """Return the picture of a mission, as data.
+
+        Raises:
+            Refused: if it has not been running.
+        """
+        engine = self._begun(name).engine
+        return picture_to_data(picture_of(engine.program, engine.robot))
+
+    def running(
+        self, name: str, what: Callable[[MissionRun], bool] = lambda one: True, word: str = "running"
+    ) -> MissionRun:
+        """Return the mission of this name; without a name, the only one for which `what` holds.
+
+        Raises:
+            Refused: if it does not run, or it is not clear which one is meant.
+        """
+        if name:
+            if name not in self.names:
+                self._program(name)
+                raise Refused(f"mission {name} is not running")
+            return self.runs[name]
+        found = [run for run in self if what(run)]
+        if len(found) == 1:
+            return found[0]
+        if not found:
+            only = list(self)
+            if len(only) == 1:
+                return only[0]
+            raise Refused(f"no mission is {word}")
+        raise Refused(f"several missions are {word}: {', '.join(run.name for run in found)}; name one")
+
+    def listed(self) -> tuple[ListedMission, ...]:
+        """Return all missions of the robot with their states."""
+        return tuple(self._listed(name, program) for name, program in self._equipment.programs.items())
+
+    def _listed(self, name: str, program: Program) -> ListedMission:
+        run, names = self.runs.get(name), self._equipment.names
+        claims = sorted(claims_of(link(program, names.missions), names.skills)) if name in names.missions else []
+        return ListedMission(name, program.about, run.state if run else NAMES[IDLE], tuple(claims))
+
+    def since(self, number: int) -> LogPart:
+        """Return the records of the log after the first `number`."""
+        return LogPart(self._log.written, self._log.since(number))
+
+    def _begun(self, name: str) -> MissionRun:
+        if name not in self.runs:
+            raise Refused(f"mission {name} has not been running")
+        return self.runs[name]
+
+    def _program(self, name: str) -> Program:
+        programs = self._equipment.programs
+        if name not in programs:
+            raise Refused(f"the robot has no mission '{name}': {suggest(name, programs, 'its missions')}")
+        return programs[name]
+
+    def _inputs(self, name: str, program: Program, given: Mapping[str, str]) -> Mapping[str, Value]:
+        """Return the robot's inputs for a mission, overridden by those that were given."""
+        known = self._equipment.inputs.get(name, {})
+        inputs, findings = bind_texts(program, given, known, self._equipment.names.places)
+        if findings:
+            raise Refused("; ".join((*(finding.message for finding in findings), "give inputs by '--set NAME=VALUE'")))
+        return inputs
+
+    def _clash(self, linked: Program) -> str:
+        """Return why a mission cannot run beside the running ones; empty if it can."""
+        wanted = claims_of(linked, self._equipment.names.skills)
+        for other in self:
+            if common := sorted(wanted & other.claims):
+                return f"{' and '.join(common)} {'is' if len(common) == 1 else 'are'} in use by {other.name}"
+        return ""
+
+    def _write(self, record: LogRecord) -> None:
+        self._log.append(record)
+        self._publish(record)
+
+
+PATH = "missions"
+_ALWAYS = frozenset({"mission", "version", "whole", "state"})  # what is in all updates
+
+Open = Callable[[str, Query[Any]], Window]  # takes a path and the query that is made there
+
+
+class Broadcast:
+    """A window for each mission of a robot."""
+
+    def __init__(self, names: Iterable[str], open_window: Open) -> None:
+        self._list = open_window(PATH, ListMissions())
+        self._feeds = {name: MissionFeed(open_window(f"{PATH}/{name}", LookAtAll(name))) for name in names}
+
+    def tell(self, missions: RunningMissions) -> None:
+        """Publish what has changed; nothing is prepared without a viewer."""
+        for name, run in missions.runs.items():
+            self._feeds[name].tell(run)
+
+
+class MissionFeed:
+    """What was last published about one mission."""
+
+    def __init__(self, window: Window) -> None:
+        self._window = window
+        self._run: MissionRun | None = None
+        self._told: dict[str, Any] = {}
+
+    def tell(self, run: MissionRun) -> None:
+        """Send what is new, if there is a subscriber and something new."""
+        if not self._window.is_watched:
+            return
+        if run is not self._run:
+            self._run, self._told = run, {}
+        seen = run.seen(self._told.get("version", 0))
+        fresh = {key: value for key, value in seen.items() if key in _ALWAYS or self._told.get(key) != value}
+        fresh |= {"statuses": seen["statuses"], "data": seen["data"]}
+        if all(self._told.get(key) == seen[key] for key in ("version", "state", "transitions", "began")):
+            return
+        self._told = seen
+        self._window.put(fresh)

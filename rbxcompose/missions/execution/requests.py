@@ -1,0 +1,138 @@
+"""What people and viewers may ask of a robot's missions."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import field
+from typing import Any
+
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.requests import Command, Query, Refused
+
+MISSION = "mission"
+_SET, _FROM = "--set", "--from"
+
+Seen = Mapping[str, Any]
+"""The state of a mission, as `Running.seen` returns it."""
+PictureData = Mapping[str, Any]
+"""A picture of a mission, as `picture_to_data` returns it."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunMission(Command):
+    """Start a mission, with inputs as text, in the state `start` of its machines if one is named."""
+
+    about = MISSION
+    mission: str
+    inputs: Mapping[str, str] = field(default_factory=dict)
+    start: str = ""
+
+    @property
+    def words(self) -> str:
+        """Return it as written on the command line."""
+        inputs = [word for name, text in self.inputs.items() for word in (_SET, f"{name}={text}")]
+        return shlex.join(["run", self.mission, *inputs, *([_FROM, self.start] if self.start else [])])
+
+
+@dataclass(frozen=True, slots=True)
+class _OfMission(Command):
+    """A command to a running mission; without a name, to the only one."""
+
+    about = MISSION
+    mission: str = ""
+
+    @property
+    def words(self) -> str:
+        """Return it as written on the command line."""
+        verb = type(self).__name__.removesuffix("Mission").lower()
+        return shlex.join([verb, self.mission] if self.mission else [verb])
+
+
+@dataclass(frozen=True, slots=True)
+class CancelMission(_OfMission):
+    """End a mission for good."""
+
+
+@dataclass(frozen=True, slots=True)
+class PauseMission(_OfMission):
+    """Pause a mission; its timers stop."""
+
+
+@dataclass(frozen=True, slots=True)
+class ResumeMission(_OfMission):
+    """Resume a paused mission."""
+
+
+@dataclass(frozen=True, slots=True)
+class ListedMission:
+    """A mission of the robot, its state, and the parts of the robot that it needs exclusively."""
+
+    name: str
+    about: str
+    state: str
+    claims: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ListMissions(Query[tuple[ListedMission, ...]]):
+    """Query the list of missions."""
+
+    about = MISSION
+
+
+@dataclass(frozen=True, slots=True)
+class ShowPicture(Query[PictureData]):
+    """Ask for the picture of a mission that has been running."""
+
+    about = MISSION
+    mission: str
+
+
+@dataclass(frozen=True, slots=True)
+class LookAtMission(Query[Seen]):
+    """Query what has changed in a mission since a version; 0 gives the full state."""
+
+    about = MISSION
+    mission: str
+    since: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class LookAtAll(Query[Seen]):
+    """Query the full state of a mission, with its picture under `picture`."""
+
+    about = MISSION
+    mission: str
+
+
+@dataclass(frozen=True, slots=True)
+class LogPart:
+    """Records of the missions' log; `next` is how many were written so far."""
+
+    next: int
+    records: Sequence[Mapping[str, Any]]
+
+
+@dataclass(frozen=True, slots=True)
+class ReadLog(Query[LogPart]):
+    """Query the records of the log after the first `after`."""
+
+    about = MISSION
+    after: int = 0
+
+
+def settings(lines: Sequence[str]) -> Mapping[str, str]:
+    """Return inputs such as `rounds=2` by name.
+
+    Raises:
+        Refused: if there is no name or no `=`.
+    """
+    return dict(map(_setting, lines))
+
+
+def _setting(text: str) -> tuple[str, str]:
+    name, equals, value = text.partition("=")
+    if not name or not equals:
+        raise Refused(f"'{text}' is not NAME=VALUE")
+    return name, value

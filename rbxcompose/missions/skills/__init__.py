@@ -1,0 +1,1 @@
+"""Skills in Python, a file each."""

@@ -1,1 +1,0 @@
-"""Motions of arms: planned on the body's real geometry, verified, and timed within the limits of joints."""

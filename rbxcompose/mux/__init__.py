@@ -1,1 +1,0 @@
-"""Pure core of command muxes: which of several sources of commands is let through."""

@@ -1,1 +1,0 @@
-"""Pure cores that drive a base to a goal."""

@@ -1,1 +1,0 @@
-"""Parameters as ROS 2 knows them, made from the configuration of a component."""

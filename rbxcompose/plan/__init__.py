@@ -1,1 +1,0 @@
-"""From a checked robot to the plan of what will run: frozen, sorted, independent of the manifest's language."""

@@ -1,1 +1,0 @@
-"""Formats of findings, one file each. Pure: nothing is printed here."""

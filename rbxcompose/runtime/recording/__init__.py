@@ -1,0 +1,1 @@
+"""MCAP files: writes, reads and recovers them."""

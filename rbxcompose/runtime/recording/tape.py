@@ -1,0 +1,157 @@
+"""A tape: all that happens on the bus of one process on a stepped clock, in order and exactly enough to repeat it.
+
+Besides the topics of the robot, it holds the events of services, as ROS 2 records them, and on two topics of its own
+the orders that the host received and the instants whose time [s] cannot be computed from nanoseconds.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+
+from rbxcompose.base.clock import NANOSECONDS, Clock
+from rbxcompose.bus.local import WitnessedCall
+from rbxcompose.bus.names import ADMIN, decode_attachment
+from rbxcompose.bus.tokens import EndpointToken, gid, parse_token
+from rbxcompose.bus.transport import (
+    LONGEST_WAIT,
+    Arrival,
+    Closable,
+    Question,
+    RemotePublisher,
+    Transport,
+    TransportReply,
+)
+from rbxcompose.msgs.cdr import encode
+from rbxcompose.msgs.events import TOPIC, event_of
+from rbxcompose.msgs.service_msgs import ServiceEventInfo
+from rbxcompose.msgs.stamps import to_time
+from rbxcompose.msgs.std_msgs import Float64, String
+from rbxcompose.msgs.types import Message
+from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic, definition_of, topic_of
+from rbxcompose.sdk.ports import Qos
+
+PLAN = "plan.json"  # name of the attachment with the plan of the robot
+ORDERS = "/rbxcompose/orders"
+INSTANTS = "/rbxcompose/instants"
+
+
+class Tape:
+    """Passes events to `write`, and topics to `declare` as soon as they have a publisher."""
+
+    def __init__(
+        self, clock: Clock, declare: Callable[[RecordedTopic], None], write: Callable[[Recorded], None]
+    ) -> None:
+        self._clock, self._declare, self._write = clock, declare, write
+        self._instant, self._stamp = 0.0, 0  # [s] and [ns], the last instant
+        self._topics: dict[bytes, RecordedTopic] = {}  # by the GID of the publisher
+
+    def around(self, transport: Transport) -> Transport:
+        """Return a transport that behaves like this one and is recorded."""
+        return _Taped(self, transport)
+
+    def witness(self, call: WitnessedCall) -> None:
+        """Record a request or a reply."""
+        event = event_of(call.service)
+        kind = ServiceEventInfo.RESPONSE_SENT if call.is_reply else ServiceEventInfo.REQUEST_SENT
+        stamp = to_time(self._clock.stamp())
+        info = ServiceEventInfo(event_type=kind, stamp=stamp, client_gid=call.client, sequence_number=call.sequence)
+        held = () if call.message is None else (call.message,)
+        message = event(info=info, response=held) if call.is_reply else event(info=info, request=held)
+        self._say(f"{call.name}/{TOPIC}", message, node=call.node, sequence=call.sequence)
+
+    def order(self, verb: str, *words: object) -> None:
+        """Record an order to the host."""
+        self._say(ORDERS, String(data=json.dumps([verb, *words])))
+
+    def announced(self, token: str) -> None:
+        """Register a publisher."""
+        endpoint = parse_token(token)
+        topic = topic_of(endpoint) if isinstance(endpoint, EndpointToken) else None
+        if isinstance(endpoint, EndpointToken) and topic is not None:
+            whole = replace(topic, definition=definition_of(topic.type), node=endpoint.node.name)
+            self._topics[gid(token)] = whole
+            self._declare(whole)
+
+    def published(self, payload: bytes, attachment: bytes) -> None:
+        """Record a message."""
+        source = decode_attachment(attachment)
+        self._keep(self._topics[source.gid], source.sequence, payload)
+
+    def _say(self, name: str, message: Message, *, node: str = "", sequence: int = 0) -> None:
+        topic = RecordedTopic(name, message.TYPE, message.HASH, Qos.EVENT, definition_of(message.TYPE), node=node)
+        self._keep(topic, sequence, encode(message))
+
+    def _keep(self, topic: RecordedTopic, sequence: int, payload: bytes) -> None:
+        now, stamp = self._clock.now(), self._clock.stamp()
+        if now != self._instant:
+            is_next_to_last = stamp == self._stamp  # two instants may have one stamp
+            self._instant, self._stamp = now, stamp
+            if is_next_to_last or now != stamp / NANOSECONDS:
+                self._say(INSTANTS, Float64(data=now))
+        self._write(Recorded(topic, stamp, stamp, sequence, payload))
+
+
+class _Taped:
+    """A transport that records on a tape what leaves the process, even without a subscriber outside."""
+
+    def __init__(self, tape: Tape, inner: Transport) -> None:
+        self._tape, self._inner = tape, inner
+        self.session = inner.session
+
+    def wake(self, owner: str, callback: Callable[[], None]) -> None:
+        self._inner.wake(owner, callback)
+
+    def bring(self, owner: str, callback: Callable[[], None]) -> None:
+        self._inner.bring(owner, callback)
+
+    def publisher(self, key: str, qos: Qos) -> RemotePublisher:
+        if key.startswith(ADMIN):  # what tools look at is not part of the robot's behaviour
+            return self._inner.publisher(key, qos)
+        return _TapedPublisher(self._tape, self._inner.publisher(key, qos))
+
+    def subscribe(self, key: str, qos: Qos, arrived: Callable[[Arrival], None]) -> Closable:
+        return self._inner.subscribe(key, qos, arrived)
+
+    def serve(self, key: str, asked: Callable[[Question], None]) -> Closable:
+        return self._inner.serve(key, asked)
+
+    def ask(
+        self,
+        key: str,
+        payload: bytes,
+        attachment: bytes,
+        answered: Callable[[TransportReply], None],
+        *,
+        of_all: bool = True,
+        within: float = LONGEST_WAIT,
+    ) -> Closable:
+        return self._inner.ask(key, payload, attachment, answered, of_all=of_all, within=within)
+
+    def announce(self, token: str) -> Closable:
+        self._tape.announced(token)
+        return self._inner.announce(token)
+
+    def watch(self, pattern: str, changed: Callable[[str, bool], None]) -> Closable:
+        return self._inner.watch(pattern, changed)
+
+    def close(self) -> None:
+        self._inner.close()
+
+
+class _TapedPublisher:
+    """A publisher that always has a subscriber: the tape."""
+
+    has_match = True
+
+    def __init__(self, tape: Tape, inner: RemotePublisher) -> None:
+        self._tape, self._inner = tape, inner
+
+    def put(self, payload: bytes, attachment: bytes) -> None:
+        self._tape.published(payload, attachment)
+        if self._inner.has_match:
+            self._inner.put(payload, attachment)
+
+    def close(self) -> None:
+        self._inner.close()

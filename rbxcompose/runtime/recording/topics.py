@@ -1,0 +1,157 @@
+"""Topics in a recording: what it stores about them, their definitions, and their selection."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from fnmatch import fnmatchcase
+
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.bus.names import name_problem
+from rbxcompose.bus.tokens import EndpointToken, EntityKind
+from rbxcompose.bus.wire import ros_qos
+from rbxcompose.msgs import registry
+from rbxcompose.msgs.definitions import INTERFACES, FieldType, parse_type
+from rbxcompose.msgs.packages import joined, parts, short
+from rbxcompose.sdk.ports import Qos
+
+CDR = "cdr"
+HASH, CLASS, ROS_QOS = "topic_type_hash", "rbxcompose.class", "offered_qos_profiles"  # keys of a channel's metadata
+NODE = "rbxcompose.node"
+
+_DDS_TYPE = re.compile(r"(\w+)::(msg|srv|action)::dds_::(\w+)_", re.ASCII)
+_TYPE = re.compile(r"\w+/(msg|srv|action)/\w+", re.ASCII)
+_HASH = re.compile(r"\w{1,100}", re.ASCII)
+_QOS = re.compile(r"(?P<reliability>\d?):(?P<durability>\d?):(?P<history>\d?),(?P<depth>\d{0,9}):.*")
+_FOREVER = "{sec: 9223372036, nsec: 854775807}"  # how ROS writes "no limit"
+_IS_LATCHED = re.compile(r"^[ \t-]*+durability: *+(1|transient_local)[ \t\r]*+$", re.MULTILINE)
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedTopic:
+    """A topic with one type; another type, or another publisher, under the same name is another topic."""
+
+    name: str  # with its leading slash
+    type: str  # `geometry_msgs/msg/Twist`
+    hash: str  # of the type, as in the keys of the bus
+    qos: Qos = Qos.STATE
+    definition: str = ""  # text of the type and of all types inside it; empty if unknown
+    encoding: str = CDR
+    node: str = ""  # the publisher; empty if not recorded
+
+    def metadata(self) -> dict[str, str]:
+        """Return the metadata of a channel besides name and type: hash and quality of service, for ROS and for us."""
+        qos = ros_qos(self.qos)
+        profile = (
+            f"- history: {2 if qos.keeps_all else 1}\n  depth: {qos.depth}\n"
+            f"  reliability: {1 if qos.is_reliable else 2}\n  durability: {1 if qos.is_transient_local else 2}\n"
+            f"  deadline: {_FOREVER}\n  lifespan: {_FOREVER}\n"
+            f"  liveliness: 1\n  liveliness_lease_duration: {_FOREVER}\n  avoid_ros_namespace_conventions: false\n"
+        )
+        node = {NODE: self.node} if self.node else {}
+        return {HASH: self.hash, CLASS: self.qos.value, ROS_QOS: profile, **node}
+
+
+def qos_of_metadata(metadata: Mapping[str, str]) -> Qos:
+    """Return the class of a recorded topic; recordings by other tools say at most whether it is latched."""
+    written = metadata.get(CLASS, "")
+    if written in set(Qos):
+        return Qos(written)
+    return Qos.LATCHED if _IS_LATCHED.search(metadata.get(ROS_QOS, "")) else Qos.STATE
+
+
+def by_name(counts: Mapping[RecordedTopic, int]) -> dict[RecordedTopic, int]:
+    """Return the numbers of messages, summed over all publishers of a topic."""
+    found: dict[RecordedTopic, int] = {}
+    for topic, count in counts.items():
+        whole = replace(topic, node="")
+        found[whole] = found.get(whole, 0) + count
+    return found
+
+
+def is_replayable(topic: RecordedTopic) -> bool:
+    """Return whether a recorded topic can be published: its names must be valid on the bus, which carries only CDR."""
+    is_named = _TYPE.fullmatch(topic.type) and _HASH.fullmatch(topic.hash) and not name_problem(topic.name)
+    return bool(is_named) and topic.encoding == CDR
+
+
+def topic_of(token: EndpointToken) -> RecordedTopic | None:
+    """Return the topic of a publisher, without a definition; None for other endpoints and for invalid names."""
+    found = _DDS_TYPE.fullmatch(token.dds_type)
+    if token.kind is not EntityKind.PUBLISHER or not found or name_problem(token.name):
+        return None
+    if not _HASH.fullmatch(token.type_hash):  # the hash becomes part of a key
+        return None
+    return RecordedTopic(token.name, "/".join(found.groups()), token.type_hash, qos_of_token(token.qos))
+
+
+def qos_of_token(text: str) -> Qos:
+    """Return the class nearest to the quality of service of a token."""
+    found = _QOS.fullmatch(text)
+    if not found:
+        return Qos.STATE
+    if found["durability"] == "1":
+        return Qos.LATCHED
+    if found["reliability"] == "2":
+        return Qos.BULK
+    if found["history"] == "2":
+        return Qos.EVENT
+    return Qos.COMMAND if found["depth"] == "1" else Qos.STATE
+
+
+@dataclass(frozen=True, slots=True)
+class Selection:
+    """A selection of topics: by name (`odom`, `/camera/*`) and by class; an empty one means all."""
+
+    patterns: Sequence[str] = ()
+    classes: Sequence[Qos] = ()
+
+    def takes(self, topic: RecordedTopic) -> bool:
+        """Return whether a topic is selected."""
+        return self.names(topic) and (not self.classes or topic.qos in self.classes)
+
+    def names(self, topic: RecordedTopic) -> bool:
+        """Return whether a topic has one of the selected names."""
+        name = topic.name.lstrip("/")
+        return not self.patterns or any(fnmatchcase(name, pattern.lstrip("/")) for pattern in self.patterns)
+
+
+def definition_of(name: str) -> str:
+    """Return the text of a type (`nav_msgs/msg/Odometry`), then those of the types in it, each below a line of `=`.
+
+    It is empty for a type without a known definition.
+    """
+    try:
+        return joined(name, parts(name, _types), _text)
+    except KeyError:
+        return ""
+
+
+def _types(name: str) -> list[FieldType]:
+    return [parse_type(text) for text in registry.message(name).FIELDS.values()]
+
+
+def _text(name: str) -> str:
+    package, kind, bare = name.split("/")
+    written = INTERFACES / package / kind / f"{bare}.{kind}"
+    if kind == "msg" and written.is_file():
+        return written.read_text(encoding="utf-8")
+    # A part of an action, or a type of another package: its fields are what counts.
+    return "".join(f"{_short_type(type_)} {field}\n" for field, type_ in registry.message(name).FIELDS.items())
+
+
+def _short_type(text: str) -> str:
+    base = parse_type(text).base
+    return text.replace(base, short(base), 1) if "/" in base else text
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """A message as bytes, with the times [ns since 1970] when it arrived and when it was published."""
+
+    topic: RecordedTopic
+    log_time: int
+    publish_time: int
+    sequence: int  # counted by its publisher; 0 if not counted
+    payload: bytes

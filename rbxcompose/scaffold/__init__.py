@@ -1,1 +1,0 @@
-"""What `new` writes: answers become the texts of files, which are written to the disk, all or none."""

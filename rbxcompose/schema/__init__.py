@@ -1,1 +1,0 @@
-"""JSON Schemas of the manifests, made from the models, the registry of components and the kinds of mission nodes."""

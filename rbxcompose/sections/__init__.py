@@ -1,1 +1,0 @@
-"""The sections of robots, parts and overlays: one file each."""

@@ -1,1 +1,0 @@
-"""Pure cores of the simulated world: the twins of drivers and what they measure."""

@@ -1,1 +1,0 @@
-"""Skills in Python that ship with the project, one file each."""

@@ -1,1 +1,0 @@
-"""Robots on several hosts: which host runs what, what crosses between them, and how they are linked."""

@@ -1,0 +1,35 @@
+"""List the actions on the bus, or send a goal to one.
+
+`send` prints feedback as it arrives, then the result. An interrupt cancels the goal and waits for its end; a second one
+does not wait.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+from rbxcompose.commands.guest import Guest, add_server_verbs, tell_list, visit
+from rbxcompose.commands.options import BUS
+
+ON_SYSTEM = BUS
+_VERB = ("send", "send a goal, print feedback and result")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    add_server_verbs(parser, "action", _VERB, "goal", "/go_to", (_ls, _send))
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the chosen subcommand."""
+    return visit(arguments, lambda guest: int(arguments.do(guest, arguments)))
+
+
+def _ls(guest: Guest, arguments: argparse.Namespace) -> int:
+    return tell_list(guest.graph().actions, ("servers", "clients"), arguments)
+
+
+def _send(guest: Guest, arguments: argparse.Namespace) -> int:
+    from rbxcompose.commands.messages import send  # the imports for messages would slow down the list
+
+    return send(guest, arguments)

@@ -1,0 +1,227 @@
+"""Report every error of a robot before a motor moves.
+
+PATH is a robot's file or folder, a folder with robots or tests below it, a test, a system, or a mission or part: it
+checks the robots of the project that use it. Check an overlay on a robot: check ROBOT -f FILE. Exit codes: 0 fine, 1
+errors found (with --strict also warnings), 2 wrong usage.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import sys
+from collections.abc import Callable, Collection, Iterable, Iterator
+from dataclasses import field, replace
+from pathlib import Path
+from typing import Protocol
+
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.files import read_regular, replace_file
+from rbxcompose.base.findings import Finding, Fix, Report, Sources, nearest
+from rbxcompose.base.fixes import apply, safe_fixes
+from rbxcompose.base.formats import format_names, renderer
+from rbxcompose.base.printable import plain
+from rbxcompose.commands.console import FINDINGS, good, has_colour, tell
+from rbxcompose.commands.targets import Targets, add_layer_options, compiled, projects_of, targets
+from rbxcompose.compiler.compile import Compilation
+from rbxcompose.compiler.plan.model import Plan, extent
+from rbxcompose.manifest.documents import KINDS
+from rbxcompose.manifest.tree import FILE_BYTES
+
+TEXT = "text"
+FOR_PEOPLE = (TEXT, "github")  # formats that may contain lines without a finding
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("paths", nargs="*", default=["."], metavar="PATH", help="what to check; else the robots here")
+    add_layer_options(parser)
+    parser.add_argument("--format", choices=format_names(), default=TEXT, help="output format")
+    parser.add_argument("--strict", action="store_true", help="count warnings as errors")
+    parser.add_argument("--fix", action="store_true", help="fix what is certain, in the files")
+
+
+@dataclass(slots=True)
+class CheckedRobots:
+    """The findings of all robots together; `fine` has the plans of those that can run."""
+
+    report: Report = field(default_factory=Report)
+    sources: dict[str, str] = field(default_factory=dict)
+    fine: list[Plan] = field(default_factory=list)
+    tests: list[str] = field(default_factory=list)  # names of the tests that can run
+    systems: list[str] = field(default_factory=list)  # systems that can run, in words
+
+    def add(self, compilation: Compilation) -> None:
+        """Add the findings of one robot."""
+        self.report.extend(compilation.report)
+        self.sources.update(compilation.sources)
+        if compilation.plan is not None:
+            self.fine.append(compilation.plan)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Compile the robots, apply fixes if requested, and write the findings to stdout."""
+    wanted = targets(arguments.paths)
+    if arguments.fix:
+        fix(lambda: _check(wanted, arguments), tell if arguments.format == TEXT else _whisper)
+    checked = _check(wanted, arguments)
+    tell(_written(checked, arguments.format).rstrip("\n"))
+    is_wrong = checked.report.has_errors or (arguments.strict and any(checked.report))
+    return FINDINGS if is_wrong else 0
+
+
+def _check(wanted: Targets, arguments: argparse.Namespace) -> CheckedRobots:
+    checked = CheckedRobots()
+    for robot in wanted.robots:
+        checked.add(compiled(robot, arguments))
+    for robot in wanted.users:
+        one = compiled(robot, arguments)
+        if any(file in one.sources for file in wanted.files):
+            checked.add(one)
+    if wanted.tests:
+        _check_tests(wanted.tests, checked)
+    for path in wanted.systems:
+        _check_system(path, arguments, checked)
+    projects = projects_of([*wanted.robots, *wanted.users, *wanted.tests, *wanted.systems])
+    checked.report = Report([*only_ours(checked.report, checked.sources, projects), *wanted.unused(checked.sources)])
+    return checked
+
+
+def _check_tests(tests: list[str], checked: CheckedRobots) -> None:
+    from rbxcompose.tools.mission_tests.reader import TrialReader  # only needed for tests
+
+    reading, found = TrialReader(os.environ), Report()
+    for path in tests:
+        trial, report = reading.read(Path(path).resolve())
+        found.extend(report)
+        if trial is not None:
+            checked.tests.append(trial.name)
+    checked.report.extend([*reading.report, *reading.summed_up(found)])
+    checked.sources.update(reading.sources)
+
+
+def _check_system(path: str, arguments: argparse.Namespace, checked: CheckedRobots) -> None:
+    from rbxcompose.compiler.systems.reader import compile_system
+    from rbxcompose.tools.inspection.plan_text import system_extent  # only needed for systems
+
+    system = compile_system(path, environment=os.environ, real=arguments.real, profiles=arguments.profile)
+    tried = [] if arguments.profile else [(name,) for name in system.known_profiles]
+    all_ = [
+        system,
+        *(compile_system(path, environment=os.environ, real=arguments.real, profiles=names) for names in tried),
+    ]
+    for one in all_:
+        known = {(each.code, each.span, each.message) for each in checked.report}
+        checked.report.extend(each for each in one.report if (each.code, each.span, each.message) not in known)
+        checked.sources.update(one.sources)
+    if not any(one.report.has_errors for one in all_):
+        checked.systems.append(f"{system.name} is fine: {system_extent(system)}")
+
+
+def _written(checked: CheckedRobots, form: str) -> str:
+    if any(checked.report) or form not in FOR_PEOPLE:
+        return renderer(form)(checked.report, checked.sources, has_colour(sys.stdout))
+    lines = [f"{plan.robot} is fine: {extent(len(plan.instances), len(plan.groups))}" for plan in checked.fine]
+    lines += [f"the test {name} is fine" for name in checked.tests]
+    return "\n".join(map(good, [*lines, *checked.systems]))
+
+
+def _whisper(text: str) -> None:
+    """Write to stderr, beside output that a program reads."""
+    sys.stderr.write(f"{text}\n")
+
+
+_KIND = re.compile(r"^[ \t]*+(?:[{,]\s*+|\{[^\n]*?,\s*+)?+['\"]?kind['\"]?\s*+:\s*+['\"]?(\w++)", re.MULTILINE)
+ROUNDS = 20  # one fix may reveal the next mistake
+_WORDS = 200  # characters of a title
+PrintLine = Callable[[str], None]
+
+
+class CheckedTexts(Protocol):
+    """The findings of a check, and the texts that it read."""
+
+    @property
+    def report(self) -> Report:
+        """Return the findings."""
+        ...
+
+    @property
+    def sources(self) -> Sources:
+        """Return the texts by the names that findings show."""
+        ...
+
+
+def fix(check: Callable[[], CheckedTexts], say: PrintLine) -> None:
+    """Check, apply and report all safe fixes, and repeat until none is left."""
+    for _ in range(ROUNDS):
+        checked = check()
+        fixes = safe_fixes(checked.report, checked.sources)
+        if not fixes or not _apply(fixes, checked.sources, say):
+            return
+    say(f"stopped after {ROUNDS} rounds: each fix leads to another")
+
+
+def only_ours(findings: Iterable[Finding], sources: Sources, projects: Collection[Path]) -> Iterator[Finding]:
+    """Yield the findings, but drop fixes that would change a file outside of `projects`, or one that is not ours."""
+    for finding in findings:
+        is_ours = finding.fix is None or _is_ours(finding.fix, sources, projects)
+        yield finding if is_ours else replace(finding, fix=None)
+
+
+def _is_ours(one: Fix, sources: Sources, projects: Collection[Path]) -> bool:
+    files = {edit.span.file for edit in one.edits}
+    if not all(_has_known_kind(sources[file]) for file in files if file in sources):
+        return False
+    paths = {Path(file).resolve() for file in files}
+    return all(any(path.is_relative_to(project) for project in projects) for path in paths)
+
+
+def _has_known_kind(text: str) -> bool:
+    """Return whether a text is XML, which a robot names as its body, or a manifest of a kind that there is."""
+    if text.lstrip().startswith("<"):
+        return True
+    written = _KIND.search(text)
+    return written is not None and bool(nearest(written[1], KINDS))  # a misspelt one may be corrected
+
+
+def _apply(fixes: list[Fix], sources: Sources, say: PrintLine) -> bool:
+    """Write fixes and return whether any file has changed."""
+    texts = {}
+    for file in dict.fromkeys(edit.span.file for one in fixes for edit in one.edits):
+        text = _unchanged_text(file, sources[file])
+        if text is None:
+            say(f"left {plain(file)} as it is: it has changed since it was read, or can no longer be read")
+        else:
+            texts[file] = text
+    out = apply(fixes, texts)
+    written = {file for file, text in out.texts.items() if text != texts[file] and _write(file, text, say)}
+    for one in out.done:
+        if all(edit.span.file in written for edit in one.edits):
+            say(f"fixed {_told(one)}")
+    for one in out.postponed:
+        say(f"not yet {_told(one)}: it overlaps with another fix")
+    return bool(written)
+
+
+def _told(one: Fix) -> str:
+    first = next(edit for edit in one.edits if edit.text != edit.old)
+    return f"{plain(str(first.span))}: {plain(one.title, _WORDS)}"
+
+
+def _unchanged_text(file: str, read: str) -> str | None:
+    """Return the text of a file with its byte order mark and line ends; None if it differs from what was read."""
+    try:
+        text = read_regular(Path(file), FILE_BYTES).decode("utf-8")
+    except (OSError, UnicodeDecodeError):
+        return None
+    return text if text.removeprefix("\ufeff").replace("\r\n", "\n") == read else None
+
+
+def _write(file: str, text: str, say: PrintLine) -> bool:
+    try:
+        replace_file(Path(file).resolve(), text.encode("utf-8"))
+    except OSError as error:
+        say(f"left {plain(file)} as it is: {error.strerror}")
+        return False
+    return True

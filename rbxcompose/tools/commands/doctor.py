@@ -1,0 +1,134 @@
+"""Examine this machine and the robots that run on it: what is wrong, and what to do about it.
+
+With a robot, by file or name, it examines only that robot, including its devices and secrets. Exit codes: 0 no
+error, 1 errors found, 2 wrong usage.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import sys
+import time
+
+from rbxcompose.base.findings import Finding, Report
+from rbxcompose.commands.console import FINDINGS, NotDoneError, has_colour, refuse, tell, tell_report
+from rbxcompose.commands.formats.text import render_text
+from rbxcompose.commands.guest import Guest, HeardMessage
+from rbxcompose.commands.lookup import add_robot_option, find_robot, place_of, robots_up
+from rbxcompose.commands.messages import to_json
+from rbxcompose.commands.options import add_json_option
+from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.compiler.model.robot import Robot
+from rbxcompose.domains.devices.serial_ports import latency_timers, serial_ports
+from rbxcompose.manifest.files import PREFIX
+from rbxcompose.runtime.folder import BrokenStateError, RobotFolder, base_folder
+from rbxcompose.tools import doctor as machine
+from rbxcompose.tools.doctor import BusFacts, ExaminationResult, HostFacts, RunningRobot, examine_all, has_errors
+
+_LISTENING = 1.0  # [s] of listening to messages, for their stamps
+_NANOSECONDS = 1e9
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("path", nargs="?", metavar="ROBOT|PATH", help="only this robot, by name or file")
+    add_robot_option(parser)
+    add_json_option(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Collect the facts, examine them, and report the results."""
+    watch = machine.ClockWatch()
+    try:
+        folders, path = _meant(arguments.robot or arguments.path)
+    except NotDoneError as error:
+        return refuse(error.finding)
+    file = None if path is None else _described(path)
+    if path is not None and file is None:
+        return FINDINGS
+    running = [_running(folder) for folder in folders]
+    facts = HostFacts(
+        running=running,
+        file=file,
+        python=platform.python_version(),
+        versions=machine.versions(),
+        clocks=watch.clocks(),
+        limits=machine.limits(),
+        listeners=machine.listeners(),
+        processes=machine.processes(),
+        base=base_folder(),
+        latencies=latency_timers(),
+        ports=serial_ports(),
+    )
+    answers = examine_all(facts)
+    tell(to_json([result.to_data() for result in answers]) if arguments.json else _text(answers))
+    return FINDINGS if has_errors(answers) else 0
+
+
+def _meant(wanted: str | None) -> tuple[list[RobotFolder], str | None]:
+    """Return the running robots, or the given file, whose robot need not run.
+
+    Raises:
+        NotDoneError: if `wanted` is neither.
+    """
+    if wanted is None:
+        return robots_up(), None
+    try:
+        return [find_robot(wanted)], None
+    except NotDoneError:
+        if not os.path.exists(wanted) and not wanted.startswith(PREFIX):
+            raise
+        return [], wanted
+
+
+def _described(path: str) -> Robot | None:
+    """Return the robot that a file describes; if it cannot be read as one, report the findings."""
+    compilation = compile_robot(path, environment=os.environ)
+    if compilation.robot is None:
+        tell_report(compilation.report, compilation.sources)
+    return compilation.robot
+
+
+def _running(folder: RobotFolder) -> RunningRobot:
+    try:
+        state = folder.read_state()
+    except BrokenStateError as error:
+        return RunningRobot(folder, None, str(error))
+    if state is None:
+        return RunningRobot(folder, None, "it is gone")
+    robot = compile_robot(state.file, environment=os.environ).robot if os.path.exists(state.file) else None
+    return RunningRobot(folder, state, "", robot, _bus(folder))
+
+
+def _bus(folder: RobotFolder) -> BusFacts | None:
+    """Listen for a moment; return None if the bus cannot be reached, which other examinations report."""
+    try:
+        with Guest(place_of(folder)) as guest:
+            graph = guest.graph()
+            nodes = {end.gid: end.node for topic in graph.topics for end in topic.givers}
+            ages: dict[str, float] = {}
+
+            def heard(message: HeardMessage) -> None:
+                age = time.time() - (guest.clock.now() - message.time) - message.stamp / _NANOSECONDS
+                node = nodes.get(message.sender)
+                if node is not None and message.stamp:
+                    ages[node] = min(age, ages.get(node, age))
+
+            for topic in graph.topics:
+                if all(end.qos is not None and not end.qos.is_transient_local for end in topic.givers):
+                    guest.listen(topic, heard)
+            guest.run(lambda: False, _LISTENING)
+            return BusFacts(graph, ages)
+    except NotDoneError:
+        return None
+
+
+def _text(answers: list[ExaminationResult]) -> str:
+    """Return the examinations that passed, then the findings."""
+    width = max(len(result.examination) for result in answers)
+    lines = [f"ok  {result.examination:<{width}}  {result.told}" for result in answers if isinstance(result.told, str)]
+    report = Report()
+    report.extend(result.told for result in answers if isinstance(result.told, Finding))
+    return "\n".join([*lines, render_text(report, {}, has_colour(sys.stdout))]).rstrip("\n")

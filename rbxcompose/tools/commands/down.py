@@ -1,0 +1,85 @@
+"""Stop a robot and end all of its processes, also those that a dead supervisor has left."""
+
+from __future__ import annotations
+
+import argparse
+import json
+
+from rbxcompose.base.requests import Refused
+from rbxcompose.commands.console import FINDINGS, NotDoneError, refuse, tell
+from rbxcompose.commands.lookup import NO_ANSWER, NOT_UP, add_robot_option, find_robot, known_state
+from rbxcompose.commands.options import add_system_options, is_system
+from rbxcompose.runtime.control import NoAnswerError, ask, supervisor_of
+from rbxcompose.runtime.folder import RobotFolder, RobotState
+from rbxcompose.runtime.processes import Process, wait_until_ended
+from rbxcompose.runtime.requests import BringDown
+from rbxcompose.runtime.supervision.launch import end_leftovers, kill_supervisor
+
+_ANSWER = 1.0  # [s]
+_ORDERLY = 3.0  # [s] for a supervisor to bring everything down, after it has come to rest
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("path", nargs="?", metavar="ROBOT|PATH", help="the robot, by name or file; or a system")
+    add_robot_option(parser)
+    add_system_options(parser)
+    parser.add_argument("--json", action="store_true", help="answer in JSON")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """End the robot: orderly if its supervisor answers, else by force."""
+    wanted = arguments.robot or arguments.path
+    if wanted is not None and is_system(wanted):
+        from rbxcompose.commands.hosts import ask_all, every_share  # only needed for systems
+
+        if (shares := every_share(wanted, arguments)) is None:
+            return FINDINGS
+        options = ["--json"] if arguments.json else []  # the end on one host may end it on the others before they do
+        return ask_all(shares, lambda robot: ["down", robot, *options], in_json=arguments.json, tolerates=NOT_UP.code)
+    try:
+        folder = find_robot(wanted)
+        told = _end(folder)
+    except NotDoneError as error:
+        return refuse(error.finding)
+    if arguments.json:
+        tell(json.dumps({"robot": folder.path.name, "told": told}))
+        return 0
+    for text in told:
+        tell(text)
+    tell(f"{folder.path.name} is down")
+    return 0
+
+
+def _end(folder: RobotFolder) -> list[str]:
+    """End the robot and return a report for people.
+
+    Raises:
+        NotDoneError: if someone else holds the robot and cannot be found.
+    """
+    told: list[str] = []
+    state = known_state(folder)
+    patience = _ORDERLY + (state.rest_time if state is not None else 1.0)
+    if (supervisor := _supervisor(folder, state)) is not None:
+        if not supervisor.is_stopped and _asked(folder) and not wait_until_ended([supervisor], patience):
+            return told
+        told.append("the supervisor did not answer and was killed")
+        kill_supervisor(supervisor)
+    lock = folder.lock()
+    if lock is None:
+        raise NotDoneError(NO_ANSWER.at(None, f"'{folder.path.name}' is held by a process that cannot be found"))
+    told += end_leftovers(folder)
+    folder.clear()
+    return told
+
+
+def _supervisor(folder: RobotFolder, state: RobotState | None) -> Process | None:
+    return state.supervisor if state is not None and state.is_supervised else supervisor_of(folder)
+
+
+def _asked(folder: RobotFolder) -> bool:
+    try:
+        ask(folder, BringDown(), timeout=_ANSWER)
+    except (NoAnswerError, Refused):
+        return False
+    return True

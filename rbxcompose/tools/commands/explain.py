@@ -1,0 +1,64 @@
+"""Explain the code of a finding and how to correct it; without a code, list all.
+
+Exit codes: 0 fine, 2 there is no such code.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+
+from rbxcompose.base.findings import FindingKind, suggest
+from rbxcompose.commands.console import misused, tell
+from rbxcompose.commands.finding_pages import all_kinds, body_of, family_of, text_of, title_of
+
+_PREFIX = "RBX"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("code", nargs="?", metavar="CODE", help="such as RBX1001; without it, list all codes")
+    parser.add_argument("--json", action="store_true", help="answer in JSON")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Write the page of one code, or the list of all codes."""
+    kinds = all_kinds()
+    if arguments.code is None:
+        tell(_as_json(list(kinds.values())) if arguments.json else _listed(kinds))
+        return 0
+    written = arguments.code.upper()
+    code = written if written in kinds else _PREFIX + written.removeprefix(_PREFIX)
+    if code not in kinds:
+        family = [kind for kind in kinds if kind.startswith(code[: len(_PREFIX) + 2])]
+        hint = suggest(code, family or kinds, "codes")
+        return misused("explain", f"there is no code {arguments.code!r}; {hint}")
+    tell(_as_json(kinds[code]) if arguments.json else text_of(kinds[code]).rstrip("\n"))
+    return 0
+
+
+def _listed(kinds: dict[str, FindingKind]) -> str:
+    lines = []
+    family = ""
+    for kind in kinds.values():
+        if family_of(kind) != family:
+            family = family_of(kind)
+            lines += ["", f"{family}:"]
+        lines.append(f"  {kind.code}  {title_of(kind)}")
+    return "\n".join(lines[1:])
+
+
+def _as_json(what: FindingKind | list[FindingKind]) -> str:
+    data = [_data(kind) for kind in what] if isinstance(what, list) else _data(what)
+    return json.dumps(data, indent=2, ensure_ascii=False)
+
+
+def _data(kind: FindingKind) -> dict[str, object]:
+    return {
+        "code": kind.code,
+        "title": title_of(kind),
+        "severity": kind.severity.value,
+        "family": family_of(kind),
+        "is_fixable": kind.is_fixable,
+        "text": body_of(kind),
+    }

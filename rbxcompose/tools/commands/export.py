@@ -1,0 +1,146 @@
+"""Write a system for what keeps it alive, or a robot for ROS 2 or MoveIt.
+
+`systemd`, `compose` and `k8s` write units, a Compose file and manifests of Kubernetes; `srdf` is for MoveIt.
+`ros2` writes packages for a workspace: messages, and for each robot a launch file for RViz or Foxglove.
+
+The files go to a new or empty folder; `srdf` writes a URDF and an SRDF.
+Exit codes: 0 fine, 1 errors found, 2 wrong usage.
+"""
+
+from __future__ import annotations
+
+import argparse
+import getpass
+import os
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+
+from rbxcompose import __version__
+from rbxcompose.base.findings import Finding, kind
+from rbxcompose.commands.console import FINDINGS, refuse, tell, tell_report
+from rbxcompose.commands.options import is_system
+from rbxcompose.compiler.compile import Compilation, compile_robot
+from rbxcompose.compiler.systems.bundle import files_of
+from rbxcompose.compiler.systems.model import System
+from rbxcompose.compiler.systems.reader import compile_system
+from rbxcompose.tools.exporting import compose, kubernetes, ros2, systemd
+from rbxcompose.tools.exporting.exported_share import shares
+
+NOT_EXPORTED = kind("RBX6115")
+SRDF, ROS2 = "srdf", "ros2"
+PROGRAMS = ("systemd", "compose", "k8s", ROS2, SRDF)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("program", choices=PROGRAMS, help="for which program")
+    parser.add_argument("path", metavar="SYSTEM", help="the file of the system; for srdf a robot, for ros2 either")
+    parser.add_argument("--out", metavar="FOLDER", required=True, help="a new or empty folder")
+    parser.add_argument("--host", metavar="NAME", help="only what this host runs")
+    parser.add_argument("--profile", action="append", default=[], metavar="P", help="apply this profile of the system")
+    parser.add_argument("--real", action="store_true", help="use the real devices; without it, they are simulated")
+    parser.add_argument("--user", metavar="NAME", help="systemd: the user that runs it (default: you)")
+    parser.add_argument("--file", metavar="PATH", help="systemd: the system's file on the host (default: as here)")
+    parser.add_argument("--command", metavar="PATH", help="systemd: rbxcompose on the host (default: as here)")
+    parser.add_argument("--image", metavar="NAME", default=f"rbxcompose:{__version__}", help="k8s: the image")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Compile the system and write the files."""
+    if arguments.program == SRDF:
+        return _export_robot(arguments)
+    if arguments.program == ROS2:
+        return _ros2(arguments)
+    if not is_system(arguments.path):
+        return refuse(NOT_EXPORTED.at(None, f"'{arguments.path}' is not the file of a system"))
+    system = compile_system(arguments.path, environment=os.environ, real=arguments.real, profiles=arguments.profile)
+    tell_report(system.report, system.sources)
+    if system.report.has_errors:
+        return FINDINGS
+    if arguments.host is not None and arguments.host not in system.hosts:
+        message = f"the system has no host '{arguments.host}'"
+        return refuse(NOT_EXPORTED.misspelt(None, message, arguments.host, system.hosts, "hosts"))
+    try:
+        made = _made(system, arguments)
+    except ValueError as error:
+        return refuse(NOT_EXPORTED.at(None, f"'{system.name}' cannot be exported: {error}"))
+    return _finish(arguments, made)
+
+
+def _ros2(arguments: argparse.Namespace) -> int:
+    """Write packages for the robots of a system, or for a single robot."""
+    compiled: System | Compilation
+    if is_system(arguments.path):
+        compiled = compile_system(arguments.path, environment=os.environ, real=arguments.real)
+        plans = [robot.plan for robot in compiled.robots.values()]
+    else:
+        compiled = compile_robot(arguments.path, real=arguments.real, environment=os.environ)
+        plans = [compiled.plan] if compiled.plan else []
+    tell_report(compiled.report, compiled.sources)
+    if compiled.report.has_errors:
+        return FINDINGS
+    return _finish(arguments, _encoded(ros2.packages(plans, __version__)))
+
+
+def _finish(arguments: argparse.Namespace, made: Mapping[str, bytes]) -> int:
+    if (problem := _write(Path(arguments.out), made)) is not None:
+        return refuse(problem)
+    for name in made:
+        tell(str(Path(arguments.out, name)))
+    return 0
+
+
+def _export_robot(arguments: argparse.Namespace) -> int:
+    from rbxcompose.compiler.compile import compile_robot
+    from rbxcompose.tools.exporting.srdf import exported  # imports the sections of robots
+
+    compilation = compile_robot(arguments.path, environment=os.environ, real=arguments.real)
+    tell_report(compilation.report, compilation.sources)
+    if compilation.robot is None or compilation.report.has_errors:
+        return FINDINGS
+    manifest = compilation.robot.manifest
+    made = exported(manifest.contents, manifest.name)
+    if not made:
+        return refuse(NOT_EXPORTED.at(None, f"'{manifest.name}' has no body"))
+    if (problem := _write(Path(arguments.out), _encoded(made))) is not None:
+        return refuse(problem)
+    for name in made:
+        tell(str(Path(arguments.out, name)))
+    return 0
+
+
+def _made(system: System, arguments: argparse.Namespace) -> dict[str, bytes]:
+    found, (file, files) = list(shares(system, arguments.host)), files_of(system)
+    match arguments.program:
+        case "systemd":
+            words = {
+                "program": arguments.command or shutil.which("rbxcompose") or "/usr/local/bin/rbxcompose",
+                "file": arguments.file or str(system.path),
+                "user": arguments.user or getpass.getuser(),
+            }
+            made = {systemd.unit_name(item): systemd.unit(item, **words) for item in found}
+        case "compose":
+            text = compose.compose_file(found, system=system.name, file=file)
+            made = {"Dockerfile": compose.dockerfile(__version__), "compose.yaml": text}
+            return {**_encoded(made), **{f"project/{name}": data for name, data in files.items()}}
+        case _:
+            made = kubernetes.manifests(found, system=system.name, file=file, files=files, image=arguments.image)
+    return _encoded(made)
+
+
+def _encoded(texts: Mapping[str, str]) -> dict[str, bytes]:
+    return {name: text.encode() for name, text in texts.items()}
+
+
+def _write(folder: Path, made: Mapping[str, bytes]) -> Finding | None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if any(folder.iterdir()):
+            return NOT_EXPORTED.at(None, f"the folder '{folder}' is not empty", help="name a new one")
+        for name, data in made.items():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_bytes(data)
+    except OSError as error:
+        return NOT_EXPORTED.at(None, f"'{folder}' cannot be written: {error.strerror}")
+    return None

@@ -1,0 +1,178 @@
+"""See, command and follow many robots of systems at once, chosen by their labels.
+
+A label is one of `labels` of a robot, its name, or the name that its instances have in common; of several, a robot
+must have all. Without a SYSTEM, the only one of the project is meant.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import groupby
+from typing import Any
+
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.findings import kind
+from rbxcompose.base.levels import LOG_LEVELS
+from rbxcompose.commands.console import FINDINGS, refuse, table, tell
+from rbxcompose.commands.hosts import (
+    SSH_FAILED,
+    WHICH,
+    Running,
+    Shares,
+    answering,
+    ask_all,
+    compiled,
+    follow_all,
+    on_all,
+    shares_of,
+)
+from rbxcompose.commands.lookup import NOT_UP
+from rbxcompose.commands.options import add_system_options
+from rbxcompose.missions.execution.requests import MISSION
+
+NO_LABEL = kind("RBX6130")
+_COLUMNS = ("robot", "host", "state", "mission", "battery")
+ShareFacts = tuple[str, str, dict[str, Any]]  # robot, host, and what `top` tells of the share, or its `state` alone
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    actions = parser.add_subparsers(dest="action", metavar="ls|run|logs", required=True)
+    ls = actions.add_parser("ls", help="list robots: hosts, state, mission, batteries")
+    run_ = actions.add_parser("run", help="start a mission on each")
+    run_.add_argument("mission", metavar="MISSION", help="which one")
+    run_.add_argument("--set", action="append", default=[], dest="sets", metavar="K=V", help="give it an input")
+    logs = actions.add_parser("logs", help="show the logs of all, each line with its robot")
+    logs.add_argument("--level", choices=LOG_LEVELS, default="info", help="the lowest level to show")
+    logs.add_argument("-f", "--follow", action="store_true", help="follow new records, until interrupted")
+    logs.add_argument("-n", "--lines", type=int, metavar="N", help="start with the last N records of each")
+    for subparser in (ls, run_, logs):
+        subparser.add_argument("paths", metavar="SYSTEM", nargs="*", help="files of systems")
+        subparser.add_argument(
+            "--label", action="append", default=[], dest="labels", metavar="L", help="only robots with it"
+        )
+        add_system_options(subparser)
+    for subparser in (ls, run_):
+        subparser.add_argument("--json", action="store_true", help="answer in JSON")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the chosen subcommand."""
+    from rbxcompose.commands.targets import UNNAMED, systems_here  # the compiler, which completion does not need
+
+    paths = arguments.paths or systems_here()
+    if not arguments.paths and len(paths) != 1:
+        message = f"no system is named, and this folder has {', '.join(paths) if paths else 'none'}"
+        return refuse(UNNAMED.at(None, message, help="give the path of one"))
+    fleet = Fleet.of(paths, arguments)
+    if isinstance(fleet, int):
+        return fleet
+    match arguments.action:
+        case "ls":
+            return fleet.tell(in_json=arguments.json)
+        case "run":
+            return fleet.run(arguments.mission, arguments.sets, in_json=arguments.json)
+        case _:
+            lines = ["-n", str(arguments.lines)] if arguments.lines is not None else []
+            return fleet.follow(["--level", arguments.level, *(["-f"] if arguments.follow else []), *lines])
+
+
+@dataclass(frozen=True, slots=True)
+class Fleet:
+    """The shares of the chosen robots, and among them those that run missions."""
+
+    shares: Shares
+    executives: Shares
+
+    @classmethod
+    def of(cls, paths: Sequence[str], arguments: argparse.Namespace) -> Fleet | int:
+        """Return the robots of systems that have all labels of the command; the exit code after a finding."""
+        shares: Shares = {}
+        executives: Shares = {}
+        known: set[str] = set()
+        for path in paths:
+            system = compiled(path, arguments)
+            if system is None:
+                return FINDINGS
+            every = shares_of(system, arguments.ssh_config)
+            for robot in system.robots.values():
+                known |= {*robot.labels}
+                if not {*robot.labels} >= {*arguments.labels}:
+                    continue
+                own = {key: share for key, share in every.items() if key[1] == robot.name}
+                if own.keys() & shares.keys():
+                    message = f"two of these systems have a robot '{robot.name}' on a host of the same name"
+                    return refuse(WHICH.at(None, message, help="name the systems in two commands"))
+                shares = {**shares, **own}
+                keys = ((host, robot.name) for host in answering(robot, MISSION))
+                executives = {**executives, **{key: every[key] for key in keys}}
+        if not shares:
+            wrong = next((label for label in arguments.labels if label not in known), "")
+            message = f"no robot has the label{'s' * (len(arguments.labels) > 1)} {' and '.join(arguments.labels)}"
+            return refuse(NO_LABEL.misspelt(None, message, wrong, sorted(known), "labels"))
+        return cls(shares, executives)
+
+    def tell(self, *, in_json: bool) -> int:
+        """List the robots; return the exit code, which is that of findings if a share cannot be reached or is down."""
+        asked = on_all(
+            {" ".join(key): share.rbxcompose(["top", key[1], "--json"]) for key, share in self.shares.items()}
+        )
+        found = sorted((robot, host, _facts(asked[f"{host} {robot}"])) for host, robot in self.shares)
+        rows = [_row(robot, list(shares)) for robot, shares in groupby(found, key=lambda row: row[0])]
+        if in_json:
+            tell(json.dumps({"robots": rows}))
+        else:
+            tell(table([_COLUMNS, *([str(row[column]) for column in _COLUMNS] for row in rows)]))
+        return FINDINGS if any(row["state"] != _UP for row in rows) else 0
+
+    def run(self, mission: str, sets: Sequence[str], *, in_json: bool) -> int:
+        """Start a mission on each robot that has missions."""
+        words = [mission, *(word for set_ in sets for word in ("--set", set_)), *(["--json"] if in_json else [])]
+        if not self.executives:
+            return refuse(NO_LABEL.at(None, "none of these robots runs missions"))
+        return ask_all(self.executives, lambda robot: ["mission", "run", *words, "--robot", robot], in_json=in_json)
+
+    def follow(self, options: Sequence[str]) -> int:
+        """Show the logs of all."""
+        return follow_all(self.shares, lambda robot: ["logs", robot, *options])
+
+
+_UP = "up"
+
+
+def _facts(one: Running) -> dict[str, Any]:
+    """Return what is known of a share."""
+    told = one.answer
+    if isinstance(told, dict) and "components" in told:
+        return told
+    if one.wait() == SSH_FAILED:
+        return {"state": "unreachable"}
+    is_down = any(NOT_UP.code in line for line in one.lines)
+    return {"state": "down" if is_down else one.lines[-1] if one.lines else "no answer"}
+
+
+def _row(robot: str, shares: Sequence[ShareFacts]) -> dict[str, str]:
+    told = [facts for _, _, facts in shares]
+    states = [_state(facts) for facts in told]
+    several = len(shares) > 1
+    wrong = [f"{host} {state}" if several else state for (_, host, _), state in zip(shares, states, strict=True)]
+    return {
+        "robot": robot,
+        "host": ", ".join(host for _, host, _ in shares),
+        "state": _UP if set(states) == {_UP} else ", ".join(text for text in wrong if not text.endswith(_UP)),
+        "mission": "; ".join(_missions(told)),
+        "battery": ", ".join(text for facts in told for text in facts.get("batteries", {}).values()),
+    }
+
+
+def _state(facts: Mapping[str, Any]) -> str:
+    if "components" not in facts:
+        return str(facts["state"])
+    off = [component["name"] for component in facts["components"] if component["state"] != "active"]
+    return f"{', '.join(off)} not active" if off else _UP
+
+
+def _missions(told: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    yield from (str(facts["mission"]) for facts in told if facts.get("mission"))

@@ -1,0 +1,85 @@
+"""Make a manifest from files of another program.
+
+Comments tell where each value stood; findings tell what was guessed, and what could not be carried over. Several files
+make one robot. Without `--out`, the manifest goes to stdout and the findings to stderr; a file is never overwritten.
+Exit codes: 0 fine, 1 errors found (what was understood is written nevertheless), 2 wrong usage.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from dataclasses import replace
+from pathlib import Path
+
+from rbxcompose.base.findings import Finding, Report, Sources
+from rbxcompose.commands.console import FINDINGS, refuse, tell, tell_report
+from rbxcompose.commands.formats.json_ import as_data
+from rbxcompose.commands.importing.foreign_files import read_files
+from rbxcompose.commands.importing.importer import ImportedFiles, broken_importers, imported, importers
+from rbxcompose.commands.new_files import EXISTS, AnswerError, name_like, read_name, write_new
+from rbxcompose.commands.options import add_json_option
+from rbxcompose.manifest.files import shown_name
+
+OTHERWISE = "imported"  # the name of a robot if the first file's has no letter
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    programs = parser.add_subparsers(dest="program", metavar="PROGRAM", required=True)
+    for name, importer in importers().items():
+        program = programs.add_parser(name, help=f"import {importer.about}", description=f"Import {importer.about}.")
+        program.add_argument("files", nargs="+", metavar="FILE", help="its files; together they make one robot")
+        program.add_argument("--out", metavar="FILE", help="write the manifest to this new file")
+        program.add_argument("--name", metavar="NAME", help="the robot's name (default: that of the first file)")
+        add_json_option(program)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Read the files, write the manifest, and report the findings."""
+    report, sources = Report(broken_importers()), dict[str, str]()
+    try:
+        name = _name(arguments)
+    except AnswerError as error:
+        return refuse(error.finding)
+    files = read_files(map(Path, arguments.files), report, sources)
+    made = imported(arguments.program, files, name, report)
+    told = Report([replace(one, fix=None) for one in report])  # fixes are for manifests, which `check --fix` corrects
+    if made.text and arguments.out is not None and (finding := _write(Path(arguments.out), made)) is not None:
+        told.add(finding)
+        made = ImportedFiles("")
+    return _answer(made, told, sources, arguments)
+
+
+def _name(arguments: argparse.Namespace) -> str:
+    if arguments.name is not None:
+        return read_name(arguments.name, "the robot")
+    return name_like(Path(arguments.files[0]).stem) or OTHERWISE
+
+
+def _write(path: Path, made: ImportedFiles) -> Finding | None:
+    finding = write_new(path.parent, {path.name: made.text, **made.beside})
+    if finding is not None and finding.code == EXISTS.code:
+        return replace(finding, help="choose another file with '--out', or move this one away")
+    return finding
+
+
+def _answer(made: ImportedFiles, report: Report, sources: Sources, arguments: argparse.Namespace) -> int:
+    """Write the findings, and the manifest if there is one; return the exit code."""
+    text = made.text
+    if not text or not arguments.json:
+        tell_report(report, sources)
+    if not text:
+        return FINDINGS
+    shown = shown_name(Path(arguments.out)) if arguments.out is not None else None
+    if arguments.json:
+        findings = [as_data(finding, sources) for finding in report]
+        data = {"manifest": text, "file": shown, "beside": dict(made.beside), "findings": findings}
+        tell(json.dumps(data, ensure_ascii=False))
+    elif shown is None:
+        tell("\n".join([text, *(f"--- # {name}\n{each}" for name, each in made.beside.items())]).rstrip("\n"))
+    else:
+        folder = Path(shown).parent
+        for each in (Path(shown), *(folder / name for name in made.beside)):
+            tell(f"wrote {each}")
+    return FINDINGS if report.has_errors else 0

@@ -1,0 +1,208 @@
+"""Run, hold, watch, draw and explore the missions of a robot.
+
+Exit codes: 0 fine, 1 refused or errors found, 2 wrong usage.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections.abc import Callable, Sequence
+from typing import TypeVar
+
+from rbxcompose.base.requests import Command, Query, Refused, to_data
+from rbxcompose.commands.console import NotDoneError, refuse, tell
+from rbxcompose.commands.lookup import REFUSED, WHICH, add_asking_options, answer_of, find_robot, pass_on
+from rbxcompose.commands.options import Declare, Subcommand, add_actions, argument, run_action
+from rbxcompose.missions.execution.requests import (
+    MISSION,
+    CancelMission,
+    ListedMission,
+    ListMissions,
+    LookAtMission,
+    PauseMission,
+    ReadLog,
+    ResumeMission,
+    RunMission,
+    Seen,
+    ShowPicture,
+    settings,
+)
+
+A = TypeVar("A")
+
+ON_SYSTEM = MISSION
+_PERIOD = 0.2  # [s] between two requests to a robot that is followed
+_FORMATS = "text", "mermaid", "dot", "html"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    mission = argument("name", nargs="?", default="", metavar="MISSION", help="which one")
+    the_mission = argument("name", metavar="MISSION", help="which one")
+    robot = argument("path", nargs="?", metavar="ROBOT", help="the robot's file; without it, the running robot")
+    sets = argument("--set", action="append", default=[], dest="sets", metavar="K=V", help="give it an input")
+    json_ = argument("--json", action="store_true", help="answer in JSON")
+    named = (mission, add_asking_options)
+    started = (
+        argument("name", nargs=None, default="", metavar="MISSION", help="which one"),
+        add_asking_options,
+        sets,
+        argument("--from", dest="start", default="", metavar="STATE", help="start in this state: 'outer.inner'"),
+    )
+    logged = (
+        *named,
+        argument("-f", "--follow", action="store_true", help="follow new records, until interrupted"),
+        argument("--all", action="store_true", help="also its inputs, so that it can be run again"),
+    )
+    again = (argument("log", metavar="FILE", help="the output of 'mission log --all'"), robot)
+    drawn = (
+        the_mission,
+        robot,
+        argument("--format", choices=_FORMATS, default="text", help="output format"),
+        argument("--out", metavar="FILE", help="write it to this file"),
+    )
+    explored = (
+        the_mission,
+        robot,
+        sets,
+        argument("--states", type=int, default=2000, metavar="N", help="most states to look at"),
+        argument("--depth", type=int, default=30, metavar="N", help="most events on a path"),
+        json_,
+    )
+    table: tuple[tuple[str, str, Callable[[argparse.Namespace], int], tuple[Declare, ...]], ...] = (
+        ("ls", "list the robot's missions with their states", _list, (add_asking_options,)),
+        ("run", "start a mission beside those that run", _run, started),
+        ("cancel", "end a mission for good", _to(CancelMission), named),
+        ("pause", "hold a mission; its timers stand still", _to(PauseMission), named),
+        ("resume", "resume a mission where it was held", _to(ResumeMission), named),
+        ("status", "show where a mission is, with its data", _status, named),
+        ("watch", "show a mission live", _watch, named),
+        ("log", "print what missions did, as JSON, one line each", _log, logged),
+        ("replay", "run missions again from their log, and report the first difference", _replay, again),
+        ("show", "draw a mission; a running one with the states of its nodes", _show, drawn),
+        ("skills", "list the skills that missions may use on a robot", _skills, (robot, json_)),
+        ("explore", "look for dead ends by trying everything that may happen", _explore, explored),
+    )
+    add_actions(parser, (Subcommand(name, words, do, own, words) for name, words, do, own in table), metavar="ACTION")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the chosen subcommand."""
+    return run_action(arguments)
+
+
+def ask(robot: str | None, query: Query[A]) -> A:
+    """Return the answer of a robot's executive to a request."""
+    return answer_of(find_robot(robot), query)
+
+
+def _to(command: Callable[[str], Command]) -> Callable[[argparse.Namespace], int]:
+    return lambda arguments: pass_on(arguments, command(arguments.name))
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    folder = find_robot(arguments.robot)
+    try:
+        inputs = settings(arguments.sets)
+    except Refused as refusal:
+        return refuse(REFUSED.at(None, f"'{folder.path.name}' refuses: {refusal}"))
+    return pass_on(arguments, RunMission(arguments.name, inputs, arguments.start))
+
+
+def _list(arguments: argparse.Namespace) -> int:
+    missions = ask(arguments.robot, ListMissions())
+    tell(json.dumps(to_data(missions)) if arguments.json else _table(missions))
+    return 0
+
+
+def _table(missions: Sequence[ListedMission]) -> str:
+    names = max((len(mission.name) for mission in missions), default=0)
+    states = max((len(mission.state) for mission in missions), default=0)
+    lines = [f"{mission.name:<{names}}  {mission.state:<{states}}  {mission.about}".rstrip() for mission in missions]
+    return "\n".join(lines) or "this robot has no missions"
+
+
+def _chosen(arguments: argparse.Namespace) -> str:
+    """Return the addressed mission: the named one, else the only one that runs, or ran last."""
+    if arguments.name:
+        return str(arguments.name)
+    from rbxcompose.missions.program.statuses import IDLE, NAMES
+    from rbxcompose.missions.view.replica import ACTIVE
+
+    known = [one for one in ask(arguments.robot, ListMissions()) if one.state != NAMES[IDLE]]
+    active = [item for item in known if item.state in ACTIVE] or known
+    if len(active) != 1:
+        names = ", ".join(item.name for item in active)
+        words = f"which mission: {names}?" if active else "no mission is running"
+        raise NotDoneError(WHICH.at(None, words, help="'rbxcompose mission ls' lists them"))
+    return active[0].name
+
+
+def _status(arguments: argparse.Namespace) -> int:
+    name = _chosen(arguments)
+    seen = ask(arguments.robot, LookAtMission(name))
+    if arguments.json:
+        tell(json.dumps(seen))
+        return 0
+    tell("\n".join(_drawn(name, arguments.robot, seen, 120)))
+    return 0
+
+
+def _drawn(name: str, robot: str | None, seen: Seen, width: int, *, colour: bool = False) -> list[str]:
+    from rbxcompose.missions.view.picture import picture_from_data
+    from rbxcompose.tools.mission_view import lines_of
+
+    return lines_of(picture_from_data(ask(robot, ShowPicture(name))), seen, width, colour=colour)
+
+
+def _watch(arguments: argparse.Namespace) -> int:
+    from rbxcompose.tools.mission_view import follow, watch
+
+    name = _chosen(arguments)
+    do = follow if arguments.json else watch
+    return do(find_robot(arguments.robot), name, _PERIOD)
+
+
+def _log(arguments: argparse.Namespace) -> int:
+    from rbxcompose.missions.engine.logbook import INPUTS
+
+    number = 0
+    try:
+        while True:
+            news = ask(arguments.robot, ReadLog(number))
+            number = news.next
+            for record in news.records:
+                is_meant = not arguments.name or record["mission"] == arguments.name
+                if is_meant and (arguments.all or record["event"] not in INPUTS):
+                    tell(json.dumps(record))
+            if not arguments.follow:
+                return 0
+            time.sleep(_PERIOD)
+    except KeyboardInterrupt:
+        return 0
+
+
+def _replay(arguments: argparse.Namespace) -> int:
+    from rbxcompose.tools.mission_files import replay_log
+
+    return replay_log(arguments)
+
+
+def _show(arguments: argparse.Namespace) -> int:
+    from rbxcompose.tools.mission_files import show
+
+    return show(arguments)
+
+
+def _skills(arguments: argparse.Namespace) -> int:
+    from rbxcompose.tools.mission_files import skills
+
+    return skills(arguments)
+
+
+def _explore(arguments: argparse.Namespace) -> int:
+    from rbxcompose.tools.mission_files import explore
+
+    return explore(arguments)

@@ -1,0 +1,295 @@
+"""Write a new robot, mission, part or component, each with a test.
+
+What it writes has no findings and runs in simulation. At a terminal it asks a few questions; each has a default and an
+option. It never overwrites a file.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from io import TextIOWrapper
+from pathlib import Path, PurePosixPath
+from typing import TypeVar
+
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.files import read_regular, replace_file
+from rbxcompose.base.printable import plain
+from rbxcompose.commands.console import FINDINGS, refuse, tell, tell_report
+from rbxcompose.commands.new_files import ANSWER, AnswerError, read_name, read_text, read_yes, write_new
+from rbxcompose.compiler.compile import Compilation, compile_robot
+from rbxcompose.compiler.model.robot import Robot
+from rbxcompose.domains.power.charge import navigator_of, top_speed
+from rbxcompose.manifest.files import PREFIX, find, project_of, shown_name
+from rbxcompose.manifest.tree import FILE_BYTES
+from rbxcompose.tools.scaffold import robot
+from rbxcompose.tools.scaffold import robot as component
+from rbxcompose.tools.scaffold import robot as mission
+from rbxcompose.tools.scaffold import robot as part
+from rbxcompose.tools.scaffold.robot import MissionAnswers, with_entry
+
+INTERRUPTED = 130
+_WIDEST = 4096  # characters per line, enough for any path
+ABOUT = "What is it for?"
+
+
+@dataclass(frozen=True, slots=True)
+class New:
+    """Files to write below a folder, and what a user may want to do next."""
+
+    folder: Path
+    files: Mapping[str, str]
+    then: Sequence[str]
+    entry: Callable[[], list[str]] | None = None  # called once the files exist; returns the lines that report it
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    kinds = parser.add_subparsers(dest="what", metavar="WHAT", required=True)
+    for what, about in (
+        ("robot", "a robot that drives, with its mission"),
+        ("mission", "one more mission for a robot"),
+        ("part", "a part that robots can include"),
+        ("component", "a component type in Python, as a package to install"),
+    ):
+        subparser = kinds.add_parser(what, help=about, description=f"Write {about}.", allow_abbrev=False)
+        subparser.add_argument("name", metavar="NAME", help="lower-case letters, digits, underscores")
+        subparser.add_argument(
+            "--yes", action="store_true", help="ask nothing; use the defaults where there is no option"
+        )
+        if what != "mission":
+            subparser.add_argument(
+                "--into", metavar="DIR", type=Path, default=Path(), help="the project's folder (default: this one)"
+            )
+        if what != "component":
+            subparser.add_argument("--about", metavar="TEXT", help="what it is for, in a sentence")
+    new_robot, new_mission = kinds.choices["robot"], kinds.choices["mission"]
+    new_robot.add_argument("--base", metavar="TYPE", help=f"the component that drives ({robot.BASE})")
+    new_robot.add_argument(
+        "--place", metavar="NAME=X,Y", action="append", help="a place to go to, besides the dock at 0,0"
+    )
+    new_mission.add_argument("--robot", metavar="PATH", default="", help="the robot, if there is more than one")
+    new_mission.add_argument("--no-add", action="store_true", help="do not change the robot's file; show what to add")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Ask, write the files, and report them."""
+    asker = Asker(is_asking=not arguments.yes)
+    try:
+        return _write(_MAKERS[arguments.what](arguments, asker))
+    except AnswerError as error:
+        return refuse(error.finding)
+    except MistakenRobotError as error:
+        tell_report(error.compilation.report, error.compilation.sources)
+        return FINDINGS
+    except CancelledError:
+        return INTERRUPTED
+
+
+def _write(new: New) -> int:
+    finding = write_new(new.folder, new.files)
+    if finding is not None:
+        return refuse(finding)
+    lines = [f"wrote {shown_name(new.folder / file)}" for file in new.files]
+    lines += [] if new.entry is None else new.entry()
+    lines += ["then:", *(f"  {line}" for line in new.then)]
+    tell("\n".join(plain(line, _WIDEST) for line in lines))
+    return 0
+
+
+def _robot(arguments: argparse.Namespace, asker: Asker) -> New:
+    name = read_name(arguments.name, "the robot")
+    about = asker.ask(ABOUT, read_text, robot.ABOUT, given=arguments.about)
+    base = asker.ask("Which component drives it?", robot.read_base, robot.BASE, given=arguments.base)
+    if arguments.place is None:
+        question = "Where can it go? Write one place, such as 'table=2,0' in metres from the dock, or nothing to go on"
+        places = tuple(asker.ask_several(question, robot.read_next_place)) or robot.PLACES
+    else:
+        places = robot.read_places(arguments.place)
+    files = robot.robot_files(robot.RobotAnswers(name, about, base, places))
+    path = shown_name(arguments.into / f"robots/{name}")
+    then = (
+        f"rbxcompose check {path}",
+        f"rbxcompose up --rate 10x {path}",
+        f"python -m pytest {_test(arguments, name)}",
+    )
+    return New(arguments.into, files, then)
+
+
+def _test(arguments: argparse.Namespace, name: str) -> str:
+    return shown_name(arguments.into / f"tests/test_{name}.py")
+
+
+def _part(arguments: argparse.Namespace, asker: Asker) -> New:
+    name = read_name(arguments.name, "the part")
+    about = asker.ask(ABOUT, read_text, part.ABOUT, given=arguments.about)
+    then = (f"include it in a robot, as parts/{name}.yaml shows", f"python -m pytest {_test(arguments, name)}")
+    return New(arguments.into, part.part_files(name, about), then)
+
+
+def _component(arguments: argparse.Namespace, asker: Asker) -> New:
+    name = component.read_component_name(arguments.name)
+    folder = shown_name(arguments.into / name)
+    then = (f"python -m pip install -e {folder}", f"python -m pytest {folder}", f"use it in a robot: type: {name}")
+    return New(arguments.into, component.component_files(name), then)
+
+
+def _mission(arguments: argparse.Namespace, asker: Asker) -> New:
+    home = find_home(arguments.robot)
+    usual = home.usual(read_name(arguments.name, "the mission", home.robot.manifest.missions))
+    answers = replace(usual, about=asker.ask(ABOUT, read_text, usual.about, given=arguments.about))
+    file = shown_name(home.file)
+    is_wanted = not arguments.no_add and asker.ask(f"Shall it be added to {file}?", read_yes, "yes")
+    then = (
+        f"rbxcompose up --rate 10x {shown_name(home.file.parent)} --set start={answers.name}",
+        f"python -m pytest {shown_name(home.project / 'tests')}/test_{answers.name}.py",
+    )
+
+    def entry() -> list[str]:
+        if is_wanted and home.add(answers):
+            return [f"added '{answers.name}' to {file}"]
+        why = f"it could not be added to {file} safely; " if is_wanted else ""
+        return [f"{why}write into {file}:", "  missions:", f"    {answers.name}: {answers.entry}"]
+
+    return New(home.project, mission.mission_files(answers), then, entry)
+
+
+_MAKERS: dict[str, Callable[[argparse.Namespace, Asker], New]] = {
+    "robot": _robot,
+    "mission": _mission,
+    "part": _part,
+    "component": _component,
+}
+T = TypeVar("T")
+Read = Callable[[str], T]
+
+
+class CancelledError(Exception):
+    """Raised when a person stops answering (Ctrl-D)."""
+
+
+class Asker:
+    """Asks, or takes given answers; `is_asking` is whether somebody is there to answer."""
+
+    def __init__(self, *, is_asking: bool) -> None:
+        self.is_asking = is_asking and sys.stdin.isatty()
+        if self.is_asking and isinstance(sys.stdin, TextIOWrapper):
+            sys.stdin.reconfigure(errors="replace")  # a key that sends invalid UTF-8 is a wrong letter, not an abort
+
+    def ask(self, question: str, read: Read[T], default: str, *, given: str | None = None) -> T:
+        """Return what `read` makes of the answer; report a refused answer and ask again.
+
+        Raises:
+            AnswerError: if `given`, or the default, is refused.
+            CancelledError: if there is no answer.
+        """
+        if given is not None or not self.is_asking:
+            return read(default if given is None else given)
+        while True:
+            try:
+                return read(_line(f"{question} [{default}]: ") or default)
+            except AnswerError as error:
+                refuse(error.finding)
+
+    def ask_several(self, question: str, read: Callable[[str, list[T]], T]) -> list[T]:
+        """Return what `read` makes of each answer and those before it, until an empty one; none if nobody is there."""
+        found: list[T] = []
+        while self.is_asking and (text := _line(f"{question}: ")):
+            try:
+                found.append(read(text, found))
+            except AnswerError as error:
+                refuse(error.finding)
+        return found
+
+
+def _line(prompt: str) -> str:
+    sys.stdout.write(prompt)
+    sys.stdout.flush()
+    text = sys.stdin.readline()
+    if not text:
+        sys.stdout.write("\n")
+        raise CancelledError
+    return text.strip()
+
+
+class MistakenRobotError(Exception):
+    """Raised with the compiler's result when the robot itself has mistakes."""
+
+    def __init__(self, compilation: Compilation) -> None:
+        super().__init__("the robot has errors")
+        self.compilation = compilation
+
+
+@dataclass(frozen=True, slots=True)
+class MissionHome:
+    """The robot that gets a mission, its file, and the project of both."""
+
+    robot: Robot
+    file: Path
+    project: Path
+
+    def usual(self, name: str) -> MissionAnswers:
+        """Return the default answers for a mission of this robot."""
+        file = PurePosixPath(self.file.relative_to(self.project))
+        places = tuple(self.robot.manifest.places.values())
+        for skill in sorted(self.robot.skills) if places else ():
+            if driver := navigator_of(self.robot, skill):
+                return MissionAnswers(name, file, places, skill, top_speed(self.robot, *driver))
+        return MissionAnswers(name, file)
+
+    def add(self, answers: MissionAnswers) -> bool:
+        """Write the mission's entry into the robot's file, if that surely changes nothing else; return whether done."""
+        before = read_regular(self.file, FILE_BYTES)
+        text = with_entry(before.decode("utf-8"), answers)
+        if text is None:
+            return False
+        unsaved = {self.file: text.removeprefix("\ufeff").replace("\r\n", "\n")}
+        after = compile_robot(str(self.file), environment=os.environ, unsaved=unsaved)
+        if after.plan is None or after.robot is None or answers.name not in after.robot.missions:
+            return False
+        if before != read_regular(self.file, FILE_BYTES):
+            return False
+        try:
+            replace_file(self.file, text.encode("utf-8"))
+        except OSError:  # the caller reports what to write by hand
+            return False
+        return True
+
+
+def find_home(written: str) -> MissionHome:
+    """Return the robot that gets the mission; if none is named, the only one below `robots/`.
+
+    Raises:
+        AnswerError: if there is no such robot, if there are several, or if it belongs to the library.
+        MistakenRobotError: if it has mistakes.
+    """
+    file = _file(written)
+    out = compile_robot(str(file), environment=os.environ)
+    if out.robot is None or out.report.has_errors:
+        raise MistakenRobotError(out)
+    return MissionHome(out.robot, file, project_of(file))
+
+
+def _file(written: str) -> Path:
+    if written.startswith(PREFIX):
+        help_text = "create your own with 'rbxcompose new robot NAME'"
+        raise AnswerError(
+            ANSWER.at(None, f"'{written}' is a robot of the library, which stays as it is", help=help_text)
+        )
+    path = find(written or _only())
+    if isinstance(path, Path):
+        return path
+    raise AnswerError(path)
+
+
+def _only() -> str:
+    files = sorted(Path("robots").glob("*/robot.yaml"))
+    if len(files) == 1:
+        return str(files[0])
+    if files:
+        names = ", ".join(shown_name(file.parent) for file in files)
+        raise AnswerError(ANSWER.at(None, "which robot is the mission for?", help=f"name it with '--robot': {names}"))
+    raise AnswerError(ANSWER.at(None, "there is no robot below 'robots/'", help="name one with '--robot PATH'"))

@@ -1,0 +1,99 @@
+"""See and change parameters while the robot runs, also of ROS 2 nodes; keep them in the manifest.
+
+A value is written as in a manifest (`param set battery runtime "30 s"`); a bare number is SI, and so is JSON. What
+changes values refuses what `check` would refuse, with the values that all components have now, and changes all of
+several values or none. A change lasts until the process ends; `save` writes it into the manifest, at its place.
+Exit codes: 0 done, 1 refused (`diff`: there is a difference), 2 wrong usage.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from functools import partial
+from importlib import import_module
+from pathlib import Path
+
+from rbxcompose.commands.guest import visit
+from rbxcompose.commands.hosts import SystemCommand
+from rbxcompose.commands.lookup import add_bus_options
+from rbxcompose.commands.options import (
+    BUS,
+    Declare,
+    Subcommand,
+    add_actions,
+    add_count_options,
+    add_json_option,
+    add_system_options,
+    add_timeout_option,
+    argument,
+)
+from rbxcompose.tools.parameters.nodes import ParameterNodes
+
+ON_SYSTEM = BUS
+_WITH_FILES = ("load", "save", "diff", "reset")
+
+
+def _home(module: str, action: str) -> Callable[[ParameterNodes, argparse.Namespace], int]:
+    """Return what carries an action out; it imports its module, since some need the compiler and others do not."""
+
+    def do(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
+        found = import_module(f"rbxcompose.tools.commands.parameters.{module}")
+        return int(getattr(found, f"param_{action}")(nodes, arguments))
+
+    return do
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    only = argument("component", metavar="COMPONENT", nargs="?", help="only those of this component or node")
+    component = argument("component", metavar="COMPONENT", help="a component or node, such as battery")
+    name = argument("name", metavar="PARAMETER", help="the parameter, such as runtime")
+    any_name = argument("name", metavar="PARAMETER", nargs="?", help="the parameter, such as runtime; else all")
+    words = "COMPONENT PARAMETER VALUE, or several COMPONENT.PARAMETER=VALUE; values as in a manifest: '30 s', [1, 2]"
+    values = argument("words", metavar="COMPONENT|SETTING|PARAMETER", nargs="+", help=words)
+    words = "as `dump` writes it, or `ros2 param dump`; - is stdin"
+    file = argument("file", metavar="FILE", type=Path, help=words)
+    names = argument("names", metavar="COMPONENT|SETTING", nargs="*", help="only these: battery, battery.runtime")
+    words = "this one, as `history` calls it: battery:3"
+    change = argument("--change", metavar="CHANGE", default="", help=words)
+    last = argument("-n", "--last", metavar="N", type=int, default=0, help="only the last N")
+    dry = argument("--dry-run", action="store_true", help="only show what would be written")
+    table: tuple[tuple[str, str, str, tuple[Declare, ...]], ...] = (
+        ("ls", "nodes", "list parameters with their values", (only,)),
+        ("get", "nodes", "print the value of a parameter", (component, name)),
+        ("describe", "nodes", "tell what a parameter is, its limits, and whether it may change", (component, any_name)),
+        ("set", "changes", "change parameters, all or none", (values,)),
+        ("load", "changes", "set all parameters of a file, all or none", (file,)),
+        ("reset", "files", "set parameters to the values in the manifest", (names,)),
+        ("undo", "changes", "take back the last change, or another one", (change,)),
+        ("history", "history", "list the changes: who, when, from what to what", (only, last)),
+        ("watch", "history", "follow the changes", (only, add_count_options)),
+        ("diff", "files", "show what is not as in the manifest", ()),
+        ("dump", "files", "write the live parameters as YAML, for `load`", (only,)),
+        ("save", "files", "write changed values into the manifest, each at its place", (names, dry)),
+    )
+    actions = (Subcommand(verb, words, _home(module, verb), own) for verb, module, words, own in table)
+    timeout = partial(add_timeout_option, default="5s")
+    add_actions(parser, actions, timeout, add_json_option, add_bus_options, add_system_options)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the chosen subcommand."""
+    return visit(arguments, lambda guest: int(arguments.do(ParameterNodes(guest, arguments.timeout), arguments)))
+
+
+def run_on_system(command: SystemCommand) -> int | None:
+    """Run what works with the files of a robot on another host: its live values, and the files of this one."""
+    action = command.arguments.action
+    if action not in _WITH_FILES:
+        return None
+    if len(command.shares) > 1:
+        return command.refuse(f"'param {action}' works with the files of one robot")
+    ((_, robot), remote), *_ = command.shares.items()
+    if remote.is_here:
+        return None
+    from rbxcompose.tools.parameters.files import RemoteParameters  # the compiler
+
+    parameters = RemoteParameters(command.system, command.system.robots[robot], remote, command.words_for(robot))
+    return parameters.run(command.arguments)

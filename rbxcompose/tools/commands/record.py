@@ -1,0 +1,245 @@
+"""Record the topics of a robot to an MCAP file, until Ctrl-C.
+
+Payloads stay as they are on the bus, with the definitions of their types, so Foxglove, Lichtblick and ROS 2 can read
+them. A recorder that is killed loses at most half a second: the next one in its folder recovers its file.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import re
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from datetime import datetime
+from itertools import count
+from pathlib import Path
+
+from rbxcompose.base.findings import Finding, Report
+from rbxcompose.base.printable import plain
+from rbxcompose.bus.names import data_key, decode_attachment
+from rbxcompose.bus.tokens import SPACE, EndpointToken, parse_token
+from rbxcompose.bus.transport import Arrival
+from rbxcompose.commands.console import NotDoneError, refuse, table, tell, tell_report
+from rbxcompose.commands.guest import Guest
+from rbxcompose.commands.lookup import BusPlace, add_bus_options, find_place, find_robot
+from rbxcompose.commands.options import add_json_option, seconds
+from rbxcompose.runtime.recording.codes import LOST, RECOVERED, UNWRITABLE
+from rbxcompose.runtime.recording.files import ENDING, Recorder, Split, recover_all
+from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic, Selection, by_name, definition_of, topic_of
+from rbxcompose.sdk.ports import Qos
+
+_PAUSE = 0.02  # [s] between checks for messages
+_SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*([kMG])B")
+_TIMES = {"k": 1e3, "M": 1e6, "G": 1e9}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    add_bus_options(parser)
+    add_selection_options(parser)
+    add_json_option(parser)
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="the file, else ROBOT-DATE-TIME.mcap")
+    parser.add_argument("--for", type=seconds, dest="duration", metavar="30s", help="end after this time")
+    parser.add_argument(
+        "--split", type=_split, default=Split(), metavar="SIZE|TIME", help="start a new file after 500MB, or 10min"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Record, then report what was recorded."""
+    try:
+        place = find_place(arguments)
+        path = _path(arguments)
+        if path.parent.is_dir():
+            recover_in(path.parent)
+        return _record(arguments, place, path)
+    except NotDoneError as error:
+        return refuse(error.finding)
+
+
+def _record(arguments: argparse.Namespace, place: BusPlace, path: Path) -> int:
+    with Guest(place, stays=True) as guest, guest.interruptible():
+        start = guest.clock.now()
+        try:
+            recorder = Recorder(path, start, arguments.split)
+        except OSError as error:
+            return refuse(UNWRITABLE.at(None, f"'{plain(str(path))}' cannot be written: {_reason(error)}"))
+        tap = Tap(guest, selection_of(arguments))
+        if not arguments.json:
+            tell(f"recording to {recorder.paths[0]}; Ctrl-C ends it")
+        end = math.inf if arguments.duration is None else start + arguments.duration
+        return _write(recorder, tap, guest, end, is_json=arguments.json)
+
+
+def _write(recorder: Recorder, tap: Tap, guest: Guest, end: float, *, is_json: bool) -> int:
+    try:
+        while not guest.is_interrupted and guest.clock.now() < end:
+            guest.run(lambda: guest.is_interrupted, _PAUSE)
+            for message in tap.take():
+                recorder.add(message)
+            recorder.keep(guest.clock.now())
+        recorder.finish()
+    except OSError as error:
+        recorder.abandon()
+        return refuse(UNWRITABLE.at(None, f"'{plain(str(recorder.paths[-1]))}' cannot be written: {_reason(error)}"))
+    if tap.lost:
+        warn(LOST.at(None, f"{tap.lost:,} messages came too fast to be recorded", help="choose fewer with '--topics'"))
+    counts = recorder.counts
+    if is_json:
+        tell(
+            json.dumps(
+                {
+                    "files": [str(path) for path in recorder.paths],
+                    "messages": {topic.name: number for topic, number in counts.items()},
+                }
+            )
+        )
+        return 0
+    paths = ", ".join(map(str, recorder.paths))
+    tell(f"{count_table(counts)}\nrecorded {counts.total():,} messages to {paths}")
+    return 0
+
+
+def _path(arguments: argparse.Namespace) -> Path:
+    wanted: Path | None = arguments.output
+    if wanted is not None:
+        return wanted if wanted.suffix == ENDING else wanted.with_name(wanted.name + ENDING)
+    name = "recording" if arguments.router else find_robot(arguments.robot).path.name
+    return Path(f"{name}-{datetime.now():%Y%m%d-%H%M%S}{ENDING}")
+
+
+def _reason(error: OSError) -> str:
+    return plain(error.strerror or str(error))
+
+
+def _split(text: str) -> Split:
+    """Read `500MB` or `10min`."""
+    if found := _SIZE.fullmatch(text.strip()):
+        return Split(size=max(1, int(float(found[1]) * _TIMES[found[2]])))
+    try:
+        return Split(time=seconds(text))
+    except argparse.ArgumentTypeError:
+        raise argparse.ArgumentTypeError(f"'{text}' is neither a size nor a time; write '500MB' or '10min'") from None
+
+
+def add_selection_options(parser: argparse.ArgumentParser) -> None:
+    """Declare `--topics` and `--class`."""
+    parser.add_argument(
+        "--topics",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="PATTERN",
+        help="only these, such as odom '/camera/*'",
+    )
+    parser.add_argument(
+        "--class",
+        nargs="+",
+        action="extend",
+        default=[],
+        dest="classes",
+        type=_class,
+        metavar="CLASS",
+        help=f"only these classes: {', '.join(Qos)}",
+    )
+
+
+def selection_of(arguments: argparse.Namespace) -> Selection:
+    """Return the selection of topics."""
+    return Selection(tuple(arguments.topics), tuple(arguments.classes))
+
+
+def _class(text: str) -> Qos:
+    try:
+        return Qos(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a class; choose from {', '.join(Qos)}") from None
+
+
+def recover_in(folder: Path) -> None:
+    """Recover the unfinished recordings of a folder and report them."""
+    for one in recover_all(folder):
+        if one.problem:
+            warn(RECOVERED.at(None, f"'{plain(str(one.path))}' is unfinished and stays so: {plain(one.problem)}"))
+        else:
+            warn(
+                RECOVERED.at(None, f"'{plain(str(one.path))}' was unfinished: {one.messages:,} messages are recovered")
+            )
+
+
+def warn(finding: Finding) -> None:
+    """Report a finding that does not end the command."""
+    report = Report()
+    report.add(finding)
+    tell_report(report, {})
+
+
+def count_table(counts: Mapping[RecordedTopic, int]) -> str:
+    """Return one line for each topic: name, type, class, number of messages."""
+    rows = [("topic", "type", "class", "messages")]
+    together = by_name(counts)
+    topics = sorted(together, key=lambda topic: (topic.name, topic.type))
+    rows += [(topic.name, topic.type or "-", topic.qos.value, f"{together[topic]:,}") for topic in topics]
+    return table(rows)
+
+
+MOST_WAITING = 20_000  # messages that arrived and are not yet written
+MOST_TOPICS = 2_000
+
+
+class Tap:
+    """Receives the messages of all selected topics, including those that appear while it runs."""
+
+    def __init__(self, guest: Guest, wanted: Selection) -> None:
+        self._guest, self._wanted = guest, wanted
+        self._tokens: deque[str] = deque(maxlen=MOST_WAITING)
+        self._waiting: deque[Callable[[], Recorded]] = deque(maxlen=MOST_WAITING)
+        self._arrivals = count(1)
+        self._arrived = self._taken = 0
+        self._keys: set[str] = set()
+        guest.transport.watch(f"{SPACE}/{guest.domain}/**", self._noticed)
+
+    @property
+    def lost(self) -> int:
+        """Return how many messages had to make room for newer ones."""
+        return max(0, self._arrived - self._taken - len(self._waiting))
+
+    def take(self) -> Iterator[Recorded]:
+        """Yield the messages that have arrived, and subscribe to new topics."""
+        while self._tokens:
+            self._subscribe(self._tokens.popleft())
+        for _ in range(len(self._waiting)):
+            self._taken += 1
+            yield self._waiting.popleft()()
+
+    def _noticed(self, token: str, is_there: bool) -> None:
+        if is_there:
+            self._tokens.append(token)
+
+    def _subscribe(self, key: str) -> None:
+        token = parse_token(key)
+        topic = topic_of(token) if isinstance(token, EndpointToken) else None
+        if topic is None or not self._wanted.takes(topic) or len(self._keys) >= MOST_TOPICS:
+            return
+        data = data_key(self._guest.domain, topic.name, topic.type, topic.hash)
+        if data in self._keys:
+            return
+        self._keys.add(data)
+        whole = replace(topic, definition=definition_of(topic.type))
+        self._guest.transport.subscribe(data, topic.qos, lambda arrival: self._arrive(whole, arrival))
+
+    def _arrive(self, topic: RecordedTopic, arrival: Arrival) -> None:
+        stamp = self._guest.clock.stamp()
+        self._waiting.append(lambda: _recorded(topic, stamp, arrival))
+        self._arrived = next(self._arrivals)
+
+
+def _recorded(topic: RecordedTopic, stamp: int, arrival: Arrival) -> Recorded:
+    try:
+        sequence, published, _ = decode_attachment(arrival.attachment)
+    except ValueError:
+        sequence, published = 0, stamp  # it comes from no ROS participant: only its time of arrival is known
+    return Recorded(topic, stamp, max(0, published), max(0, sequence), arrival.payload)

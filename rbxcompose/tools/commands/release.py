@@ -1,0 +1,24 @@
+"""Allow motion again after `stop`; nothing moves by itself.
+
+A mission continues after `mission resume`.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+from rbxcompose.commands.lookup import add_asking_options, pass_on
+from rbxcompose.commands.options import BUS
+from rbxcompose.runtime.requests import ReleaseRobot
+
+ON_SYSTEM = BUS
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    add_asking_options(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Release the robot."""
+    return pass_on(arguments, ReleaseRobot())

@@ -1,0 +1,453 @@
+"""Publish a recording again on a robot's bus, or show what is in it.
+
+Messages come at the recorded intervals. Topics of the class `command` make a robot move: they are
+left out unless `--topics` names them. So are topics that are being published now, unless `--over` mixes them, or
+`--namespace` keeps them apart. With --alone, or if no robot is up, it brings a router of its own.
+
+With --into, nothing is published: it runs one component of a run that `up --rate max --record` has recorded again, with
+its recorded inputs, and compares its outputs with the recording. The settings are those of the run, or those of
+--robot PATH. Exit codes: 0 the same, 1 a difference or findings.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from itertools import count
+from pathlib import Path
+
+from rbxcompose.base.config import HIDDEN
+from rbxcompose.base.files import NotRegularError, open_regular
+from rbxcompose.base.findings import MOST_NAMES, Finding, Severity, suggest
+from rbxcompose.base.printable import plain
+from rbxcompose.bus.endpoints import tcp_endpoint
+from rbxcompose.bus.names import Attachment, data_key, dds_type, resolve
+from rbxcompose.bus.tokens import EntityKind, NodeToken, gid
+from rbxcompose.bus.transport import RemotePublisher
+from rbxcompose.bus.wire import WIRE_PROFILES, ros_qos
+from rbxcompose.bus.zenoh_session import open_router
+from rbxcompose.commands.console import NotDoneError, misused, refuse, tell, tell_report
+from rbxcompose.commands.guest import NO_ROUTER, Guest
+from rbxcompose.commands.lookup import BusPlace, add_bus_options, find_place, robots_up
+from rbxcompose.commands.options import seconds
+from rbxcompose.commands.targets import add_layer_options, compiled
+from rbxcompose.compiler.plan.dump import PlanTextError, dump, load
+from rbxcompose.compiler.plan.model import Instance, Plan
+from rbxcompose.runtime.recording.codes import (
+    DAMAGED,
+    DIFFERENT,
+    NOT_ENOUGH,
+    NOT_REPLAYED,
+    NOTHING,
+    SENT_ALREADY,
+    UNREADABLE,
+    UNWRITABLE,
+)
+from rbxcompose.runtime.recording.files import PART, Recorder, write_problem
+from rbxcompose.runtime.recording.reader import (
+    NotARecordingError,
+    RecordingReader,
+    RecordingSummary,
+    playlist,
+    summary_of,
+)
+from rbxcompose.runtime.recording.tape import PLAN
+from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic, Selection, by_name, is_replayable
+from rbxcompose.runtime.replay import ReplayResult, RunDifference, missing_topics, replayed
+from rbxcompose.sdk.ports import Qos
+from rbxcompose.tools.commands.record import add_selection_options, count_table, recover_in, selection_of, warn
+
+_MATCHING = 1.0  # [s] maximum wait until subscribers have found a new publisher
+_MATCH_PAUSE = 0.01  # [s] between two checks for them
+
+
+class Player:
+    """Publishes recorded messages as the node `replay`, below a namespace (`/old`) if there is one."""
+
+    def __init__(self, guest: Guest, topics: Iterable[RecordedTopic], namespace: str = "") -> None:
+        self._guest = guest
+        self._sequence = count(1)
+        transport, domain = guest.transport, guest.domain
+        node = NodeToken(domain, transport.session, 0, "replay")
+        transport.announce(node.key)
+        self._publishers: dict[RecordedTopic, tuple[RemotePublisher, bytes]] = {}
+        for number, topic in enumerate(topics, 1):
+            qos = WIRE_PROFILES["jazzy"].qos_text(ros_qos(topic.qos))
+            name = f"{namespace}{topic.name}"
+            place = (EntityKind.PUBLISHER, number, name, dds_type(topic.type), topic.hash, qos)
+            token = node.endpoint_key(*place)
+            publisher = transport.publisher(data_key(domain, name, topic.type, topic.hash), topic.qos)
+            transport.announce(token)
+            self._publishers[topic] = publisher, gid(token)
+
+    def wait_for_subscribers(self) -> None:
+        """Wait until each topic has a subscriber, but only briefly: many will never have one."""
+        publishers = [publisher for publisher, _ in self._publishers.values()]
+        deadline = self._guest.clock.now() + _MATCHING
+        while not all(publisher.has_match for publisher in publishers) and self._guest.clock.now() < deadline:
+            if self._guest.run(lambda: self._guest.is_interrupted, _MATCH_PAUSE):
+                return
+
+    def put(self, message: Recorded) -> None:
+        """Publish a message again."""
+        publisher, sender = self._publishers[message.topic]
+        publisher.put(message.payload, Attachment(next(self._sequence), self._guest.clock.stamp(), sender).encode())
+
+
+_PAUSE = 0.05  # [s] before a recording restarts
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("path", type=Path, metavar="FILE", help="the recording")
+    add_bus_options(parser)
+    add_selection_options(parser)
+    parser.add_argument("--rate", type=_rate, default=1.0, metavar="2x", help="faster or slower than it was")
+    parser.add_argument("--from", type=seconds, default=0.0, dest="start", metavar="10s", help="skip everything before")
+    parser.add_argument("--alone", action="store_true", help="on a router of its own, away from robots that are up")
+    parser.add_argument("--namespace", type=_namespace, metavar="NAME", help="put it before all topics")
+    parser.add_argument("--over", action="store_true", help="also topics that are being published now")
+    parser.add_argument("--loop", action="store_true", help="start again at the end, until Ctrl-C")
+    parser.add_argument(
+        "--into",
+        metavar="COMPONENT",
+        help="run one component of a recorded run again, as it was or as in --robot PATH, and compare",
+    )
+    parser.add_argument("--write", type=Path, metavar="FILE", help="with --into: keep what it sends now")
+    add_layer_options(parser)
+    parser.add_argument("--info", action="store_true", help="only show topics, types, counts and duration")
+    parser.add_argument("--json", action="store_true", help="with --info or --into: answer with one JSON object")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Read the file once to learn its contents, then replay it."""
+    if problem := _misused(arguments):
+        return misused("replay", problem)
+    path = arguments.path
+    if path.parent.is_dir():
+        recover_in(path.parent)
+    if path.name.endswith(PART) and not path.exists():
+        path = path.with_name(path.name.removesuffix(PART))
+    try:
+        if arguments.into is not None:
+            with _opened(path) as reader:
+                return run_again(arguments, path, reader)
+        summary = _look_through(path)
+        if arguments.info:
+            tell(json.dumps(_fields(summary)) if arguments.json else _text(path, summary))
+            return 0
+        return _replay(arguments, path, summary)
+    except NotDoneError as error:
+        return refuse(error.finding)
+
+
+def _misused(arguments: argparse.Namespace) -> str:
+    """Return what is wrong with incompatible options."""
+    layers = arguments.profile or arguments.overlays or arguments.sets or arguments.real
+    if layers and not (arguments.into and arguments.robot):
+        return "options that change the robot's file need --into and --robot PATH"
+    if arguments.json and not (arguments.info or arguments.into):
+        return "--json needs --info or --into"
+    if arguments.alone and (arguments.router or arguments.robot):
+        return "--alone has a bus of its own, so no robot and no router is named"
+    return "--write needs --into" if arguments.write and not arguments.into else ""
+
+
+def _look_through(path: Path) -> RecordingSummary:
+    with _opened(path) as reader:
+        summary = summary_of(reader.messages())
+    if reader.damage:
+        place = f"after {summary.messages:,} messages"
+        warn(DAMAGED.at(None, f"'{plain(str(path))}' is damaged {place}: {reader.damage}"))
+    return summary
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[RecordingReader]:
+    try:
+        with open_regular(path) as file:
+            yield RecordingReader(file)
+    except NotRegularError as error:
+        raise NotDoneError(UNREADABLE.at(None, f"'{plain(str(path))}' is not a recording: it is not a file")) from error
+    except OSError as error:
+        reason = plain(error.strerror or str(error))
+        raise NotDoneError(UNREADABLE.at(None, f"'{plain(str(path))}' cannot be read: {reason}")) from error
+    except NotARecordingError as error:
+        finding = UNREADABLE.at(None, f"'{plain(str(path))}' is not a recording: {error}")
+        raise NotDoneError(finding) from error
+
+
+def _replay(arguments: argparse.Namespace, path: Path, summary: RecordingSummary) -> int:
+    topics = _chosen(summary, selection_of(arguments))
+    if not topics or arguments.start > summary.duration:
+        why = "none of the chosen topics can be replayed" if not topics else f"it lasts {summary.duration:.1f} s"
+        return refuse(NOTHING.at(None, f"nothing of '{plain(str(path))}' is replayed: {why}"))
+    with replay_bus(arguments) as place:
+        if not arguments.over:
+            with Guest(place) as looking:  # its router knows all; a guest that stays has to make its own links first
+                sent = _sent_already(looking, topics, arguments.namespace or "")
+            topics = [topic for topic in topics if topic.name not in sent]
+            if sent:
+                finding = _left_out(sent)
+                if not topics:
+                    return refuse(finding)
+                warn(replace(finding, severity=Severity.WARNING))
+        return _replay_on(place, topics, arguments, path)
+
+
+def _replay_on(place: BusPlace, topics: list[RecordedTopic], arguments: argparse.Namespace, path: Path) -> int:
+    with Guest(place, stays=True) as guest, guest.interruptible():
+        player = Player(guest, topics, arguments.namespace or "")
+        player.wait_for_subscribers()
+        tell(f"replaying {len(topics)} topics of {plain(str(path))}; Ctrl-C ends it")
+        count = _play(path, player, topics, arguments, guest)
+        while arguments.loop and _wait(guest.clock.now() + _PAUSE, guest):  # even if the recording has no duration
+            count += _play(path, player, topics, arguments, guest)
+    tell(f"replayed {count:,} messages")
+    return 0
+
+
+def _sent_already(guest: Guest, topics: list[RecordedTopic], namespace: str) -> list[str]:
+    """Return the recorded names of topics that somebody publishes now."""
+    given = {topic.name for topic in guest.graph().topics if topic.givers}
+    return list(dict.fromkeys(topic.name for topic in topics if f"{namespace}{topic.name}" in given))
+
+
+def _left_out(names: list[str]) -> Finding:
+    rest = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+    message = f"these topics are being published now: {plain(', '.join(names[:MOST_NAMES]))}{rest}"
+    return SENT_ALREADY.at(None, message, help="'--namespace old' keeps them apart, '--over' mixes them")
+
+
+def _chosen(summary: RecordingSummary, wanted: Selection) -> list[RecordedTopic]:
+    """Return the topics to publish, and report which selected ones are left out."""
+    topics = sorted((topic for topic in summary.counts if wanted.takes(topic)), key=lambda topic: topic.name)
+    unfit = [topic.name for topic in topics if not is_replayable(topic)]
+    commands = [topic.name for topic in topics if topic.qos is Qos.COMMAND and not wanted.patterns]
+    if unfit:
+        warn(NOT_REPLAYED.at(None, f"topics that the bus cannot carry: {plain(', '.join(unfit))}"))
+    if commands:
+        names = plain(", ".join(commands))
+        warn(NOT_REPLAYED.at(None, f"topics that make a robot move: {names}", help="'--topics NAME' replays them"))
+    return [topic for topic in topics if topic.name not in {*unfit, *commands}]
+
+
+def _play(path: Path, player: Player, topics: list[RecordedTopic], arguments: argparse.Namespace, guest: Guest) -> int:
+    """Publish the recording once and return the number of messages."""
+    chosen = set(topics)
+    count = 0
+    start = guest.clock.now()
+    with _opened(path) as reader:
+        for due, message in playlist(reader.messages(), rate=arguments.rate, start=arguments.start):
+            if not _wait(start + due, guest):
+                break
+            count += _put(player, message, chosen)
+    return count
+
+
+def _put(player: Player, message: Recorded, chosen: set[RecordedTopic]) -> int:
+    if message.topic not in chosen:
+        return 0
+    player.put(message)
+    return 1
+
+
+def _wait(until: float, guest: Guest) -> bool:
+    """Wait until a time of the guest's clock; return False if an interrupt came first."""
+    return not guest.run(lambda: guest.is_interrupted, until - guest.clock.now())
+
+
+def _text(path: Path, summary: RecordingSummary) -> str:
+    head = f"{plain(str(path))}: {summary.messages:,} messages, {summary.duration:.3f} s"
+    return f"{head}\n{count_table(summary.counts)}" if summary.counts else head
+
+
+def _fields(summary: RecordingSummary) -> dict[str, object]:
+    topics = [
+        {
+            "name": topic.name,
+            "type": topic.type,
+            "class": topic.qos.value,
+            "encoding": topic.encoding,
+            "messages": number,
+        }
+        for topic, number in sorted(by_name(summary.counts).items(), key=lambda item: (item[0].name, item[0].type))
+    ]
+    return {
+        "messages": summary.messages,
+        "start": summary.start,
+        "end": summary.end,
+        "duration": summary.duration,
+        "topics": topics,
+    }
+
+
+def _namespace(text: str) -> str:
+    """Read `old` or `/old/run`, as what stands before the name of a topic."""
+    try:
+        return resolve(text.strip("/"))
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def _rate(text: str) -> float:
+    """Read `2x`."""
+    try:
+        rate = float(text.removesuffix("x"))
+    except ValueError:
+        rate = math.nan
+    if not 0 < rate < math.inf:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a rate; write '2x' or '0.5x'")
+    return rate
+
+
+_PORT, _TRIES = 7447, 20  # the port at which ROS 2 looks for a router, and those behind it
+
+
+@contextmanager
+def replay_bus(arguments: argparse.Namespace) -> Iterator[BusPlace]:
+    """Yield the bus that the options name; with `--alone`, or if no robot is up, one with a router of its own.
+
+    Raises:
+        NotDoneError: if there is none.
+    """
+    is_named = arguments.router is not None or arguments.robot is not None
+    if is_named or (robots_up() and not arguments.alone):
+        yield find_place(arguments)
+        return
+    with _own_router() as endpoint:
+        tell(f"a router of its own is at {endpoint}: 'rbxcompose topic echo TOPIC --router {endpoint}'")
+        yield BusPlace(endpoint, arguments.domain or 0)
+
+
+@contextmanager
+def _own_router() -> Iterator[str]:
+    for port in range(_PORT, _PORT + _TRIES):
+        endpoint = tcp_endpoint(port)
+        try:
+            session = open_router(endpoint)
+        except OSError:
+            continue
+        try:
+            yield endpoint
+        finally:
+            session.close()  # type: ignore[no-untyped-call]
+        return
+    raise NotDoneError(NO_ROUTER.at(None, f"no port from {_PORT} to {_PORT + _TRIES - 1} is free for a router"))
+
+
+HOW = "'rbxcompose up PATH --rate max --record FILE' records everything that is needed"
+
+
+def run_again(arguments: argparse.Namespace, path: Path, reader: RecordingReader) -> int:
+    """Run the component that `--into` names and report the first difference; return 0 if there is none.
+
+    Raises:
+        NotDoneError: if the recording lacks something needed, or the outputs cannot be written.
+    """
+    deque(reader.messages(), maxlen=0)  # the index of a truncated recording has no attachments
+    plan = _plan(arguments, path, reader)
+    instance = _instance(plan, arguments.into)
+    if missing := missing_topics(plan, instance, reader.topics):
+        names = plain(", ".join(missing))
+        raise NotDoneError(NOT_ENOUGH.at(None, f"'{plain(str(path))}' lacks inputs of '{instance.name}': {names}"))
+    with open_regular(path) as file, _kept(arguments.write) as keep:
+        found = replayed(plan, instance, RecordingReader(file).messages(), keep)
+    return _told(arguments, instance.name, found)
+
+
+def _plan(arguments: argparse.Namespace, path: Path, reader: RecordingReader) -> Plan:
+    if PLAN not in reader.attachments:
+        message = f"'{plain(str(path))}' was not recorded within a stepped run"
+        raise NotDoneError(NOT_ENOUGH.at(None, message, help=HOW))
+    if arguments.robot is not None:
+        compilation = compiled(arguments.robot, arguments)
+        tell_report(compilation.report, compilation.sources)
+        if compilation.plan is None:
+            raise NotDoneError(NOT_ENOUGH.at(None, f"'{plain(arguments.robot)}' has errors"))
+        return compilation.plan
+    try:
+        return load(reader.attachments[PLAN].decode())
+    except ValueError as error:
+        reason = str(error) if isinstance(error, PlanTextError) else "its plan is not text"
+        raise NotDoneError(NOT_ENOUGH.at(None, f"'{plain(str(path))}': {plain(reason)}")) from error
+
+
+def _instance(plan: Plan, name: str) -> Instance:
+    instance = next((candidate for candidate in plan.instances if candidate.name == name), None)
+    if instance is None:
+        names = [one.name for one in plan.instances]
+        message = f"the robot '{plain(plan.robot)}' has no component '{plain(name, 60)}'"
+        raise NotDoneError(NOT_ENOUGH.at(None, message, help=suggest(name, names, "components")))
+    if HIDDEN in _settings(plan, instance):
+        message = f"'{name}' has a secret, which a recording does not hold"
+        raise NotDoneError(NOT_ENOUGH.at(None, message, help="'--robot PATH' takes it from the robot's file"))
+    return instance
+
+
+def _settings(plan: Plan, instance: Instance) -> list[object]:
+    """Return the values of a recorded configuration."""
+    whole = json.loads(dump(Plan(plan.robot, plan.file, (instance,))))
+    left: list[object] = [whole["instances"][0]["config"]]
+    found: list[object] = []
+    while left:
+        one = left.pop()
+        if isinstance(one, dict):
+            left += one.values()
+        elif isinstance(one, list):
+            left += one
+        else:
+            found.append(one)
+    return found
+
+
+@contextmanager
+def _kept(path: Path | None) -> Iterator[Callable[[Recorded], None] | None]:
+    """Yield a function that takes the outputs, and write them to a file if one is requested."""
+    if path is None:
+        yield None
+        return
+    if problem := write_problem(path):
+        raise NotDoneError(UNWRITABLE.at(None, problem))
+    try:
+        recorder = Recorder(path, 0.0)
+        yield recorder.add
+        recorder.finish()
+    except OSError as error:
+        reason = plain(error.strerror or str(error))
+        raise NotDoneError(UNWRITABLE.at(None, f"'{plain(str(path))}' cannot be written: {reason}")) from error
+
+
+def _told(arguments: argparse.Namespace, name: str, found: ReplayResult) -> int:
+    for text in found.errors:
+        tell(plain(text))
+    if arguments.json:
+        tell(json.dumps({"component": name, "equal": found.equal, "difference": _difference_fields(found.difference)}))
+    elif found.difference is None:
+        tell(f"'{name}' sends the same as recorded: {found.equal:,} messages")
+    else:
+        return refuse(DIFFERENT.at(None, _difference_text(name, found.difference, found.equal)))
+    return 0 if found.difference is None else 1
+
+
+def _difference_text(name: str, one: RunDifference, equal: int) -> str:
+    where = f", field '{plain(one.field)}'" if one.field else ""
+    values = f"recorded {plain(one.recorded)}, now {plain(one.now)}"
+    return f"'{name}' differs at {one.time:.3f} s on {plain(one.topic)}{where}: {values}; {equal:,} messages were equal"
+
+
+def _difference_fields(difference: RunDifference | None) -> dict[str, object] | None:
+    if difference is None:
+        return None
+    return {
+        "time": difference.time,
+        "topic": difference.topic,
+        "field": difference.field,
+        "recorded": difference.recorded,
+        "now": difference.now,
+    }

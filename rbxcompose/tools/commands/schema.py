@@ -1,0 +1,24 @@
+"""Print the JSON Schema of a kind of manifest, for editors.
+
+It knows all installed component types, including those of other distributions.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+from rbxcompose.commands.console import tell
+from rbxcompose.compiler.schema.documents import MAKERS, as_text, installed_schema
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    kinds = {kind.lower(): kind for kind in MAKERS}
+    parser.add_argument("kind", metavar="KIND", choices=list(kinds), help=f"one of {', '.join(kinds)}")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print the schema."""
+    kind = next(kind for kind in MAKERS if kind.lower() == arguments.kind)
+    tell(as_text(installed_schema(kind)).rstrip("\n"))
+    return 0

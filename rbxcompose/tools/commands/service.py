@@ -1,0 +1,34 @@
+"""List the services on the bus, or call one.
+
+The request is YAML with the fields of the service's type; missing fields are zero.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+from rbxcompose.commands.guest import Guest, add_server_verbs, tell_list, visit
+from rbxcompose.commands.options import BUS
+
+ON_SYSTEM = BUS
+_VERB = ("call", "send a request and print the response")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    add_server_verbs(parser, "service", _VERB, "request", "/battery/set_level", (_ls, _call))
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the chosen subcommand."""
+    return visit(arguments, lambda guest: int(arguments.do(guest, arguments)))
+
+
+def _ls(guest: Guest, arguments: argparse.Namespace) -> int:
+    return tell_list(guest.graph().services, ("servers", "clients"), arguments)
+
+
+def _call(guest: Guest, arguments: argparse.Namespace) -> int:
+    from rbxcompose.commands.messages import call  # the imports for messages would slow down the list
+
+    return call(guest, arguments)

@@ -1,0 +1,100 @@
+"""Run the tests of missions, in virtual time.
+
+PATH is a test or a folder with tests below it; without one it is `missions/`. Exit codes: 0 all passed, 1 a test failed
+or has errors, 2 wrong usage.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from rbxcompose.base.findings import Report
+from rbxcompose.base.printable import plain
+from rbxcompose.commands.console import FINDINGS, has_colour, misused, tell, tell_report
+from rbxcompose.manifest.files import shown_name
+from rbxcompose.tools.mission_tests.coverage import Coverage
+from rbxcompose.tools.mission_tests.finding_files import tests_of
+from rbxcompose.tools.mission_tests.reader import TrialReader, WrittenTrial
+from rbxcompose.tools.mission_tests.report import FileOutcome, Teller, as_json, coverage_text, junit
+from rbxcompose.tools.mission_tests.runner import run_trial
+
+HERE = Path("missions")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument(
+        "paths", nargs="*", type=Path, default=[HERE], metavar="PATH", help="tests, or folders of tests"
+    )
+    parser.add_argument("--filter", default="", metavar="TEXT", help="only those with this text in their names")
+    parser.add_argument("--coverage", action="store_true", help="show which parts of the missions no test covered")
+    parser.add_argument("--junit", type=Path, metavar="FILE", help="write the results as JUnit XML")
+    parser.add_argument("-v", "--verbose", action="store_true", help="show the traces of all tests")
+    parser.add_argument("--json", action="store_true", help="write JSON")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Read, run and judge the tests, and report the results."""
+    for path in arguments.paths:
+        if not path.exists():
+            return misused("test", f"there is no '{plain(str(path))}'")
+    files = tests_of(arguments.paths)
+    if not files:
+        return misused("test", f"no tests ('kind: Test') in {plain(', '.join(map(str, arguments.paths)))}")
+    reading, coverage, teller = TrialReader(os.environ), Coverage(), Teller(has_colour(sys.stdout))
+    outcomes: list[FileOutcome] = []
+    unreadable = Report()
+    for written in (trial for file in files for trial in reading.every(file)):
+        began = time.perf_counter()
+        if arguments.filter not in written.name:
+            unreadable.extend(() if written.root else written.report)
+            continue
+        outcome = _outcome(written, reading, began)
+        outcomes.append(outcome)
+        if outcome.verdict:
+            coverage.add(outcome.verdict.trial.linked, outcome.verdict.trial.names, outcome.verdict.seen.keys)
+        if not arguments.json:
+            _tell(outcome, teller, arguments.verbose)
+    tell_report(_findings(reading, outcomes) if outcomes else unreadable, reading.sources)
+    if not outcomes:
+        return misused("test", f"no test has '{plain(arguments.filter)}' in its name")
+    _finish(outcomes, coverage, teller, arguments)
+    return 0 if all(file_outcome.passed for file_outcome in outcomes) else FINDINGS
+
+
+def _outcome(written: WrittenTrial, reading: TrialReader, began: float) -> FileOutcome:
+    trial = reading.understand(written)
+    compiled = time.perf_counter()
+    shown, findings = shown_name(written.path), tuple(written.report)
+    if trial is None:
+        return FileOutcome(shown, written.name, findings, took=compiled - began)
+    return FileOutcome(shown, written.name, findings, run_trial(trial), time.perf_counter() - compiled)
+
+
+def _tell(outcome: FileOutcome, teller: Teller, verbose: bool) -> None:
+    tell(teller.line(outcome))
+    if outcome.verdict and (verbose or not outcome.passed):
+        tell(teller.trace(outcome.verdict))
+
+
+def _findings(reading: TrialReader, outcomes: Sequence[FileOutcome]) -> Report:
+    return Report(
+        [*reading.report, *reading.summed_up(finding for outcome in outcomes for finding in outcome.findings)]
+    )
+
+
+def _finish(outcomes: Sequence[FileOutcome], coverage: Coverage, teller: Teller, arguments: argparse.Namespace) -> None:
+    if arguments.junit:
+        arguments.junit.write_text(junit(outcomes), encoding="utf-8")
+    if arguments.json:
+        tell(json.dumps(as_json(outcomes, coverage), indent=1))
+        return
+    if arguments.coverage and coverage.ways:
+        tell(coverage_text(coverage))
+    tell(teller.summary(outcomes, coverage))

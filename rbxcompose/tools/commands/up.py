@@ -1,0 +1,140 @@
+"""Start a robot, or what a host runs of it: check it, bring all components up, run its mission.
+
+In the foreground it goes down when the mission named by `start:` has ended, or at Ctrl-C; with -d it stays up.
+Exit codes: 0 fine, 1 findings, 2 wrong usage, 3 the mission failed, 4 the robot failed, 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from pathlib import Path
+
+from rbxcompose.base.units import TIME, UnitError, to_si
+from rbxcompose.commands.console import FINDINGS, refuse, tell_report
+from rbxcompose.commands.options import add_system_options, is_system
+from rbxcompose.commands.targets import (
+    add_layer_options,
+    add_path_argument,
+    chosen_layers,
+    compiled,
+    layers_of,
+    robot_path,
+)
+from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.runtime.folder import RunOptions
+from rbxcompose.runtime.recording.codes import UNWRITABLE
+from rbxcompose.tools.live_rules import LiveRules
+from rbxcompose.tools.robot_changes import LiveReload
+from rbxcompose.tools.run_view import is_fit, run_plan
+
+USAGE = 2
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    add_path_argument(parser)
+    add_layer_options(parser)
+    parser.add_argument(
+        "--rate", type=_rate, default=RunOptions(), metavar="20x|max|1x", help="robot time per real time, reproducible"
+    )
+    parser.add_argument("-d", "--detach", action="store_true", help="return once everything is active; it stays up")
+    parser.add_argument(
+        "--record", type=Path, metavar="FILE", help="with --rate: record everything that happens, for replay"
+    )
+    parser.add_argument("--watch", action="store_true", help="apply changes to its files as you edit them")
+    parser.add_argument("--host", metavar="NAME", help="of a system: run what this host runs")
+    add_system_options(parser, has_profile=True)
+    parser.add_argument("--robot", metavar="NAME", help="with --host: only this robot")
+    parser.add_argument("--for", type=_duration, dest="duration", metavar="30s", help="end after this robot time")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Compile the robot, start its supervisor, and report what happens."""
+    if arguments.real and arguments.rate.is_stepped:
+        sys.stderr.write("rbxcompose up: --real keeps its own time, so --rate cannot be given with it\n")
+        return USAGE
+    if arguments.watch and (arguments.detach or arguments.rate.is_stepped):
+        other = "-d" if arguments.detach else "--rate"
+        sys.stderr.write(f"rbxcompose up: --watch is for the foreground in real time, without {other}\n")
+        return USAGE
+    path = robot_path(arguments.path, may_run=False)
+    if path is None:
+        return FINDINGS
+    if is_system(path):
+        return _run_share(path, arguments)
+    if arguments.host or arguments.robot:
+        sys.stderr.write("rbxcompose up: --host and --robot are for systems\n")
+        return USAGE
+    compilation = compile_robot(path, **layers_of(arguments))
+    tell_report(compilation.report, compilation.sources)
+    if compilation.plan is None or compilation.robot is None or compilation.report.has_errors:
+        return 1
+    if compilation.plan.follows_clock and arguments.rate.is_stepped:
+        sys.stderr.write("rbxcompose up: the robot follows /clock ('bus.clock'), so --rate cannot be given with it\n")
+        return USAGE
+    options = _options(arguments)
+    if options.record is not None and not options.is_stepped:
+        sys.stderr.write(
+            "rbxcompose up: --record needs --rate; a run in real time is recorded by 'rbxcompose record'\n"
+        )
+        return USAGE
+    if options.record is not None and (problem := _write_problem(options.record)):
+        return refuse(UNWRITABLE.at(None, problem))
+    if options.is_stepped and options.rate is None and options.duration is None and compilation.plan.start is None:
+        sys.stderr.write("rbxcompose up: without 'start:' nothing ends a run at --rate max: give --for\n")
+        return USAGE
+    if not is_fit(compilation.robot, compilation.sources):
+        return FINDINGS
+    reload = None
+    if arguments.watch:
+        reload = LiveReload(lambda: compiled(path, arguments), compilation, options.layers)
+    return run_plan(compilation.plan, options, LiveRules(compilation.robot), reload)
+
+
+def _options(arguments: argparse.Namespace) -> RunOptions:
+    return RunOptions(
+        is_stepped=arguments.rate.is_stepped,
+        rate=arguments.rate.rate,
+        duration=arguments.duration,
+        is_detached=arguments.detach,
+        record=arguments.record.absolute() if arguments.record else None,
+        layers=chosen_layers(arguments),
+    )
+
+
+def _run_share(path: str, arguments: argparse.Namespace) -> int:
+    from rbxcompose.tools.up_system import run_share  # only needed for systems
+
+    return run_share(path, arguments, _options(arguments))
+
+
+def _write_problem(path: Path) -> str:
+    from rbxcompose.runtime.recording.files import write_problem  # imports MCAP, which only a recorded run needs
+
+    return write_problem(path)
+
+
+def _rate(text: str) -> RunOptions:
+    """Read `20x`, `max` or `1x`."""
+    if text == "max":
+        return RunOptions(is_stepped=True)
+    try:
+        rate = float(text.removesuffix("x"))
+    except ValueError:
+        rate = math.nan
+    if not 0 < rate < math.inf:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a rate; write '20x', '1x' or 'max'")
+    return RunOptions() if rate == 1 else RunOptions(is_stepped=True, rate=rate)
+
+
+def _duration(text: str) -> float:
+    """Read `30s` or `2 min` [s]."""
+    try:
+        seconds = to_si(text, TIME)
+    except UnitError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+    if seconds <= 0:
+        raise argparse.ArgumentTypeError("must be above zero")
+    return seconds

@@ -1,0 +1,90 @@
+"""A Dockerfile and a Compose file: one service for each share, in a profile with the name of its host.
+
+Certificates and other secrets are in neither: they come from the host, as Compose's secrets and its environment.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+import yaml
+
+from rbxcompose.manifest.secrets import VARIABLE
+from rbxcompose.tools.exporting.exported_share import (
+    CERTIFICATES,
+    CONFIGURATION,
+    FILE,
+    GRACE,
+    MEMORY,
+    PROCESSES,
+    ExportedShare,
+)
+
+PROJECT = "/robot"  # the folder of the manifests in the image
+_DOCKERFILE = """FROM python:3.11-slim
+RUN pip install --no-cache-dir rbxcompose=={version} && useradd --create-home robot
+COPY project {project}
+USER robot
+WORKDIR {project}
+ENV XDG_RUNTIME_DIR=/run/robot XDG_CONFIG_HOME={configuration} NO_COLOR=1
+ENTRYPOINT ["rbxcompose"]
+"""
+
+
+def dockerfile(version: str) -> str:
+    """Return the Dockerfile; the system's files are in the folder `project` beside it."""
+    return _DOCKERFILE.format(version=version, project=PROJECT, configuration=CONFIGURATION)
+
+
+def compose_file(shares: Iterable[ExportedShare], *, system: str, file: str) -> str:
+    """Return the Compose file; `file` is that of the system in the project. Routers need the network of the host."""
+    given = list(shares)
+    made: dict[str, Any] = {
+        "name": system.replace("_", "-"),
+        "services": {share.name: _service(share, f"{PROJECT}/{file}") for share in given},
+    }
+    if secrets := {name: {"file": path} for share in given for name, path, _ in _certificates(share)}:
+        made["secrets"] = secrets
+    text = yaml.safe_dump(made, sort_keys=False, width=120)
+    return f"# On each host: docker compose --profile HOST up -d\n{text}"
+
+
+def _certificates(share: ExportedShare) -> Iterator[tuple[str, str, str]]:
+    """Yield name of a secret, file on the host, and file in the container."""
+    for name in CERTIFICATES if share.has_certificates else ():
+        path = f"{share.certificates}/{name}"
+        yield f"{share.name}-{name.partition('.')[0]}", f"${{HOME}}/.config/{path}", f"{CONFIGURATION}/{path}"
+
+
+def _service(share: ExportedShare, file: str) -> dict[str, Any]:
+    service: dict[str, Any] = {
+        "build": ".",
+        "profiles": [share.host],
+        "command": [file if word == FILE else word for word in share.command],
+        "network_mode": "host",
+        "init": True,
+        "read_only": True,
+        "tmpfs": ["/run/robot:mode=0700,uid=1000", "/tmp"],  # noqa: S108 - of the container
+        "shm_size": "256mb",
+        "mem_limit": MEMORY.lower(),
+        "pids_limit": PROCESSES,
+        "cap_drop": ["ALL"],
+        "security_opt": ["no-new-privileges:true"],
+        "restart": "on-failure:5",
+        "stop_grace_period": f"{share.rest_time + GRACE:g}s",
+        "healthcheck": {
+            "test": ["CMD", "rbxcompose", "ps", share.robot],
+            "interval": "5s",
+            "timeout": "5s",
+            "retries": 3,
+            "start_period": "30s",
+        },
+    }
+    if share.devices:
+        service |= {"devices": [f"{device}:{device}" for device in share.devices], "group_add": ["dialout"]}
+    if share.has_certificates:
+        service["secrets"] = [{"source": name, "target": target} for name, _, target in _certificates(share)]
+    if share.secrets:
+        service["environment"] = [f"{VARIABLE}{name.upper()}" for name in share.secrets]  # as the host has them
+    return service

@@ -1,0 +1,146 @@
+"""Manifests of Kubernetes: one pod for each share, on the node with the label `rbxcompose/host: NAME`, and the files.
+
+A Kustomize base, so that each robot of a fleet is an overlay with a name, an image and nodes of its own. Certificates
+and other secrets are objects of the kind Secret, which the manifests name and do not contain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import yaml
+
+from rbxcompose.manifest.secrets import VARIABLE
+from rbxcompose.tools.exporting.compose import PROJECT
+from rbxcompose.tools.exporting.exported_share import CERTIFICATES, CONFIGURATION, FILE, GRACE, MEMORY, ExportedShare
+
+LARGEST = 1_000_000  # [bytes] of a ConfigMap, which etcd limits
+KUSTOMIZATION = "kustomization.yaml"
+USER, DIALOUT = 1000, 20  # numbers of the image's user, and of the group that opens serial ports
+
+
+def manifests(
+    shares: Sequence[ExportedShare], *, system: str, file: str, files: Mapping[str, bytes], image: str
+) -> dict[str, str]:
+    """Return the manifests by file name; `files` are those of the system by their paths, `file` is its own.
+
+    Raises:
+        ValueError: if the files are too large for a ConfigMap, or one is no text.
+    """
+    if sum(map(len, files.values())) > LARGEST:
+        raise ValueError(f"its files have more than {LARGEST:,} bytes, the limit of a ConfigMap")
+    name = system.replace("_", "-")
+    found: dict[str, Any] = {"files.yaml": _config_map(name, files)}
+    found |= {f"{share.name}.yaml": _deployment(share, name, file, sorted(files), image) for share in shares}
+    found[KUSTOMIZATION] = {
+        "apiVersion": "kustomize.config.k8s.io/v1beta1",
+        "kind": "Kustomization",
+        "resources": sorted(found),
+        "labels": [{"pairs": {"app.kubernetes.io/part-of": name}}],
+    }
+    texts = {path: yaml.safe_dump(entry, sort_keys=False, width=120) for path, entry in found.items()}
+    for share in shares:
+        texts[f"{share.name}.yaml"] = "".join(f"# {line}\n" for line in _needed(share)) + texts[f"{share.name}.yaml"]
+    return texts
+
+
+def _needed(share: ExportedShare) -> Iterator[str]:
+    """Yield what to type so that its secrets exist; they are never written to a file of ours."""
+    if share.has_certificates:
+        files = " ".join(f"--from-file=$HOME/.config/{share.certificates}/{name}" for name in CERTIFICATES)
+        yield f"kubectl create secret generic {share.name}-certificates {files}"
+    for name in share.secrets:
+        yield f"kubectl create secret generic {_secret(share, name)} --from-file=value=secrets/{name}"
+
+
+def _secret(share: ExportedShare, name: str) -> str:
+    return f"{share.name}-{name}".replace("_", "-").lower()
+
+
+def _variable(share: ExportedShare, name: str) -> dict[str, Any]:
+    reference = {"name": _secret(share, name), "key": "value"}
+    return {"name": f"{VARIABLE}{name.upper()}", "valueFrom": {"secretKeyRef": reference}}
+
+
+def _key(path: str) -> str:
+    """Return the key of a file in a ConfigMap, which takes no slashes."""
+    return path.replace("/", "..")
+
+
+def _config_map(name: str, files: Mapping[str, bytes]) -> dict[str, Any]:
+    data = {_key(path): text.decode("utf-8") for path, text in sorted(files.items())}
+    return {"apiVersion": "v1", "kind": "ConfigMap", "metadata": {"name": f"{name}-files"}, "data": data}
+
+
+def _deployment(share: ExportedShare, system: str, file: str, files: list[str], image: str) -> dict[str, Any]:
+    labels = {"app.kubernetes.io/name": share.name, "rbxcompose/robot": share.robot, "rbxcompose/host": share.host}
+    return {
+        "apiVersion": "apps/v1",
+        "kind": "Deployment",
+        "metadata": {"name": share.name, "labels": labels},
+        "spec": {
+            "replicas": 1,
+            "strategy": {"type": "Recreate"},  # a robot runs once
+            "selector": {"matchLabels": {"app.kubernetes.io/name": share.name}},
+            "template": {"metadata": {"labels": labels}, "spec": _pod(share, system, file, files, image)},
+        },
+    }
+
+
+def _pod(share: ExportedShare, system: str, file: str, files: list[str], image: str) -> dict[str, Any]:
+    items = [{"key": _key(path), "path": path} for path in files]
+    volumes: list[dict[str, Any]] = [
+        {"name": "files", "configMap": {"name": f"{system}-files", "items": items}},
+        {"name": "run", "emptyDir": {"medium": "Memory"}},
+        {"name": "tmp", "emptyDir": {}},
+        {"name": "shm", "emptyDir": {"medium": "Memory", "sizeLimit": "256Mi"}},
+    ]
+    if share.has_certificates:
+        secret = {"secretName": f"{share.name}-certificates", "defaultMode": 0o440}
+        volumes.append({"name": "certificates", "secret": secret})
+    volumes += [{"name": f"device-{n}", "hostPath": {"path": path}} for n, path in enumerate(share.devices)]
+    return {
+        "nodeSelector": {"rbxcompose/host": share.host},
+        "hostNetwork": True,  # its router listens at the address of the host
+        "dnsPolicy": "ClusterFirstWithHostNet",
+        "automountServiceAccountToken": False,
+        "terminationGracePeriodSeconds": round(share.rest_time + GRACE),
+        "securityContext": {
+            "runAsNonRoot": True,
+            "runAsUser": USER,
+            "fsGroup": USER,  # may read its secrets
+            "supplementalGroups": [DIALOUT] if share.devices else [],
+            "seccompProfile": {"type": "RuntimeDefault"},
+        },
+        "containers": [_container(share, file, image)],
+        "volumes": volumes,
+    }
+
+
+def _container(share: ExportedShare, file: str, image: str) -> dict[str, Any]:
+    probe = {"exec": {"command": ["rbxcompose", "ps", share.robot]}, "timeoutSeconds": 5}
+    mounts = [("files", PROJECT), ("run", "/run/robot"), ("tmp", "/tmp"), ("shm", "/dev/shm")]  # noqa: S108 - of the pod
+    if share.has_certificates:
+        mounts.append(("certificates", f"{CONFIGURATION}/{share.certificates}"))
+    mounts += [(f"device-{n}", path) for n, path in enumerate(share.devices)]
+    return {
+        "name": "share",
+        "image": image,
+        "args": [f"{PROJECT}/{file}" if word == FILE else word for word in share.command],
+        "env": [
+            {"name": "XDG_RUNTIME_DIR", "value": "/run/robot"},
+            {"name": "XDG_CONFIG_HOME", "value": CONFIGURATION},
+            *(_variable(share, name) for name in share.secrets),
+        ],
+        "startupProbe": {**probe, "periodSeconds": 2, "failureThreshold": 60},
+        "livenessProbe": {**probe, "periodSeconds": 10, "failureThreshold": 3},
+        "resources": {"requests": {"cpu": "100m", "memory": "128Mi"}, "limits": {"memory": f"{MEMORY}i"}},
+        "securityContext": {
+            "privileged": bool(share.devices),  # devices of the host are open to nobody else
+            "allowPrivilegeEscalation": bool(share.devices),
+            "readOnlyRootFilesystem": True,
+            **({} if share.devices else {"capabilities": {"drop": ["ALL"]}}),
+        },
+        "volumeMounts": [{"name": name, "mountPath": path} for name, path in mounts],
+    }

@@ -1,0 +1,69 @@
+"""What MoveIt reads of a robot: its URDF, and an SRDF with its arms and the pairs of links to ignore."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rbxcompose.domains.arms.sections.arms import ArmOfRobot, arms
+from rbxcompose.domains.body.description import Description
+from rbxcompose.domains.body.model import Body
+from rbxcompose.domains.body.sections.body import body
+from rbxcompose.domains.body.srdf import EndEffector, OuterJoint, SemanticGroup, Semantics, to_srdf
+from rbxcompose.domains.servos.sections.controllers import controllers
+from rbxcompose.manifest.section import Contents
+
+_CONTROLLER = "_controller"  # ends the names of controllers, and not those of groups
+
+
+def exported(contents: Contents, name: str) -> dict[str, str]:
+    """Return the files for MoveIt by name; nothing if the robot has no body."""
+    description = contents.of(body)
+    if description is None:
+        return {}
+    return {
+        f"{name}.urdf": description.published,
+        f"{name}.srdf": to_srdf(semantics_of(contents, description.body.name)),
+    }
+
+
+def semantics_of(contents: Contents, name: str) -> Semantics:
+    """Return what is known of the arms of a robot; `name` is that of its body."""
+    description, found = contents.of(body), contents.of(arms)
+    hands: dict[str, SemanticGroup] = {}
+    effectors: list[EndEffector] = []
+    for arm, one in found.items():
+        there = contents.of(controllers).get(one.model.gripper or "")
+        if there is not None and description is not None:
+            hand = (one.model.gripper or "").removesuffix(_CONTROLLER)
+            hands[hand] = SemanticGroup(hand, joints=tuple(there.claimed))
+            effectors.append(EndEffector(hand, hand, _palm(description.body, there.claimed[0]), arm))
+    return Semantics(
+        name,
+        {**{arm: _group(arm, entry, description) for arm, entry in found.items()}, **hands},
+        {arm: poses for arm, entry in found.items() if (poses := _poses(entry))},
+        tuple(effectors),
+        tuple(dict.fromkeys(joint for entry in found.values() for joint in entry.model.passive)),
+        description.matrix.pairs if description is not None and description.matrix is not None else {},
+        tuple(_outer(description)) if description is not None else (),
+    )
+
+
+def _outer(known: Description) -> Iterator[OuterJoint]:
+    if joint := known.virtual:
+        yield OuterJoint(joint.name, joint.kind, joint.frame, known.body.own_root)
+
+
+def _group(name: str, robot: ArmOfRobot, known: Description | None) -> SemanticGroup:
+    chain, body = robot.model.chain, known.body if known is not None else Body("")
+    top = body.own_root if body.frame else ""
+    chains = ((top if chain.from_ == body.frame else chain.from_, chain.to),) if chain is not None else ()
+    return SemanticGroup(name, chains, tuple(robot.model.joints), tuple(robot.model.links), tuple(robot.model.groups))
+
+
+def _poses(robot: ArmOfRobot) -> dict[str, dict[str, float]]:
+    return {pose: {joint: at.value for joint, at in written.items()} for pose, written in robot.model.poses.items()}
+
+
+def _palm(known: Body, joint: str) -> str:
+    """Return the link that carries a finger."""
+    return known.joints[joint].parent

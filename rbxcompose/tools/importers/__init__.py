@@ -1,0 +1,1 @@
+"""Importers that belong to no domain."""

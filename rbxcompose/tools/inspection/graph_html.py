@@ -1,0 +1,230 @@
+"""A robot as one self-contained HTML page: a picture to hover over, and tables of its contents."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from html import escape
+
+from rbxcompose.commands.layout import Edge, Layout, LayoutItem, Rect, lay_out
+from rbxcompose.tools.inspection.diagram import Box, BoxShape, Diagram, DiagramWire, Tip, WireContent
+
+STYLE = """
+:root{--page:#fff;--text:#1f2328;--soft:#59636e;--edge:#d0d7de;--group:#f6f8fa;--body:#fff;
+--topic:#0969da;--service:#1a7f37;--action:#8250df;--look:#818b98;--mux:#bc4c00}
+@media(prefers-color-scheme:dark){:root{--page:#0d1117;--text:#e6edf3;--soft:#9198a1;--edge:#3d444d;--group:#151b23;
+--body:#212830;--topic:#4493f8;--service:#3fb950;--action:#ab7df8;--look:#818b98;--mux:#f0883e}}
+*{box-sizing:border-box}body{margin:0;padding:20px 24px;background:var(--page);color:var(--text);
+font:14px/1.45 system-ui,sans-serif}
+h1{margin:0;font-size:22px}h2{font-size:16px;margin:24px 0 8px}header p{margin:2px 0 10px;color:var(--soft)}
+.legend{display:flex;flex-wrap:wrap;gap:6px 18px;align-items:center;margin-bottom:12px;color:var(--soft)}
+.legend label,.legend span{display:flex;gap:6px;align-items:center}.legend label{cursor:pointer}
+.legend input{margin:0}.sample{width:20px;height:13px;border:1.5px solid var(--soft);border-radius:4px}
+.sample.mux{border:3px double var(--mux);border-radius:1px}.sample.mission{border-color:var(--action);border-radius:7px}
+.sample.group{background:var(--group);border:1px solid var(--edge)}
+.picture{overflow:auto;border:1px solid var(--edge);border-radius:8px;padding:6px}
+.picture svg.graph{display:block;margin:auto}
+svg text{font:12px system-ui,sans-serif;fill:var(--text);text-anchor:middle}
+svg text.name{font-weight:600;font-size:13px}svg text.type{font-size:11px;fill:var(--soft)}
+svg text.topic{font-size:11.5px}svg text.process{text-anchor:start;fill:var(--soft);font-weight:600}
+.group{fill:var(--group);stroke:var(--edge)}.body{fill:var(--body);stroke:var(--soft);stroke-width:1.3}
+.mux .body,.mux .inner{stroke:var(--mux)}.inner{fill:none;stroke-width:1}.mission .body{stroke:var(--action)}
+.pill{fill:var(--page);stroke:var(--edge)}.open .pill{stroke-dasharray:4 3}
+.line{fill:none;stroke-width:1.5}.run{stroke:var(--soft)}
+.topic .pill{stroke:var(--topic)}.service .pill{stroke:var(--service)}.action .pill{stroke:var(--action)}
+.look-up .pill{stroke:var(--look)}
+.line.topic{stroke:var(--topic)}.line.service{stroke:var(--service);stroke-dasharray:7 4}
+.line.action{stroke:var(--action);stroke-width:2.6}.line.look-up{stroke:var(--look);stroke-dasharray:1.5 4}
+.box{cursor:pointer;outline:none}.box:focus .body{stroke-width:2.6}
+.faded .wire:not(.near),.faded .box:not(.near),.faded .run:not(.near){opacity:.13}
+.hidden{display:none}
+table{border-collapse:collapse;display:block;overflow-x:auto}
+th,td{text-align:left;padding:3px 14px 3px 0;border-bottom:1px solid var(--edge);vertical-align:top}
+th{color:var(--soft);font-weight:600}td{overflow-wrap:anywhere}
+"""
+
+SCRIPT = """
+const graph=document.querySelector("svg.graph"),all=s=>[...document.querySelectorAll(s)];
+const boxesOf=e=>(e.dataset.boxes||"").split(" ");let held=null;
+function show(key){graph.classList.toggle("faded",!!key);const near=new Set([key]);
+for(const e of all(".wire,.line.run")){const on=boxesOf(e).includes(key);e.classList.toggle("near",on);
+if(on)boxesOf(e).forEach(k=>near.add(k))}
+for(const e of all(".box"))e.classList.toggle("near",near.has(e.dataset.box))}
+for(const e of all(".box")){e.onpointerenter=()=>held||show(e.dataset.box);e.onpointerleave=()=>held||show(null);
+e.onclick=()=>{held=held===e.dataset.box?null:e.dataset.box;show(held)};
+e.onkeydown=k=>{if(k.key==="Enter")e.onclick()}}
+for(const e of all("input[data-kind]"))e.onchange=()=>{
+for(const w of all(`.wire[data-kind="${e.dataset.kind}"],tr[data-kind="${e.dataset.kind}"]`))
+w.classList.toggle("hidden",!e.checked)};
+"""
+
+
+_BOX_HEIGHT, _WIRE_HEIGHT = 46.0, 34.0
+_WIDE, _SMALL = 7.6, 6.4  # width of a letter of names and of small text [px]
+_RUNS = "runs"
+
+
+def html(diagram: Diagram) -> str:
+    """Return the HTML of the page: light or dark, as the reader has set it."""
+    return "".join(f"{line}\n" for line in _page(diagram))
+
+
+def _page(diagram: Diagram) -> Iterator[str]:
+    title = escape(diagram.robot)
+    yield "<!doctype html>"
+    yield f'<html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
+    yield '<meta name="viewport" content="width=device-width, initial-scale=1">'
+    yield f"<style>{STYLE}</style></head><body>"
+    yield f"<header><h1>{title}</h1><p>{escape(diagram.about)}</p>"
+    yield from _legend(diagram)
+    yield '</header><div class="picture">'
+    yield from _picture(diagram)
+    yield "</div>"
+    yield from _tables(diagram)
+    yield f"<script>{SCRIPT}</script></body></html>"
+
+
+def _legend(diagram: Diagram) -> Iterator[str]:
+    """Yield the legend of the lines, with a checkbox for each kind that is drawn."""
+    yield '<div class="legend">'
+    for kind in WireContent:
+        if count := sum(wire.kind is kind for wire in diagram.wires):
+            sample = f'<svg width="34" height="10"><path class="line {kind}" d="M1 5H33"/></svg>'
+            yield f'<label><input type="checkbox" checked data-kind="{kind}">{sample}{_plural(kind, count)}</label>'
+    shapes = {box.shape for box in diagram.boxes}
+    yield from (f'<span><i class="sample {shape}"></i>{shape}</span>' for shape in BoxShape if shape in shapes)
+    yield '<span><i class="sample group"></i>process</span></div>'
+
+
+def _plural(kind: WireContent, count: int) -> str:
+    return f"{count} {kind}{'' if count == 1 else 's'}"
+
+
+def _picture(diagram: Diagram) -> Iterator[str]:
+    layout = _layout(diagram)
+    yield (
+        f'<svg class="graph" width="{layout.width:.0f}" height="{layout.height:.0f}" '
+        f'viewBox="0 0 {layout.width:.0f} {layout.height:.0f}" role="img" aria-label="components and wires">'
+    )
+    yield '<defs><marker id="arrow" viewBox="0 0 8 8" refX="7.5" refY="4" markerWidth="9" markerHeight="9" '
+    yield 'markerUnits="userSpaceOnUse" orient="auto">'
+    yield '<path d="M0 0L8 4L0 8z" fill="context-stroke"/></marker></defs>'
+    for group, rect in layout.groups.items():
+        yield f"{_rect(rect, 'group', 10)}"
+        yield f'<text class="process" x="{rect.x + 12:.0f}" y="{rect.y + 18:.0f}">process {group}</text>'
+    for executive, program in diagram.runs:
+        yield from _line(layout, executive, _run(program), "run", f"{executive} {program}", has_arrow=False)
+        yield from _line(layout, _run(program), program, "run", f"{executive} {program}", has_arrow=False)
+        yield _small(layout.places[_run(program)], _RUNS)
+    for number, wire in enumerate(diagram.wires):
+        yield from _wire(layout, f"w{number}", wire)
+    for box in diagram.boxes:
+        yield from _box(layout.places[box.key], box, box.key == diagram.start)
+    yield "</svg>"
+
+
+def _run(program: str) -> str:
+    return f"run {program}"
+
+
+def _layout(diagram: Diagram) -> Layout:
+    """Return the positions of boxes, and of wires, which are placed between the boxes they connect."""
+    groups = {box.key: box.group for box in diagram.boxes}
+    items = [
+        LayoutItem(box.key, _width(box.name, box.type), _BOX_HEIGHT, box.group, is_round=box.shape is BoxShape.PROGRAM)
+        for box in diagram.boxes
+    ]
+    edges: list[Edge] = []
+    for executive, program in diagram.runs:
+        items.append(LayoutItem(_run(program), 30.0, 16.0, groups[program], is_round=True))
+        edges += [(executive, _run(program)), (_run(program), program)]
+    for number, wire in enumerate(diagram.wires):
+        key = f"w{number}"
+        width = max(_SMALL * len(text) for text in (wire.name, _second_line(wire))) + 20
+        group = groups[(wire.sources or wire.targets)[0].box]
+        items.append(LayoutItem(key, width, _WIRE_HEIGHT, group, is_round=True))
+        edges += [(tip.box, key) for tip in wire.sources] + [(key, tip.box) for tip in wire.targets]
+    return lay_out(items, list(dict.fromkeys(edges)))
+
+
+def _width(name: str, type_: str) -> float:
+    return max(_WIDE * len(name), _SMALL * len(type_), 60.0) + 26
+
+
+def _wire(layout: Layout, key: str, wire: DiagramWire) -> Iterator[str]:
+    boxes = " ".join(dict.fromkeys(tip.box for tip in (*wire.sources, *wire.targets)))
+    is_open = "" if wire.sources and wire.targets else " open"
+    rect = layout.places[key]
+    yield f'<g class="wire {wire.kind}{is_open}" data-kind="{wire.kind}" data-boxes="{escape(boxes)}">'
+    yield f"<title>{escape(_told(wire))}</title>"
+    for tip in wire.sources:
+        yield from _line(layout, tip.box, key, str(wire.kind), boxes, has_arrow=not wire.targets)
+    for tip in wire.targets:
+        yield from _line(layout, key, tip.box, str(wire.kind), boxes)
+    yield _rect(rect, "pill", rect.height / 2)
+    x, y = rect.x + rect.width / 2, rect.y
+    yield f'<text class="topic" x="{x:.0f}" y="{y + 14:.0f}">{escape(wire.name)}</text>'
+    yield f'<text class="type" x="{x:.0f}" y="{y + 27:.0f}">{escape(_second_line(wire))}</text></g>'
+
+
+def _second_line(wire: DiagramWire) -> str:
+    return f"{wire.short_type}, {wire.note}" if wire.note else wire.short_type
+
+
+def _told(wire: DiagramWire) -> str:
+    """Return a description of a wire."""
+    lines = [f"{wire.kind} {wire.name}", wire.type, *([f"quality of service: {wire.qos}"] if wire.qos else [])]
+    lines += [f"from {_names(wire.sources) or wire.about or 'outside'}", f"to {_names(wire.targets) or 'nothing here'}"]
+    return "\n".join(lines)
+
+
+def _names(tips: tuple[Tip, ...]) -> str:
+    return ", ".join(tip.box.removeprefix("mission:") + (f" ({tip.note})" if tip.note else "") for tip in tips)
+
+
+def _line(layout: Layout, begin: str, end: str, style: str, boxes: str, *, has_arrow: bool = True) -> Iterator[str]:
+    arrow = ' marker-end="url(#arrow)"' if has_arrow else ""
+    yield f'<path class="line {style}" data-boxes="{escape(boxes)}" d="{layout.paths[begin, end]}"{arrow}/>'
+
+
+def _box(rect: Rect, box: Box, is_start: bool) -> Iterator[str]:
+    x, y = rect.x + rect.width / 2, rect.y
+    yield f'<g class="box {box.shape}" data-box="{escape(box.key)}" tabindex="0">'
+    yield f"<title>{escape(box.name)}: {escape(box.type)}\n{escape(box.about)}</title>"
+    yield _rect(
+        rect, "body", {BoxShape.COMPONENT: 7.0, BoxShape.MUX: 2.0, BoxShape.PROGRAM: rect.height / 2}[box.shape]
+    )
+    if box.shape is BoxShape.MUX:
+        yield _rect(Rect(rect.x + 3, rect.y + 3, rect.width - 6, rect.height - 6), "inner", 1)
+    yield f'<text class="name" x="{x:.0f}" y="{y + 20:.0f}">{escape(box.name)}</text>'
+    kind = "start mission" if is_start else box.type
+    yield f'<text class="type" x="{x:.0f}" y="{y + 35:.0f}">{escape(kind)}</text></g>'
+
+
+def _small(rect: Rect, text: str) -> str:
+    return (
+        f'{_rect(rect, "pill", rect.height / 2)}<text class="type" x="{rect.x + rect.width / 2:.0f}" '
+        f'y="{rect.y + 12:.0f}">{text}</text>'
+    )
+
+
+def _rect(rect: Rect, style: str, radius: float) -> str:
+    return (
+        f'<rect class="{style}" x="{rect.x:.1f}" y="{rect.y:.1f}" width="{rect.width:.1f}" '
+        f'height="{rect.height:.1f}" rx="{radius:.0f}"/>'
+    )
+
+
+def _tables(diagram: Diagram) -> Iterator[str]:
+    yield "<section><h2>Components</h2><table><tr><th>name<th>type<th>process<th>what it is</tr>"
+    for box in diagram.boxes:
+        yield f"<tr>{_cells(box.name, box.type, box.group, box.about)}</tr>"
+    yield "</table></section><section><h2>Wires</h2><table><tr><th>kind<th>name<th>type<th>class<th>from<th>to</tr>"
+    for wire in diagram.wires:
+        begin, end = _names(wire.sources) or wire.about or "outside", _names(wire.targets) or "nothing here"
+        cells = _cells(str(wire.kind), wire.name, wire.type, wire.qos, begin, end)
+        yield f'<tr data-kind="{wire.kind}">{cells}</tr>'
+    yield "</table></section>"
+
+
+def _cells(*texts: str) -> str:
+    return "".join(f"<td>{escape(text)}" for text in texts)

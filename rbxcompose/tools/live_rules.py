@@ -1,0 +1,67 @@
+"""The rules of `check` for the settings of a robot that runs: what a change would break that was not broken before."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from types import MappingProxyType
+
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.findings import Finding, Span
+from rbxcompose.compiler.compile import Compilation, check_settings, compile_robot
+from rbxcompose.compiler.model.robot import NOTHING, Robot
+from rbxcompose.compiler.systems.reader import compile_system
+from rbxcompose.runtime.folder import ChosenLayers
+from rbxcompose.sdk.parameters import ChangeRefusal, Configs
+
+Broken = frozenset[tuple[str, Span | None]]
+
+
+@dataclass(slots=True)
+class LiveRules:
+    """The rules of a compiled robot; a supervisor's judge asks them in a process of its own."""
+
+    robot: Robot
+    _looked: tuple[Configs, Broken] = ({}, frozenset())  # what was broken when it looked last, with these settings
+
+    def remade(self, file: str, layers: ChosenLayers) -> LiveRules | None:
+        """Return the rules of the robot as its files are now, with these layers; None if they have errors."""
+        found = compiled_with(file, layers)
+        return None if found.robot is None or found.plan is None else LiveRules(found.robot)
+
+    def why_not(self, now: Configs, new: Configs) -> ChangeRefusal | None:
+        """Return the first rule that `new` configurations break, where others have those of `now`."""
+        written = {name: component.config for name, component in self.robot.components.items()}
+        before, after = {**written, **now}, {**written, **now, **new}
+        known = self._looked[1] if self._looked[0] == before else _broken(check_settings(self.robot, before))
+        found = list(check_settings(self.robot, after))
+        broken = next((setting for setting in found if (setting.code, setting.span) not in known), None)
+        if broken is None:
+            self._looked = after, _broken(found)  # most likely what there is when it looks next
+            return None
+        return ChangeRefusal(f"{broken.message} ({broken.code})", broken.help, breaks_rule=True)
+
+
+def compiled_with(file: str, layers: ChosenLayers, unsaved: Mapping[Path, str] = MappingProxyType({})) -> Compilation:
+    """Compile a robot's file with layers that were chosen before."""
+    outside = NOTHING
+    if layers.system:
+        system = compile_system(
+            layers.system, environment=os.environ, real=layers.real, profiles=layers.system_profiles
+        )
+        outside = system.robots[layers.member].robot.outside if layers.member in system.robots else NOTHING
+    return compile_robot(
+        file,
+        profiles=layers.profiles,
+        overlays=layers.overlays,
+        sets=layers.sets,
+        real=layers.real,
+        environment=os.environ,
+        unsaved=unsaved,
+        outside=outside,
+    )
+
+
+def _broken(found: Iterable[Finding]) -> Broken:
+    return frozenset((finding.code, finding.span) for finding in found)

@@ -1,0 +1,253 @@
+"""The robots that an editor works on: compiled with the texts as they are being typed."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import field
+from pathlib import Path
+
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.findings import Finding, Report
+from rbxcompose.compiler.compile import Compilation, compile_robot
+from rbxcompose.compiler.composition.robot_file import read_mission
+from rbxcompose.compiler.model.robot import Robot
+from rbxcompose.compiler.schema.documents import MAKERS, installed_schema
+from rbxcompose.manifest.files import ROBOT_FILE, project_of, shown_name
+from rbxcompose.manifest.reader import Texts, read_file
+from rbxcompose.missions.language.reader import read_program
+
+ROBOT, MISSION, OVERLAY = "Robot", "Mission", "Overlay"
+_KIND = re.compile(r"^kind:[ ]*[\"']?(\w+)", re.MULTILINE)
+_HEADER = re.compile(r"^rbx:", re.MULTILINE)
+_MOST_ROBOTS = 200  # examined per project
+_BEGINNING = 4_000  # characters that contain the header of a manifest
+
+FoundByFile = dict[Path, list[Finding]]
+
+
+class OutdatedError(Exception):
+    """Raised when a project is compiled whose texts have changed since."""
+
+
+def kind_of(text: str) -> str:
+    """Return the kind that a manifest declares, or nothing."""
+    match = _KIND.search(text[:_BEGINNING])
+    return match[1] if match else ""
+
+
+@dataclass(slots=True)
+class _Watched:
+    """A robot: its newest compilation, the files of that, and the robot of the last compilation that had one."""
+
+    compilation: Compilation
+    files: frozenset[Path]
+    robot: Robot | None
+
+
+@dataclass(slots=True)
+class Project:
+    """All open texts, and the robots that they are part of."""
+
+    environment: Mapping[str, str]
+    unsaved: dict[Path, str] = field(default_factory=dict)
+    is_outdated: Callable[[], bool] = lambda: False
+    _watched: dict[Path, _Watched] = field(default_factory=dict)
+    _alone: FoundByFile = field(default_factory=dict)  # findings in files that belong to no robot
+
+    def copy(self, is_outdated: Callable[[], bool]) -> Project:
+        """Return a project that changes independently of this one; it raises `OutdatedError` once it is outdated."""
+        return Project(self.environment, dict(self.unsaved), is_outdated, dict(self._watched), dict(self._alone))
+
+    def has(self, path: Path, text: str) -> bool:
+        """Return whether a text is a manifest: editors send every YAML file."""
+        return _HEADER.search(text[:_BEGINNING]) is not None or bool(self._concerned(path))
+
+    def text(self, path: Path) -> str:
+        """Return the text of a file from the editor, else the saved one; empty if it cannot be read."""
+        if path in self.unsaved:
+            return self.unsaved[path]
+        sources: dict[str, str] = {}
+        read_file(path, str(path), sources)
+        return sources.get(str(path), "")
+
+    def change(self, path: Path, text: str | None) -> FoundByFile:
+        """Take a new text (None: the saved one counts again) and return the findings of all files concerned.
+
+        A file without findings has an empty list, so that its old findings are cleared.
+        """
+        if text is None:
+            self.unsaved.pop(path, None)
+        else:
+            self.unsaved[path] = text
+        before = {file for robot in self._concerned(path) for file in self._watched[robot].files}
+        self._alone.pop(path, None)
+        robots = self._robots_of(path)
+        for robot in robots:
+            self._compile(robot)
+        if not robots and (base := self._base_of(path)):
+            self._robots_of(base)
+        if not robots:
+            self._alone[path] = self._lone_findings(path)
+        after = {file for robot in robots for file in self._watched[robot].files}
+        return {file: self.findings(file) for file in sorted({path} | before | after)}
+
+    def change_all(self, texts: Mapping[Path, str | None]) -> FoundByFile:
+        """Take several new texts in the way of `change`.
+
+        Raises:
+            OutdatedError: if the project has become outdated; it must not be used any more.
+        """
+        files = {file: None for path, text in texts.items() for file in self.change(path, text)}
+        return {file: self.findings(file) for file in files}
+
+    def findings(self, path: Path) -> list[Finding]:
+        """Return the known findings in a file, from all robots."""
+        found = [finding for robot in self._watched for finding in self._of(robot, path)]
+        return list(dict.fromkeys([*found, *self._alone.get(path, ())]))
+
+    def robot_of(self, path: Path) -> Robot | None:
+        """Return a robot that a file belongs to, as last read successfully; None before it was compiled."""
+        robots = self._concerned(path)
+        if not robots and (base := self._base_of(path)):
+            robots = self._concerned(base)
+        return next((robot for one in robots if one in self._watched and (robot := self._watched[one].robot)), None)
+
+    def _base_of(self, path: Path) -> Path | None:
+        """Return the robot that an overlay is assumed to belong to: the one beside it."""
+        robot = path.parent / ROBOT_FILE
+        return robot if kind_of(self.text(path)) == OVERLAY and robot.is_file() else None
+
+    def _of(self, robot: Path, path: Path) -> Iterator[Finding]:
+        for finding in self._watched[robot].compilation.report:
+            place = Path(finding.span.file).resolve() if finding.span else robot
+            if place == path:
+                yield finding
+
+    def _concerned(self, path: Path) -> list[Path]:
+        return [robot for robot, watched in self._watched.items() if path in watched.files]
+
+    def _robots_of(self, path: Path) -> list[Path]:
+        """Return the robots that a file is part of: itself, or those of its project that use it."""
+        kind = kind_of(self.text(path))
+        if kind == ROBOT or path in self._watched:
+            return [path]
+        for robot in _robot_files(path):
+            if robot not in self._watched and kind_of(self.text(robot)) == ROBOT:
+                self._compile(robot)
+        return self._concerned(path)
+
+    def _compile(self, path: Path) -> None:
+        if self.is_outdated():
+            raise OutdatedError
+        made = compile_robot(str(path), environment=self.environment, unsaved=self.unsaved)
+        before = self._watched.get(path)
+        files = frozenset({path, *(Path(shown).resolve() for shown in made.sources)})
+        # While a text cannot be read, the names of the last readable robot serve best.
+        robot = made.robot or (before.robot if before else None)
+        self._watched[path] = _Watched(made, files, robot)
+
+    def _lone_findings(self, path: Path) -> list[Finding]:
+        report, sources = Report(), Texts(self.unsaved)
+        if kind_of(self.text(path)) == MISSION:
+            root = read_mission(path, robot="", report=report, sources=sources, environment=self.environment)
+            if root is not None:
+                read_program(root, report)
+        elif base := self._base_of(path):
+            return self._overlay_findings(path, base)
+        else:
+            report.extend(read_file(path, shown_name(path), sources)[1])
+        return list(report)
+
+    def _overlay_findings(self, path: Path, base: Path) -> list[Finding]:
+        """Return the findings in an overlay when it is applied to the robot beside it."""
+        made = compile_robot(str(base), overlays=[str(path)], environment=self.environment, unsaved=self.unsaved)
+        return [finding for finding in made.report if finding.span and Path(finding.span.file).resolve() == path]
+
+
+def _robot_files(path: Path) -> list[Path]:
+    folder = project_of(path) / "robots"
+    found = sorted(folder.rglob("*.yaml"))[:_MOST_ROBOTS] if folder.is_dir() else []
+    return [robot.resolve() for robot in found]
+
+
+PAUSE = 0.1  # [s] without a keystroke before robots are compiled again
+
+
+class Newest:
+    """The project as last compiled, and the texts that have changed since.
+
+    A thread works on a copy of the project, which replaces the project when it is done. A text that arrives meanwhile
+    makes the copy outdated: it stops at the next robot, and the work starts again with all texts. So what is `told`
+    always comes from the newest texts. All methods belong to the thread of the event loop.
+    """
+
+    def __init__(self, project: Project, told: Callable[[FoundByFile], None]) -> None:
+        self.project = project
+        self._told = told
+        self._waiting: dict[Path, str | None] = {}
+        self._number = 0  # count of changes so far
+        self._due = 0.0  # in loop time
+        self._task: asyncio.Task[None] | None = None
+        self._thread = ThreadPoolExecutor(1, "compile")
+
+    def prepare(self) -> None:
+        """Load what the first answer needs, in the thread."""
+        for kind in MAKERS:
+            self._thread.submit(installed_schema, kind)
+
+    def has(self, path: Path) -> bool:
+        """Return whether the editor's text of a file replaces the saved one."""
+        return self._waiting.get(path) is not None or (path in self.project.unsaved and path not in self._waiting)
+
+    def text(self, path: Path) -> str:
+        """Return the newest text of a file."""
+        return waiting if (waiting := self._waiting.get(path)) is not None else self.project.text(path)
+
+    @property
+    def unsaved(self) -> dict[Path, str]:
+        """Return the newest texts that are in the editor only."""
+        there = {**self.project.unsaved, **self._waiting}
+        return {path: text for path, text in there.items() if text is not None}
+
+    def is_compiled(self, path: Path, text: str) -> bool:
+        """Return whether the project was compiled with this text of a file."""
+        return not self._waiting and self.project.text(path) == text
+
+    def change(self, path: Path, text: str | None, pause: float = 0.0) -> None:
+        """Take a new text (None: the saved one counts again) and compile it after a pause [s]."""
+        self._waiting[path] = text
+        self._number += 1
+        loop = asyncio.get_running_loop()
+        self._due = loop.time() + pause
+        if self._task is None or self._task.done():
+            self._task = loop.create_task(self._work())
+
+    def close(self) -> None:
+        """Stop the thread; its current work becomes outdated."""
+        self._number += 1
+        self._waiting.clear()
+        self._thread.shutdown(wait=False, cancel_futures=True)
+
+    async def _work(self) -> None:
+        loop = asyncio.get_running_loop()
+        while self._waiting:
+            if (pause := self._due - loop.time()) > 0:
+                await asyncio.sleep(pause)
+                continue
+            number, texts = self._number, dict(self._waiting)
+            project = self._copy(number)
+            try:
+                found = await loop.run_in_executor(self._thread, project.change_all, texts)
+            except OutdatedError:
+                continue
+            if number == self._number:
+                self.project = project
+                self._waiting.clear()
+                self._told(found)
+
+    def _copy(self, number: int) -> Project:
+        """Return a copy of the project that becomes outdated with the first change after `number`."""
+        return self.project.copy(lambda: number != self._number)

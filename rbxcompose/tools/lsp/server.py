@@ -1,0 +1,239 @@
+"""The language server: passes requests of an editor to the core, over stdin and stdout."""
+
+from __future__ import annotations
+
+import logging
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Protocol, TypeVar
+
+from lsprotocol import types
+from pygls.exceptions import JsonRpcException
+from pygls.lsp.server import LanguageServer
+from pygls.protocol import json_rpc
+
+import rbxcompose
+from rbxcompose.compiler.model.robot import Robot
+from rbxcompose.tools.lsp.answers import define, describe, outline
+from rbxcompose.tools.lsp.completion import complete
+from rbxcompose.tools.lsp.convert import Converter
+from rbxcompose.tools.lsp.document import Document
+from rbxcompose.tools.lsp.mentions import SymbolIndex, symbol_index_references
+from rbxcompose.tools.lsp.project import PAUSE, FoundByFile, Newest, Project
+from rbxcompose.tools.lsp.project_files import ProjectFiles
+from rbxcompose.tools.lsp.rename import CannotRenameError, actions, compiler, prepare, rename
+
+P = TypeVar("P")
+R = TypeVar("R")
+SWITCH = 0.001  # [s] that an answer waits for the other thread, which may be compiling
+TRIGGERS = (" ", ":", "$", "{", ".", "-", "[", ",")
+
+
+class RefusedRenameError(JsonRpcException):
+    """Raised to answer a rename that is refused with the reason, which editors show."""
+
+    CODE = types.LSPErrorCodes.RequestFailed.value
+
+
+class Session:
+    """One editor's session."""
+
+    def __init__(self, server: LanguageServer, environment: Mapping[str, str]) -> None:
+        self.server = server
+        self.newest = Newest(Project(environment), self._publish)
+        self._converter: Converter | None = None
+
+    @property
+    def project(self) -> Project:
+        """Return the project as last compiled."""
+        return self.newest.project
+
+    @property
+    def convert(self) -> Converter:
+        """Return the converter, which needs the settings negotiated at the start."""
+        if self._converter is None:
+            self._converter = Converter(lambda path: self.project.text(path), self.server.workspace.position_codec)
+        return self._converter
+
+    def opened(self, uri: str, pause: float = 0.0) -> None:
+        """Check a document."""
+        path = self.convert.path(uri)
+        text = self._text(uri)
+        if path is not None and (self.newest.has(path) or self.project.has(path, text)):
+            self.newest.change(path, text, pause)
+
+    def changed(self, uri: str) -> None:
+        """Check a document after a short pause in typing."""
+        self.opened(uri, PAUSE)
+
+    def closed(self, uri: str) -> None:
+        """Use the saved text again."""
+        path = self.convert.path(uri)
+        if path is not None and self.newest.has(path):
+            self.newest.change(path, None)
+
+    def begun(self, _: object) -> None:
+        """Prepare for the first request."""
+        self.newest.prepare()
+
+    def ended(self, _: object) -> None:
+        """Stop the thread."""
+        self.newest.close()
+
+    def _publish(self, found: FoundByFile) -> None:
+        for file, findings in found.items():
+            shown = [self.convert.diagnostic(file, finding) for finding in findings]
+            uri = self.convert.uri(file)
+            self.server.text_document_publish_diagnostics(types.PublishDiagnosticsParams(uri, shown))
+
+    def _text(self, uri: str) -> str:
+        return self.server.workspace.get_text_document(uri).source.replace("\r\n", "\n")
+
+    def document(self, uri: str) -> Document | None:
+        """Return a document with its newest text, None if it is not one of ours."""
+        path, text = self.convert.path(uri), self._text(uri)
+        if path is None or (text.strip() and not self.project.has(path, text)):
+            return None
+        return Document(path, text, self.project.robot_of(path))
+
+    def completion(self, params: types.CompletionParams) -> types.CompletionList:
+        """Propose what can be written."""
+        document = self.document(params.text_document.uri)
+        if document is None:
+            return types.CompletionList(is_incomplete=False, items=[])
+        place = self.convert.position(document.text, params.position)
+        found = enumerate(complete(document, *place))
+        return types.CompletionList(
+            is_incomplete=False, items=[self.convert.item(document.text, place, turn, one) for turn, one in found]
+        )
+
+    def definition(self, params: types.DefinitionParams) -> types.Location | None:
+        """Return the place where something is defined."""
+        document = self.document(params.text_document.uri)
+        span = define(document, *self.convert.position(document.text, params.position)) if document else None
+        return self.convert.location(span) if span else None
+
+    def hover(self, params: types.HoverParams) -> types.Hover | None:
+        """Describe what is at a position."""
+        document = self.document(params.text_document.uri)
+        text = describe(document, *self.convert.position(document.text, params.position)) if document else ""
+        return types.Hover(types.MarkupContent(types.MarkupKind.Markdown, text)) if text else None
+
+    def document_symbol(self, params: types.DocumentSymbolParams) -> list[types.DocumentSymbol]:
+        """Return the outline of a document."""
+        document = self.document(params.text_document.uri)
+        return (
+            [self.convert.outlined(document.text, outline_entry) for outline_entry in outline(document.text)]
+            if document
+            else []
+        )
+
+    def references(self, params: types.ReferenceParams) -> list[types.Location]:
+        """Return where the name at a position is written."""
+        document = self.document(params.text_document.uri)
+        if document is None:
+            return []
+        index, place = self._index(document), self.convert.position(document.text, params.position)
+        is_whole = params.context.include_declaration
+        found = symbol_index_references(index, document.path, *place, with_definitions=is_whole)
+        return [self.convert.mention(index.files.text(reference.file), reference) for reference in found]
+
+    def prepare_rename(self, params: types.PrepareRenameParams) -> types.PrepareRenamePlaceholder | None:
+        """Return the range of the name at a position, if it can be renamed."""
+        document = self.document(params.text_document.uri)
+        if document is None:
+            return None
+        try:
+            found = prepare(
+                self._index(document), document.path, *self.convert.position(document.text, params.position)
+            )
+        except CannotRenameError as error:
+            raise RefusedRenameError(str(error)) from None
+        place = self.convert.mention(document.text, found).range
+        return types.PrepareRenamePlaceholder(place, found.symbol.name)
+
+    def rename(self, params: types.RenameParams) -> types.WorkspaceEdit | None:
+        """Rename what is at a position, in all files of the project."""
+        document = self.document(params.text_document.uri)
+        if document is None:
+            return None
+        index, place = self._index(document), self.convert.position(document.text, params.position)
+        compiled = compiler(self.project.environment, self.newest.unsaved)
+        try:
+            made = rename(index, document.path, *place, params.new_name, compiled)
+        except CannotRenameError as error:
+            raise RefusedRenameError(str(error)) from None
+        return self.convert.renamed(made, index.files.text)
+
+    def _index(self, document: Document) -> SymbolIndex:
+        """Return all names of the project around a document."""
+        compiled = compiler(self.project.environment, self.newest.unsaved)
+
+        def robot_of(path: Path) -> Robot | None:
+            return self.project.robot_of(path) or compiled(path, {}).robot
+
+        def text(path: Path) -> str:
+            return document.text if path == document.path else self.newest.text(path)
+
+        return SymbolIndex(ProjectFiles(document.path, text), robot_of)
+
+    def code_action(self, params: types.CodeActionParams) -> list[types.CodeAction]:
+        """Offer the fixes of the findings here."""
+        path, text = self.convert.path(params.text_document.uri), self._text(params.text_document.uri)
+        if path is None or not self.newest.is_compiled(path, text):
+            return []  # the places of an older text would be wrong
+        findings = self.project.findings(path)
+        lines = params.range.start.line, params.range.end.line
+        return [self.convert.action(action) for action in actions(self.project, findings, *lines)]
+
+
+def make_server(environment: Mapping[str, str]) -> LanguageServer:
+    """Return a server; `environment` is what `${env.NAME}` sees."""
+    sys.setswitchinterval(SWITCH)
+    logging.getLogger(json_rpc.__name__).addFilter(_is_no_refusal)
+    server = LanguageServer("rbxcompose", rbxcompose.__version__)
+    session = Session(server, environment)
+
+    for notice, take in (
+        (types.TEXT_DOCUMENT_DID_OPEN, session.opened),
+        (types.TEXT_DOCUMENT_DID_SAVE, session.opened),
+        (types.TEXT_DOCUMENT_DID_CHANGE, session.changed),
+        (types.TEXT_DOCUMENT_DID_CLOSE, session.closed),
+    ):
+        server.feature(notice)(_of_document(take))
+    server.feature(types.INITIALIZED)(_function(session.begun))
+    server.feature(types.SHUTDOWN)(_function(session.ended))
+    triggers = types.CompletionOptions(trigger_characters=list(TRIGGERS))
+    fixes = types.CodeActionOptions(code_action_kinds=[types.CodeActionKind.QuickFix])
+    server.feature(types.TEXT_DOCUMENT_COMPLETION, triggers)(_function(session.completion))
+    server.feature(types.TEXT_DOCUMENT_DEFINITION)(_function(session.definition))
+    server.feature(types.TEXT_DOCUMENT_HOVER)(_function(session.hover))
+    server.feature(types.TEXT_DOCUMENT_DOCUMENT_SYMBOL)(_function(session.document_symbol))
+    server.feature(types.TEXT_DOCUMENT_REFERENCES)(_function(session.references))
+    server.feature(types.TEXT_DOCUMENT_PREPARE_RENAME)(_function(session.prepare_rename))
+    server.feature(types.TEXT_DOCUMENT_RENAME, types.RenameOptions(prepare_provider=True))(_function(session.rename))
+    server.feature(types.TEXT_DOCUMENT_CODE_ACTION, fixes)(_function(session.code_action))
+    return server
+
+
+def _is_no_refusal(record: logging.LogRecord) -> bool:
+    """Return whether a line belongs in the log: pygls takes every refusal for an exception of ours."""
+    return not (record.exc_info and isinstance(record.exc_info[1], RefusedRenameError))
+
+
+class _Notice(Protocol):
+    """A notification about one document."""
+
+    @property
+    def text_document(self) -> types.TextDocumentItem | types.TextDocumentIdentifier: ...
+
+
+def _of_document(take: Callable[[str], None]) -> Callable[[_Notice], None]:
+    """Return a handler that passes on the document that a notification is about."""
+    return lambda params: take(params.text_document.uri)
+
+
+def _function(method: Callable[[P], R]) -> Callable[[P], R]:
+    """Return a method as a plain function: pygls marks what it registers, and a bound method cannot be marked."""
+    return lambda params: method(params)

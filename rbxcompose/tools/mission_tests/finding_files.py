@@ -1,0 +1,51 @@
+"""Which files are tests: those that are named, and all tests in folders."""
+
+from __future__ import annotations
+
+import re
+import stat
+from collections.abc import Iterable
+from pathlib import Path
+
+from rbxcompose.base.files import open_regular
+from rbxcompose.manifest.section import TEST
+
+_KIND = re.compile(rb"^kind:[ \t]*['\"]?(\w+)", re.MULTILINE)
+_HEAD = 4096  # [B] at the start of a file that contain its kind
+_TESTS = (".test.yaml", ".test.yml")
+_SUFFIXES = (".yaml", ".yml")
+
+
+def tests_of(paths: Iterable[Path]) -> list[Path]:
+    """Return the tests that paths mean; a file that is named is one, whatever it contains.
+
+    So is what cannot be a file although its name is that of one, such as a pipe: reading it gives the finding.
+    """
+    found: dict[Path, None] = {}
+    for path in paths:
+        below = sorted(one for one in path.rglob("*") if is_test(one) or _is_odd(one)) if path.is_dir() else [path]
+        found.update((one.absolute() if _is_odd(one) else one.resolve(), None) for one in below)
+    return list(found)
+
+
+def _is_odd(path: Path) -> bool:
+    """Return whether a name is that of a test, but leads to a pipe, a device or nothing that can be examined.
+
+    Hidden ones are left out: editors mark open files by links to nowhere.
+    """
+    if path.name.startswith(".") or not path.name.endswith(_TESTS):
+        return False
+    try:
+        mode = path.stat().st_mode
+    except OSError:  # such as a link to itself
+        return path.is_symlink()
+    return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
+
+
+def is_test(path: Path) -> bool:
+    """Return whether a file says that it is a test."""
+    if path.suffix not in _SUFFIXES or not path.is_file():
+        return False
+    with open_regular(path) as file:
+        kind = _KIND.search(file.read(_HEAD))
+    return kind is not None and kind[1].decode() == TEST

@@ -1,0 +1,113 @@
+"""The record of a run: lines with their times, the steps that ran, messages, data, the end."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import field
+
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.expressions.values import Value
+from rbxcompose.base.levels import Level
+from rbxcompose.missions.engine.events import (
+    Logged,
+    MissionEnded,
+    MissionEvent,
+    NodeEnded,
+    NodeStarted,
+    Published,
+    Reported,
+    SkillEnded,
+    SkillStarted,
+)
+from rbxcompose.missions.engine.story import MissionStory
+from rbxcompose.missions.program.program import Skill
+from rbxcompose.tools.mission_tests.model import RUNS
+
+
+@dataclass(frozen=True, slots=True)
+class TraceLine:
+    """One line of the trace, at a time [s]."""
+
+    time: float
+    text: str
+    level: Level = Level.OK
+
+
+@dataclass(slots=True)
+class Done:
+    """A step that ran: a call of a skill, a named node or a state, from `began` to `ended_at` [s].
+
+    `line` is the line of its start in the trace. `ended` is `running` until it ends.
+    """
+
+    name: str
+    text: str
+    arguments: Mapping[str, Value]
+    began: float
+    line: int
+    ended: str = RUNS
+    ended_at: float | None = None
+
+
+@dataclass(slots=True)
+class TrialRecord:
+    """Records the events of a mission, and the actions of the test."""
+
+    mission: str
+    skills: Mapping[str, Skill]
+    now: float = 0.0  # [s] since the start
+    lines: list[TraceLine] = field(default_factory=list)
+    steps: list[Done] = field(default_factory=list)
+    published: list[tuple[str, Mapping[str, Value]]] = field(default_factory=list)
+    reports: list[str] = field(default_factory=list)
+    data: Mapping[str, Value] = field(default_factory=dict)
+    end: MissionEnded | None = None
+    trouble: str = ""  # why the run itself could not be completed
+    late: int = 0  # events of the test that were never reached
+    _story: MissionStory = field(init=False)
+    _open: dict[int, Done] = field(default_factory=dict)  # running steps: calls by node, named nodes by its negative
+
+    def __post_init__(self) -> None:
+        """Begin the story."""
+        self._story = MissionStory(self.mission, self.skills)
+
+    def note(self, text: str) -> None:
+        """Add a line on an action of the test."""
+        self.lines.append(TraceLine(self.now, f"* {text}"))
+
+    def hear(self, event: MissionEvent) -> None:
+        """Record an event."""
+        level, text = self._story.tell(event)
+        if text:
+            self.lines.append(TraceLine(self.now, text, level))
+        match event:
+            case SkillStarted(leaf=node, skill=name, arguments=arguments):
+                self._begin(node, Done(name, text, dict(arguments), self.now, len(self.lines) - 1))
+            case NodeStarted(node=node, name=name):
+                self._begin(-1 - node, Done(name, name, {}, self.now, len(self.lines) - 1))
+            case SkillEnded(leaf=node, result=result, message=told):
+                self._end(node, result)
+                self.reports += [told, text] if told else []
+            case NodeEnded(node=node, result=result):
+                self._end(-1 - node, result)
+            case Published(topic=topic, fields=fields):
+                self.published.append((topic, fields))
+            case Logged(text=told) | Reported(message=told):
+                self.reports += [told, text]  # alone, and as the trace shows it
+            case MissionEnded(message=told):
+                self.end = event
+                self.reports += [told, text] if told else []
+
+    def _begin(self, key: int, step: Done) -> None:
+        self._open[key] = step
+        self.steps.append(step)
+
+    def _end(self, key: int, result: str) -> None:
+        step = self._open.pop(key, None)
+        if step:
+            step.ended, step.ended_at = result, self.now
+
+    @property
+    def outcome(self) -> str:
+        """Return the outcome of the mission in its own word; `running` if it has not ended."""
+        return RUNS if self.end is None else self.end.outcome or self.end.result

@@ -1,0 +1,84 @@
+"""A running mission, live: its nodes with their states, its data, its last transitions."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Mapping
+from typing import Any
+
+from rbxcompose.base.expressions.text import show_value
+from rbxcompose.base.expressions.values import NOT_ARRIVED
+from rbxcompose.base.printable import fitted, plain
+from rbxcompose.commands.console import has_colour, tell
+from rbxcompose.commands.lookup import answer_of
+from rbxcompose.commands.terminal import LiveScreen, is_terminal
+from rbxcompose.missions.engine.snapshot import from_plain
+from rbxcompose.missions.execution.requests import LookAtMission, ShowPicture
+from rbxcompose.missions.view.picture import MissionPicture, picture_from_data
+from rbxcompose.missions.view.replica import ACTIVE, joined, status_list
+from rbxcompose.runtime.folder import RobotFolder
+from rbxcompose.tools.inspection.mission_text import mission_lines
+
+MOST = 5  # transitions that are shown
+_WIDTH = 120  # columns of a picture without a terminal
+
+
+def lines_of(picture: MissionPicture, seen: Mapping[str, Any], width: int, *, colour: bool = False) -> list[str]:
+    """Return the lines that show the state of a mission."""
+    statuses = status_list(joined({"statuses": {}, "data": {}}, seen), picture.count)
+    lines = [fitted(f"mission {plain(seen['mission'])}: {seen['state']}", width)]
+    lines += mission_lines(picture, statuses, width=width, colour=colour)
+    if seen["data"]:
+        values = ", ".join(f"{name} {_value(from_plain(data))}" for name, data in seen["data"].items())
+        lines.append(fitted(f"data: {plain(values, 400)}", width))
+    for one in seen["transitions"][-MOST:]:
+        lines.append(fitted(f"{one['time']:9.2f}  {one['state']} -> {one['to']}  ({one['outcome']})", width))
+    return lines
+
+
+def _value(value: Any) -> str:
+    if value is NOT_ARRIVED:
+        return "(nothing yet)"
+    return show_value("", value) or "(empty)"
+
+
+def follow(folder: RobotFolder, name: str, period: float) -> int:
+    """Print a mission as JSON until it ends, or until Ctrl-C: first the whole state, then one line per change."""
+    seen = answer_of(folder, LookAtMission(name))
+    told: Mapping[str, Any] = {}
+    try:
+        while True:
+            if any(told.get(key) != seen[key] for key in ("version", "state")):
+                tell(json.dumps(seen))
+            if seen["state"] not in ACTIVE:
+                return 0
+            told = seen
+            time.sleep(period)
+            seen = answer_of(folder, LookAtMission(name, seen["version"]))
+    except KeyboardInterrupt:
+        return 0
+
+
+def watch(folder: RobotFolder, name: str, period: float) -> int:
+    """Show a mission until it ends, or until q or Ctrl-C; without a terminal once."""
+    picture = picture_from_data(answer_of(folder, ShowPicture(name)))
+    seen = joined({"statuses": {}, "data": {}}, answer_of(folder, LookAtMission(name)))
+    colour = has_colour(sys.stdout)
+    if not is_terminal():
+        tell("\n".join(lines_of(picture, seen, _WIDTH, colour=colour)))
+        return 0
+
+    def drawn(width: int, height: int) -> list[str]:
+        return lines_of(picture, seen, width, colour=colour)
+
+    with LiveScreen() as screen:
+        while seen["state"] in ACTIVE:
+            screen.draw(drawn)
+            screen.wait(period)
+            if screen.is_over:
+                return 0
+            seen = joined(seen, answer_of(folder, LookAtMission(name, seen["version"])))
+    tell("\n".join(lines_of(picture, seen, _WIDTH, colour=colour)))
+    return 0

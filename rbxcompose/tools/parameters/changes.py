@@ -1,0 +1,261 @@
+"""What changes parameters, all of them or none: `param set`, `load` and `undo`."""
+
+from __future__ import annotations
+
+import argparse
+import getpass
+import os
+import sys
+import uuid
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from rbxcompose.base.findings import Finding, Report, Span, kind
+from rbxcompose.base.units import written_unit
+from rbxcompose.commands.console import NotDoneError, misused, refuse, tell, tell_report
+from rbxcompose.commands.guest import NO_NAME, SAID_NO
+from rbxcompose.commands.messages import to_json
+from rbxcompose.manifest.files import shown_name
+from rbxcompose.manifest.reader import read_file, read_text
+from rbxcompose.manifest.tree import MappingNode, TreeNode
+from rbxcompose.manifest.validate import to_plain
+from rbxcompose.msgs.rbxcompose_parameters import ChangeParameters, NodeChange, ParameterChange
+from rbxcompose.msgs.rcl_interfaces import (
+    GetParameters,
+    Parameter,
+    ParameterType,
+    ParameterValue,
+    SetParametersAtomically,
+)
+from rbxcompose.runtime.settings_history import NothingToUndoError, to_undo
+from rbxcompose.sdk.parameters import SEPARATOR, to_message
+from rbxcompose.tools.parameters.history import CHANGE, changes_of
+from rbxcompose.tools.parameters.nodes import ParameterNodes, described, require_name
+
+NO_VALUES = kind("RBX9048")
+PIPED = "-"
+_ROS = "ros__parameters"
+
+
+def value_of(text: str) -> ParameterValue:
+    """Read a number, a flag or a list in YAML; anything else is text."""
+    root, findings = read_text(text, "VALUE")
+    data = text if root is None or findings or isinstance(root, MappingNode) else to_plain(root)
+    return to_message(text if data is None else data) or ParameterValue(
+        type=ParameterType.PARAMETER_STRING, string_value=text
+    )
+
+
+def file_values(path: Path, report: Report, sources: dict[str, str]) -> dict[str, tuple[Parameter, ...]]:
+    """Return the parameters in a file, by component, or `-` in what is piped in; mistakes go into `report`."""
+    if str(path) == PIPED:
+        sources[PIPED] = sys.stdin.read()
+        root, findings = read_text(sources[PIPED], PIPED)
+    else:
+        root, findings = read_file(path, shown_name(path), sources)
+    report.extend(findings)
+    found: dict[str, tuple[Parameter, ...]] = {}
+    if root is None:
+        return found
+    if not isinstance(root, MappingNode):
+        report.add(_no_map(root.span, "components"))
+        return found
+    for name, entry in root.entries.items():
+        values = entry.value
+        if isinstance(values, MappingNode) and list(values.entries) == [_ROS]:
+            values = values.entries[_ROS].value
+        if isinstance(values, MappingNode):
+            found[name] = tuple(_parameters(values, "", report))
+        else:
+            report.add(_no_map(values.span, f"the parameters of '{name}'"))
+    return found
+
+
+def _parameters(node: MappingNode, above: str, report: Report) -> list[Parameter]:
+    found = []
+    for name, entry in node.entries.items():
+        path = f"{above}{SEPARATOR}{name}" if above else name
+        if isinstance(entry.value, MappingNode):
+            found += _parameters(entry.value, path, report)
+        elif (value := _message(entry.value)) is None:
+            report.add(NO_VALUES.at(entry.value.span, f"no parameter can have this value, as '{path}' has"))
+        else:
+            found.append(Parameter(path, value))
+    return found
+
+
+def _message(node: TreeNode) -> ParameterValue | None:
+    value = to_plain(node)
+    return None if value is None else to_message(value)
+
+
+def _no_map(span: Span, what: str) -> Finding:
+    return NO_VALUES.at(span, f"{what} must be a map", help="'rbxcompose param dump' shows the form")
+
+
+HALF_DONE = kind(
+    "RBX9047",
+)
+BREAKS_RULE = kind(
+    "RBX9030",
+)
+Wanted = Mapping[str, Sequence[Parameter]]  # by node
+
+
+def change_values(
+    nodes: ParameterNodes,
+    wanted: Wanted,
+    verb: str,
+    undoes: Mapping[str, int] | None = None,
+    known: Wanted | None = None,
+) -> None:
+    """Set parameters of nodes, all or none, if they still have the `known` values.
+
+    The robot decides, and goes on with it whatever becomes of this process.
+
+    Raises:
+        NotDoneError: if they are not set, with the reason.
+    """
+    if not wanted:
+        return
+    _require_names(nodes, wanted)
+    ours = [node for node in wanted if nodes.serves(node, CHANGE)]
+    if len(ours) < len(wanted):
+        _change_foreign(nodes, wanted, ours)
+        return
+    parts = [
+        NodeChange(node, tuple(each), tuple((known or {}).get(node, ())), (undoes or {}).get(node, 0))
+        for node, each in wanted.items()
+    ]
+    together = uuid.uuid4().hex if sum(map(len, wanted.values())) > 1 else ""
+    request = ChangeParameters.Request(others=tuple(parts), by=f"{_user()}, param {verb}", together=together)
+    (answer,) = nodes.ask(ours[:1], CHANGE, ChangeParameters, [request])
+    if not answer.success:
+        finding = BREAKS_RULE if answer.breaks_rule else HALF_DONE if answer.is_half_done else SAID_NO
+        where = f"'{ours[0]}': " if finding is SAID_NO and not together else ""
+        raise NotDoneError(finding.at(None, f"{where}{answer.message}", help=answer.help))
+
+
+def _change_foreign(nodes: ParameterNodes, wanted: Wanted, ours: Sequence[str]) -> None:
+    """Set the parameters of one node that knows nothing of changes together with others."""
+    node = next(name for name in wanted if name not in ours)
+    if len(wanted) > 1:
+        message = f"'{node}' cannot change together with others: it is no component with live settings"
+        raise NotDoneError(SAID_NO.at(None, message, help="set its parameters alone"))
+    atomically = SetParametersAtomically.Request(parameters=tuple(wanted[node]))
+    (answer,) = nodes.ask([node], "set_parameters_atomically", SetParametersAtomically, [atomically])
+    if not answer.result.successful:
+        raise NotDoneError(SAID_NO.at(None, f"'{node}': {answer.result.reason}"))
+
+
+def _require_names(nodes: ParameterNodes, wanted: Wanted) -> None:
+    requests = [GetParameters.Request(names=tuple(one.name for one in each)) for each in wanted.values()]
+    answers = nodes.ask(list(wanted), "get_parameters", GetParameters, requests)
+    for (node, each), answer in zip(wanted.items(), answers, strict=True):
+        if len(answer.values) != len(each):
+            raise NotDoneError(SAID_NO.at(None, f"'{node}' does not tell its parameters"))
+        for parameter, value in zip(each, answer.values, strict=True):
+            if value.type == ParameterType.PARAMETER_NOT_SET:
+                require_name(nodes, node, parameter.name)
+
+
+def _user() -> str:
+    try:
+        return getpass.getuser()
+    except (KeyError, OSError):  # an account without a name
+        return f"user {os.getuid()}"
+
+
+_WORDS = 3  # of a single change: component, parameter, value
+
+
+def param_set(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
+    """Set one parameter, or several at once."""
+    words = arguments.words
+    if len(words) == _WORDS and "=" not in words[0]:
+        pairs = [(words[0], words[1], words[2])]
+    elif all(_is_pair(word) for word in words):
+        pairs = [_pair(word) for word in words]
+    else:
+        return misused("param", "write COMPONENT PARAMETER VALUE, or COMPONENT.PARAMETER=VALUE for each")
+    wanted: dict[str, list[Parameter]] = {}
+    for component, name, text in pairs:
+        wanted.setdefault(nodes.find(component), []).append(Parameter(name, value_of(text)))
+    change_values(nodes, wanted, "set")
+    return tell_values(nodes, wanted, arguments, [written_unit(text) for _, _, text in pairs])
+
+
+def param_load(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
+    """Set all parameters of a file."""
+    report, sources = Report(), dict[str, str]()
+    found = file_values(arguments.file, report, sources)
+    if report.has_errors:
+        tell_report(report, sources)
+        return 1
+    wanted = {nodes.find(name): list(each) for name, each in found.items() if each}
+    change_values(nodes, wanted, "load")
+    return tell_values(nodes, wanted, arguments)
+
+
+def param_undo(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
+    """Take back a change, with those that were made together with it."""
+    known = {node: changes_of(nodes, [node]) for node in nodes.names}
+    homes = {parameter_change.component: node for node, each in known.items() for parameter_change in each}
+    try:
+        found = to_undo([parameter_change for each in known.values() for parameter_change in each], arguments.change)
+    except NothingToUndoError as error:
+        return refuse(NO_NAME.at(None, str(error), help="'rbxcompose param history' lists the changes"))
+    wanted: dict[str, list[Parameter]] = {}
+    for change in sorted(found, key=lambda each: each.component):  # processes tell of a change in any order
+        wanted.setdefault(homes[change.component], []).append(Parameter(change.name, change.before))
+    expected: dict[str, list[Parameter]] = {}
+    for change in found:
+        expected.setdefault(homes[change.component], []).append(Parameter(change.name, change.after))
+    change_values(
+        nodes,
+        wanted,
+        "undo",
+        {homes[parameter_change.component]: _first(parameter_change, found) for parameter_change in found},
+        expected,
+    )
+    return tell_values(nodes, wanted, arguments)
+
+
+def _first(change: ParameterChange, found: Sequence[ParameterChange]) -> int:
+    return min(each.number for each in found if each.component == change.component)
+
+
+def _is_pair(word: str) -> bool:
+    path, equals, _ = word.partition("=")
+    return bool(equals) and SEPARATOR in path
+
+
+def _pair(word: str) -> tuple[str, str, str]:
+    path, _, value = word.partition("=")
+    component, _, name = path.partition(SEPARATOR)
+    return component, name, value
+
+
+def message_of(value: object) -> ParameterValue:
+    """Return a value as a message; one that has no message counts as not set."""
+    return to_message(value) or ParameterValue()
+
+
+def tell_values(
+    nodes: ParameterNodes,
+    wanted: dict[str, list[Parameter]],
+    arguments: argparse.Namespace,
+    units: Sequence[str | None] = (),
+) -> int:
+    """Tell the values that parameters have now; a single one alone, as `get` does."""
+    found = described(nodes, {node: tuple(parameter.name for parameter in each) for node, each in wanted.items()})
+    if len(found) == 1 and arguments.action == "set":
+        one, unit = found[0], (units or (None,))[0]
+        tell(to_json(one.value) if arguments.json else one.text(one.value, unit))
+        return 0
+    if arguments.json:
+        tell(to_json([{"node": item.node, "name": item.about.name, "value": item.value} for item in found]))
+        return 0
+    for one in found:
+        tell(f"{one.node.removeprefix('/')}.{one.about.name} = {one.text(one.value)}")
+    return 0
