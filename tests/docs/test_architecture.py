@@ -1,14 +1,13 @@
-"""The architecture page is true to the tree: packages, stages, families of codes."""
+"""The architecture page is true to the tree: rooms, stages, families of codes."""
 
 from __future__ import annotations
 
 import ast
 import re
-
-import pytest
+from pathlib import Path
 
 from tests.docs.examples import ROOT
-from tests.project.test_layers import TABLE
+from tests.project.test_layers import DOMAINS, ROOMS
 
 PACKAGE = ROOT / "rbxcompose"
 PAGE = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
@@ -25,20 +24,22 @@ def calls_of(file: str, function: str) -> list[str]:
 
 
 def functions(file: str) -> list[ast.FunctionDef]:
-    tree = ast.parse((PACKAGE / file).read_text(encoding="utf-8"))
+    tree = ast.parse(place(file).read_text(encoding="utf-8"))
     return [node for node in tree.body if isinstance(node, ast.FunctionDef)]
 
 
-def test_the_map_names_every_package_and_module_and_nothing_else() -> None:
-    there = {path.stem for path in PACKAGE.iterdir() if path.suffix == ".py" or (path / "__init__.py").exists()}
-    assert sorted(MAP) == sorted(there - {"__init__"})
+def place(file: str) -> Path:
+    """Return the file that the page names, from the package, a room of it, or the repository."""
+    rooms = (PACKAGE / room for room in (*ROOMS, "runtime/supervision", "runtime/process_group"))
+    domains = (path for path in (PACKAGE / "domains").iterdir() if path.is_dir())
+    return next((home / file for home in (PACKAGE, *rooms, *domains, ROOT) if (home / file).exists()), PACKAGE / file)
 
 
-@pytest.mark.parametrize("part", MAP)
-def test_imports_point_downwards_in_the_map(part: str) -> None:
-    below = set(MAP[MAP.index(part) + 1 :])
-    imported = {name.partition(".")[0] for name in TABLE[part]} - {part}
-    assert imported - below == set()
+def test_the_map_names_every_room_in_its_order_and_every_domain() -> None:
+    domains = {path.parent.name for path in (PACKAGE / "domains").glob("*/__init__.py")}
+    assert [name for name in MAP if name not in domains] == list(ROOMS)
+    assert {name for name in MAP if name not in ROOMS} == domains
+    assert domains > DOMAINS.keys()
 
 
 def test_every_stage_is_a_function_of_the_file_that_is_named() -> None:
@@ -48,16 +49,16 @@ def test_every_stage_is_a_function_of_the_file_that_is_named() -> None:
 
 def test_the_compiler_calls_the_stages_in_this_order() -> None:
     names = [name for name, _ in STAGES]
-    called = [name for name in calls_of("compiler.py", "compile_robot") if name in names]
+    called = [name for name in calls_of("compiler/compile.py", "compile_robot") if name in names]
     assert called == names[:4]
 
 
 def test_up_compiles_and_then_runs_the_plan() -> None:
-    assert [name for name in calls_of("cli/up.py", "run") if name in ("compile_robot", "run_plan")] == [
+    assert [name for name in calls_of("tools/commands/up.py", "run") if name in ("compile_robot", "run_plan")] == [
         "compile_robot",
         "run_plan",
     ]
-    assert "start_supervisor" in calls_of("cli/robots/run_view.py", "run_plan")
+    assert "start_supervisor" in calls_of("tools/run_view.py", "run_plan")
 
 
 def test_every_family_of_codes_is_told_and_every_one_that_is_told_exists() -> None:
@@ -67,5 +68,4 @@ def test_every_family_of_codes_is_told_and_every_one_that_is_told_exists() -> No
 
 def test_every_file_that_is_named_exists() -> None:
     files = set(re.findall(r"`([\w/]+\.py)`", PAGE))
-    homes = (PACKAGE, *(PACKAGE / room for room in ("runtime", "runtime/supervision", "runtime/process_group")), ROOT)
-    assert [file for file in files if not any((home / file).exists() for home in homes)] == []
+    assert [file for file in files if not place(file).exists()] == []
