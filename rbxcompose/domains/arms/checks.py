@@ -13,6 +13,7 @@ from rbxcompose.base.printable import plain
 from rbxcompose.base.rules import MISSIONS, NAMES, WIRING
 from rbxcompose.base.units import LENGTH, format_quantity
 from rbxcompose.compiler.check_runner import check
+from rbxcompose.compiler.model.mission_facts import constants
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.domains.arms.manifest_model import SpotModel
 from rbxcompose.domains.arms.mission_goals import WrittenReach, first_joint_in, length_of, word_of, written_reaches
@@ -23,7 +24,6 @@ from rbxcompose.domains.arms.sections.heads import heads
 from rbxcompose.domains.arms.sections.scene import scene
 from rbxcompose.domains.body.model import Body, BodyJoint, Geometry
 from rbxcompose.domains.body.sections.body import body
-from rbxcompose.domains.power.charge import constants
 from rbxcompose.domains.servos.checks import known_value
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions.analysis.facts import Constants

@@ -11,9 +11,9 @@ from rbxcompose.base.rules import NAMES, WIRING
 from rbxcompose.base.units import ANGULAR_SPEED, LENGTH, SPEED, TIME, Dimension, format_quantity
 from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.model.flow import OTHER_TYPE, Drive, MessageFlow, is_written, period_of, setting_span
+from rbxcompose.compiler.model.mission_facts import constants
 from rbxcompose.compiler.model.robot import PortEnd, Robot
 from rbxcompose.domains.bases.body_wheels import BodyWheel, differs, rolling_bases
-from rbxcompose.domains.power.charge import constants
 from rbxcompose.domains.servos.sections.joints import joints
 from rbxcompose.missions.analysis.effects import published
 from rbxcompose.missions.analysis.facts import number_of

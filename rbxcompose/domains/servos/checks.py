@@ -14,8 +14,8 @@ from rbxcompose.base.rules import NAMES, WIRING
 from rbxcompose.base.units import ANGLE, BIT_RATE, FREQUENCY, LENGTH, TIME, UNITS, Quantity, format_quantity
 from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.model.flow import setting_span
+from rbxcompose.compiler.model.mission_facts import constants, is_served
 from rbxcompose.compiler.model.robot import PortEnd, Robot, RobotMission
-from rbxcompose.domains.power.charge import constants, is_served
 from rbxcompose.domains.servos.bus import FACTORY_DELAY
 from rbxcompose.domains.servos.driven_joints import BUSES, ROUNDED, DrivenBus, DrivenJoint, driven_buses, driven_joints
 from rbxcompose.domains.servos.models import COMMON_BAUDS, model_named, stall_torque
