@@ -30,7 +30,7 @@ from rbxcompose.missions.engine.value_text import show
 from rbxcompose.missions.language.asked import WrittenArgument, expression_of
 from rbxcompose.missions.program.answers import NodeFlow
 from rbxcompose.missions.program.program import MissionNode
-from rbxcompose.sdk.capabilities import BoundsGoals
+from rbxcompose.sdk.capabilities import BoundsGoals, LocksInSilence
 from rbxcompose.sdk.ports import In, ServesAction
 
 
@@ -340,14 +340,14 @@ def late_safety(robot: Robot) -> Iterator[Finding]:
             f"the emergency stop may be silent for {format_quantity(care.estop.deadline, TIME)} until the robot stops",
             help="a few times the time between two of its messages is enough, such as '0.5 s'",
         )
-    for mux, entry in robot.manifest.muxes.items():
-        for name, lock in entry.locks.items():
-            if lock.timeout and lock.timeout > _LONGEST:
-                yield late_safety.at(
-                    robot.value("muxes", mux, "locks", name, "timeout"),
-                    f"lock '{name}' of mux '{mux}' engages after {format_quantity(lock.timeout, TIME)} of silence only",
-                    help="a few times the time between two heartbeats is enough, such as '0.5 s'",
-                )
+    for mux, lock in robot.declared(LocksInSilence):
+        if lock.timeout.value > _LONGEST:
+            silence = format_quantity(lock.timeout.value, TIME)
+            yield late_safety.at(
+                robot.value(*mux.place(lock.timeout.field)),
+                f"lock '{lock.name.value}' of mux '{mux.name}' engages after {silence} of silence only",
+                help="a few times the time between two heartbeats is enough, such as '0.5 s'",
+            )
 
 
 @check("RBX2248", Severity.WARNING, closed=())
