@@ -141,10 +141,7 @@ def _certificates(system: System, path: str) -> Iterator[Finding]:
 SOON = 30.0  # [days] before a certificate expires
 NO_CERTIFICATE = kind("RBX6117")
 REFUSED_CERTIFICATE = kind("RBX6143")
-SOON_EXPIRED = kind(
-    "RBX6144",
-    Severity.WARNING,
-)
+SOON_EXPIRED = kind("RBX6144", Severity.WARNING)
 
 
 def certificate_findings(tls: LinkTls, name: str, path: str) -> Iterator[Finding]:

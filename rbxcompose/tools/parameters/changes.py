@@ -93,12 +93,8 @@ def _no_map(span: Span, what: str) -> Finding:
     return NO_VALUES.at(span, f"{what} must be a map", help="'rbxcompose param dump' shows the form")
 
 
-HALF_DONE = kind(
-    "RBX9047",
-)
-BREAKS_RULE = kind(
-    "RBX9030",
-)
+HALF_DONE = kind("RBX9047")
+BREAKS_RULE = kind("RBX9030")
 Wanted = Mapping[str, Sequence[Parameter]]  # by node
 
 
