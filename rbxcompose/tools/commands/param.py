@@ -38,7 +38,7 @@ def _home(module: str, action: str) -> Callable[[ParameterNodes, argparse.Namesp
     """Return what carries an action out; it imports its module, since some need the compiler and others do not."""
 
     def do(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
-        found = import_module(f"rbxcompose.tools.commands.parameters.{module}")
+        found = import_module(f"rbxcompose.tools.parameters.{module}")
         return int(getattr(found, f"param_{action}")(nodes, arguments))
 
     return do
