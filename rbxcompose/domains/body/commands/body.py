@@ -29,9 +29,9 @@ from rbxcompose.commands.options import (
     run_action,
     seconds,
 )
+from rbxcompose.domains.body.command_pose import sliders_of
 from rbxcompose.domains.body.description import Description
 from rbxcompose.domains.body.files import FORMATS as MESHES
-from rbxcompose.domains.body.live_pose import sliders_of
 from rbxcompose.domains.body.meshes import LEAST_FACES, MissingLibraryError, Scale, SimplifiedMesh, simplify
 from rbxcompose.domains.body.model import Body
 from rbxcompose.domains.body.picture import draw
@@ -381,6 +381,6 @@ def _add_pose_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _pose(arguments: argparse.Namespace) -> int:
-    from rbxcompose.domains.body.live_pose import pose  # imports the bus, which no other action needs
+    from rbxcompose.domains.body.command_pose import pose  # imports the bus, which no other action needs
 
     return pose(arguments)

@@ -33,7 +33,7 @@ from rbxcompose.commands.options import (
     hertz,
     signed,
 )
-from rbxcompose.domains.body.live_body import HeardFrames
+from rbxcompose.domains.body.command_body import HeardFrames
 from rbxcompose.msgs.geometry_msgs import Quaternion, Transform, TransformStamped, Vector3
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header
