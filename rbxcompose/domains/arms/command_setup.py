@@ -17,7 +17,7 @@ from rbxcompose.base.findings import Finding, Report, Severity, Sources, kind
 from rbxcompose.base.printable import plain
 from rbxcompose.commands.console import FINDINGS, refuse, tell, tell_report
 from rbxcompose.commands.new_files import name_like, write_new
-from rbxcompose.commands.targets import compiled, robot_path
+from rbxcompose.commands.targets import compiled, missing_extras, robot_path
 from rbxcompose.compiler.compile import Compilation
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.domains.arms.arm_config import ArmConfig
@@ -130,8 +130,6 @@ def _propose(path: str, arguments: argparse.Namespace) -> int:
 
 
 def _checked(robot: Robot, compilation: Compilation, *, is_json: bool) -> int:
-    from rbxcompose.tools.run_view import missing_extras  # what starts robots
-
     lacking = Report([*missing_extras(robot)])
     if lacking.has_errors:
         tell_report(lacking, compilation.sources)
