@@ -15,9 +15,7 @@ from rbxcompose.base.printable import plain
 from rbxcompose.commands.importing import manifest_text as out
 from rbxcompose.commands.importing.foreign_files import ForeignFile, ForeignMap, FreeNames, Given
 from rbxcompose.commands.importing.importer import DISAGREES, NOT_CARRIED_OVER, OTHER_PROGRAM
-from rbxcompose.commands.importing.manifest_text import (
-    key as yaml_key,
-)
+from rbxcompose.commands.importing.manifest_text import key as yaml_key
 from rbxcompose.domains.servos.models import ServoModel, servo_models
 from rbxcompose.domains.servos.sections.actuators import ONE_ID
 from rbxcompose.domains.servos.sections.controllers import NOT_DRIVEN
@@ -150,10 +148,7 @@ def read_gripper(name: str, told: ForeignMap) -> ArbotixGripper | None:
 def _geometry(told: ForeignMap) -> Lines:
     """Return the lengths of the fingers and how far they open: opening = pad_width + 2 finger_length sin(angle)."""
     pad, finger = told.number("pad_width"), told.above_zero("finger_length")
-    lines = {
-        "pad_width": _length(pad, PAD_WIDTH),
-        "finger_length": _length(finger, FINGER_LENGTH),
-    }
+    lines = {"pad_width": _length(pad, PAD_WIDTH), "finger_length": _length(finger, FINGER_LENGTH)}
     furthest = (pad.value if pad else PAD_WIDTH) + 2 * (finger.value if finger else FINGER_LENGTH)
     return lines | _opening(told, furthest)
 
@@ -441,7 +436,7 @@ def _driver(told: ForeignMap) -> ArbotixDriver:
 
 
 def _joints(told: ForeignMap) -> tuple[dict[str, ArbotixJoint], set[str]]:
-    read = {name: read_joint(name, foreign_map) for name, foreign_map in told.maps("joints", "joint")}
+    read = {name: read_joint(name, entry) for name, entry in told.maps("joints", "joint")}
     joints = {name: joint for name, joint in read.items() if joint is not None}
     for span in told.places("joints").values():
         told.report.extend(guesses(joints.values(), span))
@@ -518,7 +513,7 @@ def merged(files: Sequence[ArbotixFile], report: Report) -> ArbotixRobot:
     """Return the robot that the files make together; of two things of one name, the first."""
     robot = ArbotixRobot()
     drivers = [driver for file in files for driver in file.drivers]
-    first_port = next((arbotix_driver.port.value for arbotix_driver in drivers if arbotix_driver.port), USUAL_PORT)
+    first_port = next((item.port.value for item in drivers if item.port), USUAL_PORT)
     for driver in drivers:
         line = robot.lines.setdefault(driver.port.value if driver.port else first_port, ServoLine())
         _join(line, driver, report)
@@ -557,7 +552,7 @@ def _join(line: ServoLine, driver: ArbotixDriver, report: Report) -> None:
 
 
 def _add(line: ServoLine, joint: ArbotixJoint, report: Report) -> None:
-    other = next((arbotix_joint for arbotix_joint in line.joints.values() if arbotix_joint.id == joint.id), None)
+    other = next((item for item in line.joints.values() if item.id == joint.id), None)
     if other is not None:
         words = (
             f"the servos of '{plain(other.name, 60)}' and '{plain(joint.name, 60)}' have the same id {joint.id.value}"

@@ -65,15 +65,7 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
 
 
 @section(
-    "heads",
-    HeadModel,
-    order=38,
-    names=HEAD,
-    runs=True,
-    wires=True,
-    entry="head",
-    repeats=False,
-    components=_components,
+    "heads", HeadModel, order=38, names=HEAD, runs=True, wires=True, entry="head", repeats=False, components=_components
 )
 def heads(reading: Reading[HeadModel]) -> dict[str, HeadOfRobot]:
     """Heads by name: a camera, and the joints that point it at things. With one head, its skill is `look_at`.

@@ -15,6 +15,6 @@ from rbxcompose.domains.servos.arbotix import ArbotixManifest, merged, read_arbo
 def arbotix(files: Sequence[ForeignFile], name: str, report: Report) -> str:
     """Return a robot with the servos, joints and controllers of the files."""
     read = {file.name: read_arbotix(file, report) for file in files}
-    found = {file: arbotix_file for file, arbotix_file in read.items() if arbotix_file.drivers or arbotix_file.grippers}
+    found = {file: item for file, item in read.items() if item.drivers or item.grippers}
     sections = ArbotixManifest(merged(list(found.values()), report)).text()
     return f"{header('arbotix', found, 'Robot', name)}\n{sections}" if sections else ""
