@@ -280,6 +280,17 @@ def held_limits(model: JointModel, joint: BodyJoint | None) -> MotionLimits:
     return limits_of(model, joint).limits or MotionLimits()
 
 
+def limits_in(contents: Contents, joint: BodyJoint) -> MotionLimits:
+    """Return the limits of a joint: those of the body, and the tighter ones of the joint if it is driven."""
+    driven = contents.of(joints).get(joint.name)
+    if driven is not None:
+        return held_limits(driven, joint)
+    outer = joint.limits
+    if outer is None or joint.kind == "continuous":
+        return MotionLimits()
+    return MotionLimits(outer.lower, outer.upper)
+
+
 def _servos(
     reading: Reading[dict[str, JointModel]], name: str, model: JointModel, users: dict[str, str]
 ) -> Iterator[Finding]:
