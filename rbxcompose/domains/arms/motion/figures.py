@@ -191,9 +191,7 @@ def read_problem(scene: Path, request: Path, root: str) -> MotionProblem:
     """
     here = scene
     try:
-        objects = tuple(
-            _object(collision_object, root) for collision_object in _data(scene)["world"]["collision_objects"]
-        )
+        objects = tuple(_object(each, root) for each in _data(scene)["world"]["collision_objects"])
         here, asked = request, _data(request)
         state = asked["start_state"]["joint_state"]
         start = {str(name): float(at) for name, at in zip(state["name"], state["position"], strict=True)}
