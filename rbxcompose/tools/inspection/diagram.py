@@ -13,6 +13,7 @@ from rbxcompose.bus.names import ActionNames, data_key, resolve
 from rbxcompose.bus.wire import WIRE_PROFILES
 from rbxcompose.compiler.model.robot import PortEnd, Robot, RobotComponent, RobotMission
 from rbxcompose.compiler.plan.model import BusPlan
+from rbxcompose.domains.muxes.sections.muxes import muxes
 from rbxcompose.missions.analysis.effects import sent_by
 from rbxcompose.missions.engine.world import POSE
 from rbxcompose.missions.sources import SkillWay
@@ -245,7 +246,7 @@ def _kind(end: PortEnd) -> WireContent | None:
 
 def _note(robot: Robot, component: RobotComponent, end: PortEnd) -> str:
     """Return the priority of an input or a lock of a mux."""
-    mux = robot.manifest.muxes.get(component.name)
+    mux = robot.manifest.contents.of(muxes).get(component.name)
     if mux is None or not isinstance(end.port, In):
         return ""
     entry = mux.inputs.get(end.name) or mux.locks.get(end.name.removeprefix("lock_"))

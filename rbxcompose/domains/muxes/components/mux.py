@@ -20,6 +20,7 @@ from rbxcompose.msgs.std_msgs import Bool, Empty, String
 from rbxcompose.msgs.topic_tools_interfaces import MuxAdd, MuxDelete, MuxList, MuxSelect
 from rbxcompose.msgs.types import Message
 from rbxcompose.sdk import Capability, Component, ComponentNoted, Forwards, In, Level, Out, Port, Serves, component
+from rbxcompose.sdk.capabilities import LocksInSilence, Setting
 
 LOCK = "lock_"  # prefix of the ports of locks
 ANNOUNCED = "announced"  # the port at which it tells who holds the output
@@ -58,9 +59,14 @@ class Mux(Component[MuxConfig]):
 
     @classmethod
     def capabilities(cls, config: MuxConfig) -> tuple[Capability, ...]:
-        """Declare which inputs it forwards."""
+        """Declare which inputs it forwards, and which locks have a heartbeat."""
         ranked = sorted(config.inputs, key=lambda name: config.inputs[name].priority, reverse=True)
-        return (Forwards(tuple(ranked), "output"),)
+        locks = (
+            LocksInSilence(Setting(name, f"locks.{name}"), Setting(lock.timeout, f"locks.{name}.timeout"))
+            for name, lock in config.locks.items()
+            if lock.timeout is not None
+        )
+        return (Forwards(tuple(ranked), "output"), *locks)
 
     def configure(self) -> None:
         """Build the core; a mux restarted while the robot is stopped starts closed."""
