@@ -36,7 +36,7 @@ from rbxcompose.sdk.ports import Out
 
 @check("RBX2379", Severity.WARNING, closed=(WIRING, NAMES, "scene"))
 def frame_of_object(robot: Robot) -> Iterator[Finding]:
-    """A thing of the scene stands in a frame outside of a body that nobody places there."""
+    """A thing of the scene is in a frame without a transform to the body."""
     description, written = robot.manifest.contents.of(body), robot.declared(WritesFrame)
     if description is None or robot.declared(Drives):
         return  # RBX2286
@@ -86,7 +86,7 @@ def hand_without_gripper(robot: Robot) -> Iterator[Finding]:
 
 @check("RBX2376", Severity.WARNING, closed=(WIRING, MISSIONS, "scene"))
 def idle_grasps(robot: Robot) -> Iterator[Finding]:
-    """Grasps are those of an object that there is not."""
+    """Grasps are given for an object that does not exist."""
     contents = robot.manifest.contents
     objects = [object_.name for object_ in contents.of(scene).objects]
     if not objects or any(isinstance(end.port, Out) and end.port.interface is CollisionObject for end in robot.ends):
