@@ -128,13 +128,7 @@ class Bus:
         return _kept(node, Client(self._services, node, name, service))
 
     def serve_action(
-        self,
-        owner: str,
-        name: str,
-        action: type[Action[G, R, F]],
-        accept: Callable[[G], str],
-        *,
-        waits: bool = False,
+        self, owner: str, name: str, action: type[Action[G, R, F]], accept: Callable[[G], str], *, waits: bool = False
     ) -> ActionServer[G, R, F]:
         """Carry out goals; with `waits`, none before `open`. `accept` returns why it refuses a goal, or nothing."""
         node = self._node(owner)

@@ -21,10 +21,7 @@ from rbxcompose.manifest.section import SYSTEM, TEST
 from rbxcompose.runtime.folder import ChosenLayers
 from rbxcompose.sdk.capabilities import NeedsExtra
 
-UNUSED = kind(
-    "RBX9007",
-    Severity.WARNING,
-)
+UNUSED = kind("RBX9007", Severity.WARNING)
 _USE = "name it in a robot ('missions:', 'include:')"
 _MANIFESTS = ("*.yaml", "*.yml")
 _ROBOTS, _SYSTEMS = "robots", "systems"

@@ -27,11 +27,7 @@ CHECKS: dict[str, Check] = {}  # every check that has been imported, by code
 
 
 def check(
-    code: str,
-    severity: Severity = Severity.ERROR,
-    *,
-    is_fixable: bool = False,
-    closed: tuple[str, ...] | None = None,
+    code: str, severity: Severity = Severity.ERROR, *, is_fixable: bool = False, closed: tuple[str, ...] | None = None
 ) -> Callable[[Find], Check]:
     """Declare a rule under its code.
 

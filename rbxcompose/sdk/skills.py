@@ -23,14 +23,7 @@ Told = bool | str | Mapping[str, object]  # how a skill ended: success or not, a
 
 F = TypeVar("F", bound=Callable[..., Any])
 _SKILLS: dict[str, SkillType] = {}
-_TYPES: Mapping[Any, Type] = {
-    str: TEXT,
-    bool: FLAG,
-    int: COUNT,
-    float: quantity_of(NUMBER),
-    Place: PLACE,
-    Pose2: POSE,
-}
+_TYPES: Mapping[Any, Type] = {str: TEXT, bool: FLAG, int: COUNT, float: quantity_of(NUMBER), Place: PLACE, Pose2: POSE}
 
 
 class Activity:

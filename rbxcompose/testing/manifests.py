@@ -83,12 +83,7 @@ def check_file(
     """Compile a robot's file."""
     return Checked(
         compile_robot(
-            str(path),
-            profiles=profiles,
-            overlays=overlays,
-            sets=sets,
-            real=real,
-            environment=environment or {},
+            str(path), profiles=profiles, overlays=overlays, sets=sets, real=real, environment=environment or {}
         )
     )
 

@@ -72,13 +72,7 @@ def _topics(components: Mapping[str, RobotComponent]) -> Iterable[SkillSource]:
             continue
         told = port.ends.interface if port.ends is not None else None
         skill = topic_skill(
-            port.interface,
-            end.skill,
-            told,
-            port.claims,
-            port.restartable,
-            outcomes=port.outcomes,
-            entries=port.entries,
+            port.interface, end.skill, told, port.claims, port.restartable, outcomes=port.outcomes, entries=port.entries
         )
         yield SkillSource(skill, end.type_name, end.topic, SkillWay.TOPIC, _orders(components, end, port))
 

@@ -31,14 +31,7 @@ class Include(Config):
 
 
 @section(
-    "include",
-    Include,
-    order=20,
-    names=INSTANCE,
-    entry="part",
-    short=Short("part"),
-    needs="part",
-    is_composed=False,
+    "include", Include, order=20, names=INSTANCE, entry="part", short=Short("part"), needs="part", is_composed=False
 )
 def include(reading: Reading[Include]) -> Iterator[tuple[str, Entry, Include | None]]:
     """The robot's parts, by instance name, which is a prefix of all names of the part.

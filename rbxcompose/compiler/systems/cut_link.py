@@ -66,10 +66,7 @@ def stops_after_cut(robot: PlacedRobot) -> Iterator[StopAfterCut]:
 def _stop_of(base: RobotComponent, drives: Drives, host: str) -> StopAfterCut:
     cycles = CYCLES / (base.cls.rate_of(base.config) or SLOWEST)
     waiting = drives.stops_after.value + cycles if drives.stops_after else None
-    times = (
-        _braking(drives.max_speed, drives.acceleration),
-        _braking(drives.max_turn_rate, drives.turn_acceleration),
-    )
+    times = (_braking(drives.max_speed, drives.acceleration), _braking(drives.max_turn_rate, drives.turn_acceleration))
     known = [time for time in times if time is not None]
     return StopAfterCut(base.name, host, waiting, max(known) if len(known) == len(times) else None)
 

@@ -225,11 +225,7 @@ def _settings(entries: Mapping[str, Any]) -> Settings:
 def _known(key: str, value: Value) -> Value:
     """Return a value that was read, which must be a number for an age, and a whole one for a count of messages."""
     what, _, name = key.partition(" ")
-    is_fit = {
-        "value": True,
-        "age": value is NOT_ARRIVED or is_number(value),
-        "count": type(value) is int,
-    }
+    is_fit = {"value": True, "age": value is NOT_ARRIVED or is_number(value), "count": type(value) is int}
     if not name or not is_fit.get(what):
         raise _WrongRecordError("'read' does not hold values, ages or counts of messages")
     return value

@@ -367,10 +367,7 @@ _ARROWS = {
     WireContent.LOOK_UP: "-.-o",
 }
 _GRAPH_MERMAID_SHAPES = {BoxShape.COMPONENT: ("[", "]"), BoxShape.MUX: ("{{", "}}"), BoxShape.PROGRAM: ("([", "])")}
-_GRAPH_MERMAID_STYLES = (
-    "classDef wire fill:none,stroke-dasharray:2 2",
-    "classDef mux stroke-width:2px",
-)
+_GRAPH_MERMAID_STYLES = ("classDef wire fill:none,stroke-dasharray:2 2", "classDef mux stroke-width:2px")
 
 
 def mermaid(diagram: Diagram) -> str:
