@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.domains.arms.manifest_model import OMPL
+from rbxcompose.domains.arms.section_models import OMPL
 from rbxcompose.domains.arms.motion.collisions import TOUCH
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory
 from rbxcompose.domains.arms.motion.planner import MotionPlan, MotionRequest

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbxcompose.base.geometry import Transform3
-from rbxcompose.domains.arms.manifest_model import FAST
+from rbxcompose.domains.arms.section_models import FAST
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.collisions import TOUCH, MeshChecker, adjacent_pairs
 from rbxcompose.domains.arms.motion.groups import ArmGroup, ArmJoint, JointSpace, interpolated

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.arms.arm_config import ArmConfig, ArmWorks
-from rbxcompose.domains.arms.manifest_model import FAST
+from rbxcompose.domains.arms.section_models import FAST
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.collisions import MeshChecker
 from rbxcompose.domains.arms.motion.figures import ended
