@@ -196,10 +196,7 @@ def _tell(file: Path, matrix: CollisionMatrix, sources: Sources, *, is_json: boo
 
 
 COLLIDES = kind("RBX9423")
-UNWATCHED = kind(
-    "RBX9424",
-    Severity.WARNING,
-)
+UNWATCHED = kind("RBX9424", Severity.WARNING)
 
 
 def run_check(robot: Robot, compilation: Compilation, *, is_json: bool) -> int:
@@ -240,10 +237,8 @@ def _findings(robot: Robot) -> Iterator[tuple[str, str, list[tuple[str, str]], F
             if pairs := works.planner.checker.colliding(values):
                 message = f"the pose '{pose}' of '{name}' is in collision: {told_pairs(pairs)}"
                 yield name, pose, pairs, COLLIDES.at(span, message)
-            if hidden := [
-                link_pair for link_pair in every.colliding(values) if matrix.get(link_pair) in ("never", "user")
-            ]:
-                reasons = " and ".join(sorted({f"'{matrix[link_pair]}'" for link_pair in hidden}))
+            if hidden := [pair for pair in every.colliding(values) if matrix.get(pair) in ("never", "user")]:
+                reasons = " and ".join(sorted({f"'{matrix[pair]}'" for pair in hidden}))
                 message = (
                     f"links collide in the pose '{pose}' of '{name}' that are there as {reasons}: {told_pairs(hidden)}"
                 )
