@@ -233,13 +233,8 @@ def _moves(robot: Robot, end: PortEnd) -> bool:
 
 @check("RBX2286", Severity.WARNING, closed=(WIRING, NAMES))
 def unplaced_base(robot: Robot) -> Iterator[Finding]:
-<<<<<<< HEAD
     """A component looks up where the robot is, and no component publishes that transform."""
-    description, bases = robot.manifest.body, robot.declared(Drives)
-=======
-    """Somebody looks up where the robot is, and nobody tells."""
     description, bases = robot.manifest.contents.of(body), robot.declared(Drives)
->>>>>>> main
     if description is None or not description.body.links or not bases:
         return
     links, root = description.body.links, description.body.root
@@ -261,15 +256,9 @@ def unplaced_base(robot: Robot) -> Iterator[Finding]:
 
 
 @check("RBX2352", Severity.WARNING, closed=(WIRING, NAMES))
-<<<<<<< HEAD
 def frame_without_publisher(robot: Robot) -> Iterator[Finding]:
     """No component publishes the transform from the frame of the virtual joint to the root of the body."""
-    description = robot.manifest.body
-=======
-def untold_frame(robot: Robot) -> Iterator[Finding]:
-    """Nobody tells where the robot is in the frame of its virtual joint."""
     description = robot.manifest.contents.of(body)
->>>>>>> main
     if description is None or description.virtual is None or description.virtual.kind == "fixed":
         return
     joint, root = description.virtual, description.body.root
