@@ -42,7 +42,7 @@ def installed(folder: Path) -> str:
     info.mkdir(parents=True)
     (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n")
     lines = [f"{name} = {module}" for name, module in points.items()]
-    (info / "entry_points.txt").write_text("\n".join(["[rbxcompose.base.plugins]", *lines, ""]))
+    (info / "entry_points.txt").write_text("\n".join(["[rbxcompose.plugins]", *lines, ""]))
     return f"{folder / 'site'}{os.pathsep}{folder / 'thermo_meter'}"
 
 

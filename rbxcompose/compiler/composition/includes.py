@@ -17,7 +17,7 @@ from rbxcompose.compiler.sections.include import Include, include
 from rbxcompose.compiler.sections.needs import needs
 from rbxcompose.compiler.sections.provides import provides
 from rbxcompose.manifest.documents import Documents, ManifestHeader
-from rbxcompose.manifest.file_models import file_model
+from rbxcompose.manifest.registry import file_model
 from rbxcompose.manifest.files import resolve, shown_name
 from rbxcompose.manifest.registry import naming, section_named, sections
 from rbxcompose.manifest.section import PART, Contents, RenamedTopic, Section

@@ -16,7 +16,7 @@ from rbxcompose.compiler.composition.robot_manifest import ROBOT_LAYER, History,
 from rbxcompose.compiler.sections.include import include
 from rbxcompose.compiler.sections.profiles import profiles
 from rbxcompose.manifest.documents import Documents, ManifestHeader
-from rbxcompose.manifest.file_models import file_model
+from rbxcompose.manifest.registry import file_model
 from rbxcompose.manifest.files import PROFILE, find, shown_name
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.registry import section_named, sections

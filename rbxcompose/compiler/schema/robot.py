@@ -14,7 +14,7 @@ from rbxcompose.compiler.sections.components import components
 from rbxcompose.compiler.sections.profiles import profiles
 from rbxcompose.domains.servos.sections.controllers import controllers
 from rbxcompose.manifest.documents import ManifestHeader
-from rbxcompose.manifest.file_models import file_model
+from rbxcompose.manifest.registry import file_model
 from rbxcompose.manifest.registry import sections as all_sections
 from rbxcompose.manifest.section import OVERLAY, PART, ROBOT
 

@@ -36,8 +36,8 @@ from rbxcompose.missions.execution.requests import (
 )
 from rbxcompose.missions.execution.topic_skills import Desks
 from rbxcompose.missions.execution.world import Arrivals, RobotWorld
+from rbxcompose.missions.program.outcomes import IDLE, Result
 from rbxcompose.missions.program.program import Program, RobotNames
-from rbxcompose.missions.program.statuses import IDLE, Result
 from rbxcompose.missions.sources import SkillSource, TopicSource, ValueSource, events_of
 from rbxcompose.msgs.std_msgs import String
 from rbxcompose.sdk import Capability, Component, Config, Level, Place, Port, Refused, RunsMissions, answers, component

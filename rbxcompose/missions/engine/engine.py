@@ -12,8 +12,8 @@ from rbxcompose.missions.engine.events import MissionEnded, Reported
 from rbxcompose.missions.engine.task import Task
 from rbxcompose.missions.engine.world import PLAIN, Settings, World
 from rbxcompose.missions.program.linker import link
+from rbxcompose.missions.program.outcomes import FAILURE, IDLE, NAMES, RUNNING, SUCCESS, Result
 from rbxcompose.missions.program.program import Program, RobotNames
-from rbxcompose.missions.program.statuses import FAILURE, IDLE, NAMES, RUNNING, SUCCESS, Result
 
 TICKS_AT_ONCE = 100  # at one instant; then the mission is slowed down to its rate
 

@@ -7,8 +7,8 @@ from typing import Any, ClassVar, Protocol
 
 from rbxcompose.base.expressions.values import Value
 from rbxcompose.missions.program.goals import SUCCESS, values_of
+from rbxcompose.missions.program.outcomes import Result
 from rbxcompose.missions.program.program import Program, RobotNames, Skill
-from rbxcompose.missions.program.statuses import Result
 from rbxcompose.missions.sources import OUTCOME, SkillSource, TopicSource, ValueSource
 from rbxcompose.msgs.std_srvs import SetBool
 from rbxcompose.sdk.bound import Ended, Outcome, Reply, SentGoal

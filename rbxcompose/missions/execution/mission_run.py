@@ -17,8 +17,8 @@ from rbxcompose.missions.engine.logbook import LoggedWorld, LogRecord
 from rbxcompose.missions.engine.story import MissionStory
 from rbxcompose.missions.engine.world import PLAIN, POSE, Settings, World
 from rbxcompose.missions.execution.world import RobotWorld
+from rbxcompose.missions.program.outcomes import IDLE, NAMES, RUNNING, Result
 from rbxcompose.missions.program.program import Program, RobotNames, Skill
-from rbxcompose.missions.program.statuses import IDLE, NAMES, RUNNING, Result
 from rbxcompose.missions.view.replica import Mirror
 
 BLOCK = 200  # records that are packed together, into about a tenth of their memory

@@ -16,8 +16,8 @@ from rbxcompose.missions.execution.errands import Equipment
 from rbxcompose.missions.execution.mission_run import LogStore, MakeWorld, MissionRun, claims_of
 from rbxcompose.missions.execution.requests import ListedMission, ListMissions, LogPart, LookAtAll, PictureData, Seen
 from rbxcompose.missions.program.linker import link
+from rbxcompose.missions.program.outcomes import IDLE, NAMES
 from rbxcompose.missions.program.program import Program
-from rbxcompose.missions.program.statuses import IDLE, NAMES
 from rbxcompose.missions.view.picture import picture_of, picture_to_data
 from rbxcompose.sdk.bound import Window
 

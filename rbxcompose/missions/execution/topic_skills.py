@@ -7,7 +7,7 @@ from typing import Any
 
 from rbxcompose.missions.execution.errands import ENDS, GONE, HALTS, SKILL, Shell, Waiting, WhenDone, port_name, text_in
 from rbxcompose.missions.program.goals import SUCCESS, values_of
-from rbxcompose.missions.program.statuses import Result
+from rbxcompose.missions.program.outcomes import Result
 from rbxcompose.missions.sources import OUTCOME, SkillSource
 from rbxcompose.msgs import registry
 from rbxcompose.sdk.bound import OrderSender

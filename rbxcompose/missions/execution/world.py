@@ -24,7 +24,7 @@ from rbxcompose.missions.execution.errands import (
 from rbxcompose.missions.execution.python_skills import PythonErrand
 from rbxcompose.missions.execution.topic_skills import Desks, TopicErrand
 from rbxcompose.missions.program.goals import filled, goal_of, message_of
-from rbxcompose.missions.program.statuses import Result
+from rbxcompose.missions.program.outcomes import Result
 from rbxcompose.missions.sources import SkillWay, ValueSource
 from rbxcompose.msgs import registry
 from rbxcompose.sdk.skills import skill_type

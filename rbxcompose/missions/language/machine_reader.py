@@ -12,7 +12,7 @@ from rbxcompose.missions.language.grammar import is_told
 from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.language.value_reader import WORDS
 from rbxcompose.missions.program.machines import ENDS, MACHINE_KEYS, MachineStates, Next
-from rbxcompose.missions.program.statuses import FAILURE, NAMES, SUCCESS
+from rbxcompose.missions.program.outcomes import FAILURE, NAMES, SUCCESS
 
 BODIES = ("do", "machine")
 STATE_KEYS = (*BODIES, "on_enter", "on_exit", "next")

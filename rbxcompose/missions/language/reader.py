@@ -19,9 +19,9 @@ from rbxcompose.missions.language.grammar import LEVELS, long_form
 from rbxcompose.missions.language.header import read_data, read_inputs, read_rate
 from rbxcompose.missions.language.keys import find_key
 from rbxcompose.missions.language.machine_reader import STATE_KEYS, as_state
-from rbxcompose.missions.language.names import NAME, NAME_HELP, no_name
 from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.language.repair import Repairs
+from rbxcompose.missions.language.value_reader import NAME, NAME_HELP, no_name
 from rbxcompose.missions.modifiers.registry import modifier_keys, modifiers
 from rbxcompose.missions.program import program
 from rbxcompose.missions.program.machines import STATE

@@ -14,7 +14,7 @@ from rbxcompose.manifest.tree import Key, ScalarNode, SequenceNode, TreeNode, ch
 from rbxcompose.missions.engine.task import Task
 from rbxcompose.missions.language.asked import expression_of
 from rbxcompose.missions.language.literals import literal
-from rbxcompose.missions.program.statuses import NodeFailed
+from rbxcompose.missions.program.outcomes import NodeFailed
 
 Getter = Callable[[Task], Value]
 PLACED = (TypeKind.PLACE, TypeKind.POSE)

@@ -11,7 +11,7 @@ from rbxcompose.base.slips import Repair
 from rbxcompose.manifest.tree import Entry, Key, MappingNode, ScalarNode, TreeNode, children, with_children
 from rbxcompose.missions import codes
 from rbxcompose.missions.language.grammar import GrammarPlace, Takes, told
-from rbxcompose.missions.language.names import NAME, cure, no_name
+from rbxcompose.missions.language.value_reader import NAME, cure, no_name
 from rbxcompose.missions.program.machines import ENDS, MACHINE_KEYS
 from rbxcompose.missions.slips import slip
 

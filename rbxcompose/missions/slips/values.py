@@ -13,7 +13,7 @@ from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNod
 from rbxcompose.missions import codes
 from rbxcompose.missions.language.asked import inner_span
 from rbxcompose.missions.language.grammar import GrammarPlace, Takes, told
-from rbxcompose.missions.language.names import NAME, no_name
+from rbxcompose.missions.language.value_reader import NAME, no_name
 from rbxcompose.missions.program.program import RESTART
 from rbxcompose.missions.slips import slip
 

@@ -32,8 +32,8 @@ from rbxcompose.missions.engine.story import MissionStory
 from rbxcompose.missions.engine.task import Task
 from rbxcompose.missions.engine.value_text import show_briefly
 from rbxcompose.missions.engine.world import POSE
+from rbxcompose.missions.program.outcomes import IDLE, RUNNING, Result
 from rbxcompose.missions.program.program import Program, RobotNames
-from rbxcompose.missions.program.statuses import IDLE, RUNNING, Result
 from rbxcompose.tools.mission_tests.model import FAILS, SUCCEEDS, missions_in
 
 MOST_PLACES = 3  # where the robot may be
