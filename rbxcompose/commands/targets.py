@@ -18,10 +18,7 @@ from rbxcompose.manifest.files import PREFIX, ROBOT_FILE, find, project_of, show
 from rbxcompose.manifest.section import SYSTEM, TEST
 from rbxcompose.runtime.folder import ChosenLayers
 
-UNUSED = kind(
-    "RBX9007",
-    Severity.WARNING,
-)
+UNUSED = kind("RBX9007", Severity.WARNING)
 _USE = "name it in a robot ('missions:', 'include:')"
 _MANIFESTS = ("*.yaml", "*.yml")
 _ROBOTS, _SYSTEMS = "robots", "systems"

@@ -258,6 +258,15 @@ class SetScope(Enum):
 
 
 @dataclass(frozen=True, slots=True)
+class AlwaysRun:
+    """A component that every robot runs, named after its type."""
+
+    type_name: str
+    config: Callable[[Contents, Sequence[str]], Mapping[str, object]]
+    """Returns the data of its configuration; it is given the names of all components of the robot."""
+
+
+@dataclass(frozen=True, slots=True)
 class Declaration(Generic[M]):
     """How a section is declared; `M` is the model of an entry, or of the whole section if its keys are fixed."""
 
@@ -316,6 +325,11 @@ class Declaration(Generic[M]):
     """Names of the components that it adds if it is present."""
     components: Callable[[Contents, Wiring], Iterable[WantedComponent]] = lambda contents, wiring: ()
     """Returns the components that it defines."""
+    always: AlwaysRun | None = None
+    """The component that it configures, and that every robot runs, with or without this section."""
+    levels: Callable[[Contents], Mapping[str, str]] = lambda contents: {}
+    """Names of levels (`ok`, `warn`, ...) that values read as `SECTION.NAME`, each with the name of its status in
+    `/diagnostics_agg`."""
     wires: bool = False
     """Whether its entries decide which components there are, and what they are connected to."""
     connects: Callable[[Contents], Mapping[str, Mapping[str, str]]] = lambda contents: {}

@@ -173,12 +173,7 @@ def _example(skill: Skill) -> str:
 def _data(source: SkillSource) -> dict[str, Any]:
     skill = source.skill
     arguments = [
-        {
-            "name": name,
-            "type": argument.detail,
-            "needed": name in skill.required,
-            "main": name == skill.main,
-        }
+        {"name": name, "type": argument.detail, "needed": name in skill.required, "main": name == skill.main}
         for name, argument in skill.arguments.items()
     ]
     return {

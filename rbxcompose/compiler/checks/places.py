@@ -12,8 +12,8 @@ from rbxcompose.base.expressions.tree import Comparison, ExpressionNode, Functio
 from rbxcompose.base.findings import Finding, Related, Severity
 from rbxcompose.base.units import ANGLE, ANGULAR_SPEED, LENGTH, SPEED, TIME, Dimension, format_quantity
 from rbxcompose.compiler.check_runner import check
+from rbxcompose.compiler.model.mission_facts import constants, ways_of
 from rbxcompose.compiler.model.robot import Robot, RobotComponent
-from rbxcompose.domains.power.charge import constants, ways_of
 from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.tree import ScalarNode, at
 from rbxcompose.missions.analysis.facts import place_in_text

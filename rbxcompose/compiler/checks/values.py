@@ -10,12 +10,11 @@ from rbxcompose.base.findings import DID_YOU_MEAN, Finding, Related, Severity, c
 from rbxcompose.base.rules import MISSIONS, NAMES, WIRING
 from rbxcompose.base.units import RATIO, UNITS
 from rbxcompose.compiler.check_runner import check
-from rbxcompose.compiler.model.flow import is_written
+from rbxcompose.compiler.model.flow import Wrong, is_written
+from rbxcompose.compiler.model.mission_facts import constants
 from rbxcompose.compiler.model.robot import PortEnd, Robot, RobotComponent, resolve
 from rbxcompose.compiler.model.values import fitting_kinds
 from rbxcompose.compiler.sections.values import ValueModel
-from rbxcompose.domains.muxes.checks import Wrong
-from rbxcompose.domains.power.charge import constants
 from rbxcompose.missions.analysis.effects import called, published
 from rbxcompose.missions.analysis.facts import Constants, number_of
 from rbxcompose.missions.program.machines import MessageTemplate, TemplateShape, WrittenValue

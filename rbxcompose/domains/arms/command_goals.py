@@ -20,6 +20,7 @@ from rbxcompose.domains.arms.arm_config import ArmConfig, ArmWorks
 from rbxcompose.domains.arms.sections.arms import ArmOfRobot, arms
 from rbxcompose.domains.arms.sections.scene import scene
 from rbxcompose.domains.body.description import Description
+from rbxcompose.domains.body.sections.body import body
 from rbxcompose.domains.servos.sections.joints import JointPosition
 from rbxcompose.manifest.fields import FramePose
 from rbxcompose.manifest.reader import read_text
@@ -175,7 +176,7 @@ def chosen_arm(arguments: argparse.Namespace, *, is_fast: bool = False) -> tuple
     if name not in found:
         words = f"there is no arm '{name}'; {suggest(name, found, 'arms')}" if name else "name one with --arm"
         raise NotDoneError(NO_MOTION.at(None, words if found else "this robot has no arms"))
-    config, description = robot.components[name].config, robot.manifest.body
+    config, description = robot.components[name].config, robot.manifest.contents.of(body)
     if not isinstance(config, ArmConfig) or description is None:
         return None
     return found[name], works_of(robot, config, description, is_fast=is_fast)

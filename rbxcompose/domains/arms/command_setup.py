@@ -27,6 +27,7 @@ from rbxcompose.domains.arms.motion.collisions import MeshChecker, adjacent_pair
 from rbxcompose.domains.arms.sections.arms import arms
 from rbxcompose.domains.body.description import Description
 from rbxcompose.domains.body.link_pairs import CollisionMatrix, LinkPair, read_matrix
+from rbxcompose.domains.body.sections.body import body
 from rbxcompose.domains.body.source import bare_body, is_description
 from rbxcompose.manifest.files import PREFIX, find, shown_name
 from rbxcompose.manifest.reader import read_source
@@ -75,7 +76,7 @@ def run_setup(arguments: argparse.Namespace) -> int:
     compilation = compiled(path, arguments)
     report = Report([finding for finding in compilation.report if finding.severity is Severity.ERROR])
     tell_report(report, compilation.sources)
-    description = compilation.robot.manifest.body if compilation.robot is not None else None
+    description = compilation.robot.manifest.contents.of(body) if compilation.robot is not None else None
     found = find(path)
     if report.has_errors or isinstance(found, Finding) or compilation.robot is None:
         return 1
@@ -223,7 +224,7 @@ def run_check(robot: Robot, compilation: Compilation, *, is_json: bool) -> int:
 
 
 def _findings(robot: Robot) -> Iterator[tuple[str, str, list[tuple[str, str]], Finding]]:
-    contents, description = robot.manifest.contents, robot.manifest.body
+    contents, description = robot.manifest.contents, robot.manifest.contents.of(body)
     if description is None:
         return
     matrix = description.matrix.pairs if description.matrix is not None else {}

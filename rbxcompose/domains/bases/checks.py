@@ -11,9 +11,10 @@ from rbxcompose.base.rules import NAMES, WIRING
 from rbxcompose.base.units import ANGULAR_SPEED, LENGTH, SPEED, TIME, Dimension, format_quantity
 from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.model.flow import OTHER_TYPE, Drive, MessageFlow, is_written, period_of, setting_span
+from rbxcompose.compiler.model.mission_facts import constants
 from rbxcompose.compiler.model.robot import PortEnd, Robot
 from rbxcompose.domains.bases.body_wheels import BodyWheel, differs, rolling_bases
-from rbxcompose.domains.power.charge import constants
+from rbxcompose.domains.body.sections.body import body
 from rbxcompose.domains.servos.sections.joints import joints
 from rbxcompose.missions.analysis.effects import published
 from rbxcompose.missions.analysis.facts import number_of
@@ -233,7 +234,7 @@ def _moves(robot: Robot, end: PortEnd) -> bool:
 @check("RBX2286", Severity.WARNING, closed=(WIRING, NAMES))
 def unplaced_base(robot: Robot) -> Iterator[Finding]:
     """Somebody looks up where the robot is, and nobody tells."""
-    description, bases = robot.manifest.body, robot.declared(Drives)
+    description, bases = robot.manifest.contents.of(body), robot.declared(Drives)
     if description is None or not description.body.links or not bases:
         return
     links, root = description.body.links, description.body.root
@@ -256,7 +257,7 @@ def unplaced_base(robot: Robot) -> Iterator[Finding]:
 @check("RBX2352", Severity.WARNING, closed=(WIRING, NAMES))
 def untold_frame(robot: Robot) -> Iterator[Finding]:
     """Nobody tells where the robot is in the frame of its virtual joint."""
-    description = robot.manifest.body
+    description = robot.manifest.contents.of(body)
     if description is None or description.virtual is None or description.virtual.kind == "fixed":
         return
     joint, root = description.virtual, description.body.root

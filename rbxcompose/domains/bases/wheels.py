@@ -181,11 +181,7 @@ class WheelDrive:
     """Follows commands for the velocity of a base; without new ones it brakes within its limits."""
 
     def __init__(
-        self,
-        geometry: WheelGeometry,
-        limits: BaseLimits,
-        command_timeout: float = 0.5,
-        wheel_speed: float = math.inf,
+        self, geometry: WheelGeometry, limits: BaseLimits, command_timeout: float = 0.5, wheel_speed: float = math.inf
     ) -> None:
         """`command_timeout` [s] is how long a command holds; 0 is for ever. `wheel_speed` limits wheels [units/s]."""
         self.geometry = geometry

@@ -17,7 +17,7 @@ from rbxcompose.commands.console import FINDINGS, misused, refuse, tell, tell_re
 from rbxcompose.commands.targets import add_layer_options, compiled, robot_path
 from rbxcompose.domains.body.description import BodyPart, Description, describe
 from rbxcompose.domains.body.files import BodyFile
-from rbxcompose.domains.body.sections.body import as_xacro_text
+from rbxcompose.domains.body.sections.body import as_xacro_text, body
 from rbxcompose.manifest.files import find, shown_name
 
 URDF, XACRO = ".urdf", ".xacro"
@@ -66,7 +66,7 @@ def described(arguments: argparse.Namespace) -> DescribedBody:
     if not is_description(arguments.path):
         _refuse_options(arguments, _FILES, "is for .urdf and .xacro files; a robot names it in its 'body'")
         compilation = compiled(arguments.path, arguments)
-        description = compilation.robot.manifest.body if compilation.robot else None
+        description = compilation.robot.manifest.contents.of(body) if compilation.robot else None
         return DescribedBody(_usable(description), compilation.report, compilation.sources)
     _refuse_options(arguments, _LAYERS, "is for robots, not for .urdf and .xacro files")
     if arguments.with_ and arguments.path.endswith(URDF):

@@ -107,10 +107,7 @@ def lock_states(core: Core, topics: Mapping[str, str], now: float) -> tuple[MuxL
     """Return all locks."""
     return tuple(
         MuxLockState(
-            name,
-            topics[name],
-            int(entry.priority) if entry.priority < math.inf else None,
-            core.locks.why(name, now),
+            name, topics[name], int(entry.priority) if entry.priority < math.inf else None, core.locks.why(name, now)
         )
         for name, entry in core.locks.declared.items()
     )

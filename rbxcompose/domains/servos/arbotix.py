@@ -12,25 +12,9 @@ from typing import Protocol, TypeVar
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, Related, Report, Severity, Span, kind
 from rbxcompose.base.printable import plain
+from rbxcompose.commands.importing import manifest_text as out
 from rbxcompose.commands.importing.foreign_files import ForeignFile, ForeignMap, FreeNames, Given
 from rbxcompose.commands.importing.importer import DISAGREES, NOT_CARRIED_OVER, OTHER_PROGRAM
-from rbxcompose.commands.importing.manifest_text import (
-    WIDEST,
-    Row,
-    angle,
-    degrees_shown,
-    flag,
-    flow,
-    flow_list,
-    length,
-    number,
-    place,
-    places,
-    quantity,
-    row,
-    section,
-    word,
-)
 from rbxcompose.commands.importing.manifest_text import (
     key as yaml_key,
 )
@@ -117,7 +101,7 @@ def _diff(name: str, told: ForeignMap) -> DiffController:
 
 
 def _figures(base: DiffController) -> str:
-    known = [f"{key} {number(base.kept[key].value)}" for key in ("base_width", "ticks_meter") if key in base.kept]
+    known = [f"{key} {out.number(base.kept[key].value)}" for key in ("base_width", "ticks_meter") if key in base.kept]
     return f"the real one has {' and '.join(known)}; a comment keeps that" if known else ""
 
 
@@ -154,9 +138,9 @@ def read_gripper(name: str, told: ForeignMap) -> ArbotixGripper | None:
         return None
     kind_of = MODELS[model.value]
     joints = tuple(told.text(key) or Given(usual, told.span) for key, usual in _JOINTS[kind_of].items())
-    lines: Lines = {"type": ("gripper", ""), "model": (kind_of, place(model.span))}
+    lines: Lines = {"type": ("gripper", ""), "model": (kind_of, out.place(model.span))}
     keys = ("left", "right") if len(joints) > 1 else ("joint",)
-    lines |= {key: (word(joint.value), place(joint.span)) for key, joint in zip(keys, joints, strict=True)}
+    lines |= {key: (out.word(joint.value), out.place(joint.span)) for key, joint in zip(keys, joints, strict=True)}
     lines |= _scale(told) if kind_of == "parallel" else _geometry(told)
     lines |= _two_sides(told) if kind_of == "dual" else _one_side(told, kind_of)
     told.tell_others()
@@ -175,7 +159,7 @@ def _geometry(told: ForeignMap) -> Lines:
 
 
 def _length(found: Given[float] | None, usual: float) -> tuple[str, str]:
-    return (length(found.value), place(found.span)) if found else (length(usual), _DRIVER)
+    return (out.length(found.value), out.place(found.span)) if found else (out.length(usual), _DRIVER)
 
 
 def _opening(told: ForeignMap, furthest: float) -> Lines:
@@ -183,11 +167,13 @@ def _opening(told: ForeignMap, furthest: float) -> Lines:
     low = least.value if least else MIN_OPENING
     high = greatest.value if greatest else min(MAX_OPENING, furthest)
     if 0 <= low < high <= furthest:
-        given = [place(one.span) for one in (least, greatest) if one]
-        return {"opening": (flow_list([length(low), length(high)]), ", ".join(dict.fromkeys(given)) or _DRIVER)}
+        given = [out.place(one.span) for one in (least, greatest) if one]
+        return {
+            "opening": (out.flow_list([out.length(low), out.length(high)]), ", ".join(dict.fromkeys(given)) or _DRIVER)
+        }
     given_at = least if least and low < 0 else greatest or least
-    reason = "the least is below 0" if low < 0 else f"the fingers open from 0 m to {number(round(furthest, 6))} m"
-    words = f"{told.what} cannot open from {number(low)} m to {number(high)} m, so that is left out: {reason}"
+    reason = "the least is below 0" if low < 0 else f"the fingers open from 0 m to {out.number(round(furthest, 6))} m"
+    words = f"{told.what} cannot open from {out.number(low)} m to {out.number(high)} m, so that is left out: {reason}"
     help_text = "openings are distances between the pads in metres; these look like angles of the joint in radians"
     told.tell(NO_OPENING.at(given_at.span if given_at else told.span, words, help=help_text))
     return {}
@@ -199,17 +185,17 @@ def _scale(told: ForeignMap) -> Lines:
         told.tell(OUT_OF_RANGE.at(scale.span, f"'scale' of {told.what} must not be 0", help="it is left out"))
         scale = None
     value = scale.value if scale else 1.0
-    where = place(scale.span) if scale else _DRIVER
-    words = f"{where}: {number(value)} rad/m; how far it opens is not in the file: write 'opening'"
-    lines = {"travel": (length(round(math.tau / abs(value), 7)), words)}
-    return lines if value > 0 else lines | {"invert": (flag(True), where)}
+    where = out.place(scale.span) if scale else _DRIVER
+    words = f"{where}: {out.number(value)} rad/m; how far it opens is not in the file: write 'opening'"
+    lines = {"travel": (out.length(round(math.tau / abs(value), 7)), words)}
+    return lines if value > 0 else lines | {"invert": (out.flag(True), where)}
 
 
 def _one_side(told: ForeignMap, kind_of: str) -> Lines:
     center = told.number("center")
-    lines = {"center": (angle(center.value), place(center.span))} if center else {}
+    lines = {"center": (out.angle(center.value), out.place(center.span))} if center else {}
     if kind_of == "one_sided" and told.is_set("invert"):
-        lines["invert"] = (flag(True), place(told.places("invert")["invert"]))
+        lines["invert"] = (out.flag(True), out.place(told.places("invert")["invert"]))
     return lines
 
 
@@ -217,10 +203,10 @@ def _two_sides(told: ForeignMap) -> Lines:
     lines: Lines = {}
     for key in ("center_left", "center_right"):
         if (center := told.number(key)) is not None:
-            lines[key] = (angle(center.value), place(center.span))
+            lines[key] = (out.angle(center.value), out.place(center.span))
     for key in ("invert_left", "invert_right"):
         if (invert := told.flag(key)) is not None and invert.value:
-            lines[key] = (flag(True), place(invert.span))
+            lines[key] = (out.flag(True), out.place(invert.span))
     return lines
 
 
@@ -313,7 +299,7 @@ def _model(told: ForeignMap) -> tuple[ServoModel, float] | None:
             return servo_models()[name], turn
     span = given.span if given else ticks.span if ticks else told.span
     known = ", ".join(f"{guess}: {_ticks(guess)}" for guess in GUESSES)
-    words = f"no servo has {count} ticks over {number(turn)} degrees, so {told.what} is left out"
+    words = f"no servo has {count} ticks over {out.number(turn)} degrees, so {told.what} is left out"
     told.tell(NO_SUCH_SERVO.at(span, words, help=known))
     return None
 
@@ -338,14 +324,14 @@ def _unreachable(joint: ArbotixJoint, what: str) -> Iterable[Finding]:
     slack = joint.model.per_tick
     for limit, outwards, end in ((joint.least, -1, low), (joint.greatest, 1, high)):
         if limit is not None and outwards * (math.radians(limit.value) - end) > slack:
-            words = f"{what} never gets to {number(limit.value)} deg: {turns(joint)}"
+            words = f"{what} never gets to {out.number(limit.value)} deg: {turns(joint)}"
             yield UNREACHABLE.at(limit.span, words, help="'neutral' is the tick at which it is at 0")
 
 
 def turns(joint: ArbotixJoint) -> str:
     """Return how far the servo of a joint turns, in words."""
     low, high = joint.reach
-    return f"its servo turns from {degrees_shown(low)} to {degrees_shown(high)}"
+    return f"its servo turns from {out.degrees_shown(low)} to {out.degrees_shown(high)}"
 
 
 def guesses(joints: Iterable[ArbotixJoint], span: Span) -> Iterable[Finding]:
@@ -614,86 +600,88 @@ class ArbotixManifest:
     def text(self) -> str:
         """Return the sections, an empty line between two of them."""
         parts = (self._bus_rows, self._actuator_rows, self._joint_rows, self._controller_rows, self._base_rows)
-        return "\n".join(text for part in parts if (text := section(part())))
+        return "\n".join(text for part in parts if (text := out.section(part())))
 
-    def _bus_rows(self) -> Iterator[Row]:
+    def _bus_rows(self) -> Iterator[out.Row]:
         if self._buses:
-            yield row(0, "buses:")
+            yield out.row(0, "buses:")
         for port, name in self._buses.items():
             yield from _bus(name, self._robot.lines[port])
 
-    def _actuator_rows(self) -> Iterator[Row]:
+    def _actuator_rows(self) -> Iterator[out.Row]:
         if self._buses:
-            yield row(0, "actuators:")
-            yield row(1, "", "the files name no models: these are guesses by the ticks of the servos")
+            yield out.row(0, "actuators:")
+            yield out.row(1, "", "the files name no models: these are guesses by the ticks of the servos")
         for port, name in self._buses.items():
             for joint in self._robot.lines[port].joints.values():
-                yield row(1, f"{self._actuators[joint.name]}: {_servo(name, joint)}", _origin(joint))
+                yield out.row(1, f"{self._actuators[joint.name]}: {_servo(name, joint)}", _origin(joint))
 
-    def _joint_rows(self) -> Iterator[Row]:
+    def _joint_rows(self) -> Iterator[out.Row]:
         if self._buses:
-            yield Row("", "the joints below are those of the robot's URDF; name that file here:")
-            yield Row("", "body: {urdf: robot.urdf}")
-            yield row(0, "joints:")
+            yield out.Row("", "the joints below are those of the robot's URDF; name that file here:")
+            yield out.Row("", "body: {urdf: robot.urdf}")
+            yield out.row(0, "joints:")
         for joint in self._robot.joints.values():
-            yield row(1, f"{yaml_key(joint.name)}:", place(joint.span))
-            yield row(
+            yield out.row(1, f"{yaml_key(joint.name)}:", out.place(joint.span))
+            yield out.row(
                 2, f"actuator: {self._actuators[joint.name]}", "" if joint.limits else f"no limits: {turns(joint)}"
             )
             if limits := _manifest_limits(joint):
-                yield row(2, f"limits: {flow(limits)}", _half_given(joint))
+                yield out.row(2, f"limits: {out.flow(limits)}", _half_given(joint))
 
-    def _controller_rows(self) -> Iterator[Row]:
+    def _controller_rows(self) -> Iterator[out.Row]:
         controllers = [one for one in self._robot.controllers.values() if not isinstance(one, DiffController)]
         if controllers:
-            yield row(0, "controllers:")
+            yield out.row(0, "controllers:")
         for controller in controllers:
             yield self._head(controller.name, controller)
             yield from self._follow(controller) if isinstance(controller, FollowController) else _gripper(controller)
 
-    def _head(self, wanted: str, one: FollowController | DiffController | ArbotixGripper) -> Row:
+    def _head(self, wanted: str, one: FollowController | DiffController | ArbotixGripper) -> out.Row:
         name = self._names.take(wanted, "controller")
         was = f"; its name was '{plain(one.name, 60)}'" if name != one.name else ""
-        return row(1, f"{name}:", f"{place(one.span)}{was}")
+        return out.row(1, f"{name}:", f"{out.place(one.span)}{was}")
 
-    def _follow(self, controller: FollowController) -> Iterator[Row]:
-        yield row(2, "type: joint_trajectory")
+    def _follow(self, controller: FollowController) -> Iterator[out.Row]:
+        yield out.row(2, "type: joint_trajectory")
         gone = self._robot.missing(controller)
-        names = [word(joint.value) for joint in controller.joints if joint.value not in gone]
+        names = [out.word(joint.value) for joint in controller.joints if joint.value not in gone]
         without = f"without {', '.join(plain(name, 60) for name in gone)}" if gone else ""
-        line = row(2, f"joints: {flow_list(names)}", without)
-        if len(line.text) <= WIDEST:
+        line = out.row(2, f"joints: {out.flow_list(names)}", without)
+        if len(line.text) <= out.WIDEST:
             yield line
             return
-        yield row(2, "joints:", without)
+        yield out.row(2, "joints:", without)
         for name in names:
-            yield row(3, f"- {name}")
+            yield out.row(3, f"- {name}")
 
-    def _base_rows(self) -> Iterator[Row]:
+    def _base_rows(self) -> Iterator[out.Row]:
         bases = [
             controller for controller in self._robot.controllers.values() if isinstance(controller, DiffController)
         ]
         if bases:
-            yield row(0, "components:")
+            yield out.row(0, "components:")
         for base in bases:
             yield self._head(base.name.removesuffix("_controller"), base)
             yield from _base(base)
 
 
-def _bus(name: str, line: ServoLine) -> Iterator[Row]:
-    yield row(1, f"{name}:")
-    yield row(2, "type: dynamixel")
+def _bus(name: str, line: ServoLine) -> Iterator[out.Row]:
+    yield out.row(1, f"{name}:")
+    yield out.row(2, "type: dynamixel")
     port = line.port
-    yield row(
-        2, f"port: {word(port.value if port else USUAL_PORT)}", place(port.span) if port else "the driver's default"
+    yield out.row(
+        2,
+        f"port: {out.word(port.value if port else USUAL_PORT)}",
+        out.place(port.span) if port else "the driver's default",
     )
     if line.baud:
-        yield row(2, f"baud: {line.baud.value}", place(line.baud.span))
+        yield out.row(2, f"baud: {line.baud.value}", out.place(line.baud.span))
     if line.rate:
         why = "the larger of read_rate and write_rate"
-        yield row(2, f"rate: {quantity(line.rate.value, 'Hz')}", f"{place(line.rate.span)}: {why}")
+        yield out.row(2, f"rate: {out.quantity(line.rate.value, 'Hz')}", f"{out.place(line.rate.span)}: {why}")
     if line.idle:
-        yield row(2, "", f"not needed here: {places(line.idle)}")
+        yield out.row(2, "", f"not needed here: {out.places(line.idle)}")
 
 
 def _servo(bus: str, joint: ArbotixJoint) -> str:
@@ -701,20 +689,20 @@ def _servo(bus: str, joint: ArbotixJoint) -> str:
     if joint.neutral:
         entries["neutral"] = str(joint.neutral.value)
     if joint.is_inverted:
-        entries["invert"] = flag(True)
-    return flow(entries)
+        entries["invert"] = out.flag(True)
+    return out.flow(entries)
 
 
 def _origin(joint: ArbotixJoint) -> str:
-    return f"{place(joint.id.span)}: {joint.model.family.ticks} ticks over {number(joint.turn)} deg"
+    return f"{out.place(joint.id.span)}: {joint.model.family.ticks} ticks over {out.number(joint.turn)} deg"
 
 
 def _manifest_limits(joint: ArbotixJoint) -> dict[str, str]:
     found = {}
     if joint.limits:
-        found["position"] = flow_list([quantity(limit, "deg") for limit in joint.limits])
+        found["position"] = out.flow_list([out.quantity(limit, "deg") for limit in joint.limits])
     if joint.speed:
-        found["velocity"] = quantity(joint.speed.value, "deg/s")
+        found["velocity"] = out.quantity(joint.speed.value, "deg/s")
     return found
 
 
@@ -724,22 +712,22 @@ def _half_given(joint: ArbotixJoint) -> str:
     return f"{'max' if joint.least else 'min'}_angle is the driver's default"
 
 
-def _gripper(gripper: ArbotixGripper) -> Iterator[Row]:
+def _gripper(gripper: ArbotixGripper) -> Iterator[out.Row]:
     for name, (value, origin) in gripper.lines.items():
-        yield row(2, f"{name}: {value}", origin)
+        yield out.row(2, f"{name}: {value}", origin)
 
 
-def _base(controller: DiffController) -> Iterator[Row]:
-    yield row(2, "type: diff_drive_sim", "the ArbotiX board drives the real base by its own firmware")
+def _base(controller: DiffController) -> Iterator[out.Row]:
+    yield out.row(2, "type: diff_drive_sim", "the ArbotiX board drives the real base by its own firmware")
     if controller.acceleration:
-        text = quantity(controller.acceleration.value, "m/s^2")
-        yield row(2, f"acceleration: {text}", f"{place(controller.acceleration.span)}: accel_limit")
+        text = out.quantity(controller.acceleration.value, "m/s^2")
+        yield out.row(2, f"acceleration: {text}", f"{out.place(controller.acceleration.span)}: accel_limit")
     if controller.timeout:
-        yield row(
+        yield out.row(
             2,
-            f"command_timeout: {quantity(controller.timeout.value, 's')}",
-            f"{place(controller.timeout.span)}: timeout",
+            f"command_timeout: {out.quantity(controller.timeout.value, 's')}",
+            f"{out.place(controller.timeout.span)}: timeout",
         )
     if controller.kept:
-        known = (f"{name} {number(found.value)}{_UNITS.get(name, '')}" for name, found in controller.kept.items())
-        yield row(2, "", f"of the real one: {', '.join(known)}")
+        known = (f"{name} {out.number(found.value)}{_UNITS.get(name, '')}" for name, found in controller.kept.items())
+        yield out.row(2, "", f"of the real one: {', '.join(known)}")

@@ -21,8 +21,8 @@ from rbxcompose.base.printable import plain
 from rbxcompose.commands.console import FINDINGS, refuse, tell, tell_report
 from rbxcompose.commands.new_files import ANSWER, AnswerError, read_name, read_text, read_yes, write_new
 from rbxcompose.compiler.compile import Compilation, compile_robot
+from rbxcompose.compiler.model.mission_facts import navigator_of, top_speed
 from rbxcompose.compiler.model.robot import Robot
-from rbxcompose.domains.power.charge import navigator_of, top_speed
 from rbxcompose.manifest.files import PREFIX, find, project_of, shown_name
 from rbxcompose.manifest.tree import FILE_BYTES
 from rbxcompose.tools.scaffold import robot

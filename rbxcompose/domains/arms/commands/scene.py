@@ -19,20 +19,9 @@ from rbxcompose.base.requests import to_data
 from rbxcompose.commands.console import NotDoneError, misused, refuse, table, tell, tell_report
 from rbxcompose.commands.lookup import add_asking_options, answer_of, find_robot, pass_on
 from rbxcompose.commands.options import Declare, Subcommand, add_actions, argument, run_action
+from rbxcompose.domains.arms import scene_view
 from rbxcompose.domains.arms.motion.scene import PairDistance, PlacedObject
 from rbxcompose.domains.arms.motion.scene_text import written_scene
-from rbxcompose.domains.arms.scene_view import (
-    SCENE,
-    AddToScene,
-    ArmView,
-    AttachInScene,
-    DetachInScene,
-    ListScene,
-    LoadScene,
-    RemoveFromScene,
-    StandingObjects,
-    ViewOfArm,
-)
 from rbxcompose.domains.arms.sections.scene import NO_MESH, ObjectModel, mesh_mistake, scene_of
 from rbxcompose.domains.body.meshes import MissingLibraryError
 from rbxcompose.domains.body.model import Body, Geometry
@@ -42,7 +31,7 @@ from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.validate import validate
 
 NO_PAIR = kind("RBX9426")
-ON_SYSTEM = SCENE
+ON_SYSTEM = scene_view.SCENE
 _SHOWN = "OBJECT"  # name of the object's text in findings
 Do = Callable[[argparse.Namespace], int]
 
@@ -93,7 +82,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _objects(arguments: argparse.Namespace) -> tuple[PlacedObject, ...]:
-    return answer_of(find_robot(arguments.robot), ListScene())
+    return answer_of(find_robot(arguments.robot), scene_view.ListScene())
 
 
 def _ls(arguments: argparse.Namespace) -> int:
@@ -130,32 +119,34 @@ def _add(arguments: argparse.Namespace) -> int:
     if read is None:
         tell_report(report, {_SHOWN: arguments.object})
         return 1
-    return pass_on(arguments, AddToScene(read.placed(arguments.name, "", file)))
+    return pass_on(arguments, scene_view.AddToScene(read.placed(arguments.name, "", file)))
 
 
 def _remove(arguments: argparse.Namespace) -> int:
-    return pass_on(arguments, RemoveFromScene(arguments.name))
+    return pass_on(arguments, scene_view.RemoveFromScene(arguments.name))
 
 
 def _attach(arguments: argparse.Namespace) -> int:
-    return pass_on(arguments, AttachInScene(arguments.name, arguments.link, tuple(arguments.touch)))
+    return pass_on(arguments, scene_view.AttachInScene(arguments.name, arguments.link, tuple(arguments.touch)))
 
 
 def _detach(arguments: argparse.Namespace) -> int:
-    return pass_on(arguments, DetachInScene(arguments.name))
+    return pass_on(arguments, scene_view.DetachInScene(arguments.name))
 
 
 def _load(arguments: argparse.Namespace) -> int:
     found = scene_of(Path(arguments.file))
     if isinstance(found, Finding):
         return refuse(found)
-    return pass_on(arguments, LoadScene(written_scene(found.name, found.objects), arguments.file, arguments.link))
+    return pass_on(
+        arguments, scene_view.LoadScene(written_scene(found.name, found.objects), arguments.file, arguments.link)
+    )
 
 
 def _save(arguments: argparse.Namespace) -> int:
     """Write what stands around the robot; what it holds, and octrees, are left out and told."""
     folder = find_robot(arguments.robot)
-    stands = answer_of(folder, StandingObjects())
+    stands = answer_of(folder, scene_view.StandingObjects())
     kept = [
         placed_object
         for placed_object in stands
@@ -199,8 +190,8 @@ def _read(shape: Geometry) -> Geometry:
     return replace(shape, file="", points=tuple(points), triangles=tuple(triangles))
 
 
-def _view(arguments: argparse.Namespace, *between: str) -> ArmView:
-    return answer_of(find_robot(arguments.robot), ViewOfArm(arguments.arm, between))
+def _view(arguments: argparse.Namespace, *between: str) -> scene_view.ArmView:
+    return answer_of(find_robot(arguments.robot), scene_view.ViewOfArm(arguments.arm, between))
 
 
 def _watch(arguments: argparse.Namespace) -> int:

@@ -11,15 +11,7 @@ from rbxcompose.base.config import ARM, CONTROLLER, Config, JointName, Length, L
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, Related
 from rbxcompose.base.units import ANGLE, LENGTH, Quantity, format_quantity
-from rbxcompose.domains.arms.manifest_model import (
-    PLANNERS,
-    ChainModel,
-    GraspModel,
-    HandConfig,
-    PlannerModel,
-    SolverModel,
-    SpotModel,
-)
+from rbxcompose.domains.arms import manifest_model
 from rbxcompose.domains.arms.motion.group_findings import (
     BEYOND,
     GRIPPER_ELSEWHERE,
@@ -53,7 +45,7 @@ _ROUNDING = 1e-6  # [rad or m]
 class ArmModel(Config):
     """Joints that move together."""
 
-    chain: ChainModel | None = None
+    chain: manifest_model.ChainModel | None = None
     """Its joints are those between these links."""
     joints: list[JointName] = []
     """Its joints, instead of a chain."""
@@ -71,17 +63,17 @@ class ArmModel(Config):
     """The frame between the fingers of the gripper: x ahead, y across; without it, the tip."""
     squeeze: Length = Field(0.0, ge=0)
     """By how much the gripper is asked to close farther than an object is wide; simulated fingers feel no objects."""
-    grasps: dict[Name, list[GraspModel]] = {}
+    grasps: dict[Name, list[manifest_model.GraspModel]] = {}
     """How objects may be held, by their names; grasps of others follow from their shapes."""
     pictures: str | None = Field(None, min_length=1)
     """A folder, relative to this file, into which each failure of picking and placing draws the scene; 20 are kept."""
-    spots: dict[Name, SpotModel] = {}
+    spots: dict[Name, manifest_model.SpotModel] = {}
     """Where the arm may put things, by name."""
     poses: dict[Name, dict[JointName, JointPosition]] = {}
     """Positions of joints by the name of the pose; a joint that a pose leaves out stays where it is."""
-    planner: PlannerModel = PlannerModel()
+    planner: manifest_model.PlannerModel = manifest_model.PlannerModel()
     """How its motions are planned."""
-    kinematics: SolverModel = SolverModel()
+    kinematics: manifest_model.SolverModel = manifest_model.SolverModel()
     """How positions of joints are searched for a pose of the tip."""
 
     @model_validator(mode="after")
@@ -147,7 +139,7 @@ def _pairs(description: Description, group: ArmGroup) -> dict[str, list[LinkPair
     }
 
 
-def hand_in(contents: Contents, arm: ArmOfRobot) -> HandConfig | None:
+def hand_in(contents: Contents, arm: ArmOfRobot) -> manifest_model.HandConfig | None:
     """Return the gripper of an arm, if it has one."""
     model, there = arm.model, contents.of(controllers).get(arm.model.gripper or "")
     if model.gripper is None or there is None:
@@ -155,7 +147,7 @@ def hand_in(contents: Contents, arm: ArmOfRobot) -> HandConfig | None:
     name = model.gripper
     bounds = (each for each in controller_type(there.type).capabilities(name, there) if isinstance(each, BoundsGoals))
     ranges = [pair for each in bounds if each.ranges is not None for pair in each.ranges.value.values()]
-    return HandConfig(
+    return manifest_model.HandConfig(
         controller=name,
         command=served_topic(name, there, GripperCommand),
         opening=ranges[0] if ranges else None,
@@ -220,10 +212,12 @@ def arms(reading: Reading[ArmModel]) -> dict[str, ArmOfRobot]:
     description, entries, found = reading.contents.of(body), reading.entries(), dict[str, ArmOfRobot]()
     groups: dict[str, ArmGroup | None] = {}
     for name, entry in entries.items():
-        if entry.planner.type not in PLANNERS:
+        if entry.planner.type not in manifest_model.PLANNERS:
             path = ("arms", name, "planner", "type")
             node = at(reading.contents.root, path)
-            reading.report.add(not_a_choice(value_span(reading.contents.root, path), "type", node, list(PLANNERS)))
+            reading.report.add(
+                not_a_choice(value_span(reading.contents.root, path), "type", node, list(manifest_model.PLANNERS))
+            )
         if description is None:
             continue  # it is missing or has a mistake, which is told
         group = _group_of(reading, name, entries, groups, description.body)
@@ -231,7 +225,7 @@ def arms(reading: Reading[ArmModel]) -> dict[str, ArmOfRobot]:
             continue
         wrong = list(_mistakes(reading, name, entry, group, description.body))
         reading.report.extend(wrong)
-        found[name] = ArmOfRobot(entry, group, not wrong and entry.planner.type in PLANNERS)
+        found[name] = ArmOfRobot(entry, group, not wrong and entry.planner.type in manifest_model.PLANNERS)
     return found
 
 

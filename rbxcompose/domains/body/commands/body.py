@@ -14,21 +14,12 @@ from pathlib import Path
 from rbxcompose.base.files import replace_file
 from rbxcompose.base.findings import Finding, Report, Severity, Sources, kind
 from rbxcompose.base.printable import plain
+from rbxcompose.commands import options
 from rbxcompose.commands.console import FINDINGS, has_colour, misused, refuse, table, tell, tell_report
 from rbxcompose.commands.formats.json_ import as_data
 from rbxcompose.commands.formats.text import render_text
 from rbxcompose.commands.layout import NotDrawnError
 from rbxcompose.commands.lookup import add_bus_options
-from rbxcompose.commands.options import (
-    Declare,
-    Subcommand,
-    add_actions,
-    add_json_option,
-    add_timeout_option,
-    argument,
-    run_action,
-    seconds,
-)
 from rbxcompose.domains.body.description import Description
 from rbxcompose.domains.body.files import FORMATS as MESHES
 from rbxcompose.domains.body.live_pose import sliders_of
@@ -65,31 +56,31 @@ from rbxcompose.manifest.files import find, shown_name
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    out = argument("--out", metavar="FILE", help="write it to this file")
+    out = options.argument("--out", metavar="FILE", help="write it to this file")
     words = "lines, or a picture as a graph"
-    form = argument("--format", choices=(TEXT, *FORMATS), default=TEXT, help=words)
+    form = options.argument("--format", choices=(TEXT, *FORMATS), default=TEXT, help=words)
     words = "write it to this file (default of a PDF: NAME.pdf)"
-    out_or_pdf = argument("--out", metavar="FILE", help=words)
-    picture = argument("--out", metavar="FILE", help="the picture (default: NAME.png)")
+    out_or_pdf = options.argument("--out", metavar="FILE", help=words)
+    picture = options.argument("--out", metavar="FILE", help="the picture (default: NAME.png)")
     words = "a joint's position, such as '35 deg'; a bare number is in rad or m"
-    joint = argument("--joint", action="append", default=[], metavar="NAME=POSITION", help=words)
+    joint = options.argument("--joint", action="append", default=[], metavar="NAME=POSITION", help=words)
     tree = "show which link hangs on which, by which joint"
     check = "report what is wrong with the body alone: findings RBX20.., or the errors that keep it from being read"
     source = add_source_options
-    table: tuple[tuple[str, str, Do, tuple[Declare, ...]], ...] = (
+    table: tuple[tuple[str, str, Do, tuple[options.Declare, ...]], ...] = (
         ("show", "list links and joints with masses and limits", using(_show), (source,)),
         ("tree", tree, using(_tree), (source, form, out_or_pdf)),
-        ("check", check, reading(_check), (source, add_json_option)),
+        ("check", check, reading(_check), (source, options.add_json_option)),
         ("expand", "print the URDF, with nothing of xacro left", using(_expand), (source, out)),
         ("picture", "draw it as a PNG", using(_picture), (source, picture, joint)),
         ("simplify", _SIMPLIFY, _run, (_add_simplify_options,)),
         ("pose", _POSE, _pose, (_add_pose_options,)),
     )
     more = {"simplify": _SIMPLIFY_MORE, "pose": _POSE_MORE}
-    add_actions(
+    options.add_actions(
         parser,
         (
-            Subcommand(
+            options.Subcommand(
                 name, words, do, own, f"{words[:1].upper()}{words[1:]}.\n\n{more[name]}" if name in more else words
             )
             for name, words, do, own in table
@@ -99,7 +90,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the chosen action."""
-    return run_action(arguments)
+    return options.run_action(arguments)
 
 
 def _show(arguments: argparse.Namespace, description: Description) -> int:
@@ -374,9 +365,9 @@ def _add_pose_options(parser: argparse.ArgumentParser) -> None:
     words = "publish this position and end: 0.6 (rad or m), '35 deg', '5 cm'; no terminal is needed"
     parser.add_argument("--joint", action="append", default=[], metavar="NAME=POSITION", help=words)
     words = "publish the positions of --joint for this long (default: once)"
-    parser.add_argument("--duration", type=seconds, metavar="T", help=words)
+    parser.add_argument("--duration", type=options.seconds, metavar="T", help=words)
     parser.add_argument("--topic", metavar="TOPIC", help="the topic with the URDF (default: robot_description)")
-    add_timeout_option(parser, "2s")
+    options.add_timeout_option(parser, "2s")
     add_bus_options(parser)
 
 

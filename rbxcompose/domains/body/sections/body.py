@@ -21,7 +21,7 @@ from rbxcompose.manifest.fields import FileName, PieceAttachment
 from rbxcompose.manifest.files import project_of, resolve, shown_name
 from rbxcompose.manifest.reader import UNREADABLE, read_source
 from rbxcompose.manifest.registry import section
-from rbxcompose.manifest.section import Contents, Reading, WantedComponent, Wiring
+from rbxcompose.manifest.section import AlwaysRun, Contents, Reading, WantedComponent, Wiring
 from rbxcompose.manifest.tree import BROKEN, Entry, KeyPath, MappingNode, ScalarNode, TreeNode, at, key_span, value_span
 from rbxcompose.manifest.validate import WRONG_TYPE
 
@@ -124,6 +124,10 @@ def _names(read: Description | None) -> Mapping[str, Mapping[str, object]]:
     return {LINK: read.body.links, JOINT: read.body.joints} if read else {}
 
 
+def _text(read: Description | None) -> str:
+    return read.text if read else ""
+
+
 @section(
     "body",
     BodyModel,
@@ -133,6 +137,7 @@ def _names(read: Description | None) -> Mapping[str, Mapping[str, object]]:
     entry="piece",
     shared=((), (PIECES,)),
     brings=(DESCRIPTION,),
+    always=AlwaysRun("transforms", lambda contents, names: {"urdf": _text(contents.of(body))}),
     wires=True,
     brought=_brought,
     defines=(LINK, JOINT),

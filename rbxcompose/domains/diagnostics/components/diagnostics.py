@@ -7,15 +7,8 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from rbxcompose.base.findings import suggest
 from rbxcompose.base.levels import Level
+from rbxcompose.domains.diagnostics import requests
 from rbxcompose.domains.diagnostics.core import Aggregator, TreeRow
-from rbxcompose.domains.diagnostics.requests import (
-    Acknowledge,
-    DiagnosticsTree,
-    LevelChange,
-    ListChanges,
-    ShowDiagnostics,
-    TreeLine,
-)
 from rbxcompose.domains.diagnostics.ros1 import Ros1Aggregator
 from rbxcompose.domains.diagnostics.settings import DiagnosticsModel
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -141,8 +134,8 @@ class Diagnostics(Component[DiagnosticsConfig]):
             self.context.log(level, f"{group.name} is {level.name}{cause}")
         self.told[group.name] = level
 
-    @answers(ShowDiagnostics)
-    def show(self, request: ShowDiagnostics) -> DiagnosticsTree:
+    @answers(requests.ShowDiagnostics)
+    def show(self, request: requests.ShowDiagnostics) -> requests.DiagnosticsTree:
         """Return the tree as it is now; of too many lines, groups and the worst."""
         self.core.advance(self.now)
         rows = self.core.report(self.now)
@@ -154,17 +147,17 @@ class Diagnostics(Component[DiagnosticsConfig]):
         kept = sorted(_within(worst_first, [_size(line) for line in lines]))
         told = tuple(lines[index] for index in kept)
         refused = self.core.admission.refused
-        return DiagnosticsTree(self.now, level, cause, told, len(lines) - len(told), refused)
+        return requests.DiagnosticsTree(self.now, level, cause, told, len(lines) - len(told), refused)
 
-    @answers(ListChanges)
-    def changes(self, request: ListChanges) -> tuple[LevelChange, ...]:
+    @answers(requests.ListChanges)
+    def changes(self, request: requests.ListChanges) -> tuple[requests.LevelChange, ...]:
         """Return the first of the changes that are still known."""
         known = list(self.core.history.after(request.after))
         kept = _within(range(len(known)), [len(change.path) + len(change.cause) + 100 for change in known])
         return tuple(known[index] for index in kept)
 
-    @answers(Acknowledge)
-    def acknowledge(self, request: Acknowledge) -> str:
+    @answers(requests.Acknowledge)
+    def acknowledge(self, request: requests.Acknowledge) -> str:
         """Let latched levels follow the present."""
         path = f"/{request.path.strip('/')}" if request.path else ""
         known = self.core.paths()
@@ -177,14 +170,16 @@ class Diagnostics(Component[DiagnosticsConfig]):
         return f"acknowledged: {', '.join(done)}"
 
 
-def _line(row: TreeRow) -> TreeLine:
+def _line(row: TreeRow) -> requests.TreeLine:
     status = row.status
     values = () if row.is_group else tuple((pair.key, pair.value) for pair in status.values)  # those of a group repeat
     level = Level(status.level)
-    return TreeLine(status.name, row.name, row.depth, row.is_group, level, status.message, status.hardware_id, values)
+    return requests.TreeLine(
+        status.name, row.name, row.depth, row.is_group, level, status.message, status.hardware_id, values
+    )
 
 
-def _size(line: TreeLine) -> int:
+def _size(line: requests.TreeLine) -> int:
     texts = (line.path, line.name, line.message, line.hardware_id, *(text for pair in line.values for text in pair))
     return 150 + sum(map(len, texts))
 
@@ -199,7 +194,7 @@ def _within(order: Iterable[int], sizes: Sequence[int]) -> Iterator[int]:
         yield index
 
 
-def _as_status(change: LevelChange) -> DiagnosticStatus:
+def _as_status(change: requests.LevelChange) -> DiagnosticStatus:
     told = (("number", change.number), ("time", f"{change.time:.3f}"), ("old", change.old.name.lower()))
     return DiagnosticStatus(
         int(change.new), change.path, change.cause, values=tuple(KeyValue(key, str(value)) for key, value in told)
