@@ -17,10 +17,9 @@ from rbxcompose.compiler.composition.overlay import NOTHING_TO_CHANGE
 from rbxcompose.compiler.composition.robot_manifest import RobotManifest
 from rbxcompose.compiler.composition.scopes import fill_scopes
 from rbxcompose.manifest.documents import Documents, ManifestHeader
-from rbxcompose.manifest.registry import file_model
 from rbxcompose.manifest.files import find, project_of, shown_name
 from rbxcompose.manifest.fill import SHOWN_SECRET, fill, names_of
-from rbxcompose.manifest.registry import broken_sections, naming, sections
+from rbxcompose.manifest.registry import broken_sections, file_model, naming, sections
 from rbxcompose.manifest.secrets import Secrets
 from rbxcompose.manifest.section import ROBOT, Contents, Section, is_empty
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode, at, children, key_span
