@@ -90,13 +90,13 @@ def naming(kind: str) -> Iterator[Section[Any, Any]]:
 
 def broken_sections() -> list[Finding]:
     """Return a finding for each section of another package that is left out."""
-    return [LEFT_OUT.at(None, told) for told in _problems()]
+    return [LEFT_OUT.at(None, problem) for problem in _problems()]
 
 
 @cache
 def _problems() -> tuple[str, ...]:
     """Import all sections; return why some of other packages are left out."""
-    return tuple(told for name in PLUGINS.names() if (told := _problem(name)))
+    return tuple(problem for name in PLUGINS.names() if (problem := _problem(name)))
 
 
 def _problem(name: str) -> str:

@@ -194,5 +194,5 @@ class SteppedMission:
 
     def say(self, event: MissionEvent, /) -> None:
         """Keep what it tells."""
-        if text := self._story.tell(event)[1]:
+        if text := self._story.line(event)[1]:
             self.told.append(text)

@@ -270,7 +270,7 @@ class MissionsSeen:
         if (message := _read(payload)) is None:
             return
         name = message["value"]["mission"]
-        if self._replicas.setdefault(name, Replica()).heard(message):
+        if self._replicas.setdefault(name, Replica()).apply(message):
             self._ask(f"{_PATH}/{name}")
 
 

@@ -146,7 +146,7 @@ class Simulated:
     def say(self, event: MissionEvent, /) -> None:
         """Write an event down."""
         self.events.append((self.now, event))
-        self.told.append(f"{self.now:g} {self.story.tell(event)[1]}")
+        self.told.append(f"{self.now:g} {self.story.line(event)[1]}")
 
     def finish(self, leaf: int) -> None:
         """Tell the engine how a skill ended."""

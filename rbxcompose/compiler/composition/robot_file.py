@@ -202,7 +202,7 @@ def load_robot(
     if not (report.has_errors or profiles):  # a misspelt name may be the one that is not read; a profile may replace it
         for node in (root, *composed.parts.roots):
             report.extend(unread_arguments(node))
-    report.findings = composed.parts.inclusions.told(report.findings)
+    report.findings = composed.parts.inclusions.located(report.findings)
     return manifest
 
 

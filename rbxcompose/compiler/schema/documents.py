@@ -57,8 +57,8 @@ def trial_schema(types: Iterable[str]) -> Schema:
     steps: Schema = {"type": "array", "items": {"$ref": f"{DEFINITIONS}{STEP}"}}
     expect = sections["expect"]
     about = {key: expect["properties"][key]["description"] for key in ("steps", "never")}
-    told = {key: {**steps, "description": text} for key, text in about.items()}
-    sections["expect"] = {**expect, "properties": {**expect["properties"], **told}}
+    described = {key: {**steps, "description": text} for key, text in about.items()}
+    sections["expect"] = {**expect, "properties": {**expect["properties"], **described}}
     made = {name: {**sections[name], "description": _description(name)} for name in sections}
     whole = document(TEST, test_file.TrialFile, made, {**definitions, STEP: _step(schemas["at"])})
     return {**whole, "required": [*whole["required"], "robot", "mission", "expect"]}

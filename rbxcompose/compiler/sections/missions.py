@@ -29,9 +29,9 @@ class MissionModel(Config):
 
     file: FileName
     """The mission's file, relative to this one."""
-    with_: dict[Annotated[Name, Refers(INPUT, is_told=True)], Annotated[Any, Refers(ANYTHING, is_told=True)]] = Field(
-        {}, alias="with"
-    )
+    with_: dict[
+        Annotated[Name, Refers(INPUT, is_reported=True)], Annotated[Any, Refers(ANYTHING, is_reported=True)]
+    ] = Field({}, alias="with")
     """Values of its inputs, by name."""
 
 

@@ -233,13 +233,10 @@ class _Compiling:
         self.out.sources.update(compilation.sources)
         known = {(one.code, one.span, one.message) for one in self.out.report}
         for finding in compilation.report:
-            told = (
-                replace(finding, span=at_profile)
-                if finding.span is not None and finding.span.file == PROFILE
-                else finding
-            )
-            if (told.code, told.span, told.message) not in known:
-                self.out.report.add(told)
+            if finding.span is not None and finding.span.file == PROFILE:
+                finding = replace(finding, span=at_profile)
+            if (finding.code, finding.span, finding.message) not in known:
+                self.out.report.add(finding)
         return compilation
 
 

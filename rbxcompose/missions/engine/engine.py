@@ -158,11 +158,11 @@ class Engine(EngineBase):
                 break
             number = failed[-1]
         path, reason = self.program.nodes[number].path, self.reasons.get(number)
-        told = f"{path}: {reason}" if reason else f"{path} failed"
+        trouble = f"{path}: {reason}" if reason else f"{path} failed"
         if isinstance(course, Reaction):
-            return f"the reaction of '{course.name}' failed: {told}"
+            return f"the reaction of '{course.name}' failed: {trouble}"
         says_it_all = self.outcome and not reason and number == self.program.main
-        return "" if says_it_all else told
+        return "" if says_it_all else trouble
 
     def _deciding(self, number: int) -> tuple[int, ...]:
         """Return the children whose failure can make a node fail."""

@@ -44,7 +44,7 @@ class Task(ABC):
     saved: ClassVar[tuple[str, ...]] = ()
     times: ClassVar[tuple[str, ...]] = ()  # those of `saved` that are times [s]
     fresh: ClassVar[tuple[str, ...]] = ()  # those without a meaning until the next start computes them
-    told: ClassVar[tuple[str, ...]] = ()  # those that affect only what is reported
+    reported: ClassVar[tuple[str, ...]] = ()  # those that affect only what is reported
 
     def __init__(self, site: Site) -> None:
         self.engine = site.engine

@@ -91,7 +91,7 @@ class RobotWorld:
         ended: Callable[[int, Result], None],
         say: Callable[[MissionEvent], None],
     ) -> None:
-        self._shell, self._arrivals, self._desks, self._told, self._say = shell, arrivals, desks, ended, say
+        self._shell, self._arrivals, self._desks, self._on_end, self._say = shell, arrivals, desks, ended, say
         self._errands: dict[int, Errand] = {}
 
     # Values
@@ -188,4 +188,4 @@ class RobotWorld:
 
     def _ended(self, leaf: int, result: Result) -> None:
         self._errands.pop(leaf, None)
-        self._told(leaf, result)
+        self._on_end(leaf, result)

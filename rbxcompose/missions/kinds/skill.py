@@ -38,7 +38,7 @@ class SkillTask(Leaf):
     __slots__ = ("arguments", "claims", "getters", "is_restartable", "skill", "started")
     saved = (*Leaf.saved, "arguments", "started")
     fresh = ("arguments",)
-    told = ("started",)
+    reported = ("started",)
 
     def __init__(self, site: Site, step: SkillStep) -> None:
         super().__init__(site)

@@ -16,7 +16,7 @@ from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions import codes
 from rbxcompose.missions.language.asked import Asked, expression_of, inner_span
-from rbxcompose.missions.language.grammar import is_told
+from rbxcompose.missions.language.grammar import is_reported
 
 NAME = re.compile(r"[a-z][a-z0-9_]{0,59}")
 NAME_HELP = "names start with a lower-case letter; lower-case letters, digits and underscores follow"
@@ -106,7 +106,7 @@ class ValueReader:
     def scalar(self, key: str, what: str) -> ScalarNode | None:
         """Return an option that must be one word, number or text; None, with a finding, if it is not."""
         value = self.mapping.get(key)
-        if is_told(value):
+        if is_reported(value):
             return None
         if isinstance(value, ScalarNode) and (value.text or not value.plain):
             return value

@@ -50,7 +50,7 @@ class OptionalTask(TurningTask):
     """Keeps in mind whether its node failed, and whether it ever succeeded."""
 
     __slots__ = ("failed", "succeeded")
-    saved = told = ("failed", "succeeded")
+    saved = reported = ("failed", "succeeded")
 
     def __init__(self, site: Site, options: Optional, inner: Task) -> None:
         super().__init__(site, options, inner)

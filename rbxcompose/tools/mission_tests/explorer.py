@@ -347,7 +347,7 @@ class ExploredWorld:
 
     def say(self, event: MissionEvent, /) -> None:
         """Record faults, and the texts of calls."""
-        _, text = self.story.tell(event) if isinstance(event, SkillStarted) else (None, "")
+        _, text = self.story.line(event) if isinstance(event, SkillStarted) else (None, "")
         match event:
             case SkillStarted(leaf=leaf):
                 self.calls[leaf] = text
@@ -386,7 +386,7 @@ def _state(task: Task, state: Sequence[Any], now: float, runs: bool) -> list[Any
     counting = []
     for name, value in zip(("current", *task.saved), state, strict=True):
         is_time = name in task.times and isinstance(value, float)
-        if name not in task.told and (runs or name not in task.fresh):
+        if name not in task.reported and (runs or name not in task.fresh):
             counting.append(round(value - now, 6) if is_time else value)
     return counting
 
