@@ -305,6 +305,9 @@ class Declaration(Generic[M]):
     """Tells of what two parts bring under a path in the section: what it is, and what helps."""
     models: Callable[[TreeNode], Iterable[Any]] | None = None
     """Returns the models of one entry, if they depend on its content."""
+    types: Callable[[], Mapping[str, Any]] | None = None
+    """Returns the classes that an entry may name as its `type`, by name: each has a `config_type()`, which is the model
+    of such an entry."""
     repeats: bool = True
     """Whether a name in a part gets the instance's name as a prefix even if that ends with it: without, the entry `arm`
     of the part `right_arm` is `right_arm`."""

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.compiler.plan.model import Plan
+from rbxcompose.domains.arms.command_watch import WindowViews, line_of
 from rbxcompose.domains.arms.scene_view import goal_words
-from rbxcompose.domains.arms.scene_watch import WindowViews, line_of
 from rbxcompose.msgs.moveit_msgs import CollisionObject
 from rbxcompose.msgs.rbxcompose_msgs import MoveArm
 from rbxcompose.msgs.shape_msgs import SolidPrimitive

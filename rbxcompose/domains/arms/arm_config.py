@@ -230,9 +230,7 @@ class ArmWorks:
         """
         self.objects, self.paddings = tuple(objects), paddings
         own = (shape.geometry for link in self.kinematics.body.links.values() for shape in link.collisions)
-        self._shapes.keep(
-            (*own, *(piece.shape for placed_object in self.objects for piece in placed_object.own_pieces))
-        )
+        self._shapes.keep((*own, *(piece.shape for thing in self.objects for piece in thing.own_pieces)))
         self._checker = self._checker_among(self.objects)
         self.planner.checker = self._fast(self._checker)
 

@@ -14,7 +14,7 @@ from rbxcompose.base.config import Angle, Config, Length, Ratio, Speed
 from rbxcompose.base.findings import Report, kind, suggest
 from rbxcompose.base.units import ANGLE, LENGTH, Dimension
 from rbxcompose.commands.console import NotDoneError, tell_report
-from rbxcompose.commands.targets import compiled, robot_path
+from rbxcompose.commands.targets import compiled, missing_extras, robot_path
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.domains.arms.arm_config import ArmConfig, ArmWorks
 from rbxcompose.domains.arms.sections.arms import ArmOfRobot, arms
@@ -159,8 +159,6 @@ def chosen_robot(arguments: argparse.Namespace) -> Robot | None:
     report = Report()
     report.extend(finding for finding in compilation.report if finding.severity.value == "error")
     if compilation.robot is not None and not report.has_errors and arguments.action != "ls":
-        from rbxcompose.tools.run_view import missing_extras  # what starts robots
-
         report.extend(missing_extras(compilation.robot))
     tell_report(report, compilation.sources)
     return None if report.has_errors else compilation.robot

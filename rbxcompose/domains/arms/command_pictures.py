@@ -119,12 +119,8 @@ def run_reach(arguments: argparse.Namespace, works: ArmWorks, start: NDArray[np.
         return failed
     if arguments.json:
         told = [
-            {
-                "cell": list(cell),
-                "directions": len(reached_cell.directions),
-                "manipulability": reached_cell.manipulability,
-            }
-            for cell, reached_cell in sorted(found.cells.items())
+            {"cell": list(cell), "directions": len(found_cell.directions), "manipulability": found_cell.manipulability}
+            for cell, found_cell in sorted(found.cells.items())
         ]
         data = {"side": found.side, "of": DIRECTIONS, "samples": found.tried, "seed": arguments.seed, "cells": told}
         tell(json.dumps({**data, "colliding": found.colliding, "joints": list(works.space.names)}))
@@ -187,10 +183,10 @@ def _drawn(
     positions = dict(zip(works.space.names, start.tolist(), strict=True))
     robot = ArmPicture(works.kinematics.body, works.meshes, positions, works.objects, told=text)
     if what == REACH:
-        values = {cell: float(len(reached_cell.directions)) for cell, reached_cell in found.cells.items()}
+        values = {cell: float(len(found_cell.directions)) for cell, found_cell in found.cells.items()}
         legend = f"directions of the tip's x axis, of {DIRECTIONS}"
     else:
-        values = {cell: reached_cell.manipulability for cell, reached_cell in found.cells.items()}
+        values = {cell: found_cell.manipulability for cell, found_cell in found.cells.items()}
         legend = "manipulability of the tip's position [m^3/rad^3]"
     most = max(values.values(), default=math.nan)
     return draw_reach(ReachPicture(robot, values, found.side, most, legend, cut is not None))

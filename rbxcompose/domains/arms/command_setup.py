@@ -17,7 +17,7 @@ from rbxcompose.base.findings import Finding, Report, Severity, Sources, kind
 from rbxcompose.base.printable import plain
 from rbxcompose.commands.console import FINDINGS, refuse, tell, tell_report
 from rbxcompose.commands.new_files import name_like, write_new
-from rbxcompose.commands.targets import compiled, robot_path
+from rbxcompose.commands.targets import compiled, missing_extras, robot_path
 from rbxcompose.compiler.compile import Compilation
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.domains.arms.arm_config import ArmConfig
@@ -130,8 +130,6 @@ def _propose(path: str, arguments: argparse.Namespace) -> int:
 
 
 def _checked(robot: Robot, compilation: Compilation, *, is_json: bool) -> int:
-    from rbxcompose.tools.run_view import missing_extras  # what starts robots
-
     lacking = Report([*missing_extras(robot)])
     if lacking.has_errors:
         tell_report(lacking, compilation.sources)
@@ -198,10 +196,7 @@ def _tell(file: Path, matrix: CollisionMatrix, sources: Sources, *, is_json: boo
 
 
 COLLIDES = kind("RBX9423")
-UNWATCHED = kind(
-    "RBX9424",
-    Severity.WARNING,
-)
+UNWATCHED = kind("RBX9424", Severity.WARNING)
 
 
 def run_check(robot: Robot, compilation: Compilation, *, is_json: bool) -> int:
@@ -242,10 +237,8 @@ def _findings(robot: Robot) -> Iterator[tuple[str, str, list[tuple[str, str]], F
             if pairs := works.planner.checker.colliding(values):
                 message = f"the pose '{pose}' of '{name}' is in collision: {told_pairs(pairs)}"
                 yield name, pose, pairs, COLLIDES.at(span, message)
-            if hidden := [
-                link_pair for link_pair in every.colliding(values) if matrix.get(link_pair) in ("never", "user")
-            ]:
-                reasons = " and ".join(sorted({f"'{matrix[link_pair]}'" for link_pair in hidden}))
+            if hidden := [pair for pair in every.colliding(values) if matrix.get(pair) in ("never", "user")]:
+                reasons = " and ".join(sorted({f"'{matrix[pair]}'" for pair in hidden}))
                 message = (
                     f"links collide in the pose '{pose}' of '{name}' that are there as {reasons}: {told_pairs(hidden)}"
                 )

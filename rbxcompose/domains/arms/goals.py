@@ -93,11 +93,7 @@ def goal_of(message: ArmMessage, solver: SolverSettings = SOLVER) -> ArmGoal:
         )
         return ArmGoal(trace=wish, frame=message.frame, acceleration=acceleration)
     ask = partial(
-        ArmGoal,
-        speed=message.speed or 1.0,
-        acceleration=acceleration,
-        keep=_keep(message.keep),
-        replans=message.replan,
+        ArmGoal, speed=message.speed or 1.0, acceleration=acceleration, keep=_keep(message.keep), replans=message.replan
     )
     if isinstance(message, MoveArm.Goal):
         positions = dict(zip(message.joints, message.positions.tolist(), strict=False))

@@ -9,33 +9,32 @@ from pydantic import Field, model_validator
 
 from rbxcompose.base.config import ARM, CONTROLLER, Config, JointName, Length, LinkName, Name, Refers
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.findings import Finding, Related
+from rbxcompose.base.findings import Finding, Related, kind
 from rbxcompose.base.units import ANGLE, LENGTH, Quantity, format_quantity
 from rbxcompose.domains.arms import manifest_model
-from rbxcompose.domains.arms.motion.group_findings import (
-    BEYOND,
-    GRIPPER_ELSEWHERE,
-    NO_CHAIN,
-    NO_GRIPPER,
-    NO_POSE,
-    NOT_LED,
-    NOT_OF_ARM,
-)
 from rbxcompose.domains.arms.motion.groups import ArmGroup, carrying, chain, group_of, moved_links, together
 from rbxcompose.domains.body.description import Description
 from rbxcompose.domains.body.link_pairs import LinkPair, PairReason
-from rbxcompose.domains.body.model import Body
+from rbxcompose.domains.body.model import Body, BodyJoint
 from rbxcompose.domains.body.sections.body import body
 from rbxcompose.domains.servos.controller import ControllerConfig, controller_type
-from rbxcompose.domains.servos.led_joints import follow_topic, joint_limits, limits_in, served_topic, stream_topic
-from rbxcompose.domains.servos.sections.controllers import controllers
-from rbxcompose.domains.servos.sections.joints import JointPosition
+from rbxcompose.domains.servos.sections.controllers import controllers, follow_topic, served_topic, stream_topic
+from rbxcompose.domains.servos.sections.joints import JointPosition, limits_in
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading, WantedComponent, Wiring
 from rbxcompose.manifest.tree import at, key_span, value_span
 from rbxcompose.manifest.validate import not_a_choice
 from rbxcompose.msgs.control_msgs import FollowJointTrajectory, GripperCommand
 from rbxcompose.sdk.capabilities import BoundsGoals
+
+NO_CHAIN = kind("RBX2301")
+NOT_LED = kind("RBX2302")
+NOT_OF_ARM = kind("RBX2303")
+BEYOND = kind("RBX2304")
+NO_GRIPPER = kind("RBX2305")
+GRIPPER_ELSEWHERE = kind("RBX2308")
+NO_POSE = kind("RBX2357")
+
 
 MOVE_GROUP = "move_group"
 """The component that passes goals of programs for MoveIt on to arms."""
@@ -121,6 +120,13 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
     if found := contents.of(arms):
         groups = {name: {"joints": one.group.joints} for name, one in found.items()}
         yield WantedComponent(MOVE_GROUP, MOVE_GROUP, {"arms": groups}, ("arms",))
+
+
+def joint_limits(contents: Contents, joint: BodyJoint) -> dict[str, object]:
+    """Return the limits of a joint as an `ArmJointConfig` has them."""
+    limits = limits_in(contents, joint)
+    found = {name: getattr(limits, name) for name in ("lower", "upper", "velocity", "acceleration", "jerk")}
+    return {**found, "is_continuous": joint.kind == "continuous", "slides": joint.slides}
 
 
 def _pairs(description: Description, group: ArmGroup) -> dict[str, list[LinkPair]] | None:
