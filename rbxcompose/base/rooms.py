@@ -26,6 +26,12 @@ def file_of(module: str) -> str:
     return os.path.join(_PACKAGE, *module.split(".")[1:]) + ".py"
 
 
+def domain_of(module: str) -> str:
+    """Return the domain of a module, by its name; empty for modules of other rooms and of other packages."""
+    package, _, below = module.partition(f".{_DOMAINS}.")
+    return below.partition(".")[0] if package == _NAME else ""
+
+
 def _found(folder: str) -> Iterator[tuple[str, str]]:
     for room, path in _rooms():
         try:

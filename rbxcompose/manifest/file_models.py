@@ -8,8 +8,9 @@ from typing import Any
 from pydantic import Field, create_model
 
 from rbxcompose.manifest.documents import ManifestHeader
-from rbxcompose.manifest.registry import sections
+from rbxcompose.manifest.registry import section_named, sections, sections_in_use
 from rbxcompose.manifest.section import OVERLAY, PART, ROBOT
+from rbxcompose.manifest.tree import MappingNode
 
 FILES = {
     ROBOT: "A robot: its components and how they are connected.",
@@ -21,6 +22,14 @@ FILES = {
 def file_model(kind: str) -> type[ManifestHeader]:
     """Return the model of a robot's, part's or overlay's file: its keys, with anything allowed in each section."""
     return _model(kind, tuple((section.name, section.doc) for section in sections(kind)))
+
+
+def model_for(kind: str, root: MappingNode) -> type[ManifestHeader]:
+    """Return a model that judges a file as `file_model` does; sections that it lacks count only if a key is unknown."""
+    found = {name: section_named(name) for name in root.entries if name not in ManifestHeader.model_fields}
+    if all(section is not None and kind in section.files for section in found.values()):
+        return _model(kind, tuple((section.name, section.doc) for section in sections_in_use(kind)))
+    return file_model(kind)
 
 
 @cache

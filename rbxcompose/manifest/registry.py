@@ -11,6 +11,7 @@ from typing import Any, ParamSpec, TypeVar
 
 from rbxcompose.base.findings import Finding
 from rbxcompose.base.plugins import LEFT_OUT, BrokenPluginError, Plugins
+from rbxcompose.base.rooms import domain_of
 from rbxcompose.manifest.section import Declaration, Reading, Section
 from rbxcompose.manifest.validate import ENTRY_WORDS
 
@@ -70,20 +71,51 @@ def register(made: Section[Any, Any]) -> None:
 
 
 def sections(kind: str = "") -> list[Section[Any, Any]]:
-    """Return all sections in their order, or those that a kind of manifest may have."""
+    """Import all sections and return them in their order, or those that a kind of manifest may have."""
     _problems()
+    PLUGINS.load_shipped()
+    return _of_kind(kind)
+
+
+def sections_in_use(kind: str = "") -> list[Section[Any, Any]]:
+    """Return those of `sections` that the files read so far can have: none of a domain of which they have no section.
+
+    A domain's sections are imported together, when `section_named` is first asked for one of them: as it is for each
+    key of a file.
+    """
+    _problems()
+    _load_domain("")
+    return _of_kind(kind)
+
+
+def _of_kind(kind: str) -> list[Section[Any, Any]]:
     return [one for one in _SECTIONS.values() if not kind or kind in one.files]
 
 
 def section_named(name: object) -> Section[Any, Any] | None:
     """Return the section of this name, or None."""
     _problems()
+    if name in PLUGINS.shipped:
+        _load_domain(domain_of(PLUGINS.shipped[str(name)]))
     return _SECTIONS.get(str(name))
+
+
+@cache
+def _load_domain(domain: str) -> None:
+    """Import the sections of a domain, or those that belong to none."""
+    for name, module in PLUGINS.shipped.items():
+        if domain_of(module) == domain:
+            PLUGINS.load(name)
 
 
 def naming(kind: str) -> Iterator[Section[Any, Any]]:
     """Yield the sections whose keys are names of a kind."""
     return (one for one in sections() if one.has_names_of(kind))
+
+
+def naming_in_use(kind: str) -> list[Section[Any, Any]]:
+    """Return those of `naming` that are in use."""
+    return [one for one in sections_in_use() if one.has_names_of(kind)]
 
 
 def broken_sections() -> list[Finding]:
@@ -93,8 +125,8 @@ def broken_sections() -> list[Finding]:
 
 @cache
 def _problems() -> tuple[str, ...]:
-    """Import all sections; return why some of other packages are left out."""
-    return tuple(told for name in PLUGINS.names() if (told := _problem(name)))
+    """Import the sections of other packages; return why some are left out."""
+    return tuple(told for name in sorted(PLUGINS.third_party) if (told := _problem(name)))
 
 
 def _problem(name: str) -> str:

@@ -16,7 +16,7 @@ from rbxcompose.compiler.composition.robot_manifest import ROBOT_LAYER, History,
 from rbxcompose.compiler.sections.include import include
 from rbxcompose.compiler.sections.profiles import profiles
 from rbxcompose.manifest.documents import Documents, ManifestHeader
-from rbxcompose.manifest.file_models import file_model
+from rbxcompose.manifest.file_models import model_for
 from rbxcompose.manifest.files import PROFILE, find, shown_name
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.registry import section_named, sections
@@ -244,7 +244,7 @@ def _overlays(chosen: Sequence[str], documents: Documents) -> Iterator[tuple[Map
         if isinstance(file, Finding):
             documents.report.add(file)
         elif (root := documents.read(file, OVERLAY)) is not None:
-            root = documents.meant(file_model(OVERLAY), root)
-            documents.check(file_model(OVERLAY), root)
+            root = documents.meant(model_for(OVERLAY, root), root)
+            documents.check(model_for(OVERLAY, root), root)
             sections = {name: entry for name, entry in root.entries.items() if name not in ManifestHeader.model_fields}
             yield replace(root, entries=sections), f"overlay '{shown_name(file)}'"

@@ -25,7 +25,7 @@ from rbxcompose.compiler.model.robot import (
 from rbxcompose.compiler.model.skills import names_of_skills, services_of, skills_of, topics_of
 from rbxcompose.compiler.model.values import value_of
 from rbxcompose.compiler.sections.missions import missions
-from rbxcompose.manifest.registry import sections
+from rbxcompose.manifest.registry import sections_in_use
 from rbxcompose.manifest.section import ROBOT, Contents, WantedComponent
 from rbxcompose.manifest.tree import at
 from rbxcompose.missions.analysis.effects import sent_by, settings_of
@@ -128,7 +128,7 @@ def written_components(manifest: RobotManifest) -> dict[str, RobotComponent]:
     """Return the wired components that the sections request: first those named by users, then those of sections."""
     wires = _Wires(manifest.bus.namespace or "")
     given = _given_topics(manifest.contents)
-    for section in sorted(sections(ROBOT), key=lambda one: not one.names):
+    for section in sorted(sections_in_use(ROBOT), key=lambda one: not one.names):
         for wanted in section.components(manifest.contents, wires):
             wires.add(_component(manifest, wanted, given.get(wanted.name, {})))
     return wires.components
@@ -137,7 +137,7 @@ def written_components(manifest: RobotManifest) -> dict[str, RobotComponent]:
 def _given_topics(contents: Contents) -> dict[str, dict[str, str]]:
     """Return the topics that sections give to ports of components: component -> port -> topic."""
     found: dict[str, dict[str, str]] = {}
-    for section in sections(ROBOT):
+    for section in sections_in_use(ROBOT):
         for component, topics in section.connects(contents).items():
             found.setdefault(component, {}).update(topics)
     return found
