@@ -9,16 +9,19 @@ from dataclasses import fields
 from functools import cache
 from typing import Any, ParamSpec, TypeVar
 
+from pydantic import Field, create_model
+
 from rbxcompose.base.findings import Finding
 from rbxcompose.base.plugins import LEFT_OUT, BrokenPluginError, Plugins
-from rbxcompose.base.rooms import domain_of
-from rbxcompose.manifest.section import Declaration, Reading, Section
+from rbxcompose.base.rooms import domain_of, package_of
+from rbxcompose.manifest.documents import ManifestHeader
+from rbxcompose.manifest.section import OVERLAY, PART, ROBOT, Declaration, Reading, Section
+from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.manifest.validate import ENTRY_WORDS
 
 M = TypeVar("M")
 R = TypeVar("R")
 P = ParamSpec("P")
-
 PLUGINS = Plugins("section", "sections")
 _EXAMPLE = "Example:"
 _SECTIONS: dict[str, Section[Any, Any]] = {}
@@ -78,13 +81,13 @@ def sections(kind: str = "") -> list[Section[Any, Any]]:
 
 
 def sections_in_use(kind: str = "") -> list[Section[Any, Any]]:
-    """Return those of `sections` that the files read so far can have: none of a domain of which they have no section.
+    """Return those of `sections` that count for the files read so far: none of a domain of which they have no section.
 
     A domain's sections are imported together, when `section_named` is first asked for one of them: as it is for each
-    key of a file.
+    key of a file. Those of a domain that says `IN_EVERY_ROBOT` always count.
     """
     _problems()
-    _load_domain("")
+    _load_common()
     return _of_kind(kind)
 
 
@@ -98,6 +101,13 @@ def section_named(name: object) -> Section[Any, Any] | None:
     if name in PLUGINS.shipped:
         _load_domain(domain_of(PLUGINS.shipped[str(name)]))
     return _SECTIONS.get(str(name))
+
+
+@cache
+def _load_common() -> None:
+    for domain in dict.fromkeys(map(domain_of, PLUGINS.shipped.values())):
+        if not domain or getattr(package_of(domain), "IN_EVERY_ROBOT", False):
+            _load_domain(domain)
 
 
 @cache
@@ -120,13 +130,13 @@ def naming_in_use(kind: str) -> list[Section[Any, Any]]:
 
 def broken_sections() -> list[Finding]:
     """Return a finding for each section of another package that is left out."""
-    return [LEFT_OUT.at(None, told) for told in _problems()]
+    return [LEFT_OUT.at(None, problem) for problem in _problems()]
 
 
 @cache
 def _problems() -> tuple[str, ...]:
     """Import the sections of other packages; return why some are left out."""
-    return tuple(told for name in sorted(PLUGINS.third_party) if (told := _problem(name)))
+    return tuple(problem for name in sorted(PLUGINS.third_party) if (problem := _problem(name)))
 
 
 def _problem(name: str) -> str:
@@ -135,3 +145,34 @@ def _problem(name: str) -> str:
     except BrokenPluginError as error:
         return str(error)
     return PLUGINS.overshadowed(name)
+
+
+FILES = {
+    ROBOT: "A robot: its components and how they are connected.",
+    PART: "A part of robots: sections of a robot with arguments of their own.",
+    OVERLAY: "Changes to a robot, given by `-f FILE`.",
+}
+
+
+def file_model(kind: str) -> type[ManifestHeader]:
+    """Return the model of a robot's, part's or overlay's file: its keys, with anything allowed in each section."""
+    return _file_model(kind, tuple((section.name, section.doc) for section in sections(kind)))
+
+
+def model_for(kind: str, root: MappingNode) -> type[ManifestHeader]:
+    """Return a model that judges a file as `file_model` does; sections that it lacks count only if a key is unknown."""
+    found = [section_named(name) for name in root.entries if name not in ManifestHeader.model_fields]
+    if all(section is not None and kind in section.files for section in found):
+        return _file_model(kind, tuple((section.name, section.doc) for section in sections_in_use(kind)))
+    return file_model(kind)
+
+
+@cache
+def _file_model(kind: str, sections: tuple[tuple[str, str], ...]) -> type[ManifestHeader]:
+    fields: dict[str, Any] = {name: (Any, Field(None, description=doc)) for name, doc in sections}
+    return create_model(f"{kind}File", __base__=ManifestHeader, __doc__=FILES[kind], **fields)
+
+
+def robot_keys() -> list[str]:
+    """Return the keys of a robot's file, its header's first."""
+    return [*ManifestHeader.model_fields, *(section.name for section in sections(ROBOT))]

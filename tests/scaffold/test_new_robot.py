@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from rbxcompose.base.expressions.functions import FUNCTIONS
 from rbxcompose.commands.new_files import AnswerError
 from rbxcompose.compiler.composition.robot_file import RESERVED
-from rbxcompose.manifest.file_models import robot_keys
+from rbxcompose.manifest.registry import robot_keys
 from rbxcompose.missions.modifiers.registry import modifier_keys
 from rbxcompose.missions.program.registry import kinds
 from rbxcompose.testing import Checked, Golden, check_file, run_robot

@@ -14,16 +14,8 @@ from pydantic import Field
 from rbxcompose.base.config import Config
 from rbxcompose.base.geometry import Vector3
 from rbxcompose.base.units import ANGLE, LENGTH, Dimension
-from rbxcompose.domains.arms.manifest_model import AUTOMATIC, FAST, HandConfig
+from rbxcompose.domains.arms.motion import collisions
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
-from rbxcompose.domains.arms.motion.collisions import (
-    Checker,
-    MeshChecker,
-    SearchingChecker,
-    Shapes,
-    always_colliding,
-    load_libraries,
-)
 from rbxcompose.domains.arms.motion.groups import ArmGroup, ArmJoint, JointSpace, interpolated
 from rbxcompose.domains.arms.motion.hand_task import PlanningHelper
 from rbxcompose.domains.arms.motion.inverse_kinematics import ANGLE_TOLERANCE, RESTARTS, TOLERANCE, SolverSettings
@@ -31,6 +23,7 @@ from rbxcompose.domains.arms.motion.numba_cache import is_installed
 from rbxcompose.domains.arms.motion.planner import MotionPlanner, PlannerSettings
 from rbxcompose.domains.arms.motion.scene import PairDistance, PlacedObject
 from rbxcompose.domains.arms.motion.second_checker import SecondChecker
+from rbxcompose.domains.arms.section_models import AUTOMATIC, FAST, HandConfig
 from rbxcompose.domains.body.description import Description
 from rbxcompose.domains.body.link_pairs import LinkPair
 from rbxcompose.domains.body.urdf import body_of
@@ -192,18 +185,18 @@ class ArmWorks:
             ModuleNotFoundError: if the extra `arm` is not installed, or `fast` for a planner that needs it.
             ValueError: if a mesh cannot be read.
         """
-        load_libraries()
+        collisions.load_libraries()
         self.space, self._description = space_of(config), description_of(config)
         self.kinematics = ArmKinematics(self._description, ArmGroup(self.space.names, config.base, config.tip))
         if is_fast:
             self.kinematics.hasten()
         if (pairs := config.pairs) is None:
-            adjacent, self.always = always_colliding(self.kinematics, self.space, self._description.meshes)
+            adjacent, self.always = collisions.always_colliding(self.kinematics, self.space, self._description.meshes)
             """Pairs that collide wherever the arm is, and are not watched."""
         else:
             adjacent, self.always = frozenset(pairs.adjacent), frozenset(pairs.ignored)
         self._allowed: frozenset[LinkPair] = adjacent | self.always
-        self._shapes = Shapes(self._description.meshes)
+        self._shapes = collisions.Shapes(self._description.meshes)
         self.objects = tuple(objects)
         """Those that it plans among."""
         self.paddings = paddings
@@ -224,7 +217,7 @@ class ArmWorks:
             planner_config.simplify,
         )
         self.planner = MotionPlanner(self.space, self._fast(self._checker), settings, now, unlikely)
-        if isinstance(self.planner.checker, SearchingChecker):
+        if isinstance(self.planner.checker, collisions.SearchingChecker):
             self.planner.checker.prepare(self.space)
 
     def place_objects(
@@ -237,19 +230,17 @@ class ArmWorks:
         """
         self.objects, self.paddings = tuple(objects), paddings
         own = (shape.geometry for link in self.kinematics.body.links.values() for shape in link.collisions)
-        self._shapes.keep(
-            (*own, *(piece.shape for placed_object in self.objects for piece in placed_object.own_pieces))
-        )
+        self._shapes.keep((*own, *(piece.shape for thing in self.objects for piece in thing.own_pieces)))
         self._checker = self._checker_among(self.objects)
         self.planner.checker = self._fast(self._checker)
 
-    def checker(self, objects: Iterable[PlacedObject]) -> MeshChecker:
+    def checker(self, objects: Iterable[PlacedObject]) -> collisions.MeshChecker:
         """Return what examines positions of the arm among some objects; raises as `place_objects` does."""
         there = tuple(objects)
         return self._checker if there == self.objects else self._checker_among(there)  # asked for each grasp
 
-    def _checker_among(self, objects: Iterable[PlacedObject]) -> MeshChecker:
-        return MeshChecker(
+    def _checker_among(self, objects: Iterable[PlacedObject]) -> collisions.MeshChecker:
+        return collisions.MeshChecker(
             self.kinematics, self._description.meshes, self._allowed, objects, self.paddings, shapes=self._shapes
         )
 
@@ -280,11 +271,11 @@ class ArmWorks:
         return tuple(self.kinematics.tip_pose(values).translation for values in some)
 
 
-def _as_it_is(checker: MeshChecker) -> Checker:
+def _as_it_is(checker: collisions.MeshChecker) -> collisions.Checker:
     return checker
 
 
-def _hastened() -> Callable[[MeshChecker], Checker]:
+def _hastened() -> Callable[[collisions.MeshChecker], collisions.Checker]:
     """Return what makes a checker that gives the same answers, and searches fast.
 
     Raises:

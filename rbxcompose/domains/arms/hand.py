@@ -13,21 +13,12 @@ from rbxcompose.base.files import replace_file
 from rbxcompose.base.geometry import Quaternion, Transform3, quaternion_from_rpy
 from rbxcompose.base.units import LENGTH, RATIO
 from rbxcompose.domains.arms.arm_config import ArmConfig, ArmWorks
-from rbxcompose.domains.arms.manifest_model import GraspModel, HandConfig
+from rbxcompose.domains.arms.motion import hand_task as hand_tasks
 from rbxcompose.domains.arms.motion.arm_task import ArmGoal
 from rbxcompose.domains.arms.motion.grasps import Grasp
-from rbxcompose.domains.arms.motion.hand_task import (
-    Gripped,
-    Hand,
-    HandSite,
-    HandTask,
-    PickGoal,
-    PickTask,
-    PlaceGoal,
-    PlaceTask,
-)
 from rbxcompose.domains.arms.motion.picture import ArmPicture, draw_arm
 from rbxcompose.domains.arms.reasons import GRASP_REASONS, MotionReason, StageFailure
+from rbxcompose.domains.arms.section_models import GraspModel, HandConfig
 from rbxcompose.domains.body.meshes import MissingLibraryError
 from rbxcompose.msgs.control_msgs import GripperCommand, GripperCommandMessage
 from rbxcompose.msgs.rbxcompose_msgs import AttachObject, DetachObject, PickObject, PlaceObject
@@ -134,14 +125,14 @@ class PicksAndPlaces:
         said = picture_of_failure(Path(hand.pictures), name, self.works, positions, failure)
         return replace(result, message=f"{result.message}; {said}")
 
-    def grip(self, opening: float, ended: Callable[[Gripped], None]) -> None:
+    def grip(self, opening: float, ended: Callable[[hand_tasks.Gripped], None]) -> None:
         """Open or close the gripper [m]."""
 
         def told(end: Ended[GripperCommand.Result]) -> None:
             if end.result is not None and (end.outcome is Outcome.SUCCEEDED or end.result.stalled):
-                ended(Gripped(end.result.position))
+                ended(hand_tasks.Gripped(end.result.position))
             else:
-                ended(Gripped(math.nan, end.message or f"its goal was {end.outcome}"))
+                ended(hand_tasks.Gripped(math.nan, end.message or f"its goal was {end.outcome}"))
 
         goal = GripperCommand.Goal(command=GripperCommandMessage(position=opening))
         self.gripping = self.bound[GRIP](goal, told)
@@ -165,7 +156,7 @@ def _problem(reply: Reply[Any]) -> str:
     return "" if reply.response.success else str(reply.response.message)
 
 
-def hand_of(config: HandConfig, works: ArmWorks) -> Hand:
+def hand_of(config: HandConfig, works: ArmWorks) -> hand_tasks.Hand:
     """Return the gripper of an arm."""
     kinematics = works.kinematics
     poses = kinematics.body.poses({})
@@ -174,19 +165,19 @@ def hand_of(config: HandConfig, works: ArmWorks) -> Hand:
     for link in links:
         links.extend(joint.child for joint in kinematics.body.joints_below[link])
     least, greatest = config.opening or (0.0, math.inf)
-    return Hand(least, greatest, poses[tip].inverse().compose(poses[config.grasp]), tuple(links))
+    return hand_tasks.Hand(least, greatest, poses[tip].inverse().compose(poses[config.grasp]), tuple(links))
 
 
 def hand_task(
-    site: HandSite, works: ArmWorks, config: HandConfig, message: PickObject.Goal | PlaceObject.Goal
-) -> HandTask:
+    site: hand_tasks.HandSite, works: ArmWorks, config: HandConfig, message: PickObject.Goal | PlaceObject.Goal
+) -> hand_tasks.HandTask:
     """Return the task of a goal."""
     hand = hand_of(config, works)
     pace = ArmGoal(speed=message.speed or 1.0, acceleration=message.acceleration or 1.0)
     if isinstance(message, PickObject.Goal):
         pick_goal = message
         given = tuple(map(_grasp, config.grasps.get(pick_goal.object, ())))
-        goal = PickGoal(
+        goal = hand_tasks.PickGoal(
             pick_goal.object,
             pick_goal.approach,
             pick_goal.lift,
@@ -194,17 +185,17 @@ def hand_task(
             pick_goal.squeeze or config.squeeze,
             given,
         )
-        return PickTask(site, works, hand, goal, pace)
+        return hand_tasks.PickTask(site, works, hand, goal, pace)
     if message.spot and message.spot not in config.spots:
         unknown = f"there is no spot '{message.spot}'; the spots of this arm: {', '.join(config.spots) or 'none'}"
-        return PlaceTask(site, works, hand, PlaceGoal((0.0, 0.0, 0.0), unknown=unknown), pace)
+        return hand_tasks.PlaceTask(site, works, hand, hand_tasks.PlaceGoal((0.0, 0.0, 0.0), unknown=unknown), pace)
     at, frame, on, tolerance = (message.x, message.y, message.z), message.frame, message.on, message.tolerance
     if message.spot in config.spots:
         spot = config.spots[message.spot]
         at, frame, on = (spot.x, spot.y, spot.z), spot.frame or "", spot.on or ""
         tolerance = tolerance or spot.tolerance
-    place = PlaceGoal(at, frame, on, tolerance, message.approach, message.retreat)
-    return PlaceTask(site, works, hand, place, pace)
+    place = hand_tasks.PlaceGoal(at, frame, on, tolerance, message.approach, message.retreat)
+    return hand_tasks.PlaceTask(site, works, hand, place, pace)
 
 
 def _grasp(model: GraspModel) -> Grasp:
@@ -212,7 +203,9 @@ def _grasp(model: GraspModel) -> Grasp:
     return Grasp(pose, model.width, model.quality)
 
 
-def result_of(message: PickObject.Goal | PlaceObject.Goal, task: HandTask) -> PickObject.Result | PlaceObject.Result:
+def result_of(
+    message: PickObject.Goal | PlaceObject.Goal, task: hand_tasks.HandTask
+) -> PickObject.Result | PlaceObject.Result:
     """Return how a task has ended."""
     kind = PickObject.Result if isinstance(message, PickObject.Goal) else PlaceObject.Result
     held, failure = task.held.name if task.held is not None else "", task.failure

@@ -9,30 +9,17 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
+from rbxcompose.base import units
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, Report
 from rbxcompose.base.printable import plain
-from rbxcompose.base.units import (
-    ANGLE,
-    ANGULAR_ACCELERATION,
-    ANGULAR_SPEED,
-    CURRENT,
-    RATIO,
-    TEMPERATURE,
-    TIME,
-    VOLTAGE,
-    Dimension,
-    UnitError,
-    to_si,
-)
 from rbxcompose.commands.console import FINDINGS, NotDoneError, refuse, table, tell, tell_report
 from rbxcompose.commands.new_files import AnswerError, read_name, taken, write_new
 from rbxcompose.domains.devices.serial_ports import port_path, serial_ports, slow_adapter
-from rbxcompose.domains.servos.bus import FoundServo
+from rbxcompose.domains.servos.bus import ID_TAKEN, NO_ITEM, OTHER_RATE, REFUSED, SILENT, UNKNOWN_MODEL, FoundServo
 from rbxcompose.domains.servos.dynamixel_bus import DynamixelBus, change_id
 from rbxcompose.domains.servos.models import ServoModel, hardware_errors
 from rbxcompose.domains.servos.new_robot import NewServo, ServoRobotAnswers, servo_robot_files, servo_robot_paths
-from rbxcompose.domains.servos.servo_findings import ID_TAKEN, NO_ITEM, OTHER_RATE, REFUSED, SILENT, UNKNOWN_MODEL
 from rbxcompose.manifest.files import shown_name
 
 
@@ -92,15 +79,15 @@ def nobody(arguments: argparse.Namespace) -> int:
     return refuse(SILENT.at(None, words, help="check power and cable; try other rates with --baud"))
 
 
-DIMENSIONS: Mapping[str, Dimension] = {
-    "rad": ANGLE,
-    "rad/s": ANGULAR_SPEED,
-    "rad/s^2": ANGULAR_ACCELERATION,
-    "V": VOLTAGE,
-    "A": CURRENT,
-    "s": TIME,
-    "degC": TEMPERATURE,
-    "1": RATIO,
+DIMENSIONS: Mapping[str, units.Dimension] = {
+    "rad": units.ANGLE,
+    "rad/s": units.ANGULAR_SPEED,
+    "rad/s^2": units.ANGULAR_ACCELERATION,
+    "V": units.VOLTAGE,
+    "A": units.CURRENT,
+    "s": units.TIME,
+    "degC": units.TEMPERATURE,
+    "1": units.RATIO,
 }
 
 
@@ -132,7 +119,7 @@ def _raw_value(model: ServoModel, text: str) -> tuple[str, int]:
     try:
         raw = int(value) if value.lstrip("-").isdecimal() else item.to_raw(_quantity(item.unit, value))
         item.encode(raw)
-    except (UnitError, ValueError) as error:
+    except (units.UnitError, ValueError) as error:
         words = f"'{plain(text)}': {error}" if equals else f"'{plain(text)}' lacks '=' and a value"
         raise NotDoneError(NO_ITEM.at(None, words, help="write a raw number or a quantity with its unit")) from error
     return name, raw
@@ -141,7 +128,7 @@ def _raw_value(model: ServoModel, text: str) -> tuple[str, int]:
 def _quantity(unit: str, text: str) -> float:
     if unit not in DIMENSIONS:
         raise ValueError("must be a whole number")
-    return to_si(text, DIMENSIONS[unit])
+    return units.to_si(text, DIMENSIONS[unit])
 
 
 _TORQUE, _LIMIT, _MOST = "torque_enable", "torque_limit", "max_torque"

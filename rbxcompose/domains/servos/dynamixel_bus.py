@@ -12,14 +12,8 @@ from dynamixel_sdk import COMM_SUCCESS
 
 from rbxcompose.base.findings import Finding
 from rbxcompose.domains.devices.serial_ports import LostPortError, latency_of, port_path
-from rbxcompose.domains.servos.bus import (
-    FACTORY_DELAY,
-    FoundServo,
-    ServoReading,
-    ServoStatistics,
-    in_chunks,
-    request_groups,
-)
+from rbxcompose.domains.servos import bus as servo_bus
+from rbxcompose.domains.servos.bus import ID_TAKEN, REFUSED, SILENT, UNKNOWN_MODEL
 from rbxcompose.domains.servos.dynamixel_port import (
     Answer,
     BlockingPort,
@@ -29,7 +23,6 @@ from rbxcompose.domains.servos.dynamixel_port import (
     packets_by_protocol,
 )
 from rbxcompose.domains.servos.models import ServoModel
-from rbxcompose.domains.servos.servo_findings import ID_TAKEN, REFUSED, SILENT, UNKNOWN_MODEL
 from rbxcompose.domains.servos.transfers import ReadPlan, Stretch, WritePlan, read_plan, write_plans
 
 
@@ -42,10 +35,10 @@ class Attention:
 
     def __init__(self, patience: int = 3, period: float = 0.1) -> None:
         self.patience, self.period = patience, period
-        self.statistics: defaultdict[int, ServoStatistics] = defaultdict(ServoStatistics)
+        self.statistics: defaultdict[int, servo_bus.ServoStatistics] = defaultdict(servo_bus.ServoStatistics)
         self._probed: dict[int, float] = {}
 
-    def of(self, id: int) -> ServoStatistics:
+    def of(self, id: int) -> servo_bus.ServoStatistics:
         """Return the statistics of a servo."""
         return self.statistics[id]
 
@@ -126,10 +119,10 @@ class GroupRead:
         else:
             del self.open[answer.id]
 
-    def reading(self, id: int) -> ServoReading:
+    def reading(self, id: int) -> servo_bus.ServoReading:
         """Return what a servo told, once it is whole."""
         stamp, alert = self._last[id]
-        return ServoReading(self.plans[id].values(self._parts[id], alert), stamp, alert)
+        return servo_bus.ServoReading(self.plans[id].values(self._parts[id], alert), stamp, alert)
 
 
 class ServoReader:
@@ -143,7 +136,7 @@ class ServoReader:
         self, port: BlockingPort, read: GroupRead, models: Mapping[int, ServoModel], *, is_fast: bool = False
     ) -> None:
         """Ask servos once, by id, for all that they have not told yet; one that fails is not asked for the rest."""
-        for protocol, group in request_groups(models):
+        for protocol, group in servo_bus.request_groups(models):
             wanted = read.next_of(group)
             while wanted:
                 found = self._exchange(port, protocol, wanted, read, is_fast=is_fast)
@@ -226,7 +219,7 @@ class DynamixelBus:
         baud: int = 1_000_000,
         timeout: float = 0.002,
         retries: int = 1,
-        return_delay: float = FACTORY_DELAY,
+        return_delay: float = servo_bus.FACTORY_DELAY,
         is_fast: bool = False,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
@@ -266,7 +259,7 @@ class DynamixelBus:
         self.close()
 
     @property
-    def statistics(self) -> Mapping[int, ServoStatistics]:
+    def statistics(self) -> Mapping[int, servo_bus.ServoStatistics]:
         """Return how well each servo answers, by id."""
         return self.attention.statistics
 
@@ -296,19 +289,19 @@ class DynamixelBus:
             self.close()
             raise
 
-    def ping(self, id: int, protocol: int | None = None) -> FoundServo | None:
+    def ping(self, id: int, protocol: int | None = None) -> servo_bus.FoundServo | None:
         """Return the servo at an id, None if it is silent; of an id that is not known, ask in both protocols."""
         known = self.servos.get(id)
         protocols = (protocol,) if protocol else (known.protocol,) if known else (2, 1)
         found = (self._pinged(id, one) for one in protocols for _ in range(self.retries + 1))
         return next((servo for servo in found if servo), None)
 
-    def _pinged(self, id: int, protocol: int) -> FoundServo | None:
+    def _pinged(self, id: int, protocol: int) -> servo_bus.FoundServo | None:
         with self._in_use() as port:
             number, result, _ = self._packets[protocol].ping(port, id)
-        return FoundServo(id, protocol, number, self.baud) if result == COMM_SUCCESS else None
+        return servo_bus.FoundServo(id, protocol, number, self.baud) if result == COMM_SUCCESS else None
 
-    def scan(self, ids: Iterable[int] = IDS, protocols: Sequence[int] = (1, 2)) -> Iterator[FoundServo]:
+    def scan(self, ids: Iterable[int] = IDS, protocols: Sequence[int] = (1, 2)) -> Iterator[servo_bus.FoundServo]:
         """Yield the servos that answer, asking each id once in each protocol."""
         for servo in ids:
             for protocol in protocols:
@@ -327,7 +320,9 @@ class DynamixelBus:
                 replies += 2 if answer is NoAnswer.CORRUPT else isinstance(answer, Answer)
         return replies
 
-    def read(self, ids: Sequence[int], items: Sequence[str], *, budget: float | None = None) -> dict[int, ServoReading]:
+    def read(
+        self, ids: Sequence[int], items: Sequence[str], *, budget: float | None = None
+    ) -> dict[int, servo_bus.ServoReading]:
         """Return the items of all servos that answered.
 
         What failed is tried again while less than `budget` [s] has passed, unless it had failed before this read.
@@ -351,9 +346,9 @@ class DynamixelBus:
                 asked = in_other_order(failed)
         return self._judged(read)
 
-    def _judged(self, read: GroupRead) -> dict[int, ServoReading]:
+    def _judged(self, read: GroupRead) -> dict[int, servo_bus.ServoReading]:
         now = self._clock()
-        found: dict[int, ServoReading] = {}
+        found: dict[int, servo_bus.ServoReading] = {}
         for servo in read.plans:
             if servo in read.open:
                 self.attention.missed(servo, now, is_corrupt=servo in read.corrupt)
@@ -404,7 +399,7 @@ class DynamixelBus:
         failed: set[int] = set()
         packets = self._packets[protocol]
         with self._in_use() as port:
-            for chunk in in_chunks(data, 1 + at.length, packets.group):
+            for chunk in servo_bus.in_chunks(data, 1 + at.length, packets.group):
                 if not packets.write_group(port, at, {number: data[number] for number in chunk}):
                     failed.update(chunk)
         return failed
@@ -429,11 +424,11 @@ class DynamixelBus:
             result, error = packets.reboot(port, id)
         return bool(result == COMM_SUCCESS and not packets.is_refusal(error))
 
-    def verify(self) -> dict[int, FoundServo | None]:
+    def verify(self) -> dict[int, servo_bus.FoundServo | None]:
         """Return who answers at the id of each servo, None where nobody does."""
         return {number: self.ping(number) for number in self.servos}
 
-    def reopen(self, *, is_relaxed: bool = True) -> dict[int, FoundServo | None]:
+    def reopen(self, *, is_relaxed: bool = True) -> dict[int, servo_bus.FoundServo | None]:
         """Open the port anew, and return who answers at each id; with `is_relaxed`, torque is switched off first.
 
         Raises:

@@ -14,14 +14,7 @@ from typing import NamedTuple
 import serial
 from dynamixel_sdk import COMM_RX_TIMEOUT, COMM_SUCCESS, PortHandler, Protocol1PacketHandler, Protocol2PacketHandler
 
-from rbxcompose.domains.devices.serial_ports import (
-    BusyPortError,
-    ForbiddenPortError,
-    LostPortError,
-    NoPortError,
-    PortError,
-    UnfitPortError,
-)
+from rbxcompose.domains.devices import serial_ports
 from rbxcompose.domains.servos.bus import REPLY, ROOM
 from rbxcompose.domains.servos.transfers import Stretch
 
@@ -29,14 +22,14 @@ BITS = 10  # of a byte on the wire: start bit, eight of data, stop bit
 _CHUNK = 4096  # [B] of one read
 _EARLY = 0.0005  # [s] before the last byte of long replies at which it is worth looking
 _STUCK = 0.5  # [s] after which a port that takes no bytes has failed to send
-_ERRORS: dict[int | None, tuple[type[PortError], str]] = {
-    errno.ENOENT: (NoPortError, "does not exist"),
-    errno.ENXIO: (NoPortError, "has no device"),
-    errno.ENODEV: (NoPortError, "has no device"),
-    errno.EACCES: (ForbiddenPortError, "may not be opened by this user"),
-    errno.EPERM: (ForbiddenPortError, "may not be opened by this user"),
-    errno.EBUSY: (BusyPortError, "is used by another program"),
-    errno.EAGAIN: (BusyPortError, "is used by another program"),
+_ERRORS: dict[int | None, tuple[type[serial_ports.PortError], str]] = {
+    errno.ENOENT: (serial_ports.NoPortError, "does not exist"),
+    errno.ENXIO: (serial_ports.NoPortError, "has no device"),
+    errno.ENODEV: (serial_ports.NoPortError, "has no device"),
+    errno.EACCES: (serial_ports.ForbiddenPortError, "may not be opened by this user"),
+    errno.EPERM: (serial_ports.ForbiddenPortError, "may not be opened by this user"),
+    errno.EBUSY: (serial_ports.BusyPortError, "is used by another program"),
+    errno.EAGAIN: (serial_ports.BusyPortError, "is used by another program"),
 }
 
 
@@ -81,13 +74,15 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
             self._descriptor = self.ser.fileno()
         except (OSError, termios.error, ValueError, OverflowError) as error:
             number = getattr(error, "errno", None)
-            cause, words = _ERRORS.get(number, (UnfitPortError, f"cannot be a serial port at {self.baudrate} bit/s"))
+            cause, words = _ERRORS.get(
+                number, (serial_ports.UnfitPortError, f"cannot be a serial port at {self.baudrate} bit/s")
+            )
             raise cause(str(self.port_name), words) from error
         self.is_open, self.is_using = True, False
         self.tx_time_per_byte = 1000.0 * BITS / self.baudrate
         try:
             self.clearPort()
-        except PortError:
+        except serial_ports.PortError:
             self.closePort()
             raise
 
@@ -188,8 +183,8 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         """Return monotonic time [ms]."""
         return 1000 * self._clock()
 
-    def _lost(self) -> LostPortError:
-        return LostPortError(str(self.port_name), "has gone")
+    def _lost(self) -> serial_ports.LostPortError:
+        return serial_ports.LostPortError(str(self.port_name), "has gone")
 
 
 _ALERT = 0x80  # bit of the error byte in 2.0 that tells of the servo, not of the request

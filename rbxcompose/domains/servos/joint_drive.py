@@ -9,28 +9,9 @@ from dataclasses import replace
 from typing import Literal
 
 from rbxcompose.base.dataclass import dataclass
+from rbxcompose.domains.servos import joint_states
 from rbxcompose.domains.servos.bus import ServoReading
 from rbxcompose.domains.servos.curves import JointSample
-from rbxcompose.domains.servos.joint_states import (
-    WITH_TORQUE,
-    BringToRest,
-    Enable,
-    Hold,
-    JointCondition,
-    JointInputs,
-    JointMode,
-    JointPolicy,
-    JointRequest,
-    MoveAt,
-    MoveTo,
-    Pursue,
-    Refuse,
-    Relax,
-    TorqueOff,
-    TorqueOn,
-    WriteGoal,
-    step_joint,
-)
 from rbxcompose.domains.servos.limits import Limiter, MotionLimits
 from rbxcompose.domains.servos.models import HARDWARE_ERRORS, ONE_ERRORS, ServoModel
 from rbxcompose.domains.servos.trajectory import JointRules
@@ -148,10 +129,10 @@ Writes = Mapping[int, Raw]
 class JointDrive(ABC):
     """Carries out what is asked of one joint, within its limits and as its state permits."""
 
-    def __init__(self, joint: ServoJoint, policy: JointPolicy) -> None:
+    def __init__(self, joint: ServoJoint, policy: joint_states.JointPolicy) -> None:
         self.joint, self.policy = joint, policy
         self.rules = JointRules(joint.limits, joint.is_continuous)
-        self.condition = JointCondition()
+        self.condition = joint_states.JointCondition()
         self.limiter: Limiter | None = None  # from the first torque on
         self.measured = JointSample(math.nan)
         self.effort = math.nan
@@ -172,7 +153,7 @@ class JointDrive(ABC):
         self._stamps: dict[int, float] = {}
         self._warmth: dict[int, float] = {}
         self._errors: dict[int, str] = {}
-        self._requests: list[JointRequest] = []
+        self._requests: list[joint_states.JointRequest] = []
 
     @property
     def commanded(self) -> JointSample:
@@ -181,7 +162,7 @@ class JointDrive(ABC):
         return self.measured if limiter is None else JointSample(limiter.position, limiter.velocity)
 
     @property
-    def mode(self) -> JointMode:
+    def mode(self) -> joint_states.JointMode:
         """Return its state as people see it."""
         return self.condition.mode
 
@@ -198,8 +179,8 @@ class JointDrive(ABC):
     @property
     def has_torque(self) -> bool:
         """Return whether its servos hold or move it, and nobody has asked to relax it."""
-        is_let_go = any(isinstance(request, Relax) for request in self._requests)
-        return not self.condition.is_blocked and self.condition.base in WITH_TORQUE and not is_let_go
+        is_let_go = any(isinstance(request, joint_states.Relax) for request in self._requests)
+        return not self.condition.is_blocked and self.condition.base in joint_states.WITH_TORQUE and not is_let_go
 
     @property
     def measured_at(self) -> float:
@@ -266,20 +247,20 @@ class JointDrive(ABC):
         """Return what its servos report, such as `overload`; empty if nothing."""
         return ", ".join(words for words in self._errors.values() if words)
 
-    def ask(self, request: JointRequest) -> None:
+    def ask(self, request: joint_states.JointRequest) -> None:
         """Take a request for the next cycle."""
-        if self.hindrance and not isinstance(request, Relax | Enable):
+        if self.hindrance and not isinstance(request, joint_states.Relax | joint_states.Enable):
             self.refused = self.hindrance
         else:
             self._requests.append(request)
 
     def relax(self) -> None:
         """Switch torque off in the next cycle, until the next command."""
-        self.ask(Relax())
+        self.ask(joint_states.Relax())
 
     def hold(self) -> None:
         """Come to rest within its limits in the next cycles, and stay there with torque."""
-        self.ask(Hold())
+        self.ask(joint_states.Hold())
 
     def follow(self, sample: JointSample) -> None:
         """Be at a position at the end of the next cycle, and pass there with its velocity."""
@@ -292,27 +273,27 @@ class JointDrive(ABC):
     def step(self, now: float, dt: float) -> list[Writes]:
         """Return what is to be written in the cycle that ends `dt` [s] from `now`, one after the other."""
         found = tuple(self._requests)
-        inputs = JointInputs(self.measured.position, self.measured_at, self.warmest, self.error, found)
+        inputs = joint_states.JointInputs(self.measured.position, self.measured_at, self.warmest, self.error, found)
         self._requests.clear()
         was_blocked = self.condition.is_blocked
-        self.condition, actions = step_joint(self.condition, inputs, now, self.policy)
+        self.condition, actions = joint_states.step_joint(self.condition, inputs, now, self.policy)
         if was_blocked and not self.condition.is_blocked:
             self.refused = ""  # the reason is over
         writes: list[Writes] = []
         for action in actions:
             match action:
-                case WriteGoal(position=position):
+                case joint_states.WriteGoal(position=position):
                     self.limiter = Limiter(self.joint.limits, position)
                     writes.append(self._goal(position))
-                case TorqueOn():
+                case joint_states.TorqueOn():
                     writes.append(self._same({"torque_enable": 1}))
-                case TorqueOff():
+                case joint_states.TorqueOff():
                     writes.append(self._same({"torque_enable": 0}))
-                case Pursue(request=request) if self.limiter is not None:
+                case joint_states.Pursue(request=request) if self.limiter is not None:
                     self.refused = self._pursue(request, self.limiter, dt)
-                case BringToRest() if self.limiter is not None:
+                case joint_states.BringToRest() if self.limiter is not None:
                     self.limiter.brake()
-                case Refuse(request=request, reason=reason) if not isinstance(request, Relax):
+                case joint_states.Refuse(request=request, reason=reason) if not isinstance(request, joint_states.Relax):
                     self.refused = reason
         return [*writes, *self._moved(dt)] if self.has_torque else writes
 
@@ -324,7 +305,7 @@ class JointDrive(ABC):
         """Return what keeps it where it is when torque is switched on."""
 
     @abstractmethod
-    def _pursue(self, request: JointRequest, limiter: Limiter, dt: float) -> str:
+    def _pursue(self, request: joint_states.JointRequest, limiter: Limiter, dt: float) -> str:
         """Pass what is wanted on to the limiter; return why not, or nothing."""
 
     @abstractmethod
@@ -340,19 +321,19 @@ def _faults(servo: JointServo, reading: ServoReading) -> Iterator[str]:
 class PositionDrive(JointDrive):
     """Leads a joint to positions, along paths or by itself; `speed` is how fast it goes by itself [rad/s or m/s]."""
 
-    def __init__(self, joint: ServoJoint, policy: JointPolicy, speed: float | None = None) -> None:
+    def __init__(self, joint: ServoJoint, policy: joint_states.JointPolicy, speed: float | None = None) -> None:
         super().__init__(joint, policy)
         self.speed = speed
 
     def follow(self, sample: JointSample) -> None:
         """Be at a position at the end of the next cycle, and pass there with its velocity."""
-        self.ask(MoveTo(sample.position, sample.velocity))
+        self.ask(joint_states.MoveTo(sample.position, sample.velocity))
 
     def _goal(self, position: float) -> Writes:
         return {id_: {"goal_position": raw} for id_, raw in self.joint.raws(position).items()}
 
-    def _pursue(self, request: JointRequest, limiter: Limiter, dt: float) -> str:
-        if not isinstance(request, MoveTo):
+    def _pursue(self, request: joint_states.JointRequest, limiter: Limiter, dt: float) -> str:
+        if not isinstance(request, joint_states.MoveTo):
             return f"joint '{self.joint.name}' takes positions"
         limits = self.joint.limits
         if request.velocity is None and self.speed is not None:
@@ -361,7 +342,7 @@ class PositionDrive(JointDrive):
         self._tell_clamped(request)
         return limiter.want(request.position, request.velocity or 0.0) or ""
 
-    def _tell_clamped(self, request: MoveTo) -> None:
+    def _tell_clamped(self, request: joint_states.MoveTo) -> None:
         """Note that a single command is beyond the limits; controllers tell that of theirs."""
         inside = self.joint.limits.clamped(request.position)
         is_beyond = request.velocity is None and abs(inside - request.position) > self.per_tick
@@ -384,7 +365,7 @@ class VelocityDrive(JointDrive):
 
     def turn(self, velocity: float) -> None:
         """Move with a velocity [rad/s or m/s] up to the end of the next cycle."""
-        self.ask(MoveAt(velocity))
+        self.ask(joint_states.MoveAt(velocity))
 
     def _goal(self, position: float) -> Writes:
         self._sent = dict.fromkeys(self.joint.ids, 0)
@@ -395,8 +376,8 @@ class VelocityDrive(JointDrive):
         super().was_cut()
         self._sent = {}
 
-    def _pursue(self, request: JointRequest, limiter: Limiter, dt: float) -> str:
-        if not isinstance(request, MoveAt):
+    def _pursue(self, request: joint_states.JointRequest, limiter: Limiter, dt: float) -> str:
+        if not isinstance(request, joint_states.MoveAt):
             return f"joint '{self.joint.name}' takes velocities"
         limiter.position = self.measured.position
         return limiter.want(limiter.position + request.velocity * dt, request.velocity) or ""

@@ -8,21 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from rbxcompose import sdk
 from rbxcompose.base.geometry import Vector3
+from rbxcompose.domains.arms import goals as arm_goals
+from rbxcompose.domains.arms import scene_view
 from rbxcompose.domains.arms.arm_config import ArmConfig, ArmWorks, dimensions_of, mesh_bytes
-from rbxcompose.domains.arms.goals import (
-    MOVE_MEASURES,
-    REACH_MEASURES,
-    TRACE_MEASURES,
-    action_of,
-    ended_as,
-    feedback_of,
-    follow_goal,
-    goal_of,
-)
 from rbxcompose.domains.arms.hand import PICK, PLACE, PicksAndPlaces, hand_ports, hand_task, result_of
 from rbxcompose.domains.arms.location import TellsWhereItIs, location_ports
-from rbxcompose.domains.arms.manifest_model import FAST
 from rbxcompose.domains.arms.motion.arm_task import ArmTask
 from rbxcompose.domains.arms.motion.collisions import readers_of, told
 from rbxcompose.domains.arms.motion.hand_task import HandTask
@@ -41,16 +33,8 @@ from rbxcompose.domains.arms.moveit_ports import (
 )
 from rbxcompose.domains.arms.planning_processes import compile_elsewhere, planning_processes
 from rbxcompose.domains.arms.reasons import REASONS
-from rbxcompose.domains.arms.scene_view import (
-    ARM_WINDOW,
-    ArmView,
-    LookAtArm,
-    ViewOfArm,
-    arm_parts,
-    ended_words,
-    goal_words,
-)
-from rbxcompose.domains.arms.servo_ports import PERIOD, ArmServo, servo_ports
+from rbxcompose.domains.arms.section_models import FAST
+from rbxcompose.domains.arms.teleoperation import PERIOD, ArmServo, servo_ports
 from rbxcompose.msgs.control_msgs import FollowJointTrajectory
 from rbxcompose.msgs.fields import ArrayEntries
 from rbxcompose.msgs.geometry_msgs import PoseStamped, TwistStamped
@@ -58,36 +42,18 @@ from rbxcompose.msgs.moveit_msgs import DisplayTrajectory, ExecuteTrajectory, Mo
 from rbxcompose.msgs.nav_msgs import Path
 from rbxcompose.msgs.rbxcompose_msgs import MoveArm, PickObject, PlaceObject, ReachPose, SceneObjects, TraceArm
 from rbxcompose.msgs.sensor_msgs import JointState
-from rbxcompose.sdk import (
-    CallsAction,
-    Capability,
-    Component,
-    Ended,
-    In,
-    NeedsExtra,
-    Out,
-    Outcome,
-    Port,
-    Refused,
-    SentGoal,
-    ServedGoal,
-    ServesAction,
-    Setting,
-    answers,
-    component,
-)
 from rbxcompose.sdk.key_feed import KeyFeed, whole
 
 MOVE, REACH, TRACE, FOLLOW = "move", "reach", "trace", "follow"  # its ports
 WAY, DISPLAY = "way", "display"
 LARGE = 4_000_000  # [bytes] of meshes, whose reading takes seconds
 MOST_PAIRS = 200  # that a view tells
-AnyGoal = ServedGoal[Any, Any, Any]
+AnyGoal = sdk.ServedGoal[Any, Any, Any]
 AnyTask = ArmTask | HandTask | MoveItTask
 
 
-@component("arm")
-class Arm(PicksAndPlaces, TellsWhereItIs, AnswersPrograms, Component[ArmConfig]):
+@sdk.component("arm")
+class Arm(PicksAndPlaces, TellsWhereItIs, AnswersPrograms, sdk.Component[ArmConfig]):
     """Moves an arm to poses by name, to positions of its joints, or its tip to a pose, on ways without collisions.
 
     The actions are `NAME/move`, `NAME/reach` and `NAME/trace`, with a gripper also `NAME/pick` and `NAME/place`; the
@@ -109,58 +75,58 @@ class Arm(PicksAndPlaces, TellsWhereItIs, AnswersPrograms, Component[ArmConfig])
     configures_within = 600.0  # for the first time, code is compiled, which is slow on a small or busy machine
     rate = 20.0
     steps_for_goals = True
-    joint_states = In(JointState, "joint_states", is_open=True)
-    scene = In(SceneObjects, "scene", qos="latched")
+    joint_states = sdk.In(JointState, "joint_states", is_open=True)
+    scene = sdk.In(SceneObjects, "scene", qos="latched")
 
     @classmethod
-    def ports(cls, config: ArmConfig) -> dict[str, Port[Any]]:
+    def ports(cls, config: ArmConfig) -> dict[str, sdk.Port[Any]]:
         """Return the ports: its goals, and those of its controller."""
         outcomes = dict.fromkeys(REASONS, "failure")
         return super().ports(config) | {
-            MOVE: ServesAction(
+            MOVE: sdk.ServesAction(
                 MoveArm,
                 f"{config.name}/move",
                 claims=config.controller,
                 skill=f"move_{config.name}",
                 outcomes=outcomes,
                 entries=ArrayEntries("joints", "positions", dimensions_of(config), instead="remembered"),
-                measures=MOVE_MEASURES,
+                measures=arm_goals.MOVE_MEASURES,
                 choices={"pose": tuple(config.poses)} if config.poses else {},
             ).named(MOVE),
-            REACH: ServesAction(
+            REACH: sdk.ServesAction(
                 ReachPose,
                 f"{config.name}/reach",
                 claims=config.controller,
                 skill=f"reach_{config.name}",
                 outcomes=outcomes,
-                measures=REACH_MEASURES,
+                measures=arm_goals.REACH_MEASURES,
                 choices={"prefer": tuple(config.poses)} if config.poses else {},
                 may_lack=True,
             ).named(REACH),
-            WAY: Out(Path, f"{config.name}/plan", qos="latched").named(WAY),
-            DISPLAY: Out(DisplayTrajectory, f"{config.name}/display_planned_path", qos="latched").named(DISPLAY),
-            TRACE: ServesAction(
+            WAY: sdk.Out(Path, f"{config.name}/plan", qos="latched").named(WAY),
+            DISPLAY: sdk.Out(DisplayTrajectory, f"{config.name}/display_planned_path", qos="latched").named(DISPLAY),
+            TRACE: sdk.ServesAction(
                 TraceArm,
                 f"{config.name}/trace",
                 claims=config.controller,
                 skill=f"trace_{config.name}",
                 outcomes=outcomes,
-                measures=TRACE_MEASURES,
+                measures=arm_goals.TRACE_MEASURES,
             ).named(TRACE),
             **servo_ports(config),
             **moveit_ports(config),
             **location_ports(config),
-            FOLLOW: CallsAction(FollowJointTrajectory, config.follow).named(FOLLOW),
+            FOLLOW: sdk.CallsAction(FollowJointTrajectory, config.follow).named(FOLLOW),
             **hand_ports(config),
         }
 
     @classmethod
-    def capabilities(cls, config: ArmConfig) -> tuple[Capability, ...]:
+    def capabilities(cls, config: ArmConfig) -> tuple[sdk.Capability, ...]:
         """Declare what it imports."""
         needed = [(module, "arm") for module in ("pinocchio", "ompl", "toppra")]
         needed += [("numba", FAST)] if config.planner.type == FAST else []
         needed += [(module, "arm") for module in readers_of(config.meshes.values())]
-        return tuple(NeedsExtra(Setting(module), Setting(extra)) for module, extra in needed)
+        return tuple(sdk.NeedsExtra(sdk.Setting(module), sdk.Setting(extra)) for module, extra in needed)
 
     def configure(self) -> None:
         """Build the model of the body, its shapes and the planner."""
@@ -190,17 +156,19 @@ class Arm(PicksAndPlaces, TellsWhereItIs, AnswersPrograms, Component[ArmConfig])
 
     def activate(self) -> None:
         """Let viewers see it."""
-        self.feed = KeyFeed(self.context.window(f"{ARM_WINDOW}/{self.config.name}", LookAtArm()))
+        self.feed = KeyFeed(self.context.window(f"{scene_view.ARM_WINDOW}/{self.config.name}", scene_view.LookAtArm()))
 
-    @answers(LookAtArm)
-    def look(self, request: LookAtArm) -> Mapping[str, Any]:
+    @sdk.answers(scene_view.LookAtArm)
+    def look(self, request: scene_view.LookAtArm) -> Mapping[str, Any]:
         """Return what viewers see."""
         return whole(self.parts())
 
     def parts(self) -> Mapping[str, Any]:
         """Return what viewers see, by name."""
-        goal = goal_words(self.goal.request) if self.goal is not None else ""
-        return arm_parts(self.config.name, self.stage, goal, self.ended, self.way, self.duration, self.problem)
+        goal = scene_view.goal_words(self.goal.request) if self.goal is not None else ""
+        return scene_view.arm_parts(
+            self.config.name, self.stage, goal, self.ended, self.way, self.duration, self.problem
+        )
 
     @property
     def occupation(self) -> str:
@@ -308,7 +276,7 @@ class Arm(PicksAndPlaces, TellsWhereItIs, AnswersPrograms, Component[ArmConfig])
         if self.config.hand is not None and isinstance(message, PickObject.Goal | PlaceObject.Goal):
             return hand_task(self, self.works, self.config.hand, message)
         solver = self.config.kinematics.settings
-        return ArmTask(self, self.works.kinematics, self.works.planner, goal_of(message, solver), solver)
+        return ArmTask(self, self.works.kinematics, self.works.planner, arm_goals.goal_of(message, solver), solver)
 
     def end(self) -> None:
         """End the goal with its task."""
@@ -322,8 +290,8 @@ class Arm(PicksAndPlaces, TellsWhereItIs, AnswersPrograms, Component[ArmConfig])
             task.end()
             if task.difference is not None and self.scene.value is not None:
                 self.on_scene(self.scene.value)
-        self.stage, self.ended = "", ended_words(failure)
-        self.feed.tell(self.parts())
+        self.stage, self.ended = "", scene_view.ended_words(failure)
+        self.feed.update(self.parts())
         if failure is None:
             goal.succeeded(result)
         elif goal.cancel_requested:
@@ -335,23 +303,25 @@ class Arm(PicksAndPlaces, TellsWhereItIs, AnswersPrograms, Component[ArmConfig])
     def result_of(self, task: AnyTask, message: Any) -> Any:
         """Return how a goal has ended."""
         if isinstance(task, MoveItTask):
-            return task.result(action_of(message))
-        return result_of(message, task) if isinstance(task, HandTask) else ended_as(message, task)
+            return task.result(arm_goals.action_of(message))
+        return result_of(message, task) if isinstance(task, HandTask) else arm_goals.ended_as(message, task)
 
-    @answers(ViewOfArm)
-    def view(self, request: ViewOfArm) -> ArmView:
+    @sdk.answers(scene_view.ViewOfArm)
+    def view(self, request: scene_view.ViewOfArm) -> scene_view.ArmView:
         """Return what it knows now."""
         names, measured = self.works.space.names, self.measured
         if self.problem:
-            raise Refused(self.problem)
+            raise sdk.Refused(self.problem)
         if unknown := [name for name in names if name not in measured]:
-            raise Refused(f"nothing has reported where '{unknown[0]}' is")
+            raise sdk.Refused(f"nothing has reported where '{unknown[0]}' is")
         positions = {name: position for name, (position, _) in measured.items()}
         if self.task is None:  # it plans with the rest of the body where that was
             self.works.kinematics.place({name: position for name, position in positions.items() if name not in names})
         pairs = self.works.pairs(positions, request.between)[:MOST_PAIRS]
         config, watched = self.config, tuple(sorted(self.works.watched))
-        return ArmView(config.name, config.urdf, config.meshes, positions, self.works.objects, pairs, watched, self.way)
+        return scene_view.ArmView(
+            config.name, config.urdf, config.meshes, positions, self.works.objects, pairs, watched, self.way
+        )
 
     # What a task needs
 
@@ -359,18 +329,18 @@ class Arm(PicksAndPlaces, TellsWhereItIs, AnswersPrograms, Component[ArmConfig])
         """Send a trajectory to the controller."""
         self.show(names, trajectory)
 
-        def told(end: Ended[FollowJointTrajectory.Result]) -> None:
-            ended(problem_of(end), end.outcome is Outcome.CANCELED)
+        def told(end: sdk.Ended[FollowJointTrajectory.Result]) -> None:
+            ended(problem_of(end), end.outcome is sdk.Outcome.CANCELED)
             self.end()
 
-        self.sent: SentGoal = self.bound[FOLLOW](follow_goal(names, trajectory), told)
+        self.sent: sdk.SentGoal = self.bound[FOLLOW](arm_goals.follow_goal(names, trajectory), told)
 
     def show(self, names: tuple[str, ...], trajectory: Trajectory) -> None:
         """Tell viewers the way."""
         self.way, self.duration = self.works.way(trajectory.positions), trajectory.duration
         self.bound[WAY](path_of(self.way, self.works.kinematics.body.root))
         state = JointState(name=tuple(self.measured), position=np.array([at for at, _ in self.measured.values()]))
-        motion = RobotTrajectory(joint_trajectory=follow_goal(names, trajectory).trajectory)
+        motion = RobotTrajectory(joint_trajectory=arm_goals.follow_goal(names, trajectory).trajectory)
         self.bound[DISPLAY](
             DisplayTrajectory(
                 model_id=self.works.kinematics.body.name,
@@ -388,13 +358,13 @@ class Arm(PicksAndPlaces, TellsWhereItIs, AnswersPrograms, Component[ArmConfig])
         if self.goal is not None:
             within = self.task.stage if isinstance(self.task, HandTask) else stage
             self.stage = words = stage if stage == within else f"{within}: {stage}"
-            self.feed.tell(self.parts())
-            self.goal.feedback(feedback_of(self.goal.request, words))
+            self.feed.update(self.parts())
+            self.goal.feedback(arm_goals.feedback_of(self.goal.request, words))
 
 
-def problem_of(end: Ended[FollowJointTrajectory.Result]) -> str:
+def problem_of(end: sdk.Ended[FollowJointTrajectory.Result]) -> str:
     """Return why a controller failed, nothing if it did not."""
-    if end.outcome is Outcome.SUCCEEDED:
+    if end.outcome is sdk.Outcome.SUCCEEDED:
         return ""
     told = end.result.error_string if end.result is not None else ""
     return told or end.message or f"its trajectory was {end.outcome}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from rbxcompose import sdk
 from rbxcompose.base.geometry import Transform3, Vector3
 from rbxcompose.base.printable import plain
 from rbxcompose.base.units import TIME
@@ -14,21 +15,6 @@ from rbxcompose.msgs.geometry_msgs import Point, PointStamped, PoseStamped
 from rbxcompose.msgs.rbxcompose_msgs import FollowPoint, MoveArm
 from rbxcompose.msgs.stamps import to_nanoseconds
 from rbxcompose.msgs.std_msgs import Header
-from rbxcompose.sdk import (
-    CallsAction,
-    Component,
-    Config,
-    Ended,
-    In,
-    Looks,
-    Out,
-    Outcome,
-    Port,
-    SentGoal,
-    ServedGoal,
-    ServesAction,
-    component,
-)
 
 FOLLOW, TARGET, POSE, REST, HEAD = "follow", "target", "pose", "rest", "head"  # its ports
 SEEN, TIP = "seen", "tip"  # its looks
@@ -36,7 +22,7 @@ PATIENCE = 2.0  # [s] without a point, unless a goal says otherwise
 LOST = "lost"
 
 
-class ArmTrackerConfig(Config):
+class ArmTrackerConfig(sdk.Config):
     """An arm, the point that it follows, and the distances; lengths in [m]."""
 
     name: str
@@ -71,8 +57,8 @@ class ArmTrackerConfig(Config):
     """Beyond this the arm rests."""
 
 
-@component("arm_tracker")
-class ArmTracker(Component[ArmTrackerConfig]):
+@sdk.component("arm_tracker")
+class ArmTracker(sdk.Component[ArmTrackerConfig]):
     """Follows a point with the tip of an arm, as long as a goal of its action `NAME/follow` lasts.
 
     The tip points away from the shoulder. The arm slows down and stops for what it would hit, as it does when somebody
@@ -88,9 +74,9 @@ class ArmTracker(Component[ArmTrackerConfig]):
     steps_for_goals = True
 
     @classmethod
-    def ports(cls, config: ArmTrackerConfig) -> dict[str, Port[Any]]:
+    def ports(cls, config: ArmTrackerConfig) -> dict[str, sdk.Port[Any]]:
         """Return the ports: its goals, the point, those of the arm and of the head."""
-        follow: ServesAction[Any, Any, Any] = ServesAction(
+        follow: sdk.ServesAction[Any, Any, Any] = sdk.ServesAction(
             FollowPoint,
             f"{config.name}/follow",
             claims=config.controller,
@@ -98,23 +84,23 @@ class ArmTracker(Component[ArmTrackerConfig]):
             outcomes={LOST: "failure"},
             measures={"patience": TIME},
         )
-        found: dict[str, Port[Any]] = {
+        found: dict[str, sdk.Port[Any]] = {
             FOLLOW: follow.named(FOLLOW),
-            TARGET: In(PointStamped, config.target, qos="command", is_open=True, may_be_silent=True).named(TARGET),
-            POSE: Out(PoseStamped, f"{config.arm}/servo/pose", qos="command").named(POSE),
-            SEEN: Looks(source=config.frame, target=config.base).named(SEEN),
-            TIP: Looks(source=config.tip, target=config.base).named(TIP),
+            TARGET: sdk.In(PointStamped, config.target, qos="command", is_open=True, may_be_silent=True).named(TARGET),
+            POSE: sdk.Out(PoseStamped, f"{config.arm}/servo/pose", qos="command").named(POSE),
+            SEEN: sdk.Looks(source=config.frame, target=config.base).named(SEEN),
+            TIP: sdk.Looks(source=config.tip, target=config.base).named(TIP),
         }
         if config.rest:
-            found[REST] = CallsAction(MoveArm, f"{config.arm}/move").named(REST)
+            found[REST] = sdk.CallsAction(MoveArm, f"{config.arm}/move").named(REST)
         if config.head:
-            found[HEAD] = Out(PointStamped, f"{config.head}/target", qos="command").named(HEAD)
+            found[HEAD] = sdk.Out(PointStamped, f"{config.head}/target", qos="command").named(HEAD)
         return found
 
     def configure(self) -> None:
         """Follow nothing yet."""
-        self.goal: ServedGoal[FollowPoint.Goal, FollowPoint.Result, FollowPoint.Feedback] | None = None
-        self.resting: SentGoal | None = None
+        self.goal: sdk.ServedGoal[FollowPoint.Goal, FollowPoint.Result, FollowPoint.Feedback] | None = None
+        self.resting: sdk.SentGoal | None = None
         self.rests = self.is_moving = False  # it was sent to where it rests, and is on its way
         self.problem = ""
 
@@ -189,10 +175,10 @@ class ArmTracker(Component[ArmTrackerConfig]):
             pose = pose_message(Transform3(*wanted))
             self.bound[POSE](PoseStamped(header=Header(frame_id=self.config.base), pose=pose))
 
-    def rested(self, end: Ended[MoveArm.Result]) -> None:
+    def rested(self, end: sdk.Ended[MoveArm.Result]) -> None:
         """Know that the arm moves no more, and tell why it did not go where it rests."""
         self.is_moving, self.resting = False, None
-        if end.outcome not in (Outcome.SUCCEEDED, Outcome.CANCELED):
+        if end.outcome not in (sdk.Outcome.SUCCEEDED, sdk.Outcome.CANCELED):
             self.warn(f"the arm does not go to '{self.config.rest}': {end.message}")
 
     def let_go(self) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from rbxcompose import sdk
 from rbxcompose.base.geometry import Transform3, rotate
 from rbxcompose.domains.arms.motion.clouds import CloudError, SeenCells, SpaceFilter, points_of
 from rbxcompose.domains.arms.motion.collisions import readers_of
@@ -21,20 +22,6 @@ from rbxcompose.domains.body.urdf import body_of
 from rbxcompose.msgs.rbxcompose_msgs import SceneObject, SceneObjects
 from rbxcompose.msgs.sensor_msgs import JointState, PointCloud2
 from rbxcompose.msgs.stamps import NANOSECONDS, to_nanoseconds
-from rbxcompose.sdk import (
-    Capability,
-    Component,
-    Config,
-    In,
-    Length,
-    Level,
-    Looks,
-    NeedsExtra,
-    Out,
-    Port,
-    Setting,
-    component,
-)
 from rbxcompose.sdk.updater import TaskStatus
 
 Array = NDArray[np.float64]
@@ -47,7 +34,7 @@ SOON = 1e-3  # [s]
 _AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
-class CloudMapperConfig(Config):
+class CloudMapperConfig(sdk.Config):
     """Which clouds, and what is made of them; lengths in [m], times in [s]."""
 
     name: str
@@ -58,15 +45,15 @@ class CloudMapperConfig(Config):
     """Text of the URDF of the body."""
     meshes: dict[str, str] = {}
     """Files of meshes by their names in the URDF."""
-    range: Length = Field(1.5, gt=0)
+    range: sdk.Length = Field(1.5, gt=0)
     """How far from the sensor points count."""
-    nearest: Length = Field(0.0, ge=0)
+    nearest: sdk.Length = Field(0.0, ge=0)
     """Nearer points do not count."""
-    cell: Length = Field(0.02, ge=0.005, le=0.5)
+    cell: sdk.Length = Field(0.02, ge=0.005, le=0.5)
     """Side of a cell of the octree."""
     least: int = Field(1, ge=1)
     """How many points of one cloud a cell must have."""
-    padding: Length = Field(0.03, ge=0)
+    padding: sdk.Length = Field(0.03, ge=0)
     """Points nearer to the robot or to known things are taken for these."""
     forget: float = Field(5.0, gt=0)
     """How long a cell stays in which clouds show nothing any more."""
@@ -78,8 +65,8 @@ class CloudMapperConfig(Config):
     """Frames outside of the body in which clouds may be."""
 
 
-@component("cloud_mapper")
-class CloudMapper(Component[CloudMapperConfig]):
+@sdk.component("cloud_mapper")
+class CloudMapper(sdk.Component[CloudMapperConfig]):
     """Turns clouds of points into an octree of the planning scene, without the robot itself and things that are known.
 
     Example:
@@ -89,25 +76,25 @@ class CloudMapper(Component[CloudMapperConfig]):
     made_by = "Each entry of `scene: {clouds: ...}` runs one."
     process = "clouds"
     blocking = True
-    joint_states = In(JointState, "joint_states", is_open=True)
-    scene = In(SceneObjects, "scene", qos="latched")
+    joint_states = sdk.In(JointState, "joint_states", is_open=True)
+    scene = sdk.In(SceneObjects, "scene", qos="latched")
 
     @classmethod
-    def ports(cls, config: CloudMapperConfig) -> dict[str, Port[Any]]:
+    def ports(cls, config: CloudMapperConfig) -> dict[str, sdk.Port[Any]]:
         """Return the ports: clouds, the octree, and a look at each frame outside of the body."""
         root = body_of(config.urdf).root
-        clouds = In(
+        clouds = sdk.In(
             PointCloud2, config.topic, qos="bulk", is_open=True, max_rate=max(1.0, 2 * config.rate), max_size=LARGEST
         )
-        looks = {_look(frame): Looks(source=frame, target=root).named(_look(frame)) for frame in _outside(config)}
-        cells: Out[SceneObjects] = Out(SceneObjects, f"scene/{config.name}", qos="latched")
+        looks = {_look(frame): sdk.Looks(source=frame, target=root).named(_look(frame)) for frame in _outside(config)}
+        cells: sdk.Out[SceneObjects] = sdk.Out(SceneObjects, f"scene/{config.name}", qos="latched")
         return super().ports(config) | {CLOUD: clouds.named(CLOUD), "cells": cells.named("cells"), **looks}
 
     @classmethod
-    def capabilities(cls, config: CloudMapperConfig) -> tuple[Capability, ...]:
+    def capabilities(cls, config: CloudMapperConfig) -> tuple[sdk.Capability, ...]:
         """Declare what it imports."""
         needed = ("coal", *readers_of(config.meshes.values()))
-        return tuple(NeedsExtra(Setting(module), Setting("arm")) for module in needed)
+        return tuple(sdk.NeedsExtra(sdk.Setting(module), sdk.Setting("arm")) for module in needed)
 
     def configure(self) -> None:
         """Measure the body."""
@@ -168,7 +155,7 @@ class CloudMapper(Component[CloudMapperConfig]):
         problem = self.problem
         if not problem and silence > max(2.0 / self.config.rate, OLDEST):
             problem = f"no cloud for {silence:.0f} s: what was seen last stays" if self.heard_at >= 0 else self.told
-        return TaskStatus(Level.WARN if problem else Level.OK, problem or self.told)
+        return TaskStatus(sdk.Level.WARN if problem else sdk.Level.OK, problem or self.told)
 
     def use(self, message: PointCloud2) -> int:
         """See what a cloud shows, and tell the scene; return how many points counted.

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
+from rbxcompose import sdk
 from rbxcompose.base.config import Config
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Vector3
@@ -26,27 +27,13 @@ from rbxcompose.msgs.rbxcompose_msgs import LookAtPoint, SceneObjects
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.stamps import to_duration
 from rbxcompose.msgs.trajectory_msgs import JointTrajectory, JointTrajectoryPoint
-from rbxcompose.sdk import (
-    CallsAction,
-    Component,
-    Ended,
-    In,
-    Looks,
-    Out,
-    Outcome,
-    Port,
-    SentGoal,
-    ServedGoal,
-    ServesAction,
-    component,
-)
 
 LOOK, FOLLOW, SCENE, TARGET, STREAM = "look", "follow", "scene", "target", "stream"  # its ports
 SETTLING = 3.0  # [s] in which joints, the scene and frames become known
 CLOSE = math.radians(1)  # [rad] by which it may look past a point, unless a goal says otherwise
 OUTCOMES = (*REASONS, str(GraspReason.UNKNOWN_OBJECT))
 MEASURES = {**dict.fromkeys(("x", "y", "z"), LENGTH), "tolerance": ANGLE, "duration": TIME}
-LookGoal = ServedGoal[LookAtPoint.Goal, LookAtPoint.Result, LookAtPoint.Feedback]
+LookGoal = sdk.ServedGoal[LookAtPoint.Goal, LookAtPoint.Result, LookAtPoint.Feedback]
 LATER = (MotionReason.UNKNOWN_START, MotionReason.UNKNOWN_SCENE)  # may be known soon
 
 
@@ -83,8 +70,8 @@ class HeadConfig(Config):
     """Frames outside of the body in which points may be."""
 
 
-@component("head")
-class Head(Component[HeadConfig]):
+@sdk.component("head")
+class Head(sdk.Component[HeadConfig]):
     """Turns a head so that its camera looks at a point, or at the middle of an object of the scene.
 
     The action is `NAME/look_at`. Points on the topic `NAME/target` are followed as they come. Where the head is, the
@@ -101,12 +88,12 @@ class Head(Component[HeadConfig]):
     made_by = "Each entry of `heads` runs one."
     rate = 20.0
     steps_for_goals = True
-    joint_states = In(JointState, "joint_states", is_open=True)
+    joint_states = sdk.In(JointState, "joint_states", is_open=True)
 
     @classmethod
-    def ports(cls, config: HeadConfig) -> dict[str, Port[Any]]:
+    def ports(cls, config: HeadConfig) -> dict[str, sdk.Port[Any]]:
         """Return the ports: its goals, those of its controller, the scene, and a look at each frame outside."""
-        look: ServesAction[Any, Any, Any] = ServesAction(
+        look: sdk.ServesAction[Any, Any, Any] = sdk.ServesAction(
             LookAtPoint,
             f"{config.name}/look_at",
             claims=config.controller,
@@ -114,18 +101,18 @@ class Head(Component[HeadConfig]):
             outcomes=dict.fromkeys(OUTCOMES, "failure"),
             measures=MEASURES,
         )
-        found: dict[str, Port[Any]] = {
+        found: dict[str, sdk.Port[Any]] = {
             LOOK: look.named(LOOK),
-            FOLLOW: CallsAction(FollowJointTrajectory, config.follow).named(FOLLOW),
+            FOLLOW: sdk.CallsAction(FollowJointTrajectory, config.follow).named(FOLLOW),
         }
         if config.sees_scene:
-            found[SCENE] = In(SceneObjects, "scene", qos="latched").named(SCENE)
+            found[SCENE] = sdk.In(SceneObjects, "scene", qos="latched").named(SCENE)
         if config.stream:
             topic = f"{config.name}/target"
-            found[TARGET] = In(PointStamped, topic, qos="command", is_open=True, may_be_silent=True).named(TARGET)
-            found[STREAM] = Out(JointTrajectory, config.stream).named(STREAM)
+            found[TARGET] = sdk.In(PointStamped, topic, qos="command", is_open=True, may_be_silent=True).named(TARGET)
+            found[STREAM] = sdk.Out(JointTrajectory, config.stream).named(STREAM)
         root = body_of(config.urdf).root
-        looks = {_look(frame): Looks(source=frame, target=root).named(_look(frame)) for frame in config.frames}
+        looks = {_look(frame): sdk.Looks(source=frame, target=root).named(_look(frame)) for frame in config.frames}
         return super().ports(config) | found | looks
 
     def configure(self) -> None:
@@ -137,7 +124,7 @@ class Head(Component[HeadConfig]):
         self.objects: Mapping[str, Vector3] | None = None  # middles in the frame of their links; None while unknown
         self.links: Mapping[str, str] = {}
         self.goal: LookGoal | None = None
-        self.sent: SentGoal | None = None
+        self.sent: sdk.SentGoal | None = None
         self.began, self.said = 0.0, ""
 
     @property
@@ -201,12 +188,12 @@ class Head(Component[HeadConfig]):
         elif found.reason not in LATER or self.now - self.began >= SETTLING:
             self.fail(goal, found)
 
-    def arrived(self, goal: LookGoal, end: Ended[FollowJointTrajectory.Result]) -> None:
+    def arrived(self, goal: LookGoal, end: sdk.Ended[FollowJointTrajectory.Result]) -> None:
         """End the goal with the motion, if it is still wanted."""
         if goal is not self.goal:
             return
         self.sent = None
-        if end.outcome is Outcome.SUCCEEDED:
+        if end.outcome is sdk.Outcome.SUCCEEDED:
             self.goal = None
             goal.succeeded(LookAtPoint.Result(angle=self.past(goal.request)))
         else:

@@ -8,6 +8,7 @@ from typing import Any
 
 from pydantic import Field
 
+from rbxcompose import sdk
 from rbxcompose.base.config import Config as Model
 from rbxcompose.domains.arms.motion.moveit import not_done
 from rbxcompose.msgs.moveit_msgs import (
@@ -19,22 +20,8 @@ from rbxcompose.msgs.moveit_msgs import (
     PlanningOptions,
     PlanningScene,
 )
-from rbxcompose.sdk import (
-    CallsAction,
-    Component,
-    Config,
-    Ended,
-    Later,
-    Outcome,
-    Port,
-    SentGoal,
-    ServedGoal,
-    Serves,
-    ServesAction,
-    component,
-)
 
-MotionGoal = ServedGoal[Any, Any, Any]
+MotionGoal = sdk.ServedGoal[Any, Any, Any]
 
 
 class GroupConfig(Model):
@@ -44,15 +31,15 @@ class GroupConfig(Model):
     """Its joints."""
 
 
-class MoveGroupConfig(Config):
+class MoveGroupConfig(sdk.Config):
     """The arms of a robot."""
 
     arms: dict[str, GroupConfig] = Field(min_length=1)
     """Arms by name."""
 
 
-@component("move_group")
-class MoveGroupServer(Component[MoveGroupConfig]):
+@sdk.component("move_group")
+class MoveGroupServer(sdk.Component[MoveGroupConfig]):
     """Passes goals of programs for MoveIt on to the arm that they name, or whose joints they name.
 
     The actions are `move_action` and `execute_trajectory`, the service is `plan_kinematic_path`. What an arm cannot do
@@ -66,17 +53,17 @@ class MoveGroupServer(Component[MoveGroupConfig]):
     process = "scene"
     rate = 20.0
     steps_for_goals = True
-    move_action = ServesAction(MoveGroup, "move_action", skill=None)
-    execute_trajectory = ServesAction(ExecuteTrajectory, "execute_trajectory", skill=None)
-    plan_kinematic_path = Serves(GetMotionPlan, "plan_kinematic_path", skill=None)
+    move_action = sdk.ServesAction(MoveGroup, "move_action", skill=None)
+    execute_trajectory = sdk.ServesAction(ExecuteTrajectory, "execute_trajectory", skill=None)
+    plan_kinematic_path = sdk.Serves(GetMotionPlan, "plan_kinematic_path", skill=None)
 
     @classmethod
-    def ports(cls, config: MoveGroupConfig) -> dict[str, Port[Any]]:
+    def ports(cls, config: MoveGroupConfig) -> dict[str, sdk.Port[Any]]:
         """Return the ports: its own, and those of the arms."""
-        found: dict[str, Port[Any]] = super().ports(config)
+        found: dict[str, sdk.Port[Any]] = super().ports(config)
         for name in config.arms:
-            move: CallsAction[Any, Any, Any] = CallsAction(MoveGroup, f"{name}/move_action")
-            execute: CallsAction[Any, Any, Any] = CallsAction(ExecuteTrajectory, f"{name}/execute_trajectory")
+            move: sdk.CallsAction[Any, Any, Any] = sdk.CallsAction(MoveGroup, f"{name}/move_action")
+            execute: sdk.CallsAction[Any, Any, Any] = sdk.CallsAction(ExecuteTrajectory, f"{name}/execute_trajectory")
             found |= {_move(name): move.named(_move(name)), _execute(name): execute.named(_execute(name))}
         return found
 
@@ -132,9 +119,9 @@ class MoveGroupServer(Component[MoveGroupConfig]):
         words = f"no arm has the joints {', '.join(joints)}" if joints else "the trajectory has no joints"
         return "", not_done(MoveItErrorCodes.INVALID_MOTION_PLAN, words)
 
-    def on_plan_kinematic_path(self, request: GetMotionPlan.Request) -> Later[GetMotionPlan.Response]:
+    def on_plan_kinematic_path(self, request: GetMotionPlan.Request) -> sdk.Later[GetMotionPlan.Response]:
         """Have an arm plan, and tell the plan when it is there."""
-        later, wanted = Later[GetMotionPlan.Response](), request.motion_plan_request
+        later, wanted = sdk.Later[GetMotionPlan.Response](), request.motion_plan_request
         name, wrong = self.named(wanted.group_name)
 
         def reply(found: MoveGroup.Result) -> None:
@@ -147,7 +134,7 @@ class MoveGroupServer(Component[MoveGroupConfig]):
             )
             later.reply(GetMotionPlan.Response(motion_plan_response=response))
 
-        def ended(end: Ended[MoveGroup.Result]) -> None:
+        def ended(end: sdk.Ended[MoveGroup.Result]) -> None:
             reply(end.result or MoveGroup.Result(error_code=_lost(end)))
 
         if wrong is None and any(entry.is_for(MoveGroup) for entry in self.passed.values()):
@@ -165,7 +152,7 @@ class Passed:
 
     def __init__(self, goal: MotionGoal, result: Any) -> None:
         self.goal, self._result = goal, result
-        self._sent: SentGoal | None = None
+        self._sent: sdk.SentGoal | None = None
         self._is_canceled = False
 
     def is_for(self, action: type[Any]) -> bool:
@@ -175,10 +162,10 @@ class Passed:
     def send(self, arm: Any, ended: Callable[[Passed], None]) -> None:
         """Send it to the arm; `ended` is called at its end."""
 
-        def told(end: Ended[Any]) -> None:
+        def told(end: sdk.Ended[Any]) -> None:
             ended(self)
             result = end.result or self._result(error_code=_lost(end))
-            if end.outcome is Outcome.SUCCEEDED:
+            if end.outcome is sdk.Outcome.SUCCEEDED:
                 self.goal.succeeded(result)
             elif self.goal.cancel_requested:
                 self.goal.canceled(result)
@@ -194,7 +181,7 @@ class Passed:
             self._sent.cancel()
 
 
-def _lost(end: Ended[Any]) -> MoveItErrorCodes:
+def _lost(end: sdk.Ended[Any]) -> MoveItErrorCodes:
     """Return why there is no result of an arm."""
     return not_done(MoveItErrorCodes.COMMUNICATION_FAILURE, end.message or f"the arm's goal was {end.outcome}")
 

@@ -14,22 +14,11 @@ from pydantic import Field
 from rbxcompose.base.findings import Finding
 from rbxcompose.base.geometry import Quaternion, Transform3, Vector3
 from rbxcompose.base.printable import plain
+from rbxcompose.domains.arms import scene_view
 from rbxcompose.domains.arms.motion.moveit import MoveItScene
 from rbxcompose.domains.arms.motion.scene import Colour, PlacedObject, PlanningScene, SceneError, ScenePiece
 from rbxcompose.domains.arms.motion.scene_messages import markers, object_message, placed_object
 from rbxcompose.domains.arms.motion.scene_text import read_scene
-from rbxcompose.domains.arms.scene_view import (
-    SCENE_WINDOW,
-    AddToScene,
-    AttachInScene,
-    DetachInScene,
-    ListScene,
-    LoadScene,
-    LookAtScene,
-    RemoveFromScene,
-    StandingObjects,
-    scene_parts,
-)
 from rbxcompose.domains.body.model import Geometry
 from rbxcompose.domains.body.urdf import body_of
 from rbxcompose.msgs.moveit_msgs import ApplyPlanningScene, AttachedCollisionObject, CollisionObject, GetPlanningScene
@@ -150,8 +139,8 @@ class Scene(Component[SceneConfig]):
     def activate(self) -> None:
         """Publish it, as soon as frames are known."""
         self.is_told, self.began = False, self.now
-        self.seen = scene_parts((), "nothing is known yet")
-        self.feed = KeyFeed(self.context.window(SCENE_WINDOW, LookAtScene()))
+        self.seen = scene_view.scene_parts((), "nothing is known yet")
+        self.feed = KeyFeed(self.context.window(scene_view.SCENE_WINDOW, scene_view.LookAtScene()))
         self.published = -MOMENT
         self.publish()
         self.wake()
@@ -227,18 +216,18 @@ class Scene(Component[SceneConfig]):
         """Return where all links and frames are."""
         return self.things.body.poses(self.positions) | self.looked()
 
-    @answers(LookAtScene)
-    def look(self, request: LookAtScene) -> Mapping[str, Any]:
+    @answers(scene_view.LookAtScene)
+    def look(self, request: scene_view.LookAtScene) -> Mapping[str, Any]:
         """Return what viewers see."""
         return whole(self.seen)
 
-    @answers(ListScene)
-    def listed(self, request: ListScene) -> tuple[PlacedObject, ...]:
+    @answers(scene_view.ListScene)
+    def listed(self, request: scene_view.ListScene) -> tuple[PlacedObject, ...]:
         """Return all objects; points of meshes and octrees are too many to be told."""
         return tuple(_without_points(object_) for object_ in self.things.objects.values())
 
-    @answers(StandingObjects)
-    def standing(self, request: StandingObjects) -> tuple[PlacedObject, ...]:
+    @answers(scene_view.StandingObjects)
+    def standing(self, request: scene_view.StandingObjects) -> tuple[PlacedObject, ...]:
         """Return the objects around the robot."""
         try:
             found = self.things.on_body(self.looked())
@@ -249,7 +238,7 @@ class Scene(Component[SceneConfig]):
     def on_attach_object(self, request: AttachObject.Request) -> AttachObject.Response:
         """Let an object move with a link."""
         try:
-            said = self.attach(AttachInScene(request.object, request.link, request.touches))
+            said = self.attach(scene_view.AttachInScene(request.object, request.link, request.touches))
         except Refused as refusal:
             return AttachObject.Response(success=False, message=str(refusal))
         return AttachObject.Response(success=True, message=said)
@@ -257,20 +246,20 @@ class Scene(Component[SceneConfig]):
     def on_detach_object(self, request: DetachObject.Request) -> DetachObject.Response:
         """Let an object stay where it is."""
         try:
-            said = self.detach(DetachInScene(request.object))
+            said = self.detach(scene_view.DetachInScene(request.object))
         except Refused as refusal:
             return DetachObject.Response(success=False, message=str(refusal))
         return DetachObject.Response(success=True, message=said)
 
-    @answers(AddToScene)
-    def add(self, request: AddToScene) -> str:
+    @answers(scene_view.AddToScene)
+    def add(self, request: scene_view.AddToScene) -> str:
         """Put an object into the scene."""
         object_ = replace(request.entry, link=request.entry.link or self.things.body.root)
         self.change(lambda: self.things.add(object_))
         return f"'{object_.name}' is in the scene, in the frame of '{object_.link}'"
 
-    @answers(LoadScene)
-    def load(self, request: LoadScene) -> str:
+    @answers(scene_view.LoadScene)
+    def load(self, request: scene_view.LoadScene) -> str:
         """Put the objects of a text into the scene, all or none."""
         read = read_scene(request.text, request.file)
         if isinstance(read, Finding):
@@ -284,20 +273,20 @@ class Scene(Component[SceneConfig]):
         self.change(change)
         return f"{len(read.objects)} objects are in the scene, in the frame of '{link}'"
 
-    @answers(RemoveFromScene)
-    def remove(self, request: RemoveFromScene) -> str:
+    @answers(scene_view.RemoveFromScene)
+    def remove(self, request: scene_view.RemoveFromScene) -> str:
         """Take an object out of the scene."""
         self.change(lambda: self.things.remove(request.object))
         return f"'{request.object}' is gone"
 
-    @answers(AttachInScene)
-    def attach(self, request: AttachInScene) -> str:
+    @answers(scene_view.AttachInScene)
+    def attach(self, request: scene_view.AttachInScene) -> str:
         """Let an object move with a link."""
         self.change(lambda: self.things.attach(request.object, request.link, request.touches, self.poses))
         return f"'{request.object}' moves with '{request.link}'"
 
-    @answers(DetachInScene)
-    def detach(self, request: DetachInScene) -> str:
+    @answers(scene_view.DetachInScene)
+    def detach(self, request: scene_view.DetachInScene) -> str:
         """Let an object stay where it is."""
         self.change(lambda: self.things.detach(request.object, self.poses))
         return f"'{request.object}' stays where it is"
@@ -331,8 +320,8 @@ class Scene(Component[SceneConfig]):
         if problem and not self.is_told and self.now - self.began < PATIENCE:
             return
         self.is_told, self.published = True, self.now
-        self.seen = scene_parts(found, problem)
-        self.feed.tell(self.seen)
+        self.seen = scene_view.scene_parts(found, problem)
+        self.feed.update(self.seen)
         try:
             self.markers(markers(found))
         except ValueError as error:

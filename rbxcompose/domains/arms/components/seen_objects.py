@@ -7,6 +7,7 @@ import math
 import numpy as np
 from pydantic import Field
 
+from rbxcompose import sdk
 from rbxcompose.base.geometry import Transform3, Vector3
 from rbxcompose.base.levels import Level
 from rbxcompose.base.printable import plain
@@ -18,27 +19,13 @@ from rbxcompose.msgs.shape_msgs import SolidPrimitive
 from rbxcompose.msgs.stamps import to_nanoseconds
 from rbxcompose.msgs.std_msgs import Header, String
 from rbxcompose.msgs.vision_msgs import Detection3D, Detection3DArray
-from rbxcompose.sdk import (
-    Capability,
-    Component,
-    Config,
-    In,
-    Length,
-    Looks,
-    Out,
-    Port,
-    PutsThings,
-    Setting,
-    Time,
-    component,
-)
 
 DETECTIONS, LOOK = "detections", "look"  # ports that depend on the configuration
 SMALLEST, LARGEST = 1e-3, 10.0  # [m] of a side
 AT_ORIGIN = (0.0, 0.0, 0.0)
 
 
-class SeenObjectsConfig(Config):
+class SeenObjectsConfig(sdk.Config):
     """Where detections come from, and when they are of the same thing."""
 
     topic: str = Field("detections", min_length=1)
@@ -49,16 +36,16 @@ class SeenObjectsConfig(Config):
     """The frame in which things stay where they are while the camera turns: the root of the body, or `odom`."""
     score: float = Field(0.5, ge=0, le=1)
     """How sure a detection must be; one without a score counts."""
-    near: Length = Field(0.1, gt=0)
+    near: sdk.Length = Field(0.1, gt=0)
     """Detections of the same class so near to each other are of the same thing, unless a tracker gives them ids."""
-    still: Length = Field(0.005, ge=0)
+    still: sdk.Length = Field(0.005, ge=0)
     """By how much a thing must be elsewhere until the scene is told."""
-    forget: Time = Field(30.0, gt=0)
+    forget: sdk.Time = Field(30.0, gt=0)
     """What was not seen for so long is gone: longer than an arm that reaches for a thing hides it."""
 
 
-@component("seen_objects")
-class SeenObjects(Component[SeenObjectsConfig]):
+@sdk.component("seen_objects")
+class SeenObjects(sdk.Component[SeenObjectsConfig]):
     """Puts boxes that a camera sees into the planning scene, moves them there, and takes them out when they are gone.
 
     An object has the id of its detection, else the class and a number: `cup_1`. The topics `nearest_object`, to
@@ -70,24 +57,24 @@ class SeenObjects(Component[SeenObjectsConfig]):
     """
 
     rate = 5.0
-    scene = In(SceneObjects, "scene", qos="latched", is_open=True)
-    objects = Out(CollisionObject, "collision_object", qos="event")
-    nearest = Out(String, "nearest_object")
-    newest = Out(String, "newest_object")
+    scene = sdk.In(SceneObjects, "scene", qos="latched", is_open=True)
+    objects = sdk.Out(CollisionObject, "collision_object", qos="event")
+    nearest = sdk.Out(String, "nearest_object")
+    newest = sdk.Out(String, "newest_object")
 
     @classmethod
-    def ports(cls, config: SeenObjectsConfig) -> dict[str, Port[object]]:
+    def ports(cls, config: SeenObjectsConfig) -> dict[str, sdk.Port[object]]:
         """Return the ports: its own, the detections, and where the camera is."""
-        detections = In(Detection3DArray, config.topic, is_open=True, may_be_silent=True).named(DETECTIONS)
+        detections = sdk.In(Detection3DArray, config.topic, is_open=True, may_be_silent=True).named(DETECTIONS)
         return super().ports(config) | {
             DETECTIONS: detections,
-            LOOK: Looks(source=config.frame, target=config.stands_in).named(LOOK),
+            LOOK: sdk.Looks(source=config.frame, target=config.stands_in).named(LOOK),
         }
 
     @classmethod
-    def capabilities(cls, config: SeenObjectsConfig) -> tuple[Capability, ...]:
+    def capabilities(cls, config: SeenObjectsConfig) -> tuple[sdk.Capability, ...]:
         """Declare where things stand."""
-        return (PutsThings(Setting(config.stands_in, "stands_in")),)
+        return (sdk.PutsThings(sdk.Setting(config.stands_in, "stands_in")),)
 
     def configure(self) -> None:
         """Know nothing yet."""
@@ -99,12 +86,9 @@ class SeenObjects(Component[SeenObjectsConfig]):
         """Note what is held, which is what may touch links, and where an arm has put things."""
         known, before = self.core.objects, self.held
         self.held = frozenset(object_.name for object_ in message.objects if object_.name in known and object_.touches)
-        for placed_object in message.objects:
-            if placed_object.name in before - self.held:
-                self.core.put(
-                    placed_object.name,
-                    pose_of(placed_object.pose) if placed_object.link == self.config.stands_in else None,
-                )
+        for thing in message.objects:
+            if thing.name in before - self.held:
+                self.core.put(thing.name, pose_of(thing.pose) if thing.link == self.config.stands_in else None)
 
     def on_detections(self, message: Detection3DArray) -> None:
         """Tell the scene what is new or has moved."""
@@ -157,13 +141,13 @@ class SeenObjects(Component[SeenObjectsConfig]):
         self.newest(String(data=self.core.newest(self.held)))
 
 
-def added(seen_object: SeenObject, frame: str) -> CollisionObject:
+def added(seen: SeenObject, frame: str) -> CollisionObject:
     """Return an object as MoveIt's scene takes it."""
-    size: Vector3 = seen_object.sighting.size
+    size: Vector3 = seen.sighting.size
     return CollisionObject(
         header=Header(frame_id=frame),
-        id=seen_object.name,
-        pose=pose_message(seen_object.sighting.pose),
+        id=seen.name,
+        pose=pose_message(seen.sighting.pose),
         primitives=(SolidPrimitive(type=SolidPrimitive.BOX, dimensions=np.array(size)),),
         operation=CollisionObject.ADD,
     )

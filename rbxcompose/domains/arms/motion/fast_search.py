@@ -7,17 +7,8 @@ from collections.abc import Generator
 import numpy as np
 from numpy.typing import NDArray
 
+from rbxcompose.domains.arms.motion import compiled_search
 from rbxcompose.domains.arms.motion.compiled_collisions import CompiledModel, Workspace, near_pairs
-from rbxcompose.domains.arms.motion.compiled_search import (
-    EXAMINED,
-    FOUND,
-    FULL,
-    LEFT,
-    RIGHT,
-    SearchTrees,
-    grow,
-    shorten,
-)
 from rbxcompose.domains.arms.motion.groups import JointSpace
 from rbxcompose.domains.arms.motion.search import MARGIN, sample_range
 
@@ -49,18 +40,20 @@ def fast_path(
     near, whole = sample_range(space, *ends, MARGIN), sample_range(space, *ends)
     low, high = np.stack((near[0], whole[0])), np.stack((near[1], whole[1]))
     trees = _trees(ends, seed)
-    while (ended := grow(model, trees, low, high, RANGE, resolution, SLICE, work)) != FOUND:
-        if ended == FULL:
+    while (
+        ended := compiled_search.grow(model, trees, low, high, RANGE, resolution, SLICE, work)
+    ) != compiled_search.FOUND:
+        if ended == compiled_search.FULL:
             if trees.nodes.shape[1] >= MOST_NODES:
                 return f"there was no path among {MOST_NODES:,} positions"
             trees = _larger(trees)
-        yield int(trees.about[EXAMINED])
+        yield int(trees.about[compiled_search.EXAMINED])
     path = _path(trees)
     if simplify:
         room = np.concatenate((path, np.empty((SHORTCUTS, path.shape[1]))))
-        count = shorten(model, room, len(path), SHORTCUTS, resolution, trees.seed, trees.about, work)
+        count = compiled_search.shorten(model, room, len(path), SHORTCUTS, resolution, trees.seed, trees.about, work)
         path = room[:count]
-    yield int(trees.about[EXAMINED])
+    yield int(trees.about[compiled_search.EXAMINED])
     return path
 
 
@@ -69,14 +62,14 @@ def compile_search(model: CompiledModel, work: Workspace, size: int) -> None:
     here = np.zeros(size)
     trees = _trees((here, here), 0)
     ranges = np.stack((here, here))
-    grow(model, trees, ranges, ranges, RANGE, RANGE, 0, work)
-    shorten(model, trees.nodes[0].copy(), 2, 0, RANGE, trees.seed, trees.about, work)
+    compiled_search.grow(model, trees, ranges, ranges, RANGE, RANGE, 0, work)
+    compiled_search.shorten(model, trees.nodes[0].copy(), 2, 0, RANGE, trees.seed, trees.about, work)
 
 
-def _trees(ends: tuple[Array, Array], seed: int) -> SearchTrees:
+def _trees(ends: tuple[Array, Array], seed: int) -> compiled_search.SearchTrees:
     nodes = np.empty((2, NODES, len(ends[0])))
     nodes[:, 0] = ends
-    return SearchTrees(
+    return compiled_search.SearchTrees(
         nodes,
         np.full((2, NODES), -1, dtype=np.int64),
         np.ones(2, dtype=np.int64),
@@ -86,7 +79,7 @@ def _trees(ends: tuple[Array, Array], seed: int) -> SearchTrees:
     )
 
 
-def _larger(trees: SearchTrees) -> SearchTrees:
+def _larger(trees: compiled_search.SearchTrees) -> compiled_search.SearchTrees:
     """Return the same trees with room for twice as many nodes."""
     nodes = np.concatenate((trees.nodes, np.empty_like(trees.nodes)), axis=1)
     parents = np.concatenate((trees.parents, np.full_like(trees.parents, -1)), axis=1)
@@ -94,10 +87,10 @@ def _larger(trees: SearchTrees) -> SearchTrees:
     return trees._replace(nodes=nodes, parents=parents, domains=domains)
 
 
-def _path(trees: SearchTrees) -> Array:
+def _path(trees: compiled_search.SearchTrees) -> Array:
     """Return the points from the start over where both trees meet to the goal."""
     sides: list[list[Array]] = []
-    for own, at in ((0, LEFT), (1, RIGHT)):
+    for own, at in ((0, compiled_search.LEFT), (1, compiled_search.RIGHT)):
         node, found = int(trees.about[at]), []
         while node >= 0:
             found.append(trees.nodes[own, node])

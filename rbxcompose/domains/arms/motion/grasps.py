@@ -9,17 +9,8 @@ import math
 from collections.abc import Iterable, Iterator
 from itertools import product
 
+from rbxcompose.base import geometry
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.geometry import (
-    Quaternion,
-    Transform3,
-    Vector3,
-    conjugate,
-    multiply,
-    quaternion_about,
-    quaternion_from_rpy,
-    rotate,
-)
 from rbxcompose.domains.arms.motion.scene import PlacedObject, ScenePiece
 from rbxcompose.domains.body.model import Geometry
 
@@ -39,36 +30,32 @@ LEVEL = 0.1  # sine of the angle by which fingers may close out of the horizonta
 class Grasp:
     """A pose of the frame between the fingers, and the width of what is between them then; better ones first."""
 
-    pose: Transform3
+    pose: geometry.Transform3
     width: float
     quality: float
 
 
-def solid_of(placed_object: PlacedObject) -> ScenePiece | None:
+def solid_of(thing: PlacedObject) -> ScenePiece | None:
     """Return the shape of an object and its pose in the object's frame; None unless it tells how to hold the object."""
-    return (
-        ScenePiece(placed_object.shape, placed_object.shape_pose)
-        if not placed_object.pieces and placed_object.shape.kind in SOLIDS
-        else None
-    )
+    return ScenePiece(thing.shape, thing.shape_pose) if not thing.pieces and thing.shape.kind in SOLIDS else None
 
 
-def _quality(turn: Quaternion, pitch: float) -> float:
-    is_from_below = rotate(turn, (1.0, 0.0, 0.0))[2] > LEVEL / 2
+def _quality(turn: geometry.Quaternion, pitch: float) -> float:
+    is_from_below = geometry.rotate(turn, (1.0, 0.0, 0.0))[2] > LEVEL / 2
     return (1.0 - abs(pitch)) * (FROM_BELOW if is_from_below else 1.0)
 
 
-def grasps_of(shape: Geometry, pose: Transform3, bearing: float, widest: float) -> list[Grasp]:
+def grasps_of(shape: Geometry, pose: geometry.Transform3, bearing: float, widest: float) -> list[Grasp]:
     """Return grasps of a box, cylinder or sphere, the best first; none if each is wider than the gripper opens.
 
     `bearing` is the direction from the arm to the object, seen from above.
     """
     found = [
-        Grasp(Transform3(_held_at(shape, pose, turn, back), turn), width, _quality(turn, pitch) * worth)
+        Grasp(geometry.Transform3(_held_at(shape, pose, turn, back), turn), width, _quality(turn, pitch) * worth)
         for turned, worth, back in _sides(shape, pose, bearing)
         if (width := _width(shape, pose, turned)) < widest
         for pitch in PITCHES
-        for turn in (multiply(turned, quaternion_from_rpy(0.0, pitch, 0.0)),)
+        for turn in (geometry.multiply(turned, geometry.quaternion_from_rpy(0.0, pitch, 0.0)),)
     ]
     return sorted(found, key=lambda grasp: -grasp.quality)
 
@@ -83,9 +70,9 @@ def least_width(shape: Geometry) -> float:
     return 2 * shape.size[0]
 
 
-def extent(shape: Geometry, rotation: Quaternion, direction: Vector3) -> float:
+def extent(shape: Geometry, rotation: geometry.Quaternion, direction: geometry.Vector3) -> float:
     """Return how far a turned object reaches from its middle along a unit vector."""
-    x, y, z = rotate(conjugate(rotation), direction)
+    x, y, z = geometry.rotate(geometry.conjugate(rotation), direction)
     match shape.kind:
         case "box":
             return sum(abs(part) * size for part, size in zip((x, y, z), shape.size, strict=True)) / 2
@@ -94,38 +81,40 @@ def extent(shape: Geometry, rotation: Quaternion, direction: Vector3) -> float:
     return shape.size[0]
 
 
-def reach_of(placed_object: PlacedObject, rotation: Quaternion, direction: Vector3) -> float | None:
+def reach_of(thing: PlacedObject, rotation: geometry.Quaternion, direction: geometry.Vector3) -> float | None:
     """Return how far an object turned by `rotation` reaches from its origin along a unit vector, if that is known."""
-    if (solid := solid_of(placed_object)) is None:
+    if (solid := solid_of(thing)) is None:
         return None
-    x, y, z = rotate(rotation, solid.pose.translation)
+    x, y, z = geometry.rotate(rotation, solid.pose.translation)
     ahead = x * direction[0] + y * direction[1] + z * direction[2]
-    return ahead + extent(solid.shape, multiply(rotation, solid.pose.rotation), direction)
+    return ahead + extent(solid.shape, geometry.multiply(rotation, solid.pose.rotation), direction)
 
 
-def _held_at(shape: Geometry, pose: Transform3, turn: Quaternion, back: float) -> Vector3:
+def _held_at(shape: Geometry, pose: geometry.Transform3, turn: geometry.Quaternion, back: float) -> geometry.Vector3:
     """Return where fingers that come from a direction hold an object: a deep one not at its middle."""
-    ahead = rotate(turn, (1.0, 0.0, 0.0))
+    ahead = geometry.rotate(turn, (1.0, 0.0, 0.0))
     back += max(0.0, extent(shape, pose.rotation, ahead) - DEPTH)
     x, y, z = (at - back * part for at, part in zip(pose.translation, ahead, strict=True))
     return (x, y, z)
 
 
-def _sides(shape: Geometry, pose: Transform3, bearing: float) -> Iterator[tuple[Quaternion, float, float]]:
+def _sides(
+    shape: Geometry, pose: geometry.Transform3, bearing: float
+) -> Iterator[tuple[geometry.Quaternion, float, float]]:
     """Yield rotations of the gripper before it is pitched, their worth, and how far it stays back."""
     for yaw, worth in _yaws(shape, pose, bearing):
         for roll in (0.0, math.pi):
-            yield quaternion_from_rpy(roll, 0.0, yaw), worth * (1.0 - TURNED * (roll > 0.0)), 0.0
-    above = quaternion_about((0.0, 1.0, 0.0), math.pi / 2)
+            yield geometry.quaternion_from_rpy(roll, 0.0, yaw), worth * (1.0 - TURNED * (roll > 0.0)), 0.0
+    above = geometry.quaternion_about((0.0, 1.0, 0.0), math.pi / 2)
     for yaw, back in product(_closing_from_above(shape, pose, bearing), SHALLOW):
-        yield multiply(quaternion_from_rpy(0.0, 0.0, yaw), above), FROM_ABOVE * (1.0 - back), back
+        yield geometry.multiply(geometry.quaternion_from_rpy(0.0, 0.0, yaw), above), FROM_ABOVE * (1.0 - back), back
 
 
-def _width(shape: Geometry, pose: Transform3, turn: Quaternion) -> float:
-    return 2 * extent(shape, pose.rotation, rotate(turn, (0.0, 1.0, 0.0)))
+def _width(shape: Geometry, pose: geometry.Transform3, turn: geometry.Quaternion) -> float:
+    return 2 * extent(shape, pose.rotation, geometry.rotate(turn, (0.0, 1.0, 0.0)))
 
 
-def _yaws(shape: Geometry, pose: Transform3, bearing: float) -> Iterable[tuple[float, float]]:
+def _yaws(shape: Geometry, pose: geometry.Transform3, bearing: float) -> Iterable[tuple[float, float]]:
     """Return directions from the side with their worth: across faces of a box, any about what is round."""
     if shape.kind == "box":
         ways = [axis for axis in _level_axes(pose, "xyz") if abs(_between(axis, bearing)) <= FACING]
@@ -135,7 +124,7 @@ def _yaws(shape: Geometry, pose: Transform3, bearing: float) -> Iterable[tuple[f
     return [(bearing + side, math.cos(side / 2)) for side in SIDES]
 
 
-def _closing_from_above(shape: Geometry, pose: Transform3, bearing: float) -> list[float]:
+def _closing_from_above(shape: Geometry, pose: geometry.Transform3, bearing: float) -> list[float]:
     """Return the yaws of a gripper that points down: it closes across a box, or across a cylinder that lies."""
     if shape.kind == "box":
         return _level_axes(pose, "xyz")
@@ -144,10 +133,10 @@ def _closing_from_above(shape: Geometry, pose: Transform3, bearing: float) -> li
     return [bearing + side for side in SIDES]
 
 
-def _level_axes(pose: Transform3, axes: str) -> list[float]:
+def _level_axes(pose: geometry.Transform3, axes: str) -> list[float]:
     """Return the directions of those axes that are level, seen from above, both ways."""
     units = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-    turned = [rotate(pose.rotation, units[name]) for name in axes]
+    turned = [geometry.rotate(pose.rotation, units[name]) for name in axes]
     level = [math.atan2(y, x) for x, y, z in turned if abs(z) <= LEVEL]
     return [angle + half for angle, half in product(level, (0.0, math.pi))]
 

@@ -15,17 +15,9 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3, Vector3
 from rbxcompose.domains.arms.motion.octree_files import read_cells
 from rbxcompose.domains.arms.motion.scene import PlacedObject
+from rbxcompose.domains.body import picture as body_picture
 from rbxcompose.domains.body.meshes import Solid, joined
 from rbxcompose.domains.body.model import Body, Geometry
-from rbxcompose.domains.body.picture import (
-    bounds_of,
-    need_for_pictures,
-    placed,
-    png_of,
-    rendered,
-    solids_of,
-    solids_of_links,
-)
 
 Array = NDArray[np.float64]
 RED, GREEN, BLUE, SAND = (0.85, 0.1, 0.1), (0.2, 0.7, 0.3), (0.1, 0.3, 0.85), (0.85, 0.7, 0.45)
@@ -62,20 +54,20 @@ def draw_arm(shown: ArmPicture) -> bytes:
         MissingLibraryError: if a library is missing.
         ValueError: if there is nothing to draw, or a file of a shape cannot be read.
     """
-    need_for_pictures()
+    body_picture.need_for_pictures()
     goal, start = dict(shown.positions) | dict(shown.goal), shown.body.poses(shown.positions)
     solids = solids_in(shown)
     if not solids:
         raise ValueError("there is nothing to draw")
     ghost = list(_links(shown, goal, shown.moved, shown.colliding, GREEN)) if shown.goal else []
-    bounds = bounds_of(joined([*solids, *ghost]))
+    bounds = body_picture.bounds_of(joined([*solids, *ghost]))
     solids += [plane for each in shown.objects for plane in _planes(each, start, bounds)]
-    pixels = rendered(joined(solids), bounds)
+    pixels = body_picture.rendered(joined(solids), bounds)
     if ghost:
-        pixels = 0.35 * pixels + 0.65 * rendered(joined([*solids, *ghost]), bounds)
+        pixels = 0.35 * pixels + 0.65 * body_picture.rendered(joined([*solids, *ghost]), bounds)
     lines = [(line, "black") for line in wrap(shown.told, _LONGEST_LINE)]
     lines += [(line, "#c01010") for line in wrap(shown.problem, _LONGEST_LINE, max_lines=3, placeholder=" ...")]
-    return png_of(pixels, *lines)
+    return body_picture.png_of(pixels, *lines)
 
 
 def solids_in(shown: ArmPicture) -> list[Solid]:
@@ -93,41 +85,41 @@ def _links(
     colliding: Collection[str],
     colour: tuple[float, ...] | None = None,
 ) -> Iterator[Solid]:
-    found = solids_of_links(shown.body, positions, shown.meshes)
+    found = body_picture.solids_of_links(shown.body, positions, shown.meshes)
     for link in links:
         tint = RED if link in colliding else colour
-        yield from (placed(solid, Transform3(), tint) for solid in found.get(link, ()))
+        yield from (body_picture.placed(solid, Transform3(), tint) for solid in found.get(link, ()))
 
 
-def _solids(placed_object: PlacedObject, poses: Mapping[str, Transform3], is_red: bool) -> Iterator[Solid]:
-    for piece in placed_object.all_pieces:
-        at, colour = poses[placed_object.link].compose(piece.pose), RED if is_red else placed_object.colour or SAND
+def _solids(thing: PlacedObject, poses: Mapping[str, Transform3], is_red: bool) -> Iterator[Solid]:
+    for piece in thing.all_pieces:
+        at, colour = poses[thing.link].compose(piece.pose), RED if is_red else thing.colour or SAND
         if piece.shape.kind == "octree":
-            yield placed(_cells(piece.shape), at, colour)
+            yield body_picture.placed(_cells(piece.shape), at, colour)
         elif piece.shape.kind != "plane":
             files = {piece.shape.file: Path(piece.shape.file)}
-            yield from (placed(each, at, colour) for each in solids_of(piece.shape, files))
+            yield from (body_picture.placed(each, at, colour) for each in body_picture.solids_of(piece.shape, files))
 
 
 def _cells(shape: Geometry) -> Solid:
     cells, side = np.array(shape.points).reshape(-1, 3), shape.size[0]
     if shape.file:
         cells, side = read_cells(Path(shape.file), side)
-    box = next(solids_of(Geometry("box", (side,) * 3), {}))
+    box = next(body_picture.solids_of(Geometry("box", (side,) * 3), {}))
     vertices = (cells[:, None] + box.vertices[None]).reshape(-1, 3)
     faces = (box.faces[None] + len(box.vertices) * np.arange(len(cells))[:, None, None]).reshape(-1, 3)
     return Solid(vertices, faces, np.tile(SAND, (len(faces), 1)))
 
 
-def _planes(placed_object: PlacedObject, poses: Mapping[str, Transform3], bounds: Array) -> Iterator[Solid]:
+def _planes(thing: PlacedObject, poses: Mapping[str, Transform3], bounds: Array) -> Iterator[Solid]:
     """Yield a thin square for each plane, below or beside all else."""
     middle, width = bounds.mean(0), float(np.linalg.norm(bounds[1] - bounds[0])) * (1 + _MARGIN)
-    for piece in placed_object.all_pieces:
+    for piece in thing.all_pieces:
         if piece.shape.kind == "plane":
-            at, normal = poses[placed_object.link].compose(piece.pose), np.array(piece.shape.size[:3])
+            at, normal = poses[thing.link].compose(piece.pose), np.array(piece.shape.size[:3])
             turned = np.array(at.compose(Transform3(_vector(normal))).translation) - at.translation
             above = float(turned @ (middle - np.array(at.translation))) + piece.shape.size[3]
-            yield _square(middle - above * turned, turned, width, placed_object.colour or FLOOR)
+            yield _square(middle - above * turned, turned, width, thing.colour or FLOOR)
 
 
 def _square(middle: Array, normal: Array, width: float, colour: tuple[float, ...]) -> Solid:

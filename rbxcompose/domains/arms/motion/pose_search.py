@@ -11,21 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
+from rbxcompose.domains.arms.motion import inverse_kinematics
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.collisions import Checker
-from rbxcompose.domains.arms.motion.damped_steps import LONGEST
 from rbxcompose.domains.arms.motion.groups import JointSpace
-from rbxcompose.domains.arms.motion.inverse_kinematics import (
-    CLOSER,
-    ENOUGH,
-    RESTARTS,
-    PoseSolutions,
-    PoseTarget,
-    bounds_of,
-    descended,
-    solved,
-)
-from rbxcompose.domains.arms.motion.kept import Keep, KeptTip
+from rbxcompose.domains.arms.motion.path_constraints import Keep, KeptTip
 
 Array = NDArray[np.float64]
 
@@ -61,21 +51,21 @@ class Posture:
 def slid(
     kinematics: ArmKinematics,
     space: JointSpace,
-    target: PoseTarget,
+    target: inverse_kinematics.PoseTarget,
     values: Array,
     posture: Posture,
     is_free: Callable[[Array], bool],
 ) -> Array:
     """Return solutions of a target nearer to a posture, from one of them: free, and verified as those of a search."""
-    wanted, bounds, (top, end) = kinematics.placement(target.pose), bounds_of(space), target.rows
+    wanted, bounds, (top, end) = kinematics.placement(target.pose), inverse_kinematics.bounds_of(space), target.rows
     here, distance, share = values, posture.distance(space, values), 1.0
     for _ in range(STEPS):
         step = _step(kinematics.error(here, wanted)[1][top:end], posture, space, here, bounds)
         longest = share * float(np.abs(step).max())
         if longest < LEAST:
             break
-        first = np.clip(here + step * share * min(1.0, LONGEST / longest), *bounds)
-        moved = space.nearest_turns(descended(kinematics, space, target, first)[0], values)
+        first = np.clip(here + step * share * min(1.0, inverse_kinematics.LONGEST / longest), *bounds)
+        moved = space.nearest_turns(inverse_kinematics.descended(kinematics, space, target, first)[0], values)
         left = posture.distance(space, moved)
         if left <= distance - LEAST and target.is_met(kinematics.tip_pose(moved)) and is_free(moved):
             here, distance, share = moved, left, min(1.0, 2.0 * share)
@@ -112,7 +102,7 @@ AS_NEAR = 1.0  # tolerances by which others may be farther away than the nearest
 def nearest_poses(
     kinematics: ArmKinematics,
     space: JointSpace,
-    target: PoseTarget,
+    target: inverse_kinematics.PoseTarget,
     start: Array,
     is_free: Callable[[Array], bool],
     *,
@@ -130,7 +120,7 @@ def nearest_poses(
     colliding: list[Array] = []
     first = space.clamped(start)
     for sample in (first, *map(space.clamped, guesses), *space.samples(FIRSTS, seed)):
-        end = space.nearest_turns(_approached(kinematics, target, sample, bounds_of(space)), start)
+        end = space.nearest_turns(_approached(kinematics, target, sample, inverse_kinematics.bounds_of(space)), start)
         (free if is_free(end) else colliding).append(end)
         if is_late():
             break
@@ -150,14 +140,20 @@ def nearest_poses(
     return tuple(one for one in ordered if excess(one) <= excess(ordered[0]) + AS_NEAR)
 
 
-def _approached(kinematics: ArmKinematics, target: PoseTarget, first: Array, bounds: tuple[Array, Array]) -> Array:
+def _approached(
+    kinematics: ArmKinematics, target: inverse_kinematics.PoseTarget, first: Array, bounds: tuple[Array, Array]
+) -> Array:
     """Return where no small step within the limits brings the tip nearer to the target any more."""
     wanted, values, damping = kinematics.placement(target.pose), np.clip(first, *bounds), FIRST_DAMPING
     error, jacobian = _weighed(kinematics, target, wanted, values)
     size = float(error @ error)
     for _ in range(NEAREST_POSES_STEPS):
         step = _nearest_poses_step(jacobian, error, damping, values, bounds)
-        moved = np.clip(values + step * min(1.0, LONGEST / max(float(np.abs(step).max()), LONGEST)), *bounds)
+        moved = np.clip(
+            values
+            + step * min(1.0, inverse_kinematics.LONGEST / max(float(np.abs(step).max()), inverse_kinematics.LONGEST)),
+            *bounds,
+        )
         ahead, there = _weighed(kinematics, target, wanted, moved)
         left = float(ahead @ ahead)
         if left < size:
@@ -172,7 +168,9 @@ def _approached(kinematics: ArmKinematics, target: PoseTarget, first: Array, bou
     return values
 
 
-def _weighed(kinematics: ArmKinematics, target: PoseTarget, wanted: Any, values: Array) -> tuple[Array, Array]:
+def _weighed(
+    kinematics: ArmKinematics, target: inverse_kinematics.PoseTarget, wanted: Any, values: Array
+) -> tuple[Array, Array]:
     """Return the parts of the error that count, in tolerances, and their Jacobian.
 
     That of the angles is the one of small errors. It has the gradient of large ones, too: the turn's own axis is what
@@ -205,16 +203,16 @@ APART = 0.05  # [rad or m] by which a joint of another solution is elsewhere
 def searched(
     kinematics: ArmKinematics,
     space: JointSpace,
-    target: PoseTarget,
+    target: inverse_kinematics.PoseTarget,
     start: Array,
     is_free: Callable[[Array], bool],
     *,
     seed: int,
     posture: Posture | None = None,
-    restarts: int = RESTARTS,
-    enough: int = ENOUGH,
+    restarts: int = inverse_kinematics.RESTARTS,
+    enough: int = inverse_kinematics.ENOUGH,
     is_late: Callable[[], bool] = lambda: False,
-) -> Generator[None, None, PoseSolutions]:
+) -> Generator[None, None, inverse_kinematics.PoseSolutions]:
     """Return solutions as `solved` does, those nearest to a posture first if there is one.
 
     Each free one is brought as near to the posture as its tip stays at the target. It never ends farther from the
@@ -222,7 +220,7 @@ def searched(
     that is approximate, the solutions are the nearest ones; the posture does not count then.
     """
     guesses = () if posture is None else (posture.guess(start),)
-    found = yield from solved(
+    found = yield from inverse_kinematics.solved(
         kinematics,
         space,
         target,
@@ -266,7 +264,7 @@ def _apart(solutions: Iterable[Array]) -> tuple[Array, ...]:
 def kept_solutions(
     kinematics: ArmKinematics,
     space: JointSpace,
-    target: PoseTarget,
+    target: inverse_kinematics.PoseTarget,
     keep: Keep,
     start: Array,
     first: Array,
@@ -274,7 +272,7 @@ def kept_solutions(
     *,
     seed: int,
     posture: Posture | None = None,
-) -> Generator[None, None, PoseSolutions]:
+) -> Generator[None, None, inverse_kinematics.PoseSolutions]:
     """Return solutions as `solved` does, for a target of which only the position counts.
 
     With a posture, one of the attempts begins there, and the solutions nearest to it come first. What is kept is
@@ -282,7 +280,7 @@ def kept_solutions(
     """
     frame = kinematics.poses(first)[keep.frame].inverse() if keep.frame else None
     point = frame.apply(target.pose.translation) if frame is not None else target.pose.translation
-    half = CLOSER * target.tolerance / math.sqrt(3.0)
+    half = inverse_kinematics.CLOSER * target.tolerance / math.sqrt(3.0)
     x, y, z = ((value - half, value + half) for value in point)
     kept = KeptTip(kinematics, keep, first, checker)
     there = KeptTip(kinematics, replace(keep, inside=(x, y, z)), first, checker)
@@ -290,18 +288,18 @@ def kept_solutions(
     colliding: list[Array] = []
     nearest, attempts = (math.inf, math.inf), 0
     guesses = (start,) if posture is None else (start, posture.guess(start))
-    for guess in (*map(space.clamped, guesses), *space.samples(RESTARTS, seed)):
+    for guess in (*map(space.clamped, guesses), *space.samples(inverse_kinematics.RESTARTS, seed)):
         attempts += 1
         values = there.projected(guess, space)
         if values is not None and kept.is_kept(values) and target.is_met(kinematics.tip_pose(values)):
             (free if checker.is_free(values) else colliding).append(values)
         elif (alone := kept.projected(guess, space)) is not None:
             nearest = min(nearest, target.error(kinematics.tip_pose(alone)))
-        if len(free) >= ENOUGH + len(guesses) - 1:
+        if len(free) >= inverse_kinematics.ENOUGH + len(guesses) - 1:
             break
         yield
     by_distance = [
         sorted(arrays, key=lambda values: float(np.max(np.abs(values - start)))) for arrays in (free, colliding)
     ]
     ordered = tuple(by_distance[0]) if posture is None else nearest_first(space, posture, by_distance[0])
-    return PoseSolutions(ordered, tuple(by_distance[1]), nearest, attempts)
+    return inverse_kinematics.PoseSolutions(ordered, tuple(by_distance[1]), nearest, attempts)

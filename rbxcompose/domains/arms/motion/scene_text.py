@@ -15,24 +15,14 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, Span, kind
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.base.printable import plain
-from rbxcompose.domains.arms.motion.scene import (
-    MESH,
-    MOST_POINTS,
-    MOST_SHAPES,
-    OCTREE,
-    SIZES,
-    Colour,
-    PlacedObject,
-    ScenePiece,
-    mistake_in_shape,
-)
+from rbxcompose.domains.arms.motion import scene
 from rbxcompose.domains.body.model import Geometry
 
 NO_SCENE = kind("RBX2351")
 LARGEST = 20_000_000  # [bytes] of a file
 _OLD_NAME = "(noname)"
 _WORD = re.compile(r"\S+")
-_KINDS = tuple(size for size in SIZES if size != OCTREE)
+_KINDS = tuple(size for size in scene.SIZES if size != scene.OCTREE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +30,7 @@ class SceneFile:
     """A scene: its name, and its objects; their link is not told, and stands for the frame of the scene."""
 
     name: str
-    objects: tuple[PlacedObject, ...]
+    objects: tuple[scene.PlacedObject, ...]
 
 
 class _WrongError(Exception):
@@ -83,7 +73,7 @@ class _Reader:
         first = next((index for index, line in enumerate(lines[1:], 1) if line.startswith("*")), len(lines))
         self._has_poses = len("".join(lines[first + 1 : first + 2]).split()) > 1
 
-    def objects(self) -> Iterator[PlacedObject]:
+    def objects(self) -> Iterator[scene.PlacedObject]:
         names: set[str] = set()
         while (word := self._next("'*' or '.'")).text != ".":
             if word.text != "*":
@@ -91,41 +81,48 @@ class _Reader:
             if word.rest in names or not word.rest:
                 reason = f"'{plain(word.rest)}' is there twice" if word.rest else "the object has no name"
                 raise _WrongError(word, reason)
-            if len(names) == MOST_SHAPES:
-                raise _WrongError(word, f"there are more than {MOST_SHAPES:,} objects")
+            if len(names) == scene.MOST_SHAPES:
+                raise _WrongError(word, f"there are more than {scene.MOST_SHAPES:,} objects")
             names.add(word.rest)
             for _ in word.rest.split():
                 self._next("a name")
             yield self._object(word)
 
-    def _object(self, head: _Word) -> PlacedObject:
+    def _object(self, head: _Word) -> scene.PlacedObject:
         pose = self._pose() if self._has_poses else Transform3()
-        count = self._count("number of shapes", MOST_SHAPES)
+        count = self._count("number of shapes", scene.MOST_SHAPES)
         if not count:
             raise _WrongError(head, f"'{plain(head.rest)}' has no shapes")
         pieces, colour = [], None
         for _ in range(count):
             shape, own = self._shape(), self._pose()
-            pieces.append(ScenePiece(shape, own))
+            pieces.append(scene.ScenePiece(shape, own))
             colour = self._colour() or colour
-        for _ in range(self._count("number of subframes", MOST_SHAPES) if self._has_poses else 0):
+        for _ in range(self._count("number of subframes", scene.MOST_SHAPES) if self._has_poses else 0):
             self._next("a subframe")
             self._pose()
         first, *rest = pieces
-        return PlacedObject(head.rest, first.shape, "", pose, pieces=tuple(rest), colour=colour, shape_pose=first.pose)
+        return scene.PlacedObject(
+            head.rest, first.shape, "", pose, pieces=tuple(rest), colour=colour, shape_pose=first.pose
+        )
 
     def _shape(self) -> Geometry:
         word = self._next("a shape")
         if word.text not in _KINDS:
             raise _WrongError(word, f"'{plain(word.text)}' is no shape: {', '.join(_KINDS)}")
-        if word.text == MESH:
-            points, triangles = self._count("number of corners", MOST_POINTS), self._count("number", MOST_POINTS * 4)
+        if word.text == scene.MESH:
+            points, triangles = (
+                self._count("number of corners", scene.MOST_POINTS),
+                self._count("number", scene.MOST_POINTS * 4),
+            )
             corners = tuple(self._number("a corner") for _ in range(3 * points))
             faces = tuple(self._count("corner of a triangle", points - 1) for _ in range(3 * triangles))
-            shape = Geometry(MESH, (1.0, 1.0, 1.0), points=corners, triangles=faces)
+            shape = Geometry(scene.MESH, (1.0, 1.0, 1.0), points=corners, triangles=faces)
         else:
-            shape = Geometry(word.text, tuple(self._number(f"{one} of a {word.text}") for one in SIZES[word.text]))
-        if wrong := mistake_in_shape(shape):
+            shape = Geometry(
+                word.text, tuple(self._number(f"{one} of a {word.text}") for one in scene.SIZES[word.text])
+            )
+        if wrong := scene.mistake_in_shape(shape):
             raise _WrongError(word, wrong)
         return shape
 
@@ -136,7 +133,7 @@ class _Reader:
             raise _WrongError(self._last, f"the length of this quaternion is {length:g}, not 1")
         return Transform3((x, y, z), (qx, qy, qz, qw))
 
-    def _colour(self) -> Colour | None:
+    def _colour(self) -> scene.Colour | None:
         red, green, blue, alpha = (self._number("a colour") for _ in range(4))
         if not all(0.0 <= share <= 1.0 for share in (red, green, blue, alpha)):
             raise _WrongError(self._last, "the parts of a colour are from 0 to 1")
@@ -166,20 +163,20 @@ class _Reader:
         return word
 
 
-def written_scene(name: str, objects: Iterable[PlacedObject]) -> str:
+def written_scene(name: str, objects: Iterable[scene.PlacedObject]) -> str:
     """Return a scene as text, in the newer variant; meshes have their triangles here, and there are no octrees."""
     lines = [name or _OLD_NAME]
-    for placed_object in objects:
-        lines += [f"* {placed_object.name}", *_pose_lines(placed_object.pose), str(len(placed_object.own_pieces))]
-        for piece in placed_object.own_pieces:
-            lines += [*_shape_lines(piece.shape), *_pose_lines(piece.pose), _row(placed_object.colour or (0, 0, 0, 0))]
+    for thing in objects:
+        lines += [f"* {thing.name}", *_pose_lines(thing.pose), str(len(thing.own_pieces))]
+        for piece in thing.own_pieces:
+            lines += [*_shape_lines(piece.shape), *_pose_lines(piece.pose), _row(thing.colour or (0, 0, 0, 0))]
         lines.append("0")
     return "\n".join([*lines, ".", ""])
 
 
 def _shape_lines(shape: Geometry) -> Iterator[str]:
     yield shape.kind
-    if shape.kind != MESH:
+    if shape.kind != scene.MESH:
         yield _row(shape.size)
         return
     points = [value * shape.size[index % 3] for index, value in enumerate(shape.points)]

@@ -10,43 +10,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbxcompose.base.geometry import Transform3
+from rbxcompose.domains.arms.motion import compiled_collisions, sphere_trees
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.collisions import CheckedPart, MeshChecker
-from rbxcompose.domains.arms.motion.compiled_collisions import (
-    BOX,
-    CYLINDER,
-    HALF_SPACE,
-    TREE,
-    Chain,
-    CompiledModel,
-    Spheres,
-    chain_of,
-    matrix_of,
-)
 from rbxcompose.domains.arms.motion.groups import leader_of
 from rbxcompose.domains.arms.motion.octree_files import read_cells
-from rbxcompose.domains.arms.motion.sphere_trees import (
-    SphereTree,
-    ball_tree,
-    box_tree,
-    cells_tree,
-    cylinder_tree,
-    kept_mesh_tree,
-)
 from rbxcompose.domains.body.model import Geometry
 
 Array = NDArray[np.float64]
 Coal = Any  # of an extra, without types
-NONE = ball_tree(np.inf)  # of a half space, which no spheres cover
+NONE = sphere_trees.ball_tree(np.inf)  # of a half space, which no spheres cover
 
 
 class Trees:
     """Spheres of shapes, each fitted once, and forgotten when it is not among those that are asked for."""
 
     def __init__(self) -> None:
-        self._made: dict[Geometry, SphereTree] = {}
+        self._made: dict[Geometry, sphere_trees.SphereTree] = {}
 
-    def of(self, parts: Iterable[CheckedPart]) -> list[SphereTree]:
+    def of(self, parts: Iterable[CheckedPart]) -> list[sphere_trees.SphereTree]:
         """Return the spheres that cover each of some shapes, in its own frame."""
         before, self._made, found = self._made, {}, []
         for part in parts:
@@ -57,44 +39,38 @@ class Trees:
         return found
 
 
-def compiled_model(checker: MeshChecker, trees: Trees) -> CompiledModel:
+def compiled_model(checker: MeshChecker, trees: Trees) -> compiled_collisions.CompiledModel:
     """Return what a checker examines, for where the other joints of the body are now; pairs keep their places."""
     parts, kinematics = checker.parts, checker.kinematics
     chain, carriers = _chain(kinematics, {part.link for part in parts})
     owners = np.array([carriers[part.link][0] for part in parts], dtype=np.int64)
-    poses = [matrix_of(carriers[part.link][1].compose(part.origin)) for part in parts]
+    poses = [compiled_collisions.matrix_of(carriers[part.link][1].compose(part.origin)) for part in parts]
     fitted = trees.of(parts)
-    starts = np.cumsum([0, *(len(sphere_tree.radii) for sphere_tree in fitted)], dtype=np.int64)
+    starts = np.cumsum([0, *(len(each.radii) for each in fitted)], dtype=np.int64)
     solids = [_solid(part.geometry) for part in parts]
     kinds = np.array([kind for kind, _ in solids], dtype=np.int64)
-    centres = [
-        sphere_tree.centres @ pose[:, :3].T + pose[:, 3] for sphere_tree, pose in zip(fitted, poses, strict=True)
-    ]
-    corners = [
-        sphere_tree.corners @ pose[:, :3].T + pose[:, 3] for sphere_tree, pose in zip(fitted, poses, strict=True)
-    ]
+    centres = [each.centres @ pose[:, :3].T + pose[:, 3] for each, pose in zip(fitted, poses, strict=True)]
+    corners = [each.corners @ pose[:, :3].T + pose[:, 3] for each, pose in zip(fitted, poses, strict=True)]
     ends = np.cumsum([len(corner) for corner in corners], dtype=np.int64)
-    spans = [
-        sphere_tree.spans + (end - len(sphere_tree.corners)) for sphere_tree, end in zip(fitted, ends, strict=True)
-    ]
+    spans = [each.spans + (end - len(each.corners)) for each, end in zip(fitted, ends, strict=True)]
     extents = np.zeros(len(chain.parents))
     for owner, middles, tree in zip(owners, centres, fitted, strict=True):
         if tree is not NONE:
             extents[owner] = max(extents[owner], float(np.linalg.norm(middles[0]) + tree.radii[0]))
-    radii = np.array([sphere_tree.radii[0] for sphere_tree in fitted])
+    radii = np.array([each.radii[0] for each in fitted])
     firsts, seconds, margins = _ordered(checker.watched_parts, kinds, radii)
     frames = np.sort(np.stack((owners[firsts], owners[seconds]), axis=1), axis=1)
     couples, coupled = np.unique(frames, axis=0, return_inverse=True)
-    return CompiledModel(
+    return compiled_collisions.CompiledModel(
         chain=chain,
         groups=owners,
         poses=np.array(poses).reshape(-1, 3, 4),
         kinds=kinds,
         sizes=np.array([size for _, size in solids]).reshape(-1, 4),
         roots=starts[:-1],
-        spheres=Spheres(
+        spheres=compiled_collisions.Spheres(
             np.concatenate((np.zeros((0, 3)), *centres)),
-            np.concatenate((np.zeros(0), *(sphere_tree.radii for sphere_tree in fitted))),
+            np.concatenate((np.zeros(0), *(each.radii for each in fitted))),
             _children(fitted, starts),
             np.concatenate((np.zeros((0, 2), dtype=np.int64), *spans)),
             np.concatenate((np.zeros((0, 3)), *corners)),
@@ -109,7 +85,9 @@ def compiled_model(checker: MeshChecker, trees: Trees) -> CompiledModel:
     )
 
 
-def _chain(kinematics: ArmKinematics, links: Iterable[str]) -> tuple[Chain, Mapping[str, tuple[int, Transform3]]]:
+def _chain(
+    kinematics: ArmKinematics, links: Iterable[str]
+) -> tuple[compiled_collisions.Chain, Mapping[str, tuple[int, Transform3]]]:
     """Return the chain of what moves, and for each link its frame in the chain and where it is in that."""
     body, group, positions = kinematics.body, kinematics.group, kinematics.positions
 
@@ -122,7 +100,7 @@ def _chain(kinematics: ArmKinematics, links: Iterable[str]) -> tuple[Chain, Mapp
         return link
 
     carriers = {link: carrier(link) for link in links}
-    chain, index = chain_of(body, group, positions, {body.root, *carriers.values()})
+    chain, index = compiled_collisions.chain_of(body, group, positions, {body.root, *carriers.values()})
     poses = body.poses(positions)
     return chain, {name: (index[by], poses[by].inverse().compose(poses[name])) for name, by in carriers.items()}
 
@@ -139,7 +117,7 @@ def _ordered(
     margins = np.array([margin for _, _, margin in pairs], dtype=np.float64)
     (kind, other_kind), (radius, other_radius) = kinds[shapes].T, radii[shapes].T
     is_other = (kind > other_kind) | ((kind == other_kind) & (radius > other_radius))
-    is_exact = (kind == BOX) & (other_kind == BOX)
+    is_exact = (kind == compiled_collisions.BOX) & (other_kind == compiled_collisions.BOX)
     firsts, seconds = np.where(is_other[:, None], shapes[:, ::-1], shapes).T
     return firsts.copy(), seconds.copy(), np.where(is_exact, margins, np.maximum(margins, 0.0))
 
@@ -149,33 +127,33 @@ def _solid(geometry: Geometry) -> tuple[int, tuple[float, float, float, float]]:
     size = geometry.size
     match geometry.kind:
         case "box":
-            return BOX, (size[0] / 2, size[1] / 2, size[2] / 2, 0.0)
+            return compiled_collisions.BOX, (size[0] / 2, size[1] / 2, size[2] / 2, 0.0)
         case "cylinder" | "cone":
-            return CYLINDER, (size[0], size[1] / 2, 0.0, 0.0)
+            return compiled_collisions.CYLINDER, (size[0], size[1] / 2, 0.0, 0.0)
         case "capsule":
-            return CYLINDER, (size[0], size[1] / 2 + size[0], 0.0, 0.0)
+            return compiled_collisions.CYLINDER, (size[0], size[1] / 2 + size[0], 0.0, 0.0)
         case "plane":
-            return HALF_SPACE, (size[0], size[1], size[2], size[3])
-    return TREE, (0.0, 0.0, 0.0, 0.0)
+            return compiled_collisions.HALF_SPACE, (size[0], size[1], size[2], size[3])
+    return compiled_collisions.TREE, (0.0, 0.0, 0.0, 0.0)
 
 
-def _tree(geometry: Geometry, coal: Coal) -> SphereTree:
+def _tree(geometry: Geometry, coal: Coal) -> sphere_trees.SphereTree:
     size = geometry.size
     match geometry.kind:
         case "box":
-            return box_tree(size)
+            return sphere_trees.box_tree(size)
         case "sphere":
-            return ball_tree(size[0])
+            return sphere_trees.ball_tree(size[0])
         case "cylinder" | "cone":
-            return cylinder_tree(size[0], size[1])
+            return sphere_trees.cylinder_tree(size[0], size[1])
         case "capsule":
-            return cylinder_tree(size[0], size[1] + 2 * size[0])
+            return sphere_trees.cylinder_tree(size[0], size[1] + 2 * size[0])
         case "plane":
             return NONE
         case "octree":
             cells = np.array(geometry.points).reshape(-1, 3), size[0]
-            return cells_tree(*(read_cells(Path(geometry.file), size[0]) if geometry.file else cells))
-    return kept_mesh_tree(triangles_of(coal))
+            return sphere_trees.cells_tree(*(read_cells(Path(geometry.file), size[0]) if geometry.file else cells))
+    return sphere_trees.kept_mesh_tree(triangles_of(coal))
 
 
 def triangles_of(mesh: Coal) -> Array:
@@ -185,7 +163,7 @@ def triangles_of(mesh: Coal) -> Array:
     return np.asarray(mesh.vertices(), dtype=np.float64)[corners]
 
 
-def _children(fitted: Sequence[SphereTree], starts: NDArray[np.int64]) -> NDArray[np.int64]:
+def _children(fitted: Sequence[sphere_trees.SphereTree], starts: NDArray[np.int64]) -> NDArray[np.int64]:
     found = [
         np.where(tree.children < 0, -1, tree.children + start) for tree, start in zip(fitted, starts, strict=False)
     ]

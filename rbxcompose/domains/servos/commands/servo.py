@@ -10,19 +10,10 @@ from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 
+from rbxcompose.commands import options
 from rbxcompose.commands.console import refuse
-from rbxcompose.commands.options import (
-    Declare,
-    Subcommand,
-    add_actions,
-    add_json_option,
-    add_timeout_option,
-    argument,
-    count,
-    run_action,
-)
 from rbxcompose.domains.devices.serial_ports import PortError
-from rbxcompose.domains.servos.servo_findings import NOT_INSTALLED
+from rbxcompose.domains.servos.bus import NOT_INSTALLED
 
 LAST_ID = 252
 USUAL = (57_600, 1_000_000)  # [bit/s], at which servos are sold
@@ -31,28 +22,30 @@ _SURVEYS = ("scan", "new-robot")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    last = argument("--last", type=servo_id, default=LAST_ID, metavar="ID", help="the last id to look for")
-    id_ = argument("id", type=servo_id, metavar="ID", help="the servo's id")
-    ids = argument("ids", type=servo_id, nargs="+", metavar="ID", help="ids of servos")
+    last = options.argument("--last", type=servo_id, default=LAST_ID, metavar="ID", help="the last id to look for")
+    id_ = options.argument("id", type=servo_id, metavar="ID", help="the servo's id")
+    ids = options.argument("ids", type=servo_id, nargs="+", metavar="ID", help="ids of servos")
     group = (
         last,
-        argument("ids", type=servo_id, nargs="*", metavar="ID", help="ids of servos"),
-        argument("--all", action="store_true", help="all that answer"),
+        options.argument("ids", type=servo_id, nargs="*", metavar="ID", help="ids of servos"),
+        options.argument("--all", action="store_true", help="all that answer"),
     )
-    items = argument("items", nargs="+", metavar="ITEM", help="such as present_position")
+    items = options.argument("items", nargs="+", metavar="ITEM", help="such as present_position")
     words = "such as led=1, goal_position='30 deg'"
-    values = argument("values", nargs="+", metavar="ITEM=VALUE", help=words)
+    values = options.argument("values", nargs="+", metavar="ITEM=VALUE", help=words)
     renamed = (
-        argument("old", type=servo_id, metavar="OLD", help="its present id"),
-        argument("new", type=servo_id, metavar="NEW", help="its new id"),
+        options.argument("old", type=servo_id, metavar="OLD", help="its present id"),
+        options.argument("new", type=servo_id, metavar="NEW", help="its new id"),
     )
     robot = (
         last,
-        argument("name", metavar="NAME", help="lower-case letters, digits, underscores"),
-        argument("--into", metavar="DIR", type=Path, default=Path(), help="the project's folder (default: this one)"),
+        options.argument("name", metavar="NAME", help="lower-case letters, digits, underscores"),
+        options.argument(
+            "--into", metavar="DIR", type=Path, default=Path(), help="the project's folder (default: this one)"
+        ),
     )
     made = "write a robot made of the servos that answer, with a joint and a controller for them"
-    table: tuple[tuple[str, str, tuple[Declare, ...]], ...] = (
+    table: tuple[tuple[str, str, tuple[options.Declare, ...]], ...] = (
         ("scan", "list the servos that answer, with their models", (last,)),
         ("ping", "tell which of some ids answer", (ids,)),
         ("info", "show all values of a servo", (id_,)),
@@ -67,10 +60,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ("new-robot", made, robot),
     )
     actions = (
-        Subcommand(name, text, _carried_out, (partial(_add_bus, is_survey=name in _SURVEYS), *own), text)
+        options.Subcommand(name, text, _carried_out, (partial(_add_bus, is_survey=name in _SURVEYS), *own), text)
         for name, text, own in table
     )
-    add_actions(parser, actions)
+    options.add_actions(parser, actions)
 
 
 def _add_bus(action: argparse.ArgumentParser, *, is_survey: bool) -> None:
@@ -79,10 +72,10 @@ def _add_bus(action: argparse.ArgumentParser, *, is_survey: bool) -> None:
     rates = "rates to look at" if is_survey else "rate of the bus"
     default = list(USUAL) if is_survey else [USUAL[-1]]
     words = f"{rates} [bit/s] (default: {' '.join(map(str, default))})"
-    action.add_argument("--baud", type=count, nargs="+" if is_survey else 1, default=default, help=words)
+    action.add_argument("--baud", type=options.count, nargs="+" if is_survey else 1, default=default, help=words)
     action.add_argument("--protocol", type=int, choices=(1, 2), help="only this one (default: both)")
-    add_timeout_option(action, "4ms")
-    add_json_option(action)
+    options.add_timeout_option(action, "4ms")
+    options.add_json_option(action)
 
 
 def servo_id(text: str) -> int:
@@ -98,7 +91,7 @@ def run(arguments: argparse.Namespace) -> int:
         help_text = "install it with: pip install 'rbxcompose[servos]'"
         return refuse(NOT_INSTALLED.at(None, "the package 'dynamixel-sdk' is not installed", help=help_text))
     try:
-        return run_action(arguments)
+        return options.run_action(arguments)
     except PortError as error:
         return refuse(error.finding())
 

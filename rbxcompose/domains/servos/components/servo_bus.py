@@ -12,18 +12,11 @@ from typing import Any, Literal
 from rbxcompose.base.clock import MonotonicClock
 from rbxcompose.base.requests import Refused, answers
 from rbxcompose.domains.devices.serial_ports import PortError
+from rbxcompose.domains.servos import controller_manager
 from rbxcompose.domains.servos.bus import bus_type
 from rbxcompose.domains.servos.bus_config import ServoBusConfig, drives_of, item_of, joint_ports, mimics_of
 from rbxcompose.domains.servos.bus_line import open_bus
 from rbxcompose.domains.servos.controller import controller_type
-from rbxcompose.domains.servos.controller_manager import (
-    ControllerManager,
-    ControllerSeat,
-    ControllerState,
-    ListControllers,
-    ScaleMotion,
-    SwitchControllers,
-)
 from rbxcompose.domains.servos.joint_drive import JointDrive, PositionDrive
 from rbxcompose.domains.servos.joint_states import Enable, Hold, JointMode, MoveTo
 from rbxcompose.domains.servos.servo_cycle import ServoCycle, ServoItem, prepare, set_up, with_torque
@@ -120,10 +113,12 @@ class ServoBusDriver(Component[ServoBusConfig]):
         self.cycle = ServoCycle(opened.bus, drives, mimics, config.watchdog, config.thermal.scope == "bus")
         self.reboots = Reboots(opened.bus, self.prepare)
         seats = {
-            name: ControllerSeat(self, name, {joint: drives[joint] for joint in controller.config.claimed})
+            name: controller_manager.ControllerSeat(
+                self, name, {joint: drives[joint] for joint in controller.config.claimed}
+            )
             for name, controller in config.controllers.items()
         }
-        self.controllers = ControllerManager(
+        self.controllers = controller_manager.ControllerManager(
             {
                 name: controller_type(controller.type)(name, controller.config, seats[name])
                 for name, controller in config.controllers.items()
@@ -215,25 +210,25 @@ class ServoBusDriver(Component[ServoBusConfig]):
         """Pass a request on to a controller."""
         return self.controllers.controllers[controller].asked(port, request)
 
-    @answers(ListControllers)
-    def listed(self, request: ListControllers) -> tuple[ControllerState, ...]:
+    @answers(controller_manager.ListControllers)
+    def listed(self, request: controller_manager.ListControllers) -> tuple[controller_manager.ControllerState, ...]:
         """Return all controllers."""
         return tuple(
-            ControllerState(
+            controller_manager.ControllerState(
                 name, controller.type_name, self.controllers.is_active(name), controller.config.claimed, controller.note
             )
             for name, controller in self.controllers.controllers.items()
         )
 
-    @answers(SwitchControllers)
-    def switch(self, request: SwitchControllers) -> str:
+    @answers(controller_manager.SwitchControllers)
+    def switch(self, request: controller_manager.SwitchControllers) -> str:
         """Switch controllers, all at once or not at all."""
         for text in (told := list(self.controllers.switch(request.on, request.off, self.now))):
             self.info(text)
         return "; ".join(told) or "nothing changes"
 
-    @answers(ScaleMotion)
-    def scale(self, request: ScaleMotion) -> str:
+    @answers(controller_manager.ScaleMotion)
+    def scale(self, request: controller_manager.ScaleMotion) -> str:
         """Let a controller follow its goals slower, or as fast as they ask for."""
         return self.controllers.set_pace(request.controller, request.share)
 

@@ -10,19 +10,9 @@ from pydantic import Field
 
 from rbxcompose.base.config import Angle, Config, JointName, Length, Speed, Time
 from rbxcompose.base.units import ANGLE, LENGTH, format_quantity
+from rbxcompose.domains.servos import gripper
 from rbxcompose.domains.servos.controller import Controller, ControllerConfig, controller
 from rbxcompose.domains.servos.curves import JointSample
-from rbxcompose.domains.servos.gripper import (
-    CalibratedGripper,
-    DualGripper,
-    FingerGeometry,
-    GripAttempt,
-    GripOutcome,
-    GripperModel,
-    GripPolicy,
-    OneSidedGripper,
-    ParallelGripper,
-)
 from rbxcompose.domains.servos.transmission import Calibration
 from rbxcompose.msgs.control_msgs import GripperCommand
 from rbxcompose.msgs.rbxcompose_msgs import Grip
@@ -197,11 +187,11 @@ class GripperController(Controller[GripperConfig]):
         """Set up the model."""
         config = self.config
         self.model = model_of(config)
-        self.policy = GripPolicy(config.tolerance, config.stall.progress, config.stall.window, config.on_stall)
+        self.policy = gripper.GripPolicy(config.tolerance, config.stall.progress, config.stall.window, config.on_stall)
         self.joints = [self.site.joints[name] for name in config.claimed]
         self.goal: ServedGoal[Any, Any, Any] | None = None  # that of the attempt
         self.port, self.wanted, self.at = GRIP, 0.0, 0.0  # the last two are openings [m]
-        self.attempt = GripAttempt(self.model, self.model.openings[0], self.policy)
+        self.attempt = gripper.GripAttempt(self.model, self.model.openings[0], self.policy)
 
     @property
     def leads(self) -> bool:
@@ -267,7 +257,7 @@ class GripperController(Controller[GripperConfig]):
             goal.canceled(result_of(port, self._outcome("canceled")))
         elif goal is not self.goal:
             self.goal, self.port, self.wanted = goal, port, opening_of(port, goal.request)
-            self.attempt = GripAttempt(self.model, self.wanted, self.policy)
+            self.attempt = gripper.GripAttempt(self.model, self.wanted, self.policy)
             self.at = self.model.opening([joint.commanded.position for joint in self.joints])
 
     def _obstacle(self) -> str:
@@ -310,12 +300,12 @@ class GripperController(Controller[GripperConfig]):
     def _effort(self) -> float:
         return max((abs(joint.effort) for joint in self.joints if math.isfinite(joint.effort)), default=0.0)
 
-    def _outcome(self, reason: str) -> GripOutcome:
+    def _outcome(self, reason: str) -> gripper.GripOutcome:
         opening = self._opening()
         known = opening if math.isfinite(opening) else 0.0  # viewers of results take numbers only
-        return GripOutcome(known, self._effort(), False, False, False, reason)
+        return gripper.GripOutcome(known, self._effort(), False, False, False, reason)
 
-    def _end(self, outcome: GripOutcome | None) -> None:
+    def _end(self, outcome: gripper.GripOutcome | None) -> None:
         goal = self.goal
         if outcome is None or goal is None:
             return
@@ -338,24 +328,24 @@ def _turned_back(pairs: Sequence[tuple[float, float]]) -> str:
     return ""
 
 
-def model_of(config: GripperConfig) -> GripperModel:
+def model_of(config: GripperConfig) -> gripper.GripperModel:
     """Return the model of a gripper. ValueError with the reason if it cannot be."""
     if config.calibration is not None:
         pairs = sorted((one.opening, one.angle) for one in config.calibration)
         if back := _turned_back(pairs):
             raise ValueError(back)
-        return CalibratedGripper(Calibration(tuple(pairs)))
+        return gripper.CalibratedGripper(Calibration(tuple(pairs)))
     least, greatest = config.opening or (0.0, 0.0)
     center, invert = config.center or 0.0, bool(config.invert)
     if config.travel is not None:
-        return ParallelGripper((-1.0 if invert else 1.0) * math.tau / config.travel, center, least, greatest)
+        return gripper.ParallelGripper((-1.0 if invert else 1.0) * math.tau / config.travel, center, least, greatest)
     if config.model == "sliding":
-        return ParallelGripper(0.5, 0.0, least, greatest)  # each finger goes half of the way
-    fingers = FingerGeometry(config.pad_width or 0.0, config.finger_length or 0.0, least, greatest)
+        return gripper.ParallelGripper(0.5, 0.0, least, greatest)  # each finger goes half of the way
+    fingers = gripper.FingerGeometry(config.pad_width or 0.0, config.finger_length or 0.0, least, greatest)
     if config.model == "one_sided":
-        return OneSidedGripper(fingers, center, invert)
+        return gripper.OneSidedGripper(fingers, center, invert)
     centers = (config.center_left or 0.0, config.center_right or 0.0)
-    return DualGripper(fingers, centers, (bool(config.invert_left), bool(config.invert_right)))
+    return gripper.DualGripper(fingers, centers, (bool(config.invert_left), bool(config.invert_right)))
 
 
 def opening_of(port: str, goal: Any) -> float:
@@ -364,14 +354,11 @@ def opening_of(port: str, goal: Any) -> float:
     return float(wanted)
 
 
-def result_of(port: str, outcome: GripOutcome) -> Message:
+def result_of(port: str, outcome: gripper.GripOutcome) -> Message:
     """Return how a goal at a port has ended."""
     if port == COMMAND:
         return GripperCommand.Result(
-            position=outcome.position,
-            effort=outcome.effort,
-            stalled=outcome.stalled,
-            reached_goal=outcome.reached_goal,
+            position=outcome.position, effort=outcome.effort, stalled=outcome.stalled, reached_goal=outcome.reached_goal
         )
     return Grip.Result(
         opening=outcome.position,

@@ -7,24 +7,9 @@ from typing import Any, Literal
 from pydantic import Field
 
 from rbxcompose.base.config import Angle, Config, JointName, Time
+from rbxcompose.domains.servos import trajectory, trajectory_follower
 from rbxcompose.domains.servos.controller import Controller, ControllerConfig, controller
 from rbxcompose.domains.servos.curves import JointSample
-from rbxcompose.domains.servos.trajectory import (
-    TrajectoryCode,
-    TrajectoryGoal,
-    TrajectoryPoint,
-    TrajectoryPolicy,
-    TrajectoryRefusal,
-    TrajectoryTolerance,
-)
-from rbxcompose.domains.servos.trajectory_follower import (
-    TrajectoryFollower,
-    TrajectoryGoals,
-    TrajectoryOutcome,
-    TrajectoryWay,
-    move_way,
-    share_mistake,
-)
 from rbxcompose.msgs.builtin_interfaces import Duration
 from rbxcompose.msgs.control_msgs import FollowJointTrajectory
 from rbxcompose.msgs.fields import ArrayEntries
@@ -105,17 +90,21 @@ class JointTrajectoryController(Controller[JointTrajectoryConfig]):
     def prepare(self) -> None:
         """Set up the follower."""
         config, site = self.config, self.site
-        policy = TrajectoryPolicy(
+        policy = trajectory.TrajectoryPolicy(
             interpolation=config.interpolation,
             outside=config.outside,
             too_fast=config.too_fast,
-            tolerance=TrajectoryTolerance(config.tolerance.path, config.tolerance.goal),
+            tolerance=trajectory.TrajectoryTolerance(config.tolerance.path, config.tolerance.goal),
             goal_time=config.tolerance.goal_time,
         )
         self.told = ""
-        self.follower = TrajectoryFollower({name: joint.rules for name, joint in site.joints.items()}, policy)
-        follow = TrajectoryWay(site.action(FOLLOW), self._trajectory, result_of)
-        self.goals = TrajectoryGoals(self.follower, {FOLLOW: follow, MOVE: move_way(site.action(MOVE))})
+        self.follower = trajectory_follower.TrajectoryFollower(
+            {name: joint.rules for name, joint in site.joints.items()}, policy
+        )
+        follow = trajectory_follower.TrajectoryWay(site.action(FOLLOW), self._trajectory, result_of)
+        self.goals = trajectory_follower.TrajectoryGoals(
+            self.follower, {FOLLOW: follow, MOVE: trajectory_follower.move_way(site.action(MOVE))}
+        )
 
     @property
     def leads(self) -> bool:
@@ -155,7 +144,7 @@ class JointTrajectoryController(Controller[JointTrajectoryConfig]):
             return
         wanted = self._trajectory(Follow.Goal(trajectory=message))
         answer = self.follower.accept(wanted, self.site.now, self._measured(), self._commanded(), is_live=True)
-        if isinstance(answer, TrajectoryRefusal):
+        if isinstance(answer, trajectory.TrajectoryRefusal):
             self.told = f"a trajectory was refused: {answer.message}"
         else:
             self.goals.replace(STREAM)
@@ -169,12 +158,12 @@ class JointTrajectoryController(Controller[JointTrajectoryConfig]):
 
     def set_pace(self, share: float) -> str:
         """Follow goals at a share of their speed, from now on."""
-        if problem := share_mistake(share):
+        if problem := trajectory_follower.share_mistake(share):
             return problem
         self.follower.pace.share = share
         return ""
 
-    def _trajectory(self, goal: Follow.Goal) -> TrajectoryGoal:
+    def _trajectory(self, goal: Follow.Goal) -> trajectory.TrajectoryGoal:
         return trajectory_of(goal, self.site.now, self.site.stamp)
 
     def _measured(self) -> dict[str, JointSample]:
@@ -183,37 +172,37 @@ class JointTrajectoryController(Controller[JointTrajectoryConfig]):
     def _commanded(self) -> dict[str, JointSample]:
         return {name: joint.commanded for name, joint in self.site.joints.items()}
 
-    def _end(self, outcome: TrajectoryOutcome | None) -> None:
+    def _end(self, outcome: trajectory_follower.TrajectoryOutcome | None) -> None:
         if outcome is not None:
             self.goals.end(outcome)
 
 
-def result_of(code: TrajectoryCode, message: str) -> Follow.Result:
+def result_of(code: trajectory.TrajectoryCode, message: str) -> Follow.Result:
     """Return how a trajectory ended as ROS writes it."""
     return Follow.Result(error_code=code, error_string=message)
 
 
-def trajectory_of(goal: Follow.Goal, now: float, stamp: int) -> TrajectoryGoal:
+def trajectory_of(goal: Follow.Goal, now: float, stamp: int) -> trajectory.TrajectoryGoal:
     """Return a goal as the follower takes it; its stamp [ns] is by the clock of headers, a zero one is now."""
     begin = to_nanoseconds(goal.trajectory.header.stamp)
     points = tuple(
-        TrajectoryPoint(
+        trajectory.TrajectoryPoint(
             seconds(point.time_from_start), tuple(point.positions), tuple(point.velocities), tuple(point.accelerations)
         )
         for point in goal.trajectory.points
     )
     paths = {one.name: one.position for one in goal.path_tolerance}
     ends = {one.name: (one.position, one.velocity) for one in goal.goal_tolerance}
-    default = TrajectoryTolerance()
+    default = trajectory.TrajectoryTolerance()
     tolerances = {
-        name: TrajectoryTolerance(
+        name: trajectory.TrajectoryTolerance(
             allowed(paths.get(name, 0.0), default.path),
             allowed(ends.get(name, (0.0, 0.0))[0], default.goal),
             allowed(ends.get(name, (0.0, 0.0))[1], default.velocity),
         )
         for name in {*paths, *ends}
     }
-    return TrajectoryGoal(
+    return trajectory.TrajectoryGoal(
         tuple(goal.trajectory.joint_names),
         points,
         now + (begin - stamp) / NANOSECONDS if begin else 0.0,

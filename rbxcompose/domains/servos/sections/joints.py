@@ -10,26 +10,9 @@ from typing import Annotated, Any
 
 from pydantic import PlainValidator, WithJsonSchema
 
+from rbxcompose.base import units
 from rbxcompose.base.config import ACTUATOR, Angle, Config, JointName, Length, Name, Refers
 from rbxcompose.base.findings import Finding, kind
-from rbxcompose.base.units import (
-    ACCELERATION,
-    ANGLE,
-    ANGULAR_ACCELERATION,
-    ANGULAR_JERK,
-    ANGULAR_SPEED,
-    FORCE,
-    JERK,
-    LENGTH,
-    SPEED,
-    TORQUE,
-    Dimension,
-    Quantity,
-    UnitError,
-    example,
-    format_quantity,
-    parse_quantity,
-)
 from rbxcompose.domains.body.model import BodyJoint
 from rbxcompose.domains.body.sections.body import body
 from rbxcompose.domains.servos.limits import MotionLimits, Tightened, tightened
@@ -46,24 +29,30 @@ DOES_NOT_MOVE = kind("RBX2217")
 NOWHERE_TO_GO = kind("RBX2224")
 
 
-def _either(turning: Dimension, sliding: Dimension) -> PlainValidator:
+def _either(turning: units.Dimension, sliding: units.Dimension) -> PlainValidator:
     """Return what reads a quantity of a joint that turns or slides."""
 
-    def read(value: object) -> Quantity:
-        read = value if isinstance(value, Quantity) else parse_quantity(value) if isinstance(value, str) else None
+    def read(value: object) -> units.Quantity:
+        read = (
+            value
+            if isinstance(value, units.Quantity)
+            else units.parse_quantity(value)
+            if isinstance(value, str)
+            else None
+        )
         if read is None or read.dimension not in (turning, sliding):
-            raise UnitError(f"must be {turning.phrase} or {sliding.phrase}, such as '{example(turning)}'")
+            raise units.UnitError(f"must be {turning.phrase} or {sliding.phrase}, such as '{units.example(turning)}'")
         return read
 
     shape = {"anyOf": [{"x-dimension": turning.name}, {"x-dimension": sliding.name}]}
     return PlainValidator(read, json_schema_input_type=Annotated[Any, WithJsonSchema(shape)])
 
 
-JointPosition = Annotated[Quantity, _either(ANGLE, LENGTH)]
-JointSpeed = Annotated[Quantity, _either(ANGULAR_SPEED, SPEED)]
-JointAcceleration = Annotated[Quantity, _either(ANGULAR_ACCELERATION, ACCELERATION)]
-JointJerk = Annotated[Quantity, _either(ANGULAR_JERK, JERK)]
-JointEffort = Annotated[Quantity, _either(TORQUE, FORCE)]
+JointPosition = Annotated[units.Quantity, _either(units.ANGLE, units.LENGTH)]
+JointSpeed = Annotated[units.Quantity, _either(units.ANGULAR_SPEED, units.SPEED)]
+JointAcceleration = Annotated[units.Quantity, _either(units.ANGULAR_ACCELERATION, units.ACCELERATION)]
+JointJerk = Annotated[units.Quantity, _either(units.ANGULAR_JERK, units.JERK)]
+JointEffort = Annotated[units.Quantity, _either(units.TORQUE, units.FORCE)]
 
 
 class DrivenLimitsModel(Config):
@@ -143,7 +132,7 @@ def joints(reading: Reading[dict[str, JointModel]]) -> dict[str, JointModel]:
         if (finding := next(mistakes, None)) is not None:
             wrong[name] = finding
     reading.report.extend(wrong.values())
-    return {name: joint_model for name, joint_model in found.items() if name not in wrong}
+    return {name: joint for name, joint in found.items() if name not in wrong}
 
 
 def _read(reading: Reading[dict[str, JointModel]]) -> dict[str, JointModel]:
@@ -214,7 +203,9 @@ def _of_body(root: MappingNode, name: str, model: JointModel, joint: BodyJoint) 
         span = value_span(root, ("joints", name, "travel"))
         yield NOT_TOGETHER.at(span, f"joint '{name}' turns: 'travel' is for joints that slide")
     for path, written in _quantities(model):
-        if written.dimension not in ((LENGTH, SPEED, ACCELERATION, FORCE) if slides else _TURNING):
+        if written.dimension not in (
+            (units.LENGTH, units.SPEED, units.ACCELERATION, units.FORCE) if slides else _TURNING
+        ):
             words = "slides" if slides else "turns"
             span = value_span(root, ("joints", name, *path))
             yield WRONG_TYPE.at(span, f"joint '{name}' {words}, and this is {written.dimension.phrase}")
@@ -240,14 +231,14 @@ def _follows(
         yield NOT_TOGETHER.at(at, f"joint '{name}' mimics '{leader}' in the body, but servos with velocities do not")
 
 
-_TURNING = (ANGLE, ANGULAR_SPEED, ANGULAR_ACCELERATION, ANGULAR_JERK, TORQUE)
+_TURNING = (units.ANGLE, units.ANGULAR_SPEED, units.ANGULAR_ACCELERATION, units.ANGULAR_JERK, units.TORQUE)
 
 
 def _no_motion(model: JointModel, joint: BodyJoint | None) -> Iterator[tuple[str, str, str]]:
     """Yield the limits under which it cannot move: the key, why not, and what helps."""
     limits, outer = model.limits, _body_limits(joint)
     for key in ("velocity", "acceleration", "jerk"):
-        value: Quantity | None = getattr(limits, key)
+        value: units.Quantity | None = getattr(limits, key)
         if value is not None and value.value <= 0.0:
             yield key, f"cannot move with a limit of {_shown(value)}", "a limit is above 0, for both directions"
     if limits.position is None:
@@ -258,13 +249,13 @@ def _no_motion(model: JointModel, joint: BodyJoint | None) -> Iterator[tuple[str
         yield "position", words, f"write '[{_shown(greatest)}, {_shown(least)}]'"
     elif greatest.value < outer.least or least.value > outer.greatest:
         dimension = least.dimension
-        bounds = " to ".join(format_quantity(bound, dimension) for bound in (outer.least, outer.greatest))
+        bounds = " to ".join(units.format_quantity(bound, dimension) for bound in (outer.least, outer.greatest))
         words = f"may go from {_shown(least)} to {_shown(greatest)}, but in the body from {bounds}"
         yield "position", words, "give it a range that lies within that of the body"
 
 
-def _shown(quantity: Quantity) -> str:
-    return format_quantity(quantity.value, quantity.dimension)
+def _shown(quantity: units.Quantity) -> str:
+    return units.format_quantity(quantity.value, quantity.dimension)
 
 
 def _body_limits(joint: BodyJoint | None) -> MotionLimits:
@@ -287,6 +278,17 @@ def limits_of(model: JointModel, joint: BodyJoint | None) -> Tightened:
 def held_limits(model: JointModel, joint: BodyJoint | None) -> MotionLimits:
     """Return the limits that hold; none for a joint whose limits are a mistake, which is told."""
     return limits_of(model, joint).limits or MotionLimits()
+
+
+def limits_in(contents: Contents, joint: BodyJoint) -> MotionLimits:
+    """Return the limits of a joint: those of the body, and the tighter ones of the joint if it is driven."""
+    driven = contents.of(joints).get(joint.name)
+    if driven is not None:
+        return held_limits(driven, joint)
+    outer = joint.limits
+    if outer is None or joint.kind == "continuous":
+        return MotionLimits()
+    return MotionLimits(outer.lower, outer.upper)
 
 
 def _servos(
@@ -314,7 +316,7 @@ def _written_servos(node: TreeNode | None) -> set[str]:
     return {item.text for item in items if isinstance(item, ScalarNode)}
 
 
-def _quantities(model: JointModel) -> Iterator[tuple[KeyPath, Quantity]]:
+def _quantities(model: JointModel) -> Iterator[tuple[KeyPath, units.Quantity]]:
     limits = model.limits
     for index, position in enumerate(limits.position or ()):
         yield ("limits", "position", index), position
@@ -339,11 +341,11 @@ def table_of(model: JointModel) -> tuple[tuple[float, float], ...]:
     return tuple(sorted((point.servo, point.joint.value) for point in model.calibration))
 
 
-def effort_of(joint_model: JointModel, servos: Iterable[ActuatorModel]) -> float | None:
+def effort_of(joint: JointModel, servos: Iterable[ActuatorModel]) -> float | None:
     """Return the most that its servos exert on a joint [Nm or N], None if that is not known of one of them."""
     models = [model_named(servo.model) for servo in servos]
     known = [model for model in models if model is not None]
     if not known or len(known) < len(models):  # those of other types of buses
         return None
-    gear = math.tau / joint_model.travel if joint_model.travel else joint_model.ratio
-    return joint_effort(known, steepest(table_of(joint_model)) if joint_model.calibration else gear)
+    gear = math.tau / joint.travel if joint.travel else joint.ratio
+    return joint_effort(known, steepest(table_of(joint)) if joint.calibration else gear)
