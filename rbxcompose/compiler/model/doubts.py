@@ -14,7 +14,7 @@ from rbxcompose.compiler.composition.robot_manifest import RobotManifest
 from rbxcompose.compiler.sections.include import include
 from rbxcompose.manifest.documents import ManifestHeader
 from rbxcompose.manifest.files import shown_name
-from rbxcompose.manifest.registry import section_named, sections
+from rbxcompose.manifest.registry import section_named, sections_in_use
 from rbxcompose.manifest.section import ROBOT, Section
 from rbxcompose.manifest.shapes import refers_below
 from rbxcompose.manifest.tree import BROKEN, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode, at
@@ -178,7 +178,7 @@ def _is_plain(section: Section[Any, Any], manifest: RobotManifest, path: KeyPath
 
 def _lost(manifest: RobotManifest) -> Iterator[tuple[Section[Any, Any], str]]:
     """Yield the entries that were written and could not be read at all."""
-    for section in sections(ROBOT):
+    for section in sections_in_use(ROBOT):
         if not section.is_composed or section.name not in manifest.root:
             continue
         read, written = manifest.contents.of(section), at(manifest.root, (section.name, *section.at))

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 
 from rbxcompose.base.findings import Finding, Related, Span, kind
 from rbxcompose.compiler.model.robot import Robot
-from rbxcompose.manifest.registry import sections
+from rbxcompose.manifest.registry import sections_in_use
 
 STILL_USED = kind("RBX1310")
 _QUOTED = re.compile(r"'([^']*)'")
@@ -20,7 +20,7 @@ def blamed(findings: Iterable[Finding], whole: Robot, changed: Robot, profile: S
     `whole` is the robot without the profile, `changed` the one with it.
     """
     history = changed.manifest.history
-    removed = {name: span for section in sections() for name, span in history.removed(section.name).items()}
+    removed = {name: span for section in sections_in_use() for name, span in history.removed(section.name).items()}
     removed = {name: span for name, span in removed.items() if profile.contains(span)}
     gone = [end for end in whole.ends if end.instance in removed]
     meant = {word: end.instance for end in gone for word in (end.skill, end.topic) if word}
