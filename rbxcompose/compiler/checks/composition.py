@@ -71,6 +71,7 @@ def part_needs(robot: Robot) -> Iterator[Finding]:
                 f"part '{part.name}' needs '{need.name}' ({short(need.type)}) from outside, and nothing has it",
                 help=f"include a part with '{need.name}', or connect it to the right topic with 'connect:'",
                 related=[Related(need.span, "needed here")],
+                about=(part.name, need.name),
             )
 
 
@@ -154,7 +155,8 @@ def part_provides(robot: Robot) -> Iterator[Finding]:
                 message = f"part '{part.name}' does not have {what}, which it says it provides"
                 is_own = part.components <= robot.components.keys() and not claim.span.file.startswith(PREFIX)
                 if not is_own:  # something of it was removed or changed
-                    yield part_provides.at(part.span, message, related=[Related(claim.span, "promised here")])
+                    related, about = [Related(claim.span, "promised here")], (part.name, claim.name)
+                    yield part_provides.at(part.span, message, related=related, about=about)
                     continue
                 known = [end.skill for end in ends if _serves(end, end.skill)] if claim.about is About.SKILL else []
                 help_text = suggest(claim.name, known, "its skills")

@@ -250,6 +250,7 @@ def unplaced_base(robot: Robot) -> Iterator[Finding]:
                     f"nobody tells where '{port.source}' is in '{port.target}', and '{component.name}' looks it up",
                     help="let the base publish its frame, or add what localises the robot",
                     related=[Related(robot.entry_span(component.name), "it looks it up")],
+                    about=(port.source, port.target, component.name),
                 )
                 return
 
@@ -272,6 +273,7 @@ def untold_frame(robot: Robot) -> Iterator[Finding]:
             f"nobody tells where '{root}' is in '{joint.frame}'",
             help=f"write {names}" if told else "write 'type: fixed' if it stands still, or add what localises it",
             related=[Related(description.body.links[root].span, "the root of the body")],
+            about=(root, joint.frame),
         )
 
 
