@@ -48,7 +48,7 @@ def frame_of_body(robot: Robot) -> Iterator[Finding]:
 
 def _other_root(body: Body, moved: Setting[str]) -> str:
     *_, section, key = ("", *moved.field.split("."))
-    named = f"write '{key}: {shape.root}' below '{section}', or " if section and key else ""
+    named = f"write '{key}: {body.root}' below '{section}', or " if section and key else ""
     return f"{named}call the root '{moved.value}'"
 
 
