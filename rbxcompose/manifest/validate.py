@@ -369,8 +369,7 @@ def _finding(model: Any, node: TreeNode, path: KeyPath, loc: KeyPath, error: Err
         case "value_error" if isinstance(cause := context.get("error"), UnitError):
             return unit_finding(cause, value or node, name)
         case "value_error":
-            absent = [key for key in keys_at(model, loc) if at(node, (*loc, key)) is None]
-            return WRONG_TYPE.at(span, f"'{name}': {context.get('error')}", about=absent)
+            return WRONG_TYPE.at(span, f"'{name}': {context.get('error')}")
         case "string_too_long" | "too_long" | "string_too_short" | "too_short":
             words, key = ("at most", "max_length") if "long" in error["type"] else ("at least", "min_length")
             one, more = ("character", "characters") if "string" in error["type"] else ("entry", "entries")
@@ -390,6 +389,8 @@ def _finding(model: Any, node: TreeNode, path: KeyPath, loc: KeyPath, error: Err
     if "valid" in context:  # a validator of ours that supplies the valid names
         message = error["msg"] if is_key else f"'{name}': {error['msg']}"
         return NOT_A_CHOICE.misspelt(place, message, context["name"], context["valid"], context["what"])
+    if "about" in context:  # or the names that it lacks
+        return WRONG_TYPE.at(span, f"'{name}': {error['msg']}", about=context["about"])
     if "help" in context:  # or its own help
         about = [str(context.get("name", ""))]
         return NOT_A_CHOICE.at(span, f"'{name}': {error['msg']}", help=str(context["help"]), about=about)

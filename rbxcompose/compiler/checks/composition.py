@@ -153,14 +153,15 @@ def part_provides(robot: Robot) -> Iterator[Finding]:
         for claim in part.claims:
             if claim.about is not About.NEED and (what := _lacking(robot, claim, ends)):
                 message = f"part '{part.name}' does not have {what}, which it says it provides"
+                about = (part.name, claim.name)
                 is_own = part.components <= robot.components.keys() and not claim.span.file.startswith(PREFIX)
                 if not is_own:  # something of it was removed or changed
-                    related, about = [Related(claim.span, "promised here")], (part.name, claim.name)
+                    related = [Related(claim.span, "promised here")]
                     yield part_provides.at(part.span, message, related=related, about=about)
                     continue
                 known = [end.skill for end in ends if _serves(end, end.skill)] if claim.about is About.SKILL else []
                 help_text = suggest(claim.name, known, "its skills")
-                yield part_provides.at(claim.span, message, help=help_text)
+                yield part_provides.at(claim.span, message, help=help_text, about=about)
 
 
 def _serves(end: PortEnd, skill: str) -> bool:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, StringConstraints, model_validator
+from pydantic_core import PydanticCustomError
 
 from rbxcompose.base.config import JOINT, LINK, Config, Name
 from rbxcompose.base.findings import Finding, Report, Severity, Span, kind, replacement
@@ -50,13 +51,14 @@ class BodyFileModel(Config):
             raise ValueError("a body has either 'urdf' or 'xacro'")
         if self.with_ and self.xacro is None:
             raise ValueError("'with' is for a xacro: a URDF has no arguments")
-        if self.urdf is None and self.xacro is None and (missing := self.lacks_file()):
-            raise ValueError(missing)
+        if self.urdf is None and self.xacro is None and self.lacks_file:
+            raise PydanticCustomError("no_file", "a body needs 'urdf' or 'xacro'", {"about": ("urdf", "xacro")})
         return self
 
-    def lacks_file(self) -> str:
-        """Return what is wrong if there is no file, or nothing."""
-        return "a body needs 'urdf' or 'xacro'"
+    @property
+    def lacks_file(self) -> bool:
+        """Return whether it needs a file."""
+        return True
 
 
 class PieceModel(BodyFileModel):
@@ -93,9 +95,10 @@ class BodyModel(BodyFileModel):
     virtual_joint: VirtualJointModel | None = None
     """The frame outside of the body in which its root stands or moves."""
 
-    def lacks_file(self) -> str:
-        """Return what is wrong if there is no file; its pieces may be all."""
-        return "" if self.pieces else "a body needs 'urdf' or 'xacro'"
+    @property
+    def lacks_file(self) -> bool:
+        """Return whether it needs a file: its pieces may be all."""
+        return not self.pieces
 
 
 def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]:
