@@ -392,8 +392,8 @@ def _finding(model: Any, node: TreeNode, path: KeyPath, loc: KeyPath, error: Err
     if "about" in context:  # or the names that it lacks
         return WRONG_TYPE.at(span, f"'{name}': {error['msg']}", about=context["about"])
     if "help" in context:  # or its own help
-        about = [str(context.get("name", ""))]
-        return NOT_A_CHOICE.at(span, f"'{name}': {error['msg']}", help=str(context["help"]), about=about)
+        named = [str(context.get("name", ""))]
+        return NOT_A_CHOICE.at(span, f"'{name}': {error['msg']}", help=str(context["help"]), about=named)
     return WRONG_TYPE.at(span, f"'{name}': {error['msg'][:1].lower()}{error['msg'][1:]}", label=label_of(value))
 
 

@@ -51,14 +51,13 @@ class BodyFileModel(Config):
             raise ValueError("a body has either 'urdf' or 'xacro'")
         if self.with_ and self.xacro is None:
             raise ValueError("'with' is for a xacro: a URDF has no arguments")
-        if self.urdf is None and self.xacro is None and self.lacks_file:
-            raise PydanticCustomError("no_file", "a body needs 'urdf' or 'xacro'", {"about": ("urdf", "xacro")})
+        if self.urdf is None and self.xacro is None and (missing := self.lacks_file()):
+            raise PydanticCustomError("no_file", "{missing}", {"missing": missing, "about": ("urdf", "xacro")})
         return self
 
-    @property
-    def lacks_file(self) -> bool:
-        """Return whether it needs a file."""
-        return True
+    def lacks_file(self) -> str:
+        """Return what is wrong if there is no file, or nothing."""
+        return "a body needs 'urdf' or 'xacro'"
 
 
 class PieceModel(BodyFileModel):
@@ -95,10 +94,9 @@ class BodyModel(BodyFileModel):
     virtual_joint: VirtualJointModel | None = None
     """The frame outside of the body in which its root stands or moves."""
 
-    @property
-    def lacks_file(self) -> bool:
-        """Return whether it needs a file: its pieces may be all."""
-        return not self.pieces
+    def lacks_file(self) -> str:
+        """Return what is wrong if there is no file; its pieces may be all."""
+        return "" if self.pieces else "a body needs 'urdf' or 'xacro'"
 
 
 def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]:
