@@ -19,7 +19,7 @@ from rbxcompose.compiler.composition.robot_manifest import History, RobotManifes
 from rbxcompose.compiler.sections.include import include
 from rbxcompose.manifest.documents import ManifestHeader
 from rbxcompose.manifest.files import shown_name
-from rbxcompose.manifest.registry import section_named, sections
+from rbxcompose.manifest.registry import section_named, sections_in_use
 from rbxcompose.manifest.section import ROBOT, Section
 from rbxcompose.manifest.shapes import refers_below
 from rbxcompose.manifest.tree import BROKEN, Entry, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode, at
@@ -186,7 +186,7 @@ def _is_plain(section: Section[Any, Any], manifest: RobotManifest, path: KeyPath
 
 def _lost(manifest: RobotManifest) -> Iterator[tuple[Section[Any, Any], str]]:
     """Yield the entries that were written and could not be read at all."""
-    for section in sections(ROBOT):
+    for section in sections_in_use(ROBOT):
         if not section.is_composed or section.name not in manifest.root:
             continue
         read, written = manifest.contents.of(section), at(manifest.root, (section.name, *section.at))
@@ -219,7 +219,7 @@ def without_half_entries(
     halves = Doubts(
         places=_by_line(
             span
-            for section in sections(ROBOT)
+            for section in sections_in_use(ROBOT)
             for name, entry in _entries(root, section.name).items()
             if section.has_topics or name.startswith(prefixes) or not prefixes
             for span in (entry.key.span, entry.value.span)
@@ -243,7 +243,7 @@ def with_removals(
 
     `ends` are the topics and skills of the robot without the profile, each with its component.
     """
-    gone = {name: span for section in sections() for name, span in history.removed(section.name).items()}
+    gone = {name: span for section in sections_in_use() for name, span in history.removed(section.name).items()}
     gone = {name: span for name, span in gone.items() if profile.contains(span)}
     owners = {name: name for name in gone} | {name: component for name, component in ends if component in gone}
     users: dict[str, list[Finding]] = {}

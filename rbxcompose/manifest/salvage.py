@@ -33,7 +33,7 @@ def salvaged(model: type[T], node: TreeNode, context: Mapping[str, object] | Non
     data, tried = to_plain(node), Counter[KeyPath]()
     for _ in range(_ROUNDS):
         try:
-            return cast(T, adapter(cast(Any, model)).validate_python(data, strict=True, context=dict(context or {})))
+            return cast(T, adapter(cast(Any, model)).validate_python(data, strict=True, context=context))
         except ValidationError as error:
             errors = error.errors(include_url=False)
         for details in errors:

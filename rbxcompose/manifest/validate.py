@@ -280,7 +280,7 @@ def validate(
     data = to_plain(node)
     for _ in range(_ROUNDS):
         try:
-            return cast(T, adapter(cast(Any, model)).validate_python(data, strict=True, context=dict(context or {})))
+            return cast(T, adapter(cast(Any, model)).validate_python(data, strict=True, context=context))
         except ValidationError as error:
             errors = error.errors(include_url=False)
         before = data
