@@ -30,7 +30,7 @@ from rbxcompose.bus.transport import Arrival
 from rbxcompose.bus.zenoh_session import open_client, open_peer
 from rbxcompose.bus.zenoh_transport import ZenohTransport
 from rbxcompose.commands import options
-from rbxcompose.commands.console import NotDoneError, refuse, table, tell
+from rbxcompose.commands.console import NotDoneError, emit, refuse, table
 from rbxcompose.commands.lookup import BusPlace, add_bus_options, find_place
 from rbxcompose.runtime.process_group.connection import CallbackInbox
 from rbxcompose.sdk.ports import Qos
@@ -243,11 +243,11 @@ def wanted(names: Sequence[GraphName], name: str, what: str) -> GraphName:
     return found
 
 
-def tell_list(names: Sequence[GraphName], ends: tuple[str, str], arguments: argparse.Namespace) -> int:
+def write_names(names: Sequence[GraphName], ends: tuple[str, str], arguments: argparse.Namespace) -> int:
     """List names with their types and the counts of both `ends`; hidden names only with `--all`."""
     listed = [name for name in names if arguments.all or not name.is_hidden]
     if arguments.json:
-        tell(json.dumps([_counted(name, ends) for name in listed]))
+        emit(json.dumps([_counted(name, ends) for name in listed]))
         return 0
     rows = [
         (
@@ -259,7 +259,7 @@ def tell_list(names: Sequence[GraphName], ends: tuple[str, str], arguments: argp
         )
         for graph_name in listed
     ]
-    tell(table([("name", "type", *ends, ""), *rows]))
+    emit(table([("name", "type", *ends, ""), *rows]))
     return 0
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 
 from rbxcompose.base.findings import Report
 from rbxcompose.base.levels import Level
-from rbxcompose.commands.console import good, has_colour, refuse, tell, tell_report
+from rbxcompose.commands.console import emit, good, has_colour, refuse, write_report
 from rbxcompose.commands.lookup import ALREADY_UP, UNSAFE
 from rbxcompose.commands.story import StoryWriter, summary
 from rbxcompose.commands.targets import missing_extras
@@ -76,7 +76,7 @@ class _Watch:
     def _tell_story(self, records: Iterable[Record]) -> None:
         for record in records:
             if record.level is not Level.OK or not self._options.is_detached:
-                tell(self._story.line(record))
+                emit(self._story.line(record))
 
     def _tell(self, report: launch.LaunchReport) -> int | None:
         """Print a report and return the exit code if it is the last."""
@@ -88,7 +88,7 @@ class _Watch:
             case launch.Up(components, processes, seconds):
                 self._is_up = True
                 took = "" if self._options.is_stepped else f", {seconds:.2f} s"  # each stepped run tells the same
-                tell(f"{name} is up: {extent(components, processes)}{took}")
+                emit(f"{name} is up: {extent(components, processes)}{took}")
                 if self._options.is_detached:
                     self._started.let_go()
                     return 0
@@ -102,7 +102,7 @@ class _Watch:
                 return refuse(UNSAFE.at(None, reason))
             case launch.RunEnded(exit_code, reason, time, facts):
                 first, *rest = summary(name, reason, time, facts).split("\n")
-                tell("\n".join([good(first) if exit_code == 0 else first, *rest]))
+                emit("\n".join([good(first) if exit_code == 0 else first, *rest]))
                 self._started.wait()
                 return exit_code
 
@@ -110,5 +110,5 @@ class _Watch:
 def is_fit(robot: Robot, sources: Mapping[str, str]) -> bool:
     """Tell what is wrong with this machine for a robot, and return whether it may start."""
     report = Report([*missing_extras(robot), *port_findings(robot, serial_ports(), look_at)])
-    tell_report(report, sources)
+    write_report(report, sources)
     return not report.has_errors

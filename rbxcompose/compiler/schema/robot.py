@@ -13,7 +13,7 @@ from rbxcompose.compiler.schema.settle import opened, schemas_of
 from rbxcompose.compiler.sections.components import components
 from rbxcompose.compiler.sections.profiles import profiles
 from rbxcompose.manifest.documents import ManifestHeader
-from rbxcompose.manifest.file_models import file_model
+from rbxcompose.manifest.registry import file_model
 from rbxcompose.manifest.registry import sections as all_sections
 from rbxcompose.manifest.section import OVERLAY, PART, ROBOT
 

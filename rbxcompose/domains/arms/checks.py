@@ -15,10 +15,10 @@ from rbxcompose.base.units import LENGTH, format_quantity
 from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.model.mission_facts import constants
 from rbxcompose.compiler.model.robot import Robot
-from rbxcompose.domains.arms.manifest_model import SpotModel
 from rbxcompose.domains.arms.mission_goals import WrittenReach, first_joint_in, length_of, word_of, written_reaches
 from rbxcompose.domains.arms.motion.grasps import grasps_of, least_width, reach_of, solid_of
 from rbxcompose.domains.arms.motion.scene import PlacedObject, settled
+from rbxcompose.domains.arms.section_models import SpotModel
 from rbxcompose.domains.arms.sections.arms import ArmOfRobot, arms, hand_in
 from rbxcompose.domains.arms.sections.heads import heads
 from rbxcompose.domains.arms.sections.scene import scene

@@ -262,8 +262,8 @@ class WheelDrive:
 
 
 def _refusal(velocity: Velocity2, excess: float) -> str:
-    told = f"{velocity.linear:g} m/s and {velocity.angular:g} rad/s"
-    return f"{told} is {excess:.1f} times too fast" if velocity.is_finite else f"{told} is no velocity"
+    command = f"{velocity.linear:g} m/s and {velocity.angular:g} rad/s"
+    return f"{command} is {excess:.1f} times too fast" if velocity.is_finite else f"{command} is no velocity"
 
 
 def _scaled(velocity: Velocity2, factor: float) -> Velocity2:

@@ -321,10 +321,10 @@ def unseen_component(robot: Robot) -> Iterator[Finding]:
     """A component belongs to no group of the diagnostics."""
     settings = robot.manifest.contents.of(diagnostics)
     groups = [model for _, model in each_analyzer(settings.analyzers)]
-    told = [condition for group in groups for condition in (*group.conditions, *group.expected)]
+    named_conditions = [condition for group in groups for condition in (*group.conditions, *group.expected)]
     lost = taken_out(robot)
     meant = (name for name, step in lost.items() if isinstance(step.node, SequenceNode) and step.node.tag == REPLACE)
-    named = {*dropped(robot), *meant, *(condition for condition in told if isinstance(condition, str))}
+    named = {*dropped(robot), *meant, *(condition for condition in named_conditions if isinstance(condition, str))}
     for name in robot.written - named if groups else ():
         is_left = not any(fits(condition, name) for condition in settings.ignore) and not any(
             matches(g, name) for g in groups

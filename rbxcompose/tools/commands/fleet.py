@@ -16,7 +16,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import kind
 from rbxcompose.base.levels import LOG_LEVELS
 from rbxcompose.commands import hosts
-from rbxcompose.commands.console import FINDINGS, refuse, table, tell
+from rbxcompose.commands.console import FINDINGS, emit, refuse, table
 from rbxcompose.commands.lookup import NOT_UP
 from rbxcompose.commands.options import add_system_options
 from rbxcompose.missions.execution.requests import MISSION
@@ -60,7 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
         return fleet
     match arguments.action:
         case "ls":
-            return fleet.tell(in_json=arguments.json)
+            return fleet.list_robots(in_json=arguments.json)
         case "run":
             return fleet.run(arguments.mission, arguments.sets, in_json=arguments.json)
         case _:
@@ -103,7 +103,7 @@ class Fleet:
             return refuse(NO_LABEL.misspelt(None, message, wrong, sorted(known), "labels"))
         return cls(shares, executives)
 
-    def tell(self, *, in_json: bool) -> int:
+    def list_robots(self, *, in_json: bool) -> int:
         """List the robots; return the exit code, which is that of findings if a share cannot be reached or is down."""
         asked = hosts.on_all(
             {" ".join(key): share.rbxcompose(["top", key[1], "--json"]) for key, share in self.shares.items()}
@@ -111,9 +111,9 @@ class Fleet:
         found = sorted((robot, host, _facts(asked[f"{host} {robot}"])) for host, robot in self.shares)
         rows = [_row(robot, list(shares)) for robot, shares in groupby(found, key=lambda row: row[0])]
         if in_json:
-            tell(json.dumps({"robots": rows}))
+            emit(json.dumps({"robots": rows}))
         else:
-            tell(table([_COLUMNS, *([str(row[column]) for column in _COLUMNS] for row in rows)]))
+            emit(table([_COLUMNS, *([str(row[column]) for column in _COLUMNS] for row in rows)]))
         return FINDINGS if any(row["state"] != _UP for row in rows) else 0
 
     def run(self, mission: str, sets: Sequence[str], *, in_json: bool) -> int:
@@ -135,9 +135,9 @@ _UP = "up"
 
 def _facts(one: hosts.Running) -> dict[str, Any]:
     """Return what is known of a share."""
-    told = one.answer
-    if isinstance(told, dict) and "components" in told:
-        return told
+    answer = one.answer
+    if isinstance(answer, dict) and "components" in answer:
+        return answer
     if one.wait() == hosts.SSH_FAILED:
         return {"state": "unreachable"}
     is_down = any(NOT_UP.code in line for line in one.lines)
@@ -145,16 +145,16 @@ def _facts(one: hosts.Running) -> dict[str, Any]:
 
 
 def _row(robot: str, shares: Sequence[ShareFacts]) -> dict[str, str]:
-    told = [facts for _, _, facts in shares]
-    states = [_state(facts) for facts in told]
+    answers = [facts for _, _, facts in shares]
+    states = [_state(facts) for facts in answers]
     several = len(shares) > 1
     wrong = [f"{host} {state}" if several else state for (_, host, _), state in zip(shares, states, strict=True)]
     return {
         "robot": robot,
         "host": ", ".join(host for _, host, _ in shares),
         "state": _UP if set(states) == {_UP} else ", ".join(text for text in wrong if not text.endswith(_UP)),
-        "mission": "; ".join(_missions(told)),
-        "battery": ", ".join(text for facts in told for text in facts.get("batteries", {}).values()),
+        "mission": "; ".join(_missions(answers)),
+        "battery": ", ".join(text for facts in answers for text in facts.get("batteries", {}).values()),
     }
 
 
@@ -165,5 +165,5 @@ def _state(facts: Mapping[str, Any]) -> str:
     return f"{', '.join(off)} not active" if off else _UP
 
 
-def _missions(told: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    yield from (str(facts["mission"]) for facts in told if facts.get("mission"))
+def _missions(answers: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    yield from (str(facts["mission"]) for facts in answers if facts.get("mission"))

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 from rbxcompose.base.requests import Command, Query, Refused, to_data
-from rbxcompose.commands.console import NotDoneError, refuse, tell
+from rbxcompose.commands.console import NotDoneError, emit, refuse
 from rbxcompose.commands.lookup import REFUSED, WHICH, add_asking_options, answer_of, find_robot, pass_on
 from rbxcompose.commands.options import Declare, Subcommand, add_actions, argument, run_action
 from rbxcompose.missions.execution import requests
@@ -100,7 +100,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
 def _list(arguments: argparse.Namespace) -> int:
     missions = ask(arguments.robot, requests.ListMissions())
-    tell(json.dumps(to_data(missions)) if arguments.json else _table(missions))
+    emit(json.dumps(to_data(missions)) if arguments.json else _table(missions))
     return 0
 
 
@@ -115,7 +115,7 @@ def _chosen(arguments: argparse.Namespace) -> str:
     """Return the addressed mission: the named one, else the only one that runs, or ran last."""
     if arguments.name:
         return str(arguments.name)
-    from rbxcompose.missions.program.statuses import IDLE, NAMES
+    from rbxcompose.missions.program.outcomes import IDLE, NAMES
     from rbxcompose.missions.view.replica import ACTIVE
 
     known = [one for one in ask(arguments.robot, requests.ListMissions()) if one.state != NAMES[IDLE]]
@@ -131,9 +131,9 @@ def _status(arguments: argparse.Namespace) -> int:
     name = _chosen(arguments)
     seen = ask(arguments.robot, requests.LookAtMission(name))
     if arguments.json:
-        tell(json.dumps(seen))
+        emit(json.dumps(seen))
         return 0
-    tell("\n".join(_drawn(name, arguments.robot, seen, 120)))
+    emit("\n".join(_drawn(name, arguments.robot, seen, 120)))
     return 0
 
 
@@ -163,7 +163,7 @@ def _log(arguments: argparse.Namespace) -> int:
             for record in news.records:
                 is_meant = not arguments.name or record["mission"] == arguments.name
                 if is_meant and (arguments.all or record["event"] not in INPUTS):
-                    tell(json.dumps(record))
+                    emit(json.dumps(record))
             if not arguments.follow:
                 return 0
             time.sleep(_PERIOD)

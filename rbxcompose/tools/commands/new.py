@@ -15,7 +15,7 @@ from pathlib import Path, PurePosixPath
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import read_regular, replace_file
 from rbxcompose.base.printable import plain
-from rbxcompose.commands.console import FINDINGS, refuse, tell, tell_report
+from rbxcompose.commands.console import FINDINGS, emit, refuse, write_report
 from rbxcompose.commands.new_files import (
     ANSWER,
     AnswerError,
@@ -89,7 +89,7 @@ def run(arguments: argparse.Namespace) -> int:
     except AnswerError as error:
         return refuse(error.finding)
     except MistakenRobotError as error:
-        tell_report(error.compilation.report, error.compilation.sources)
+        write_report(error.compilation.report, error.compilation.sources)
         return FINDINGS
     except CancelledError:
         return INTERRUPTED
@@ -102,7 +102,7 @@ def _write(new: New) -> int:
     lines = [f"wrote {shown_name(new.folder / file)}" for file in new.files]
     lines += [] if new.entry is None else new.entry()
     lines += ["then:", *(f"  {line}" for line in new.then)]
-    tell("\n".join(plain(line, _WIDEST) for line in lines))
+    emit("\n".join(plain(line, _WIDEST) for line in lines))
     return 0
 
 

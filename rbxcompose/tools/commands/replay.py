@@ -31,7 +31,7 @@ from rbxcompose.bus.tokens import EntityKind, NodeToken, gid
 from rbxcompose.bus.transport import RemotePublisher
 from rbxcompose.bus.wire import WIRE_PROFILES, ros_qos
 from rbxcompose.bus.zenoh_session import open_router
-from rbxcompose.commands.console import NotDoneError, misused, refuse, tell, tell_report
+from rbxcompose.commands.console import NotDoneError, emit, misused, refuse, write_report
 from rbxcompose.commands.guest import NO_ROUTER, Guest
 from rbxcompose.commands.lookup import BusPlace, add_bus_options, find_place, robots_up
 from rbxcompose.commands.options import seconds
@@ -130,7 +130,7 @@ def run(arguments: argparse.Namespace) -> int:
                 return run_again(arguments, path, reader)
         summary = _look_through(path)
         if arguments.info:
-            tell(json.dumps(_fields(summary)) if arguments.json else _text(path, summary))
+            emit(json.dumps(_fields(summary)) if arguments.json else _text(path, summary))
             return 0
         return _replay(arguments, path, summary)
     except NotDoneError as error:
@@ -197,11 +197,11 @@ def _replay_on(place: BusPlace, topics: list[RecordedTopic], arguments: argparse
     with Guest(place, stays=True) as guest, guest.interruptible():
         player = Player(guest, topics, arguments.namespace or "")
         player.wait_for_subscribers()
-        tell(f"replaying {len(topics)} topics of {plain(str(path))}; Ctrl-C ends it")
+        emit(f"replaying {len(topics)} topics of {plain(str(path))}; Ctrl-C ends it")
         count = _play(path, player, topics, arguments, guest)
         while arguments.loop and _wait(guest.clock.now() + _PAUSE, guest):  # even if the recording has no duration
             count += _play(path, player, topics, arguments, guest)
-    tell(f"replayed {count:,} messages")
+    emit(f"replayed {count:,} messages")
     return 0
 
 
@@ -316,7 +316,7 @@ def replay_bus(arguments: argparse.Namespace) -> Iterator[BusPlace]:
         yield find_place(arguments)
         return
     with _own_router() as endpoint:
-        tell(f"a router of its own is at {endpoint}: 'rbxcompose topic echo TOPIC --router {endpoint}'")
+        emit(f"a router of its own is at {endpoint}: 'rbxcompose topic echo TOPIC --router {endpoint}'")
         yield BusPlace(endpoint, arguments.domain or 0)
 
 
@@ -355,7 +355,7 @@ def run_again(arguments: argparse.Namespace, path: Path, reader: RecordingReader
         )
     with open_regular(path) as file, _kept(arguments.write) as keep:
         found = replayed(plan, instance, RecordingReader(file).messages(), keep)
-    return _told(arguments, instance.name, found)
+    return _report(arguments, instance.name, found)
 
 
 def _plan(arguments: argparse.Namespace, path: Path, reader: RecordingReader) -> Plan:
@@ -364,7 +364,7 @@ def _plan(arguments: argparse.Namespace, path: Path, reader: RecordingReader) ->
         raise NotDoneError(codes.NOT_ENOUGH.at(None, message, help=HOW))
     if arguments.robot is not None:
         compilation = compiled(arguments.robot, arguments)
-        tell_report(compilation.report, compilation.sources)
+        write_report(compilation.report, compilation.sources)
         if compilation.plan is None:
             raise NotDoneError(codes.NOT_ENOUGH.at(None, f"'{plain(arguments.robot)}' has errors"))
         return compilation.plan
@@ -420,13 +420,13 @@ def _kept(path: Path | None) -> Iterator[Callable[[Recorded], None] | None]:
         raise NotDoneError(codes.UNWRITABLE.at(None, f"'{plain(str(path))}' cannot be written: {reason}")) from error
 
 
-def _told(arguments: argparse.Namespace, name: str, found: ReplayResult) -> int:
+def _report(arguments: argparse.Namespace, name: str, found: ReplayResult) -> int:
     for text in found.errors:
-        tell(plain(text))
+        emit(plain(text))
     if arguments.json:
-        tell(json.dumps({"component": name, "equal": found.equal, "difference": _difference_fields(found.difference)}))
+        emit(json.dumps({"component": name, "equal": found.equal, "difference": _difference_fields(found.difference)}))
     elif found.difference is None:
-        tell(f"'{name}' sends the same as recorded: {found.equal:,} messages")
+        emit(f"'{name}' sends the same as recorded: {found.equal:,} messages")
     else:
         return refuse(codes.DIFFERENT.at(None, _difference_text(name, found.difference, found.equal)))
     return 0 if found.difference is None else 1

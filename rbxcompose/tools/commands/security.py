@@ -19,7 +19,7 @@ from pathlib import Path
 from rbxcompose.base.files import read_regular
 from rbxcompose.base.findings import Finding, Report, Severity, kind
 from rbxcompose.base.requests import to_data
-from rbxcompose.commands.console import FINDINGS, refuse, tell, tell_report
+from rbxcompose.commands.console import FINDINGS, emit, refuse, write_report
 from rbxcompose.commands.options import add_system_options, is_system
 from rbxcompose.compiler.plan.model import LinkTls
 from rbxcompose.compiler.systems import certificates
@@ -53,7 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
     if not is_system(arguments.path):
         return refuse(NOT_MADE.at(None, f"'{arguments.path}' is not the file of a system"))
     system = compile_system(arguments.path, environment=os.environ, profiles=arguments.profile)
-    tell_report(system.report, system.sources)
+    write_report(system.report, system.sources)
     if system.report.has_errors:
         return FINDINGS
     return (
@@ -72,11 +72,11 @@ def _init(system: System, arguments: argparse.Namespace) -> int:
             if host.ssh is not None and (problem := _bring(system, name, folder / name, arguments)):
                 return refuse(problem)
             there = f", brought to {host.ssh}" if host.ssh else ""
-            tell(f"{name}: {folder / name}{there}")
+            emit(f"{name}: {folder / name}{there}")
     except (certificates.OpensslError, OSError) as error:
         return refuse(NOT_MADE.at(None, f"the certificates cannot be made: {error}"))
     if system.security == certificates.NO_SECURITY:
-        tell("the system does not use them yet: it has no 'security: mtls'")
+        emit("the system does not use them yet: it has no 'security: mtls'")
     return 0
 
 
@@ -102,7 +102,7 @@ def _audit(system: System, path: str, *, in_json: bool) -> int:
     report = Report()
     report.extend(_certificates(system, path))
     if in_json:
-        tell(
+        emit(
             json.dumps(
                 {"listeners": [to_data(endpoint) for endpoint in endpoints], "keys": [to_data(key) for key in keys]}
             )
@@ -110,11 +110,11 @@ def _audit(system: System, path: str, *, in_json: bool) -> int:
     else:
         for end in endpoints:
             warning = "  OPEN TO STRANGERS" if end.is_open else ""
-            tell(f"{end.host}  {end.robot}  {end.endpoint}  {end.reached_by}, {end.proof}{warning}")
+            emit(f"{end.host}  {end.robot}  {end.endpoint}  {end.reached_by}, {end.proof}{warning}")
         for (host, robot, whom), same in groupby(keys, key=lambda key: (key.host, key.robot, key.written_by)):
             who = " and ".join((*whom, "programs there"))
-            tell(f"{host}  {robot}  written, called or answered by {who}: {', '.join(item.name for item in same)}")
-    tell_report(report, {})
+            emit(f"{host}  {robot}  written, called or answered by {who}: {', '.join(item.name for item in same)}")
+    write_report(report, {})
     return FINDINGS if report.has_errors or any(endpoint.is_open for endpoint in endpoints) else 0
 
 

@@ -59,9 +59,9 @@ def stop_by_bus(folder: RobotFolder) -> str:
 
     name, state = folder.path.name, lookup.known_state(folder)
     with Guest(lookup.place_of(folder)) as guest:
-        told = sorted(answer.decode() for answer in guest.ask(stop_key(name), _ANSWER))
-    missing = sorted({*(state.alive() if state else ())} - {*told, *_OTHERS})
-    if not told:
+        stopped = sorted(answer.decode() for answer in guest.ask(stop_key(name), _ANSWER))
+    missing = sorted({*(state.alive() if state else ())} - {*stopped, *_OTHERS})
+    if not stopped:
         raise NotDoneError(lookup.NO_ANSWER.at(None, f"'{name}' does not answer, nor does any of its processes"))
     rest = f"; NOT stopped: {', '.join(missing)}" if missing else ""
-    return f"the supervisor does not answer: stopped over the bus: {', '.join(told)}{rest}"
+    return f"the supervisor does not answer: stopped over the bus: {', '.join(stopped)}{rest}"

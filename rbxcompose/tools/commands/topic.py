@@ -17,8 +17,8 @@ from itertools import pairwise
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.bus.graph import GraphEnd
 from rbxcompose.commands import options
-from rbxcompose.commands.console import table, tell
-from rbxcompose.commands.guest import Guest, described, tell_list, visit, wanted
+from rbxcompose.commands.console import emit, table
+from rbxcompose.commands.guest import Guest, described, visit, wanted, write_names
 from rbxcompose.commands.lookup import add_bus_options
 
 ON_SYSTEM = options.BUS
@@ -63,19 +63,19 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _ls(guest: Guest, arguments: argparse.Namespace) -> int:
-    return tell_list(guest.graph().topics, _ENDS, arguments)
+    return write_names(guest.graph().topics, _ENDS, arguments)
 
 
 def _show(guest: Guest, arguments: argparse.Namespace) -> int:
     topic = wanted(guest.graph().topics, arguments.topic, "topic")
     if arguments.json:
-        tell(json.dumps(described(topic, _ENDS)))
+        emit(json.dumps(described(topic, _ENDS)))
         return 0
-    tell(f"{topic.name}: {', '.join(topic.types)}")
+    emit(f"{topic.name}: {', '.join(topic.types)}")
     if topic.clash:
-        tell(f"! {topic.clash}")
+        emit(f"! {topic.clash}")
     ends = (("publisher", topic.givers), ("subscription", topic.takers))
-    tell(table([(what, end.node, end.kind.type, _qos(end)) for what, given in ends for end in given]))
+    emit(table([(what, end.node, end.kind.type, _qos(end)) for what, given in ends for end in given]))
     return 0
 
 
@@ -160,9 +160,9 @@ def measure(guest: Guest, arguments: argparse.Namespace) -> int:
 def _tell_pace(meter: PaceMeter, as_json: bool) -> None:
     pace = meter.take()
     if as_json:
-        tell(json.dumps(asdict(pace) if pace else None))
+        emit(json.dumps(asdict(pace) if pace else None))
     elif pace is None:
-        tell("nothing new")
+        emit("nothing new")
     else:
         intervals = f"min {pace.shortest:.4f} s, max {pace.longest:.4f} s, jitter {pace.jitter:.4f} s"
-        tell(f"{pace.rate:.2f} Hz, {intervals}, {pace.messages} messages")
+        emit(f"{pace.rate:.2f} Hz, {intervals}, {pace.messages} messages")

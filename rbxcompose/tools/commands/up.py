@@ -13,7 +13,7 @@ from pathlib import Path
 
 from rbxcompose.base.units import TIME, UnitError, to_si
 from rbxcompose.commands import targets
-from rbxcompose.commands.console import FINDINGS, refuse, tell_report
+from rbxcompose.commands.console import FINDINGS, refuse, write_report
 from rbxcompose.commands.options import add_system_options, is_system
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.runtime.folder import RunOptions
@@ -61,7 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
         sys.stderr.write("rbxcompose up: --host and --robot are for systems\n")
         return USAGE
     compilation = compile_robot(path, **targets.layers_of(arguments))
-    tell_report(compilation.report, compilation.sources)
+    write_report(compilation.report, compilation.sources)
     if compilation.plan is None or compilation.robot is None or compilation.report.has_errors:
         return 1
     if compilation.plan.follows_clock and arguments.rate.is_stepped:

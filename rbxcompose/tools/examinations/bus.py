@@ -112,8 +112,8 @@ def clocks(facts: HostFacts) -> Iterator[str | Finding]:
         if ages and not wrong:
             yield f"{robot.name}: the stamps of {len(ages)} nodes agree with this clock"
         for host, offset in sorted(robot.state.clocks.items()) if robot.state else ():
-            told = f"{robot.name}: the clock of host '{host}' is {offset.words}"
-            yield HOSTS_DIFFER.at(None, told, help=_HELP) if offset.is_too_far else told
+            words = f"{robot.name}: the clock of host '{host}' is {offset.words}"
+            yield HOSTS_DIFFER.at(None, words, help=_HELP) if offset.is_too_far else words
 
 
 def _server(is_synchronised: bool | None) -> str:

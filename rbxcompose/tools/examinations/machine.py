@@ -31,8 +31,8 @@ def leftovers(facts: HostFacts) -> Iterator[str | Finding]:
             found.setdefault(match["robot"], {})[match["process"]] = process.pid
     lost = {robot: pids for robot, pids in found.items() if robot not in known and _SUPERVISOR not in pids}
     for robot, pids in sorted(lost.items()):
-        told = ", ".join(f"{plain(name)} ({pid})" for name, pid in sorted(pids.items()))
-        words = f"processes of '{plain(robot)}' run without a supervisor and without a state: {told}"
+        listed = ", ".join(f"{plain(name)} ({pid})" for name, pid in sorted(pids.items()))
+        words = f"processes of '{plain(robot)}' run without a supervisor and without a state: {listed}"
         yield LEFT.at(None, words, help=f"kill {' '.join(map(str, sorted(pids.values())))}")
     if not lost and not any(_still_runs(one) for one in facts.running):
         yield "no process runs without a supervisor"

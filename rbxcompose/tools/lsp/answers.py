@@ -289,19 +289,19 @@ def _name(spot: Spot) -> str:
     word, cursor = word_at(spot), spot.cursor
     if word.startswith("${"):
         name = word.removeprefix("${").strip()
-        return _told(f"${{{name}}}", fills(spot).get(name, ""))
+        return _described(f"${{{name}}}", fills(spot).get(name, ""))
     if word.startswith("$"):
-        return _told(word, variables(spot).get(word.removeprefix("$").partition(".")[0], ""))
+        return _described(word, variables(spot).get(word.removeprefix("$").partition(".")[0], ""))
     if spot.document.is_mission:
-        skill = _told(word, spot.known.of(SKILL).get(word, ""))
-        return skill or ("" if cursor.is_key else _told(word, spot.known.of(PLACE).get(word, "")))
+        skill = _described(word, spot.known.of(SKILL).get(word, ""))
+        return skill or ("" if cursor.is_key else _described(word, spot.known.of(PLACE).get(word, "")))
     if cursor.is_key:
         return ""
     kind = spot.guide.value(cursor.path).names
-    return _told(word, spot.known.of(kind, cursor.path).get(word, "")) if kind else ""
+    return _described(word, spot.known.of(kind, cursor.path).get(word, "")) if kind else ""
 
 
-def _told(name: str, about: str) -> str:
+def _described(name: str, about: str) -> str:
     return f"`{name}`: {about}" if about else ""
 
 

@@ -67,7 +67,7 @@ class TrialRecord:
 
     def hear(self, event: events.MissionEvent) -> None:
         """Record an event."""
-        level, text = self._story.tell(event)
+        level, text = self._story.line(event)
         if text:
             self.lines.append(TraceLine(self.now, text, level))
         match event:
@@ -75,18 +75,18 @@ class TrialRecord:
                 self._begin(node, Done(name, text, dict(arguments), self.now, len(self.lines) - 1))
             case events.NodeStarted(node=node, name=name):
                 self._begin(-1 - node, Done(name, name, {}, self.now, len(self.lines) - 1))
-            case events.SkillEnded(leaf=node, result=result, message=told):
+            case events.SkillEnded(leaf=node, result=result, message=message):
                 self._end(node, result)
-                self.reports += [told, text] if told else []
+                self.reports += [message, text] if message else []
             case events.NodeEnded(node=node, result=result):
                 self._end(-1 - node, result)
             case events.Published(topic=topic, fields=fields):
                 self.published.append((topic, fields))
-            case events.Logged(text=told) | events.Reported(message=told):
-                self.reports += [told, text]  # alone, and as the trace shows it
-            case events.MissionEnded(message=told):
+            case events.Logged(text=message) | events.Reported(message=message):
+                self.reports += [message, text]  # alone, and as the trace shows it
+            case events.MissionEnded(message=message):
                 self.end = event
-                self.reports += [told, text] if told else []
+                self.reports += [message, text] if message else []
 
     def _begin(self, key: int, step: Done) -> None:
         self._open[key] = step

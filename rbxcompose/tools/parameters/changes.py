@@ -12,7 +12,7 @@ from pathlib import Path
 
 from rbxcompose.base.findings import Finding, Report, Span, kind
 from rbxcompose.base.units import written_unit
-from rbxcompose.commands.console import NotDoneError, misused, refuse, tell, tell_report
+from rbxcompose.commands.console import NotDoneError, emit, misused, refuse, write_report
 from rbxcompose.commands.guest import NO_NAME, SAID_NO
 from rbxcompose.commands.messages import to_json
 from rbxcompose.manifest.files import shown_name
@@ -172,7 +172,7 @@ def param_set(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
     for component, name, text in pairs:
         wanted.setdefault(nodes.find(component), []).append(rcl_interfaces.Parameter(name, value_of(text)))
     change_values(nodes, wanted, "set")
-    return tell_values(nodes, wanted, arguments, [written_unit(text) for _, _, text in pairs])
+    return write_values(nodes, wanted, arguments, [written_unit(text) for _, _, text in pairs])
 
 
 def param_load(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
@@ -180,11 +180,11 @@ def param_load(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
     report, sources = Report(), dict[str, str]()
     found = file_values(arguments.file, report, sources)
     if report.has_errors:
-        tell_report(report, sources)
+        write_report(report, sources)
         return 1
     wanted = {nodes.find(name): list(each) for name, each in found.items() if each}
     change_values(nodes, wanted, "load")
-    return tell_values(nodes, wanted, arguments)
+    return write_values(nodes, wanted, arguments)
 
 
 def param_undo(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
@@ -208,7 +208,7 @@ def param_undo(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
         {homes[parameter_change.component]: _first(parameter_change, found) for parameter_change in found},
         expected,
     )
-    return tell_values(nodes, wanted, arguments)
+    return write_values(nodes, wanted, arguments)
 
 
 def _first(change: ParameterChange, found: Sequence[ParameterChange]) -> int:
@@ -231,7 +231,7 @@ def message_of(value: object) -> rcl_interfaces.ParameterValue:
     return to_message(value) or rcl_interfaces.ParameterValue()
 
 
-def tell_values(
+def write_values(
     nodes: ParameterNodes,
     wanted: dict[str, list[rcl_interfaces.Parameter]],
     arguments: argparse.Namespace,
@@ -241,11 +241,11 @@ def tell_values(
     found = described(nodes, {node: tuple(parameter.name for parameter in each) for node, each in wanted.items()})
     if len(found) == 1 and arguments.action == "set":
         one, unit = found[0], (units or (None,))[0]
-        tell(to_json(one.value) if arguments.json else one.text(one.value, unit))
+        emit(to_json(one.value) if arguments.json else one.text(one.value, unit))
         return 0
     if arguments.json:
-        tell(to_json([{"node": item.node, "name": item.about.name, "value": item.value} for item in found]))
+        emit(to_json([{"node": item.node, "name": item.about.name, "value": item.value} for item in found]))
         return 0
     for one in found:
-        tell(f"{one.node.removeprefix('/')}.{one.about.name} = {one.text(one.value)}")
+        emit(f"{one.node.removeprefix('/')}.{one.about.name} = {one.text(one.value)}")
     return 0

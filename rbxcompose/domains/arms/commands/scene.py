@@ -229,7 +229,7 @@ def _distance_row(pair: PairDistance) -> tuple[str, str, str]:
 
 
 def _picture(arguments: argparse.Namespace) -> int:
-    from rbxcompose.domains.arms.command_pictures import write_picture  # numpy, which other actions do not need
+    from rbxcompose.domains.arms.command_line import write_picture  # numpy, which other actions do not need
     from rbxcompose.domains.arms.motion.picture import ArmPicture, draw_arm
 
     view = _view(arguments)

@@ -15,9 +15,9 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import read_regular
 from rbxcompose.base.findings import Finding, Span, kind
 from rbxcompose.base.printable import plain
-from rbxcompose.domains.arms.manifest_model import CloudModel
 from rbxcompose.domains.arms.motion.scene import MOST_PADDING, MOST_SHAPES, PlacedObject, mistake_in, settled
 from rbxcompose.domains.arms.motion.scene_text import LARGEST, NO_SCENE, SceneFile, read_scene
+from rbxcompose.domains.arms.section_models import CloudModel
 from rbxcompose.domains.arms.sections.arms import arms
 from rbxcompose.domains.body.files import FORMATS, mesh_problem
 from rbxcompose.domains.body.model import Body, Geometry

@@ -15,7 +15,7 @@ from rbxcompose.base.files import replace_file
 from rbxcompose.base.findings import Finding, Report, Severity, Sources, kind
 from rbxcompose.base.printable import plain
 from rbxcompose.commands import options
-from rbxcompose.commands.console import FINDINGS, has_colour, misused, refuse, table, tell, tell_report
+from rbxcompose.commands.console import FINDINGS, emit, has_colour, misused, refuse, table, write_report
 from rbxcompose.commands.formats.json_ import as_data
 from rbxcompose.commands.formats.text import render_text
 from rbxcompose.commands.layout import NotDrawnError
@@ -95,10 +95,10 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _show(arguments: argparse.Namespace, description: Description) -> int:
     body = description.body
-    tell(f"{extent_of(body)}\n")
-    tell(table([LINKS, *links_of(body)]))
-    tell("")
-    tell(table([JOINTS, *joints_of(body)]))
+    emit(f"{extent_of(body)}\n")
+    emit(table([LINKS, *links_of(body)]))
+    emit("")
+    emit(table([JOINTS, *joints_of(body)]))
     return 0
 
 
@@ -114,7 +114,7 @@ def _tree(arguments: argparse.Namespace, description: Description) -> int:
         return write(Path(arguments.out), content)
     if arguments.format == PDF:
         return write(file_of(arguments, description, ".pdf"), content)
-    tell(content.decode().rstrip("\n"))
+    emit(content.decode().rstrip("\n"))
     return 0
 
 
@@ -133,9 +133,9 @@ def _check(arguments: argparse.Namespace, found: DescribedBody) -> int:
         return _refused(report, found.sources, arguments.json)
     body = found.description.body
     if arguments.json:
-        tell(json.dumps(_data(body, report, found.sources), ensure_ascii=False))
+        emit(json.dumps(_data(body, report, found.sources), ensure_ascii=False))
     else:
-        tell(f"{_findings(report, found.sources)}{summary_of(body, report)}")
+        emit(f"{_findings(report, found.sources)}{summary_of(body, report)}")
     return FINDINGS if report.has_errors else 0
 
 
@@ -165,9 +165,9 @@ def _findings(report: Report, sources: Sources) -> str:
 def _refused(report: Report, sources: Sources, as_json: bool) -> int:
     """Tell why there is no body; the document for JSON is written as for any command that fails."""
     if as_json:
-        tell_report(report, sources)
+        write_report(report, sources)
     else:
-        tell(render_text(report, sources, has_colour(sys.stdout)).rstrip("\n"))
+        emit(render_text(report, sources, has_colour(sys.stdout)).rstrip("\n"))
     return FINDINGS
 
 
@@ -190,7 +190,7 @@ def _counts(report: Report) -> tuple[int, int]:
 
 def _expand(arguments: argparse.Namespace, description: Description) -> int:
     if arguments.out is None:
-        tell(description.published.rstrip("\n"))
+        emit(description.published.rstrip("\n"))
         return 0
     return write(Path(arguments.out), description.published.encode())
 
@@ -302,7 +302,7 @@ def _written(arguments: argparse.Namespace, meshes: Mapping[str, Path], scales: 
             replace_file(files[meshes[name]].resolve(), mesh.data)
     except OSError as error:
         return misused("body", f"'{folder}' cannot be written: {error.strerror}")
-    tell(table([_HEAD, *(_row(name, mesh, files[meshes[name]]) for name, mesh in made.items())]))
+    emit(table([_HEAD, *(_row(name, mesh, files[meshes[name]]) for name, mesh in made.items())]))
     return 0
 
 

@@ -18,7 +18,7 @@ from rbxcompose.base.printable import plain
 from rbxcompose.base.transforms import SPAN, TransformError, TransformTree, UnknownFrameError
 from rbxcompose.base.units import ANGLE, LENGTH, TIME
 from rbxcompose.commands import options
-from rbxcompose.commands.console import NotDoneError, refuse, tell
+from rbxcompose.commands.console import NotDoneError, emit, refuse
 from rbxcompose.commands.guest import NAME, NO_NAME, NOBODY, Guest, visit
 from rbxcompose.commands.lookup import BusPlace, add_bus_options, find_place
 from rbxcompose.commands.messages import shown, to_json
@@ -78,10 +78,10 @@ def _tree(guest: Guest, arguments: argparse.Namespace) -> int:
             if parent is not None
             for frame in below
         ]
-        tell(to_json(found))
+        emit(to_json(found))
         return 0
     lines = list(_lines(tree, children, None, ""))
-    tell("\n".join(lines or ["no frames"]))
+    emit("\n".join(lines or ["no frames"]))
     return 0
 
 
@@ -133,9 +133,9 @@ def _echo(guest: Guest, arguments: argparse.Namespace) -> int:
     tree, past = frames.tree, -(at or 0)
     waits = arguments.timeout + (past / NANOSECONDS if past <= SPAN else 0.0)  # more is never remembered
     guest.run(lambda: _is_known(tree, parent, frame, at), waits)
-    told = 0
-    while arguments.count is None or told < arguments.count:
-        if told:
+    printed = 0
+    while arguments.count is None or printed < arguments.count:
+        if printed:
             guest.run(lambda: False, 1 / arguments.rate)
         try:
             placed = _placed(tree, parent, frame, at)
@@ -143,8 +143,8 @@ def _echo(guest: Guest, arguments: argparse.Namespace) -> int:
             return refuse(_finding(problem, tree))
         age = tree.age(parent, frame, guest.clock.now()) or 0.0
         text = shown({**placed, "age": round(age, _DIGITS)}, arguments.json)
-        tell(text if arguments.json else f"{text}\n---")
-        told += 1
+        emit(text if arguments.json else f"{text}\n---")
+        printed += 1
     return 0
 
 
@@ -229,6 +229,6 @@ def _hold(place: BusPlace, frames: HeardFrames, parent: str, child: str, pose: T
             transform=Transform(translation=Vector3(*pose.translation), rotation=Quaternion(*pose.rotation)),
         )
         publisher(TFMessage(transforms=(link,)))
-        tell(f"'{plain(child)}' is in '{plain(parent)}'; Ctrl-C ends it")
+        emit(f"'{plain(child)}' is in '{plain(parent)}'; Ctrl-C ends it")
         guest.run(lambda: guest.is_interrupted)
     return 0

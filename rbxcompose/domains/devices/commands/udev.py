@@ -109,7 +109,7 @@ def read_devices(path: str, arguments: argparse.Namespace) -> RobotDevices | Non
     """Return the devices of a robot, and tell its findings; None if it cannot be read."""
     found = compiled(path, arguments)
     if found.report.has_errors:
-        console.tell_report(found.report, found.sources)
+        console.write_report(found.report, found.sources)
     if found.robot is None:
         return None
     contents = found.robot.manifest.contents
@@ -135,9 +135,9 @@ def _scan(arguments: argparse.Namespace) -> int:
     ports = serial_ports(arguments.root)
     named = [device for device, _ in found.named.values()]
     if arguments.json:
-        console.tell(json.dumps([_data(port, ports, named) for port in ports], ensure_ascii=False))
+        console.emit(json.dumps([_data(port, ports, named) for port in ports], ensure_ascii=False))
     else:
-        console.tell("\n".join(_lines(ports, named, found.named)))
+        console.emit("\n".join(_lines(ports, named, found.named)))
     return 0
 
 
@@ -214,7 +214,7 @@ def _generate(arguments: argparse.Namespace) -> int:
     if found is None or not found.is_right:
         return console.FINDINGS
     rules = found.rules(arguments.group)
-    console.tell(json.dumps({"file": f"/{found.file}", "rules": rules}) if arguments.json else rules.rstrip("\n"))
+    console.emit(json.dumps({"file": f"/{found.file}", "rules": rules}) if arguments.json else rules.rstrip("\n"))
     return 0
 
 
@@ -234,10 +234,10 @@ def _check(arguments: argparse.Namespace) -> int:
     report = Report([answer for answer in answers if isinstance(answer, Finding)])
     fine = [answer for answer in answers if isinstance(answer, str)]
     if arguments.json:
-        console.tell(json.dumps({"fine": fine, "findings": [as_data(finding, found.sources) for finding in report]}))
+        console.emit(json.dumps({"fine": fine, "findings": [as_data(finding, found.sources) for finding in report]}))
     else:
-        told = render_text(report, found.sources, console.has_colour(sys.stdout))
-        console.tell("\n".join([*(f"ok  {answer}" for answer in fine), told]).rstrip("\n"))
+        text = render_text(report, found.sources, console.has_colour(sys.stdout))
+        console.emit("\n".join([*(f"ok  {answer}" for answer in fine), text]).rstrip("\n"))
     return console.FINDINGS if report.has_errors else 0
 
 
@@ -270,12 +270,12 @@ def _install(arguments: argparse.Namespace) -> int:
     if not arguments.yes:
         if arguments.json or not sys.stdin.isatty():
             return console.misused("udev install", "there is nobody to ask: give '--yes'")
-        console.tell(_change(path, before, rules))
+        console.emit(_change(path, before, rules))
         if not _agreed():
-            console.tell("nothing was written")
+            console.emit("nothing was written")
             return console.FINDINGS
     elif not arguments.json:
-        console.tell(_change(path, before, rules))
+        console.emit(_change(path, before, rules))
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         replace_file(path, rules.encode(), mode=_MODE)
@@ -305,9 +305,9 @@ def _agreed() -> bool:
 
 def _done(arguments: argparse.Namespace, path: Path, *, written: bool) -> int:
     if arguments.json:
-        console.tell(json.dumps({"file": str(path), "written": written, "reload": udev.RELOAD}))
+        console.emit(json.dumps({"file": str(path), "written": written, "reload": udev.RELOAD}))
     elif written:
-        console.tell(console.good(f"wrote {path}; it takes effect with: {udev.RELOAD}"))
+        console.emit(console.good(f"wrote {path}; it takes effect with: {udev.RELOAD}"))
     else:
-        console.tell(f"{path} has these rules already")
+        console.emit(f"{path} has these rules already")
     return 0

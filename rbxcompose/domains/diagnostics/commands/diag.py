@@ -17,7 +17,7 @@ from typing import Any
 from rbxcompose.base.levels import Level
 from rbxcompose.base.printable import fitted, plain
 from rbxcompose.base.requests import to_data
-from rbxcompose.commands.console import has_colour, tell
+from rbxcompose.commands.console import emit, has_colour
 from rbxcompose.commands.lookup import add_asking_options, answer_of, find_robot, pass_on
 from rbxcompose.commands.options import Subcommand, add_actions, argument, run_action
 from rbxcompose.commands.terminal import LiveScreen, is_terminal
@@ -53,14 +53,14 @@ def _tree(arguments: argparse.Namespace) -> int:
     folder = find_robot(arguments.robot)
     tree = answer_of(folder, requests.ShowDiagnostics())
     if arguments.json:
-        tell(_document(folder, tree))
+        emit(_document(folder, tree))
     else:
-        tell("\n".join(tree_lines(folder.path.name, tree, values=arguments.values, colour=has_colour(sys.stdout))))
+        emit("\n".join(tree_lines(folder.path.name, tree, values=arguments.values, colour=has_colour(sys.stdout))))
     return int(tree.level)
 
 
 def _document(folder: RobotFolder, tree: requests.DiagnosticsTree) -> str:
-    return json.dumps({"robot": folder.path.name, **told_tree(tree)})
+    return json.dumps({"robot": folder.path.name, **tree_data(tree)})
 
 
 def _watch(arguments: argparse.Namespace) -> int:
@@ -78,13 +78,13 @@ def _watch(arguments: argparse.Namespace) -> int:
 
 
 def _follow_tree(folder: RobotFolder) -> int:
-    told: list[tuple[str, int]] | None = None
+    printed: list[tuple[str, int]] | None = None
     while True:
         tree = answer_of(folder, requests.ShowDiagnostics())
         levels = [(line.path, int(line.level)) for line in tree.lines]
-        if levels != told:
-            tell(_document(folder, tree))
-        told = levels
+        if levels != printed:
+            emit(_document(folder, tree))
+        printed = levels
         time.sleep(_PERIOD)
 
 
@@ -111,7 +111,7 @@ def _echo(arguments: argparse.Namespace) -> int:
     try:
         while True:
             for change in _changes(folder, number):
-                tell(json.dumps(told_change(change)) if arguments.json else change_line(change, has_colour(sys.stdout)))
+                emit(json.dumps(change_data(change)) if arguments.json else change_line(change, has_colour(sys.stdout)))
                 number = change.number
             time.sleep(_PERIOD)
     except KeyboardInterrupt:
@@ -130,11 +130,11 @@ def _history(arguments: argparse.Namespace) -> int:
     known = _changes(find_robot(arguments.robot))
     changes = [change for change in known if f"{change.path}/".startswith(f"{above}/")]
     if arguments.json:
-        tell(json.dumps([told_change(change) for change in changes]))
+        emit(json.dumps([change_data(change) for change in changes]))
     elif not changes:
-        tell("no level has changed")
+        emit("no level has changed")
     else:
-        tell("\n".join(change_line(change, has_colour(sys.stdout)) for change in changes))
+        emit("\n".join(change_line(change, has_colour(sys.stdout)) for change in changes))
     return 0
 
 
@@ -195,12 +195,12 @@ def change_line(change: requests.LevelChange, colour: bool) -> str:
     return f"{change.time:8.2f}  {plain(change.path)}  {old} -> {new}  {cause}".rstrip()
 
 
-def told_change(change: requests.LevelChange) -> dict[str, Any]:
+def change_data(change: requests.LevelChange) -> dict[str, Any]:
     """Return a change as data for JSON; levels are words."""
     return {**to_data(change), "old": change.old.name.lower(), "new": change.new.name.lower()}
 
 
-def told_tree(tree: requests.DiagnosticsTree) -> dict[str, Any]:
+def tree_data(tree: requests.DiagnosticsTree) -> dict[str, Any]:
     """Return the tree as data for JSON: levels are words, values a map."""
     lines = [{**to_data(line), "level": line.level.name.lower(), "values": dict(line.values)} for line in tree.lines]
     return {**to_data(tree), "level": tree.level.name.lower(), "lines": lines}

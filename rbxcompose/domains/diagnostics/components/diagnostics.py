@@ -18,7 +18,7 @@ from rbxcompose.sdk import Component, In, Out, Refused, answers, component
 
 PAUSE = 0.05  # [s] between two reports at least, so that flapping levels cost little
 MOST_ARRAYS, LARGEST_ARRAY = 30.0, 200_000  # [Hz], [B] of one publisher: to read more takes too much of a core
-MOST_TOLD = 100_000  # characters of an answer to people
+MOST_LOGGED = 100_000  # characters of an answer to people
 ROUNDING = 1e-9  # [s]
 PAUSE_PER_ROW = 0.0001  # [s]; a row is about 20 us of work, so reports never take more than a fifth of a core
 
@@ -49,7 +49,7 @@ class Diagnostics(Component[DiagnosticsConfig]):
         """Build the core."""
         made = Ros1Aggregator if self.config.profile == "ros1" else Aggregator
         self.core: Aggregator | Ros1Aggregator = made(self.config, self.config.expected, started=self.now)
-        self.told: dict[str, Level] = {}
+        self.levels: dict[str, Level] = {}
         self.is_going_down = False
         self.reported = self.alarmed = -math.inf  # the last report, and the last immediate one
         self.rows = 0  # of the last report
@@ -57,7 +57,7 @@ class Diagnostics(Component[DiagnosticsConfig]):
 
     def take_over(self, old: Diagnostics) -> None:
         """Keep what is known: statuses, levels of groups that stay, and the history."""
-        self.told, self.published = old.told, old.published
+        self.levels, self.published = old.levels, old.published
         match self.core, old.core:
             case (Aggregator() as core, Aggregator() as before):
                 core.take_over(before, self.now)
@@ -122,17 +122,17 @@ class Diagnostics(Component[DiagnosticsConfig]):
             self.diagnostics_changes(DiagnosticArray(header=header, status=tuple(map(_as_status, changes))))
         for row in rows:
             if row.is_group and row.depth == 0:
-                self.tell(row.status)
+                self.log_level(row.status)
 
-    def tell(self, group: DiagnosticStatus) -> None:
+    def log_level(self, group: DiagnosticStatus) -> None:
         """Log a new level of a group."""
-        level, told = Level(group.level), self.told.get(group.name, Level.OK)
-        if self.is_going_down and level < told:
+        level, reported = Level(group.level), self.levels.get(group.name, Level.OK)
+        if self.is_going_down and level < reported:
             return
-        if level is not told:
+        if level is not reported:
             cause = "" if group.message == level.name else f": {group.message}"
             self.context.log(level, f"{group.name} is {level.name}{cause}")
-        self.told[group.name] = level
+        self.levels[group.name] = level
 
     @answers(requests.ShowDiagnostics)
     def show(self, request: requests.ShowDiagnostics) -> requests.DiagnosticsTree:
@@ -145,9 +145,9 @@ class Diagnostics(Component[DiagnosticsConfig]):
         lines = [_line(row) for row in rows]
         worst_first = sorted(range(len(lines)), key=lambda index: (not lines[index].is_group, -lines[index].level))
         kept = sorted(_within(worst_first, [_size(line) for line in lines]))
-        told = tuple(lines[index] for index in kept)
+        shown = tuple(lines[index] for index in kept)
         refused = self.core.admission.refused
-        return requests.DiagnosticsTree(self.now, level, cause, told, len(lines) - len(told), refused)
+        return requests.DiagnosticsTree(self.now, level, cause, shown, len(lines) - len(shown), refused)
 
     @answers(requests.ListChanges)
     def changes(self, request: requests.ListChanges) -> tuple[requests.LevelChange, ...]:
@@ -186,7 +186,7 @@ def _size(line: requests.TreeLine) -> int:
 
 def _within(order: Iterable[int], sizes: Sequence[int]) -> Iterator[int]:
     """Yield the first of `order` whose sizes an answer can hold."""
-    left = MOST_TOLD
+    left = MOST_LOGGED
     for index in order:
         left -= sizes[index]
         if left < 0:
@@ -195,7 +195,7 @@ def _within(order: Iterable[int], sizes: Sequence[int]) -> Iterator[int]:
 
 
 def _as_status(change: requests.LevelChange) -> DiagnosticStatus:
-    told = (("number", change.number), ("time", f"{change.time:.3f}"), ("old", change.old.name.lower()))
+    values = (("number", change.number), ("time", f"{change.time:.3f}"), ("old", change.old.name.lower()))
     return DiagnosticStatus(
-        int(change.new), change.path, change.cause, values=tuple(KeyValue(key, str(value)) for key, value in told)
+        int(change.new), change.path, change.cause, values=tuple(KeyValue(key, str(value)) for key, value in values)
     )

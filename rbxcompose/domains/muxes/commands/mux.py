@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 
 from rbxcompose.base.findings import suggest
 from rbxcompose.base.requests import Command, to_data
-from rbxcompose.commands.console import NotDoneError, table, tell
+from rbxcompose.commands.console import NotDoneError, emit, table
 from rbxcompose.commands.lookup import REFUSED, add_asking_options, answer_of, find_robot, known_state, show_answer
 from rbxcompose.commands.options import Subcommand, add_actions, argument, count, run_action, seconds
 from rbxcompose.domains.muxes import requests
@@ -84,22 +84,22 @@ def _ls(arguments: argparse.Namespace) -> int:
     folder = find_robot(arguments.robot)
     found = [answer_of(folder, requests.LookAtMux(name)) for name in _names(folder)]
     if arguments.json:
-        tell(json.dumps([to_data(item) for item in found]))
+        emit(json.dumps([to_data(item) for item in found]))
     elif not found:
-        tell("this robot has no muxes")
+        emit("this robot has no muxes")
     else:
         rows = [
             (state.name, state.mode, state.profile, ", ".join(each.name for each in state.inputs), state.why)
             for state in found
         ]
-        tell(table([("mux", "mode", "profile", "inputs", ""), *rows]))
+        emit(table([("mux", "mode", "profile", "inputs", ""), *rows]))
     return 0
 
 
 def _why(arguments: argparse.Namespace) -> int:
     folder = find_robot(arguments.robot)
     state = answer_of(folder, requests.LookAtMux(_only_mux(arguments, folder)))
-    tell(json.dumps(to_data(state)) if arguments.json else "\n".join(_account(state)))
+    emit(json.dumps(to_data(state)) if arguments.json else "\n".join(_account(state)))
     return 0
 
 
@@ -127,7 +127,7 @@ def _watch(arguments: argparse.Namespace) -> int:
     while True:
         changes = answer_of(folder, requests.ReadMuxChanges(mux, after))
         for change in changes if after else changes[-1:]:
-            tell(
+            emit(
                 json.dumps({"mux": mux, **to_data(change)})
                 if arguments.json
                 else f"{change.time:9.2f} s  {change.text}"

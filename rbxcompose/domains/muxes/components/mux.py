@@ -72,7 +72,7 @@ class Mux(Component[MuxConfig]):
         """Build the core; a mux restarted while the robot is stopped starts closed."""
         self.core = core_of(self.config, is_stopped=self.context.is_stopped)
         self.topics = {name: self.config.topic_of(name) for name in self.config.inputs}
-        self.told: object = None
+        self.reported: object = None
         self.announced: str | None = None
         self.noted = ""
         self.wakes_at = math.inf  # [s], the first of the wakes to come
@@ -336,8 +336,8 @@ class Mux(Component[MuxConfig]):
         active = "stop" if self.core.is_stopped else self.core.active
         locked, refused = self.core.locked_out(self.now), self.core.refused(self.now)
         text = why(self.core, self.now)
-        if (text, active, locked) != self.told:
-            self.told = text, active, locked
+        if (text, active, locked) != self.reported:
+            self.reported = text, active, locked
             level = Level.WARN if locked else Level.OK
             self.status(level, text, active=active or "none", locked_out=", ".join(locked) or "none")
             number = self.changes[-1].number + 1 if self.changes else 1
