@@ -17,6 +17,7 @@ from benchmarks.measuring import COMMAND, ROOT, Row, in_turns, program
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.domains.body.description import Description
 from rbxcompose.domains.body.pinocchio_model import PinocchioModel
+from rbxcompose.domains.body.sections.body import body
 from rbxcompose.domains.body.urdf import read_body
 from rbxcompose.domains.body.xml_reader import XmlElement, read_urdf
 
@@ -32,9 +33,14 @@ JOINT = """<link name="link{0}"/><joint name="joint{0}" type="revolute">
 def rows() -> list[Row]:
     """Return the figures of bodies."""
     box = compile_robot(str(ROBOT), environment={}).robot
-    if box is None or box.manifest.body is None:
+    description = box.manifest.contents.of(body) if box else None
+    if description is None:
         raise ValueError("robots/box_robot has no body")
-    return [*_kinematics("box_robot", box.manifest.body), *_kinematics("an arm of 7 joints", _arm()), *_checks()]
+    return [
+        *_kinematics("box_robot", description),
+        *_kinematics("an arm of 7 joints", _arm()),
+        *_checks(),
+    ]
 
 
 def _arm() -> Description:

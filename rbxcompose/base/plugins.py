@@ -1,7 +1,7 @@
 """Finding plug-ins: one file is one plug-in, its name is the plug-in's name; none is imported before it is used.
 
 Our own are in one package per family (`component`, `check`, ...). Third parties register theirs under the entry-point
-group `rbxcompose.base.plugins` as `FAMILY.NAME = "package.module"` and use the same decorators.
+group `rbxcompose.plugins` as `FAMILY.NAME = "package.module"` and use the same decorators.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from rbxcompose.base.rooms import modules_of
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
-GROUP = "rbxcompose.base.plugins"
+GROUP = "rbxcompose.plugins"
 
 BROKEN = kind("RBX9301")
 LEFT_OUT = kind("RBX9302", Severity.WARNING)

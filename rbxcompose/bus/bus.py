@@ -128,13 +128,7 @@ class Bus:
         return _kept(node, Client(self._services, node, name, service))
 
     def serve_action(
-        self,
-        owner: str,
-        name: str,
-        action: type[Action[G, R, F]],
-        accept: Callable[[G], str],
-        *,
-        waits: bool = False,
+        self, owner: str, name: str, action: type[Action[G, R, F]], accept: Callable[[G], str], *, waits: bool = False
     ) -> ActionServer[G, R, F]:
         """Carry out goals; with `waits`, none before `open`. `accept` returns why it refuses a goal, or nothing."""
         node = self._node(owner)
@@ -160,7 +154,7 @@ class Bus:
         process, transport, writers = self._process, self._transport, Writers(self._transport.session)
 
         def take(change: tuple[str, bool]) -> None:
-            writers.heard(change[0], process.clock.now(), is_there=change[1])
+            writers.apply(change[0], process.clock.now(), is_there=change[1])
 
         inbox = Inbox(owner, None, take, process.scheduler.post)
         pattern = publishers_pattern(process.domain)

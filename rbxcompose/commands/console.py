@@ -65,9 +65,9 @@ def answered(in_json: bool) -> Iterator[None]:
     try:
         yield
     finally:
-        told = _commands.pop()
-        if in_json and told.error and not told.has_begun:
-            sys.stdout.write(f"{json.dumps(told.data())}\n")
+        finished = _commands.pop()
+        if in_json and finished.error and not finished.has_begun:
+            sys.stdout.write(f"{json.dumps(finished.data())}\n")
 
 
 def misused(verb: str, problem: str) -> int:
@@ -87,14 +87,14 @@ def good(text: str) -> str:
     return f"\x1b[32m{text}\x1b[0m" if has_colour(sys.stdout) else text
 
 
-def tell(text: str) -> None:
+def emit(text: str) -> None:
     """Write lines to stdout and flush."""
     output().has_begun = True
     sys.stdout.write(f"{text}\n")
     sys.stdout.flush()
 
 
-def tell_report(report: Report, sources: Sources) -> None:
+def write_report(report: Report, sources: Sources) -> None:
     """Write all findings to stderr."""
     output().note(report, sources)
     sys.stderr.write(render_text(report, sources, has_colour(sys.stderr)))
@@ -105,7 +105,7 @@ def refuse(finding: Finding) -> int:
     """Write one finding to stderr and return the exit code for it."""
     report = Report()
     report.add(finding)
-    tell_report(report, {})
+    write_report(report, {})
     return FINDINGS
 
 
@@ -140,3 +140,6 @@ def table(rows: Sequence[Sequence[str]]) -> str:
     return "\n".join(
         "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in cells
     )
+
+
+tell, tell_report = emit, write_report

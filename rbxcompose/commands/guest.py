@@ -29,17 +29,9 @@ from rbxcompose.bus.tokens import SPACE
 from rbxcompose.bus.transport import Arrival
 from rbxcompose.bus.zenoh_session import open_client, open_peer
 from rbxcompose.bus.zenoh_transport import ZenohTransport
-from rbxcompose.commands.console import NotDoneError, refuse, table, tell
+from rbxcompose.commands import options
+from rbxcompose.commands.console import NotDoneError, emit, refuse, table
 from rbxcompose.commands.lookup import BusPlace, add_bus_options, find_place
-from rbxcompose.commands.options import (
-    Subcommand,
-    add_actions,
-    add_json_option,
-    add_ls_options,
-    add_system_options,
-    add_timeout_option,
-    argument,
-)
 from rbxcompose.runtime.process_group.connection import CallbackInbox
 from rbxcompose.sdk.ports import Qos
 
@@ -251,11 +243,11 @@ def wanted(names: Sequence[GraphName], name: str, what: str) -> GraphName:
     return found
 
 
-def tell_list(names: Sequence[GraphName], ends: tuple[str, str], arguments: argparse.Namespace) -> int:
+def write_names(names: Sequence[GraphName], ends: tuple[str, str], arguments: argparse.Namespace) -> int:
     """List names with their types and the counts of both `ends`; hidden names only with `--all`."""
     listed = [name for name in names if arguments.all or not name.is_hidden]
     if arguments.json:
-        tell(json.dumps([_counted(name, ends) for name in listed]))
+        emit(json.dumps([_counted(name, ends) for name in listed]))
         return 0
     rows = [
         (
@@ -267,7 +259,7 @@ def tell_list(names: Sequence[GraphName], ends: tuple[str, str], arguments: argp
         )
         for graph_name in listed
     ]
-    tell(table([("name", "type", *ends, ""), *rows]))
+    emit(table([("name", "type", *ends, ""), *rows]))
     return 0
 
 
@@ -289,15 +281,15 @@ def add_server_verbs(
 
     `do` has the functions that carry them out, in this order.
     """
-    named = argument("name", metavar=noun.upper(), help=f"its name, such as {example}")
+    named = options.argument("name", metavar=noun.upper(), help=f"its name, such as {example}")
     words = "YAML; missing fields are zero"
-    written = argument("content", metavar=content.upper(), nargs="?", default="", help=words)
-    sent = (named, written, partial(add_timeout_option, default="5s"), add_json_option)
+    written = options.argument("content", metavar=content.upper(), nargs="?", default="", help=words)
+    sent = (named, written, partial(options.add_timeout_option, default="5s"), options.add_json_option)
     actions = (
-        Subcommand("ls", f"list the {noun}s with their types", do[0], (add_ls_options,)),
-        Subcommand(*verb, do[1], sent),
+        options.Subcommand("ls", f"list the {noun}s with their types", do[0], (options.add_ls_options,)),
+        options.Subcommand(*verb, do[1], sent),
     )
-    add_actions(parser, actions, add_bus_options, add_system_options)
+    options.add_actions(parser, actions, add_bus_options, options.add_system_options)
 
 
 def _counted(graph_name: GraphName, ends: tuple[str, str]) -> dict[str, Any]:

@@ -22,7 +22,7 @@ from rbxcompose import __version__
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, kind
 from rbxcompose.base.printable import plain
-from rbxcompose.commands.console import FINDINGS, NotDoneError, refuse, tell, tell_report
+from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, refuse, write_report
 from rbxcompose.commands.lookup import find_robot
 from rbxcompose.commands.options import BUS, EACH, system_and_robot
 
@@ -87,11 +87,11 @@ def send(remote: Remote, bundle: Bundle) -> str | Finding:
         done = subprocess.run(remote.ssh(script), input=bundle.archive, capture_output=True, check=False)
     except OSError as error:
         return UNREACHED.at(None, f"'{remote.name}' cannot be reached: ssh cannot run: {error.strerror}")
-    told = done.stdout.decode(errors="replace").splitlines()
-    folder = next((line.removeprefix("folder ") for line in told if line.startswith("folder ")), "")
+    lines = done.stdout.decode(errors="replace").splitlines()
+    folder = next((line.removeprefix("folder ") for line in lines if line.startswith("folder ")), "")
     if not folder:
         return UNREACHED.at(None, f"'{remote.name}' cannot be reached: {_last(done.stderr)}")
-    version = next((line.removeprefix("rbxcompose ") for line in told if line.startswith("rbxcompose ")), "")
+    version = next((line.removeprefix("rbxcompose ") for line in lines if line.startswith("rbxcompose ")), "")
     if done.returncode or version != __version__:
         found = f"rbxcompose {plain(version)}" if version else f"no rbxcompose that runs: {_last(done.stderr)}"
         return OTHER_VERSION.at(None, f"'{remote.name}' has {found}; this machine has {__version__}")
@@ -134,7 +134,7 @@ class Running:
         for line in self._process.stdout or ():
             self.lines.append(text := line.rstrip("\r\n"))
             if self._shows:
-                tell(f"{self._label} | {plain(text)}")
+                emit(f"{self._label} | {plain(text)}")
         if self._process.stdout is not None:
             self._process.stdout.close()
 
@@ -200,7 +200,7 @@ def compiled(path: str, arguments: argparse.Namespace) -> System | None:
 
     system = compile_system(path, environment=os.environ, profiles=arguments.profile)
     if system.report.has_errors:
-        tell_report(system.report, system.sources)
+        write_report(system.report, system.sources)
         return None
     return system if is_reachable(system) else None
 
@@ -222,7 +222,7 @@ def reached(shares: Shares, bundle: Bundle, *, needs_all: bool = True) -> dict[s
         if isinstance(found, str):
             folders[name] = found
         elif name in optional:
-            tell(f"without '{name}', which is optional: {found.message}")
+            emit(f"without '{name}', which is optional: {found.message}")
         else:
             is_complete = False
             refuse(found)
@@ -285,9 +285,9 @@ def ask_all(shares: Shares, words: Callable[[str], Sequence[str]], *, in_json: b
     if tolerates and 0 in codes.values():
         done = {label: entry for label, entry in done.items() if not any(tolerates in line for line in entry.lines)}
     if in_json:
-        tell(json.dumps({"hosts": [_data(label, entry) for label, entry in done.items()]}))
+        emit(json.dumps({"hosts": [_data(label, entry) for label, entry in done.items()]}))
     else:
-        tell(
+        emit(
             "\n\n".join(
                 "\n".join([f"{label}:", *(f"  {line}" for line in entry.lines)]) for label, entry in done.items()
             )
@@ -317,8 +317,8 @@ class SystemCommand:
 
     def words_for(self, robot: str) -> list[str]:
         """Return the words with a robot in place of what was written for it."""
-        told, option = self.written, f"--robot={self.written}"
-        return [robot if word == told else f"--robot={robot}" if word == option else word for word in self.words]
+        written, option = self.written, f"--robot={self.written}"
+        return [robot if word == written else f"--robot={robot}" if word == option else word for word in self.words]
 
     def refuse(self, message: str) -> int:
         """Tell that one robot has to be named, and return the exit code."""

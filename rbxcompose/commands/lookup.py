@@ -12,7 +12,7 @@ from typing import TypeVar
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, kind, suggest
 from rbxcompose.base.requests import Command, Refused, Request
-from rbxcompose.commands.console import NotDoneError, refuse, tell
+from rbxcompose.commands.console import NotDoneError, emit, refuse
 from rbxcompose.commands.options import add_system_options
 from rbxcompose.runtime.control import ANSWER, NoAnswerError, ask
 from rbxcompose.runtime.folder import BrokenStateError, RobotFolder, RobotState, UnsafeFolderError, all_folders
@@ -181,4 +181,4 @@ def pass_on(arguments: argparse.Namespace, command: Command) -> int:
 
 def show_answer(arguments: argparse.Namespace, folder: RobotFolder, answer: str) -> None:
     """Print a robot's answer."""
-    tell(json.dumps({"robot": folder.path.name, "answer": answer}) if arguments.json else answer)
+    emit(json.dumps({"robot": folder.path.name, "answer": answer}) if arguments.json else answer)

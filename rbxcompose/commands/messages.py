@@ -16,7 +16,7 @@ from rbxcompose.base.findings import Finding, Report, Span, kind
 from rbxcompose.base.printable import FORBIDDEN
 from rbxcompose.bus.graph import GraphName, WireType, find
 from rbxcompose.bus.names import name_problem
-from rbxcompose.commands.console import NotDoneError, refuse, tell, tell_report
+from rbxcompose.commands.console import NotDoneError, emit, refuse, write_report
 from rbxcompose.commands.guest import NAME, NO_NAME, NOBODY, SAID_NO, Guest, HeardMessage, wanted
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.scalars import plain_value
@@ -61,7 +61,7 @@ def message_from(message: type[M], text: str) -> M | None:
     if findings:
         report = Report()
         report.extend(findings)
-        tell_report(report, {_SHOWN: text})
+        write_report(report, {_SHOWN: text})
         return None
     return made
 
@@ -191,18 +191,18 @@ class _Echo:
         if message is not None:
             self._count += 1
             text = shown(to_plain(message), self._arguments.json)
-            tell(text if self._arguments.json else f"{text}\n---")
+            emit(text if self._arguments.json else f"{text}\n---")
 
 
 def echo(guest: Guest, arguments: argparse.Namespace) -> int:
     """Print the messages of a topic."""
     topic = wanted(guest.graph().topics, arguments.topic, "topic")
-    told = _Echo(topic, arguments)
-    if told.reader.is_useless:
+    printer = _Echo(topic, arguments)
+    if printer.reader.is_useless:
         return 1
-    guest.listen(topic, told.heard)
+    guest.listen(topic, printer.heard)
     dropped = 0
-    while not guest.run(lambda: told.is_over, _PERIOD):
+    while not guest.run(lambda: printer.is_over, _PERIOD):
         if guest.dropped > dropped:
             sys.stderr.write(f"left out: {guest.dropped - dropped} messages, which came too fast to show\n")
             dropped = guest.dropped
@@ -231,7 +231,7 @@ def publish(guest: Guest, arguments: argparse.Namespace) -> int:
             sent += 1
             if sent < most:
                 guest.run(lambda: guest.is_interrupted, 1 / (arguments.rate or 1.0))
-    tell(to_json({"topic": name, "type": message.TYPE, "sent": sent}) if arguments.json else f"{name}: {sent} sent")
+    emit(to_json({"topic": name, "type": message.TYPE, "sent": sent}) if arguments.json else f"{name}: {sent} sent")
     return 0
 
 
@@ -260,7 +260,7 @@ def call(guest: Guest, arguments: argparse.Namespace) -> int:
     guest.run(lambda: bool(replies))
     if replies[0].response is None:
         return refuse(SAID_NO.at(None, f"'{found.name}': {replies[0].error}"))
-    tell(shown(to_plain(replies[0].response), arguments.json))
+    emit(shown(to_plain(replies[0].response), arguments.json))
     return 0
 
 
@@ -297,4 +297,4 @@ def _end(ended: Ended[Any], name: str, is_interrupted: bool, as_json: bool) -> i
 
 def _tell(what: str, message: Message, as_json: bool) -> None:
     data = {what: to_plain(message)}
-    tell(to_json(data) if as_json else to_text(data))
+    emit(to_json(data) if as_json else to_text(data))

@@ -46,5 +46,5 @@ def summary(robot: str, reason: str, time: float, facts: Mapping[str, Mapping[st
         for label, text in facts[instance].items():
             lines.append((label if labels[label] == 1 else f"{instance} {label}", text))
     width = max(len(label) for label, _ in lines)
-    told = [f"  {plain(label):<{width}}  {plain(text)}" for label, text in lines]
-    return "\n".join([f"{robot} is down: {plain(reason)}", *told])
+    rows = [f"  {plain(label):<{width}}  {plain(text)}" for label, text in lines]
+    return "\n".join([f"{robot} is down: {plain(reason)}", *rows])

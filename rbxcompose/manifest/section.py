@@ -111,7 +111,7 @@ class Short:
 @cache
 def short_type_of(model: Any, key: str) -> Any:
     """Return the type of the word in place of an entry."""
-    return Annotated[(str, *(Refers(kind, is_told=True) for kind in kinds_of(next(below(model, key)))))]
+    return Annotated[(str, *(Refers(kind, is_reported=True) for kind in kinds_of(next(below(model, key)))))]
 
 
 @cache  # each type is compiled once
@@ -202,7 +202,7 @@ class ComponentOptions(Config):
     """Whether and when it restarts after a failure: a word, or a map with `when`, `max`, `within` and `backoff`."""
     log: Literal["info", "warn", "error"] = "info"
     """The lowest level that it logs."""
-    connect: dict[Annotated[Name, Refers(OWN_PORT, is_told=True)], TopicName] = {}
+    connect: dict[Annotated[Name, Refers(OWN_PORT, is_reported=True)], TopicName] = {}
     """Topics by port, where they differ from the port's name."""
 
 
@@ -258,6 +258,15 @@ class SetScope(Enum):
 
 
 @dataclass(frozen=True, slots=True)
+class AlwaysRun:
+    """A component that every robot runs, named after its type."""
+
+    type_name: str
+    config: Callable[[Contents, Sequence[str]], Mapping[str, object]]
+    """Returns the data of its configuration; it is given the names of all components of the robot."""
+
+
+@dataclass(frozen=True, slots=True)
 class Declaration(Generic[M]):
     """How a section is declared; `M` is the model of an entry, or of the whole section if its keys are fixed."""
 
@@ -296,6 +305,9 @@ class Declaration(Generic[M]):
     """Tells of what two parts bring under a path in the section: what it is, and what helps."""
     models: Callable[[TreeNode], Iterable[Any]] | None = None
     """Returns the models of one entry, if they depend on its content."""
+    types: Callable[[], Mapping[str, Any]] | None = None
+    """Returns the classes that an entry may name as its `type`, by name: each has a `config_type()`, which is the model
+    of such an entry."""
     repeats: bool = True
     """Whether a name in a part gets the instance's name as a prefix even if that ends with it: without, the entry `arm`
     of the part `right_arm` is `right_arm`."""
@@ -316,6 +328,11 @@ class Declaration(Generic[M]):
     """Names of the components that it adds if it is present."""
     components: Callable[[Contents, Wiring], Iterable[WantedComponent]] = lambda contents, wiring: ()
     """Returns the components that it defines."""
+    always: AlwaysRun | None = None
+    """The component that it configures, and that every robot runs, with or without this section."""
+    levels: Callable[[Contents], Mapping[str, str]] = lambda contents: {}
+    """Names of levels (`ok`, `warn`, ...) that values read as `SECTION.NAME`, each with the name of its status in
+    `/diagnostics_agg`."""
     wires: bool = False
     """Whether its entries decide which components there are, and what they are connected to."""
     connects: Callable[[Contents], Mapping[str, Mapping[str, str]]] = lambda contents: {}

@@ -172,9 +172,7 @@ class ControlServer:
             self._drop(number)  # it is gone
             return
         self._selector.modify(
-            client.socket,
-            selectors.EVENT_WRITE if client.unsent else selectors.EVENT_READ,
-            lambda: self._serve(number),
+            client.socket, selectors.EVENT_WRITE if client.unsent else selectors.EVENT_READ, lambda: self._serve(number)
         )
 
     def _drop(self, number: int) -> None:

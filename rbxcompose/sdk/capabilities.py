@@ -141,6 +141,14 @@ class Forwards(Capability):
 
 
 @dataclass(frozen=True, slots=True)
+class LocksInSilence(Capability):
+    """A mux: its lock `name` holds inputs back once its heartbeat has been silent for `timeout` [s]."""
+
+    name: Setting[str]
+    timeout: Setting[float]
+
+
+@dataclass(frozen=True, slots=True)
 class BoundsGoals(Capability):
     """It refuses goals at its port `goals` whose arguments are beyond limits: those of joints, or its own."""
 

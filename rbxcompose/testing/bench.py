@@ -54,12 +54,7 @@ class Bench:
         self.plan = plan.in_one_process() if plan else Plan("bench", "bench.yaml", tuple(instances))
         bus = self.plan.bus
         self.bus = Bus(
-            self.scheduler,
-            self.clock,
-            domain=bus.domain,
-            namespace=bus.namespace,
-            wire=bus.wire,
-            log=self._note,
+            self.scheduler, self.clock, domain=bus.domain, namespace=bus.namespace, wire=bus.wire, log=self._note
         )
         self.host = Host(
             self.plan,

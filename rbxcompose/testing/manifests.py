@@ -19,8 +19,8 @@ from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.events import MissionEvent
 from rbxcompose.missions.engine.story import MissionStory
 from rbxcompose.missions.language.reader import read_program
+from rbxcompose.missions.program.outcomes import NAMES, Result
 from rbxcompose.missions.program.program import Program, RobotNames
-from rbxcompose.missions.program.statuses import NAMES, Result
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,12 +83,7 @@ def check_file(
     """Compile a robot's file."""
     return Checked(
         compile_robot(
-            str(path),
-            profiles=profiles,
-            overlays=overlays,
-            sets=sets,
-            real=real,
-            environment=environment or {},
+            str(path), profiles=profiles, overlays=overlays, sets=sets, real=real, environment=environment or {}
         )
     )
 
@@ -199,5 +194,5 @@ class SteppedMission:
 
     def say(self, event: MissionEvent, /) -> None:
         """Keep what it tells."""
-        if text := self._story.tell(event)[1]:
+        if text := self._story.line(event)[1]:
             self.told.append(text)

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from rbxcompose.base.findings import Finding, kind
-from rbxcompose.commands.console import FINDINGS, NotDoneError, misused, refuse, tell
+from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, misused, refuse
 from rbxcompose.commands.hosts import Running, Shares, is_reachable, on_all, reached, shares_of
 from rbxcompose.compiler.systems.bundle import bundle_of
 from rbxcompose.compiler.systems.model import System
@@ -47,7 +47,7 @@ def _apply_here(system: System, arguments: argparse.Namespace) -> int:
         for robot in chosen:
             plan, layers = planned(system, robot, arguments.host), layers_of(system, robot, real=arguments.real)
             proposal = Proposal.of(plan, robot.robot, layers)
-            tell(json.dumps(proposal.data) if arguments.json else proposal.text())
+            emit(json.dumps(proposal.data) if arguments.json else proposal.text())
             if exit_code := carry_out(proposal, arguments):
                 return exit_code
     except NotDoneError as error:
@@ -74,7 +74,7 @@ class _SystemChange:
         lacks = any(key not in usable and not share.model.optional for key, share in self._shares.items())
         problems = [_refusal(key, entry) for key, entry in found.items() if isinstance(entry, str)]
         if arguments.json:
-            tell(
+            emit(
                 json.dumps(
                     {"hosts": [{"host": key[0], "robot": key[1], "answer": entry} for key, entry in found.items()]}
                 )
@@ -99,7 +99,7 @@ class _SystemChange:
         for (host, _), one in found.items():
             if not isinstance(one, str):
                 lines = changes_text(one).splitlines()
-                tell("\n".join(f"{host} | {line}" for line in (lines if _touches(one) else lines[:1])))
+                emit("\n".join(f"{host} | {line}" for line in (lines if _touches(one) else lines[:1])))
 
     def _carry_out(self, generations: Mapping[Key, int]) -> int:
         """Change these shares, which are in these generations, in this order."""
@@ -131,7 +131,7 @@ class _SystemChange:
 
     def _tell(self, text: str) -> None:
         if not self._arguments.json:
-            tell(text)
+            emit(text)
 
     def _command(self, key: Key, how: str) -> list[str]:
         (host, robot), remote = key, self._shares[key]
@@ -153,8 +153,8 @@ def _answer(running: Running) -> Any:
         return answer
     if isinstance(answer, dict) and (answer.get("error") or answer.get("why_not")):
         return str(answer.get("error") or answer["why_not"])
-    told = [line for line in running.lines if line.startswith("error")] or running.lines
-    return told[-1] if told else f"exit code {exit_code}"
+    errors = [line for line in running.lines if line.startswith("error")] or running.lines
+    return errors[-1] if errors else f"exit code {exit_code}"
 
 
 def _changes(answer: Mapping[str, Any]) -> bool:

@@ -135,19 +135,19 @@ class ExaminationResult:
     """The result of one examination: words on what is fine, or a finding."""
 
     examination: str
-    told: str | Finding
+    answer: str | Finding
 
     @property
     def level(self) -> str:
         """Return `ok`, `warning` or `error`."""
-        return FINE if isinstance(self.told, str) else self.told.severity.value
+        return FINE if isinstance(self.answer, str) else self.answer.severity.value
 
     def to_data(self) -> dict[str, Any]:
         """Return the result as data for JSON."""
         data: dict[str, Any] = {"examination": self.examination, "level": self.level}
-        if isinstance(self.told, str):
-            return {**data, "message": self.told}
-        return {**data, "code": self.told.code, "message": self.told.message, "help": self.told.help}
+        if isinstance(self.answer, str):
+            return {**data, "message": self.answer}
+        return {**data, "code": self.answer.code, "message": self.answer.message, "help": self.answer.help}
 
 
 def examination(examine: Examine) -> Examine:
@@ -166,7 +166,7 @@ def examine_all(facts: HostFacts) -> list[ExaminationResult]:
     """Run every examination, by name."""
     for name in PLUGINS.names():
         PLUGINS.load(name)
-    return [ExaminationResult(name, told) for name in sorted(EXAMINATIONS) for told in EXAMINATIONS[name](facts)]
+    return [ExaminationResult(name, answer) for name in sorted(EXAMINATIONS) for answer in EXAMINATIONS[name](facts)]
 
 
 def has_errors(answers: Sequence[ExaminationResult]) -> bool:

@@ -17,7 +17,7 @@ from rbxcompose.base.files import TooLargeError, read_regular
 from rbxcompose.base.findings import Span, kind, suggest
 from rbxcompose.base.requests import Refused
 from rbxcompose.base.units import example
-from rbxcompose.commands.console import FINDINGS, NotDoneError, misused, refuse, table, tell, tell_report
+from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, misused, refuse, table, write_report
 from rbxcompose.commands.layout import NotDrawnError
 from rbxcompose.commands.lookup import answer_of, known_state, robots_up
 from rbxcompose.commands.targets import only_path
@@ -28,8 +28,8 @@ from rbxcompose.missions.engine.inputs import bind_texts
 from rbxcompose.missions.engine.log_replay import OtherMissionError, ReplayBudget, ReplayError, replay
 from rbxcompose.missions.engine.logbook import INPUTS, LogRecord
 from rbxcompose.missions.execution.requests import ListMissions, LookAtAll, settings
+from rbxcompose.missions.program.outcomes import IDLE, NAMES
 from rbxcompose.missions.program.program import Skill
-from rbxcompose.missions.program.statuses import IDLE, NAMES
 from rbxcompose.missions.sources import SkillSource, SkillWay
 from rbxcompose.missions.view.picture import MissionPicture, picture_from_data, picture_of
 from rbxcompose.missions.view.replica import joined, status_list
@@ -56,7 +56,7 @@ def robot_of(path: str | None) -> Robot | None:
     if path is None:
         path = _running_file() or only_path(may_run=False)
     out = compile_robot(path, environment=os.environ)
-    tell_report(out.report, out.sources)
+    write_report(out.report, out.sources)
     return None if out.report.has_errors else out.robot
 
 
@@ -79,7 +79,7 @@ def show(arguments: argparse.Namespace) -> int:
     except (NotDoneError, NotDrawnError) as error:
         return refuse(error.finding)
     if arguments.out is None:
-        tell(text.rstrip("\n"))
+        emit(text.rstrip("\n"))
         return 0
     try:
         Path(arguments.out).write_text(text, encoding="utf-8")
@@ -130,20 +130,20 @@ def skills(arguments: argparse.Namespace) -> int:
         )
     )
     if arguments.json:
-        tell(json.dumps([_data(entry) for entry in found.values()]))
+        emit(json.dumps([_data(entry) for entry in found.values()]))
         return 0
     rows = [
         (name, _arguments(entry.skill), _ends(entry.skill), entry.skill.claims, _how(entry))
         for name, entry in found.items()
     ]
-    tell(table([("skill", "arguments", "ends", "claims", "is"), *rows]))
-    tell("\n" + "\n".join(f"- {_example(entry.skill)}" for entry in found.values()))
+    emit(table([("skill", "arguments", "ends", "claims", "is"), *rows]))
+    emit("\n" + "\n".join(f"- {_example(entry.skill)}" for entry in found.values()))
     return 0
 
 
 def _arguments(skill: Skill) -> str:
-    told = [f"{name}{'' if name in skill.required else '?'}: {one.detail}" for name, one in skill.arguments.items()]
-    return ", ".join(told) or "none"
+    listed = [f"{name}{'' if name in skill.required else '?'}: {one.detail}" for name, one in skill.arguments.items()]
+    return ", ".join(listed) or "none"
 
 
 def _ends(skill: Skill) -> str:
@@ -173,12 +173,7 @@ def _example(skill: Skill) -> str:
 def _data(source: SkillSource) -> dict[str, Any]:
     skill = source.skill
     arguments = [
-        {
-            "name": name,
-            "type": argument.detail,
-            "needed": name in skill.required,
-            "main": name == skill.main,
-        }
+        {"name": name, "type": argument.detail, "needed": name in skill.required, "main": name == skill.main}
         for name, argument in skill.arguments.items()
     ]
     return {
@@ -225,7 +220,7 @@ def replay_log(arguments: argparse.Namespace) -> int:
     for (name, number), run in runs.items():
         found = difference(run, name, robot, arguments.log, budget)
         differs = differs or bool(found)
-        tell(f"{name}, run {number}: {found or f'the same, {len(run.records)} records'}")
+        emit(f"{name}, run {number}: {found or f'the same, {len(run.records)} records'}")
     return FINDINGS if differs else 0
 
 
@@ -290,7 +285,7 @@ def _line(file: str, number: int) -> Span:
 
 def difference(run: LoggedRun, name: str, robot: Robot, file: str, budget: ReplayBudget) -> str:
     """Describe the first record that differs now; empty if all are the same."""
-    then = [_told(record) for record in run.records if record["event"] not in INPUTS]
+    then = [_without_run(record) for record in run.records if record["event"] not in INPUTS]
     try:
         again = replay(run.records, mission_in(robot, name), robot.names, budget)
     except OtherMissionError:
@@ -298,7 +293,7 @@ def difference(run: LoggedRun, name: str, robot: Robot, file: str, budget: Repla
     except ReplayError as error:
         place = _line(file, run.lines[error.record])
         raise NotDoneError(NO_LOG.at(place, f"'{file}' cannot be replayed: {error}")) from error
-    now = [_told(record) for record in json.loads(json.dumps(again))]
+    now = [_without_run(record) for record in json.loads(json.dumps(again))]
     for number in range(max(len(then), len(now))):
         before, after = then[number : number + 1], now[number : number + 1]
         if before != after:
@@ -306,7 +301,7 @@ def difference(run: LoggedRun, name: str, robot: Robot, file: str, budget: Repla
     return ""
 
 
-def _told(record: LogRecord) -> dict[str, Any]:
+def _without_run(record: LogRecord) -> dict[str, Any]:
     return {key: value for key, value in record.items() if key not in _OWN}
 
 
@@ -325,7 +320,7 @@ def explore(arguments: argparse.Namespace) -> int:
     except Refused as refusal:
         return misused("mission explore", str(refusal))
     explored = explore_program(program, robot.names, inputs, ExplorationLimits(arguments.states, arguments.depth))
-    tell(json.dumps(asdict(explored), indent=1) if arguments.json else text_of(explored))
+    emit(json.dumps(asdict(explored), indent=1) if arguments.json else text_of(explored))
     return FINDINGS if explored.found else 0
 
 

@@ -11,7 +11,7 @@ from typing import Any
 from rbxcompose.base.expressions.text import show_value
 from rbxcompose.base.expressions.values import NOT_ARRIVED
 from rbxcompose.base.printable import fitted, plain
-from rbxcompose.commands.console import has_colour, tell
+from rbxcompose.commands.console import emit, has_colour
 from rbxcompose.commands.lookup import answer_of
 from rbxcompose.commands.terminal import LiveScreen, is_terminal
 from rbxcompose.missions.engine.snapshot import from_plain
@@ -47,14 +47,14 @@ def _value(value: Any) -> str:
 def follow(folder: RobotFolder, name: str, period: float) -> int:
     """Print a mission as JSON until it ends, or until Ctrl-C: first the whole state, then one line per change."""
     seen = answer_of(folder, LookAtMission(name))
-    told: Mapping[str, Any] = {}
+    printed: Mapping[str, Any] = {}
     try:
         while True:
-            if any(told.get(key) != seen[key] for key in ("version", "state")):
-                tell(json.dumps(seen))
+            if any(printed.get(key) != seen[key] for key in ("version", "state")):
+                emit(json.dumps(seen))
             if seen["state"] not in ACTIVE:
                 return 0
-            told = seen
+            printed = seen
             time.sleep(period)
             seen = answer_of(folder, LookAtMission(name, seen["version"]))
     except KeyboardInterrupt:
@@ -67,7 +67,7 @@ def watch(folder: RobotFolder, name: str, period: float) -> int:
     seen = joined({"statuses": {}, "data": {}}, answer_of(folder, LookAtMission(name)))
     colour = has_colour(sys.stdout)
     if not is_terminal():
-        tell("\n".join(lines_of(picture, seen, _WIDTH, colour=colour)))
+        emit("\n".join(lines_of(picture, seen, _WIDTH, colour=colour)))
         return 0
 
     def drawn(width: int, height: int) -> list[str]:
@@ -80,5 +80,5 @@ def watch(folder: RobotFolder, name: str, period: float) -> int:
             if screen.is_over:
                 return 0
             seen = joined(seen, answer_of(folder, LookAtMission(name, seen["version"])))
-    tell("\n".join(lines_of(picture, seen, _WIDTH, colour=colour)))
+    emit("\n".join(lines_of(picture, seen, _WIDTH, colour=colour)))
     return 0

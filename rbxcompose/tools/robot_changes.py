@@ -12,7 +12,7 @@ from typing import Any
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.requests import to_data
-from rbxcompose.commands.console import NotDoneError, misused, refuse, tell, tell_report
+from rbxcompose.commands.console import NotDoneError, emit, misused, refuse, write_report
 from rbxcompose.commands.lookup import REFUSED, answer_of, find_robot
 from rbxcompose.compiler.compile import Compilation
 from rbxcompose.compiler.composition.overlay import SET
@@ -89,7 +89,7 @@ def carry_out(proposal: Proposal, arguments: argparse.Namespace) -> int:
         return problem
     answer = proposal.apply()
     if not arguments.json:
-        tell(f"{name} is changed: {answer}")
+        emit(f"{name} is changed: {answer}")
     return 0
 
 
@@ -103,7 +103,7 @@ def unsure(name: str, arguments: argparse.Namespace) -> int | None:
     sys.stdout.flush()
     if sys.stdin.readline().strip().lower() in ("y", "yes"):
         return None
-    tell("nothing was changed")
+    emit("nothing was changed")
     return 0
 
 
@@ -152,7 +152,7 @@ class LiveReload:
         self._compiled, self._newest, self._layers = compiled, first, layers
         self._files = FileWatch(files_of(first))
         self._is_pending = False  # the newest is to be applied as soon as possible
-        self._told = ""  # the reported reason for waiting
+        self._reported = ""  # the reported reason for waiting
         self._next_look = self._next_try = 0.0  # [s, monotonic]
 
     def look(self) -> None:
@@ -169,12 +169,12 @@ class LiveReload:
     def _compile(self) -> None:
         self._newest = found = self._compiled()
         self._files.follow(files_of(found))
-        tell_report(found.report, found.sources)
-        self._told = ""
+        write_report(found.report, found.sources)
+        self._reported = ""
         self._is_pending = found.plan is not None
         self._next_try = 0.0
         if found.plan is None:
-            tell("the files have changed and have errors: the robot stays as it is")
+            emit("the files have changed and have errors: the robot stays as it is")
 
     def _take(self) -> None:
         """Show the difference and apply it, or wait."""
@@ -185,15 +185,15 @@ class LiveReload:
             is_impossible = bool(proposal.found.impossible)
             self._is_pending = bool(proposal.why_not) and not is_impossible
             if proposal.is_empty:
-                tell("the files have changed, the robot stays the same")
+                emit("the files have changed, the robot stays the same")
                 return
-            if not self._told:
-                tell(proposal.text())
+            if not self._reported:
+                emit(proposal.text())
             if not proposal.why_not:
-                tell(f"the robot is changed: {proposal.apply()}")
-            elif not self._told:
-                tell(f"{'not done' if is_impossible else 'waits'}: {proposal.why_not}")
-            self._told = self._told or proposal.why_not
+                emit(f"the robot is changed: {proposal.apply()}")
+            elif not self._reported:
+                emit(f"{'not done' if is_impossible else 'waits'}: {proposal.why_not}")
+            self._reported = self._reported or proposal.why_not
         except NotDoneError as error:
             self._is_pending = False
             refuse(error.finding)

@@ -224,7 +224,7 @@ class ShareView:
 
     robot: str
     host: str
-    told: Mapping[str, Any] | None
+    answer: Mapping[str, Any] | None
     age: float
     problem: str = ""
 
@@ -235,16 +235,16 @@ class ShareView:
             return self.problem
         if self.age > SILENT:
             return f"does not answer for {self.age:.0f} s"
-        if self.told is None:
+        if self.answer is None:
             return "asked"
-        off = [str(component["name"]) for component in self.told["components"] if component["state"] != "active"]
-        dead = "" if self.told["is_supervised"] else "its supervisor is dead"
+        off = [str(component["name"]) for component in self.answer["components"] if component["state"] != "active"]
+        dead = "" if self.answer["is_supervised"] else "its supervisor is dead"
         return dead or (f"{', '.join(off)} not active" if off else "up")
 
     @property
     def is_silent(self) -> bool:
         """Return whether nothing is known of it now."""
-        return self.told is None or bool(self.problem) or self.age > SILENT
+        return self.answer is None or bool(self.problem) or self.age > SILENT
 
 
 def system_lines(name: str, shares: Sequence[ShareView], width: int, height: int, *, colour: bool = False) -> list[str]:
@@ -258,13 +258,13 @@ def system_lines(name: str, shares: Sequence[ShareView], width: int, height: int
 def _shares(shares: Sequence[ShareView]) -> list[PictureLine]:
     rows = []
     for share in shares:
-        told = share.told if share.told is not None and not share.is_silent else {}
-        loads = told.get("processes", ())
+        answer = share.answer if share.answer is not None and not share.is_silent else {}
+        loads = answer.get("processes", ())
         cpu = sum(each["cpu"] or 0.0 for each in loads)
         memory = sum(each["memory"] for each in loads) / 1e6
         use = (f"{cpu:.0%}", f"{memory:.0f} MB") if loads else ("-", "-")
-        batteries = ", ".join(map(str, told.get("batteries", {}).values()))
-        rows.append((share.robot, share.host, *use, batteries, str(told.get("mission") or ""), share.state))
+        batteries = ", ".join(map(str, answer.get("batteries", {}).values()))
+        rows.append((share.robot, share.host, *use, batteries, str(answer.get("mission") or ""), share.state))
     head, *lines = table_of([("robot", "host", "cpu", "memory", "battery", "mission", "state"), *rows])
     colours = (RED if view.is_silent else "" if view.state == "up" else YELLOW for view in shares)
     return [PictureLine(head, FAINT), *map(PictureLine, lines, colours)]
@@ -273,7 +273,7 @@ def _shares(shares: Sequence[ShareView]) -> list[PictureLine]:
 def _share_components(shares: Sequence[ShareView]) -> list[PictureLine]:
     rows, colours = [], []
     for share in shares:
-        for component in share.told["components"] if share.told is not None and not share.is_silent else ():
+        for component in share.answer["components"] if share.answer is not None and not share.is_silent else ():
             level, rate = component["level"], component["rate"]
             says = "" if level in (None, Level.OK.name) else f"{level}: {component['message']}"
             times = "-" if rate is None else f"{rate:.1f}"
@@ -298,8 +298,8 @@ def _share_warnings(shares: Sequence[ShareView]) -> list[PictureLine]:
     found = [
         (share, warning)
         for share in shares
-        if share.told and not share.is_silent
-        for warning in share.told["warnings"][-MOST_WARNINGS:]
+        if share.answer and not share.is_silent
+        for warning in share.answer["warnings"][-MOST_WARNINGS:]
     ]
     lines = [
         PictureLine(

@@ -3,32 +3,22 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Iterator, Mapping
-from importlib.util import find_spec
+from collections.abc import Iterable, Mapping
 
-from rbxcompose.base.findings import Finding, Report, kind
+from rbxcompose.base.findings import Report
 from rbxcompose.base.levels import Level
-from rbxcompose.commands.console import good, has_colour, refuse, tell, tell_report
+from rbxcompose.commands.console import emit, good, has_colour, refuse, write_report
 from rbxcompose.commands.lookup import ALREADY_UP, UNSAFE
 from rbxcompose.commands.story import StoryWriter, summary
+from rbxcompose.commands.targets import missing_extras
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.plan.model import Plan, extent
 from rbxcompose.domains.devices.openable import look_at, port_findings
 from rbxcompose.domains.devices.serial_ports import serial_ports
 from rbxcompose.runtime.folder import RobotFolder, RunOptions
 from rbxcompose.runtime.log import NAME, Follower, Record
+from rbxcompose.runtime.supervision import launch
 from rbxcompose.runtime.supervision.conductor import ROBOT_FAILED
-from rbxcompose.runtime.supervision.launch import (
-    AlreadyUp,
-    Begun,
-    LaunchReport,
-    RunEnded,
-    Started,
-    Unsafe,
-    Up,
-    start_supervisor,
-)
-from rbxcompose.sdk.capabilities import NeedsExtra
 from rbxcompose.tools.live_rules import LiveRules
 from rbxcompose.tools.robot_changes import LiveReload
 
@@ -41,14 +31,14 @@ def run_plan(plan: Plan, options: RunOptions, rules: LiveRules | None = None, re
     Its live settings keep `rules`. Meanwhile, `reload` follows its files.
     """
     plan = plan.in_one_process() if options.is_stepped else plan
-    started = start_supervisor(plan, options, rules)
+    started = launch.start_supervisor(plan, options, rules)
     return _Watch(plan, options, started, reload).run()
 
 
 class _Watch:
     """Watches one run from its first report to its last."""
 
-    def __init__(self, plan: Plan, options: RunOptions, started: Started, reload: LiveReload | None) -> None:
+    def __init__(self, plan: Plan, options: RunOptions, started: launch.Started, reload: LiveReload | None) -> None:
         self._plan, self._options, self._started, self._reload = plan, options, started, reload
         self._is_up = False
         self._story = StoryWriter([instance.name for instance in plan.instances], colour=has_colour(sys.stdout))
@@ -60,11 +50,13 @@ class _Watch:
             while True:
                 records = self._records()
                 report = self._started.wait_for_report(0.0 if records else _LOOK)
-                exit_code = self._tell(report) if isinstance(report, Up) else None  # before the records that follow
+                exit_code = (
+                    self._tell(report) if isinstance(report, launch.Up) else None
+                )  # before the records that follow
                 self._tell_story([*records, *self._records()])
                 if self._reload is not None and self._is_up and exit_code is None:
                     self._reload.look()
-                if report is not None and not isinstance(report, Up):
+                if report is not None and not isinstance(report, launch.Up):
                     exit_code = self._tell(report)
                 if exit_code is not None:
                     return exit_code
@@ -84,51 +76,39 @@ class _Watch:
     def _tell_story(self, records: Iterable[Record]) -> None:
         for record in records:
             if record.level is not Level.OK or not self._options.is_detached:
-                tell(self._story.line(record))
+                emit(self._story.line(record))
 
-    def _tell(self, report: LaunchReport) -> int | None:
+    def _tell(self, report: launch.LaunchReport) -> int | None:
         """Print a report and return the exit code if it is the last."""
         name = self._plan.robot
         match report:
-            case Begun():
+            case launch.Begun():
                 self._log = Follower(RobotFolder.of(name).path / NAME)
                 return None
-            case Up(components, processes, seconds):
+            case launch.Up(components, processes, seconds):
                 self._is_up = True
                 took = "" if self._options.is_stepped else f", {seconds:.2f} s"  # each stepped run tells the same
-                tell(f"{name} is up: {extent(components, processes)}{took}")
+                emit(f"{name} is up: {extent(components, processes)}{took}")
                 if self._options.is_detached:
                     self._started.let_go()
                     return 0
                 return None
-            case AlreadyUp(pid):
+            case launch.AlreadyUp(pid):
                 self._started.wait()
                 shown = f" (pid {pid})" if pid else ""
                 return refuse(ALREADY_UP.at(None, f"'{name}' is already up{shown}", help=f"rbxcompose down {name}"))
-            case Unsafe(reason):
+            case launch.Unsafe(reason):
                 self._started.wait()
                 return refuse(UNSAFE.at(None, reason))
-            case RunEnded(exit_code, reason, time, facts):
+            case launch.RunEnded(exit_code, reason, time, facts):
                 first, *rest = summary(name, reason, time, facts).split("\n")
-                tell("\n".join([good(first) if exit_code == 0 else first, *rest]))
+                emit("\n".join([good(first) if exit_code == 0 else first, *rest]))
                 self._started.wait()
                 return exit_code
-
-
-NO_EXTRA = kind("RBX2253")
 
 
 def is_fit(robot: Robot, sources: Mapping[str, str]) -> bool:
     """Tell what is wrong with this machine for a robot, and return whether it may start."""
     report = Report([*missing_extras(robot), *port_findings(robot, serial_ports(), look_at)])
-    tell_report(report, sources)
+    write_report(report, sources)
     return not report.has_errors
-
-
-def missing_extras(robot: Robot) -> Iterator[Finding]:
-    """Yield a finding for each component whose extra is not installed."""
-    for component, needed in robot.declared(NeedsExtra):
-        if find_spec(needed.module.value) is None:
-            message = f"'{component.name}' needs the package '{needed.module.value}', which is not installed"
-            help_text = f"pip install 'rbxcompose[{needed.extra.value}]'"
-            yield NO_EXTRA.at(robot.component_span(component.name), message, help=help_text)

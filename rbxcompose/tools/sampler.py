@@ -18,7 +18,7 @@ from rbxcompose.bus.window import SCHEMA
 from rbxcompose.commands.guest import LONGEST_QUEUE, Guest, HeardMessage
 from rbxcompose.commands.guest import NAME as VISITOR
 from rbxcompose.commands.lookup import known_state
-from rbxcompose.missions.program.statuses import IDLE, NAMES
+from rbxcompose.missions.program.outcomes import IDLE, NAMES
 from rbxcompose.missions.view.picture import picture_from_data
 from rbxcompose.missions.view.replica import ACTIVE, Replica, status_list
 from rbxcompose.msgs import registry
@@ -110,10 +110,10 @@ class Sampler:
         if heard.kind.type != DiagnosticArray.TYPE:
             return
         try:
-            told = decode(DiagnosticArray, heard.arrival.payload)
+            array = decode(DiagnosticArray, heard.arrival.payload)
         except CdrError:
             return  # the next one comes within a second
-        self._statuses = {status.name: status for status in told.status}
+        self._statuses = {status.name: status for status in array.status}
 
     def _rates(self, graph: Graph, elapsed: float | None) -> dict[str, float]:
         """Return the message rate of each component [1/s], without those that publish nothing that is counted."""
@@ -195,7 +195,7 @@ def _tree(name: str, seen: Mapping[str, Any]) -> Tree:
 
 
 def _picture_of(
-    component_state: ComponentState, is_alive: bool, rates: Mapping[str, float], told: DiagnosticStatus | None
+    component_state: ComponentState, is_alive: bool, rates: Mapping[str, float], status: DiagnosticStatus | None
 ) -> ComponentPicture:
     return ComponentPicture(
         component_state.name,
@@ -204,8 +204,8 @@ def _picture_of(
         component_state.process,
         component_state.restarts,
         rates.get(component_state.name) if is_alive else None,
-        None if told is None else level_of(told.level),
-        "" if told is None else told.message,
+        None if status is None else level_of(status.level),
+        "" if status is None else status.message,
     )
 
 
@@ -270,7 +270,7 @@ class MissionsSeen:
         if (message := _read(payload)) is None:
             return
         name = message["value"]["mission"]
-        if self._replicas.setdefault(name, Replica()).heard(message):
+        if self._replicas.setdefault(name, Replica()).apply(message):
             self._ask(f"{_PATH}/{name}")
 
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from rbxcompose.base.findings import Finding, Report, kind
-from rbxcompose.commands.console import FINDINGS, misused, refuse, tell_report
+from rbxcompose.commands.console import FINDINGS, misused, refuse, write_report
 from rbxcompose.commands.hosts import follow_commands, is_reachable, label_of, reached, shares_of
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.plan.model import Plan
@@ -77,7 +77,7 @@ def run_share(path: str, arguments: argparse.Namespace, options: RunOptions) -> 
         plan = planned(system, robot, arguments.host)
         if not is_fit(_here(robot, arguments.host), system.sources):
             return FINDINGS
-        tell_report(found := _certificate_findings(plan, system, arguments.host, path), {})
+        write_report(found := _certificate_findings(plan, system, arguments.host, path), {})
         if found.has_errors:
             return FINDINGS
         if (problem := _address_problem(plan, arguments.host)) is not None:
@@ -94,7 +94,7 @@ def compiled_for(path: str, arguments: argparse.Namespace, verb: str) -> System 
         if given:
             return misused(verb, f"{word} is for a robot; a system says itself what its robots are")
     system = compile_system(path, environment=os.environ, real=arguments.real, profiles=arguments.profile)
-    tell_report(system.report, system.sources)
+    write_report(system.report, system.sources)
     return FINDINGS if system.report.has_errors else system
 
 

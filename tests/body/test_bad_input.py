@@ -24,6 +24,7 @@ from rbxcompose.domains.body.urdf import LARGEST, read_body
 from rbxcompose.domains.body.xml_reader import read_urdf
 from rbxcompose.testing.manifests import check_file, check_text
 from tests.body.bad_bodies import ALL, MESHES, PWNED, SECRET, YAML, BadBody, computed, fixed, links, mesh, stl, urdf
+from tests.body.described import described
 from tests.soak import Soak
 
 
@@ -67,8 +68,7 @@ def test_values_may_come_from_a_yaml_file_of_the_project(tmp_path: Path) -> None
     case = computed("xacro.load_yaml('a.yaml')['names'][1]", {"a.yaml": b"names: [left, right]\n"})
     robot = check_file(case.write(tmp_path)).compilation.robot
     assert robot
-    assert robot.manifest.body
-    assert list(robot.manifest.body.body.links) == ["right"]
+    assert list(described(robot.manifest).body.links) == ["right"]
     assert YAML
 
 

@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.domains.body.description import Description
+from rbxcompose.domains.body.sections.body import body
+from tests.body.described import described
 from tests.body.kinematics import Three, description_of
 from tests.body.random_bodies import positions, urdfs
 from tests.soak import Soak
@@ -24,14 +26,13 @@ def bodies() -> dict[str, Description]:
     for file in ROBOTS:
         plain = compile_robot(str(file), environment={}).robot
         assert plain, file
-        if plain.manifest.body is None:
+        if (description := plain.manifest.contents.of(body)) is None:
             continue
-        found[file.parent.name] = plain.manifest.body
+        found[file.parent.name] = description
         for profile in plain.manifest.profiles:
             robot = compile_robot(str(file), profiles=[profile], environment={}).robot
             assert robot, (file, profile)
-            assert robot.manifest.body
-            found[f"{file.parent.name} {profile}"] = robot.manifest.body
+            found[f"{file.parent.name} {profile}"] = described(robot.manifest)
     return found
 
 

@@ -18,6 +18,7 @@ from rbxcompose.domains.body.xml_reader import XmlElement, read_urdf
 from rbxcompose.manifest.fields import FramePose, PieceAttachment
 from rbxcompose.testing.golden import Golden
 from rbxcompose.testing.manifests import Checked, check_text
+from tests.body.described import described
 
 HEAD = "rbx: 1\nkind: Robot\nname: cart\n"
 BASE = '<robot name="base"><link name="link"/></robot>\n'
@@ -81,8 +82,7 @@ def check(folder: Path, robot: str, *sets: str) -> Checked:
 def body_of(checked: Checked) -> Body:
     robot = checked.compilation.robot
     assert robot, checked.text
-    assert robot.manifest.body, checked.text
-    return robot.manifest.body.body
+    return described(robot.manifest).body
 
 
 def piece(name: str, text: str, attachment: PieceAttachment | None = None) -> PieceOfBody:
@@ -125,7 +125,7 @@ def test_the_composed_robot_reads_back_as_the_same_body(tmp_path: Path) -> None:
     assert checked.compilation.robot
     again = check(tmp_path, dump_robot(checked.compilation.robot.manifest))
     robots = [one.compilation.robot for one in (checked, again)]
-    texts = [robot.manifest.body.text for robot in robots if robot and robot.manifest.body]
+    texts = [described(robot.manifest).text for robot in robots if robot]
     assert len(texts) == 2
     assert texts[0] == texts[1]
 

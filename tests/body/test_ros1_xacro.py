@@ -17,6 +17,7 @@ from rbxcompose.domains.body.xacro import Expanded, expand
 from rbxcompose.manifest.files import library_root, shown_name
 from rbxcompose.testing.manifests import Checked, check_file, check_text
 from rbxcompose.tools.commands.check import fix
+from tests.body.described import described
 from tests.soak import Soak
 
 ROBOT = "rbx: 1\nkind: Robot\nname: cart\nbody:\n  xacro: cart.xacro\n"
@@ -55,8 +56,7 @@ def write(folder: Path, **files: str) -> None:
 def urdf_of(checked: Checked) -> str:
     robot = checked.compilation.robot
     assert robot
-    assert robot.manifest.body, checked.text
-    return robot.manifest.body.text
+    return described(robot.manifest).text
 
 
 def fixed(folder: Path) -> list[str]:
@@ -83,8 +83,8 @@ def test_bare_tags_are_read_as_they_were_meant_and_told_once_for_each_file(tmp_p
         ("wheel.xacro", 2, 3, "'<macro>' lacks the prefix 'xacro:', like 3 other tags of this file"),
     ]
     assert set(checked.codes) == {"RBX2014"}
-    body = checked.compilation.robot and checked.compilation.robot.manifest.body
-    assert body
+    assert checked.compilation.robot
+    body = described(checked.compilation.robot.manifest)
     assert list(body.body.links) == ["base", "left"]
     assert body.body.joints["left_joint"].origin.translation == (0.0, 0.0, 0.2)
     assert body.body.links["left"].inertial

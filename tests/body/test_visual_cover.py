@@ -14,6 +14,7 @@ from rbxcompose.domains.body.description import covering, to_xml
 from rbxcompose.domains.body.link_pairs import digest_of
 from rbxcompose.domains.body.urdf import read_body
 from rbxcompose.domains.body.xml_reader import XmlElement, read_urdf
+from tests.body.described import described
 from tests.parts.project import Project
 
 SIZES = st.sampled_from(("0.1", "0.25", "0.5"))
@@ -81,8 +82,7 @@ def test_a_robot_that_covers_what_is_seen_says_so_to_everybody(tmp_path: Path) -
     for cover, codes in (("collision", ["RBX2354"]), ("visual", [])):
         project.check(ROBOT.format(cover=cover), files={"robots/one/lamp.urdf": LAMP})
         assert [finding.code for finding in project.findings] == codes
-        assert project.manifest.body is not None
-        bodies.append(project.manifest.body)
+        bodies.append(described(project.manifest))
         assert project.checked is not None
         assert project.checked.compilation.robot is not None
         configs = (project.checked.compilation.robot.components[component].config for component in COMPONENTS)
@@ -94,8 +94,7 @@ def test_a_robot_that_covers_what_is_seen_says_so_to_everybody(tmp_path: Path) -
 def test_pairs_that_were_tried_on_other_shapes_do_not_count_and_check_says_so(tmp_path: Path) -> None:
     project = Project(tmp_path)
     project.check(ROBOT.format(cover="collision"), files={"robots/one/lamp.urdf": LAMP})
-    assert project.manifest.body is not None
-    digest = digest_of(project.manifest.body.body, {})
+    digest = digest_of(described(project.manifest).body, {})
     pairs = f"body: {digest}\nsamples: 100\nseed: 1\npairs:\n- [arm_tip, lamp_bulb, adjacent]\n"
     files = {"robots/one/lamp.urdf": LAMP, "robots/one/pairs.yaml": pairs}
     for cover, codes in (("collision", ["RBX2354"]), ("visual", ["RBX2307"])):

@@ -1,27 +1,29 @@
-"""The architecture page is true to the tree: packages, stages, families of codes."""
+"""The architecture page is true to the tree: rooms and domains, stages, files, families of codes."""
 
 from __future__ import annotations
 
 import ast
 import re
 
-import pytest
-
 from tests.docs.examples import ROOT
-from tests.project.test_layers import TABLE
+from tests.project.test_layers import DOMAINS, ROOMS
 
 PACKAGE = ROOT / "rbxcompose"
 PAGE = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
-MAP = re.findall(r"^- `(\w+)`: ", PAGE.partition("## Package map\n")[2].partition("\n## ")[0], re.MULTILINE)
+MAP = PAGE.partition("## Package map\n")[2].partition("\n## ")[0]
+PICTURE = MAP.split("```")[1].strip().splitlines()
 STAGES = re.findall(r"^\d+\. \*\*.+?\*\* by `(\w+)` in `([\w/.]+)`", PAGE, re.MULTILINE)
+FILE = re.compile(r"`([\w/]+\.py)`")
+ITEM = re.compile(r"^- `([\w/]+)`: (.*(?:\n  .*)*)", re.MULTILINE)
+THERE = {path.name for path in (PACKAGE / "domains").iterdir() if (path / "__init__.py").exists()}
 
 
 def calls_of(file: str, function: str) -> list[str]:
     """Return the names that a function calls, in the order of the text."""
     [found] = [node for node in functions(file) if node.name == function]
-    calls = [node for node in ast.walk(found) if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)]
-    ordered = sorted(calls, key=lambda call: (call.lineno, call.col_offset))
-    return [call.func.id for call in ordered if isinstance(call.func, ast.Name)]
+    calls = [node for node in ast.walk(found) if isinstance(node, ast.Call)]
+    ordered = [call.func for call in sorted(calls, key=lambda call: (call.lineno, call.col_offset))]
+    return [call.attr if isinstance(call, ast.Attribute) else getattr(call, "id", "") for call in ordered]
 
 
 def functions(file: str) -> list[ast.FunctionDef]:
@@ -29,16 +31,24 @@ def functions(file: str) -> list[ast.FunctionDef]:
     return [node for node in tree.body if isinstance(node, ast.FunctionDef)]
 
 
-def test_the_map_names_every_package_and_module_and_nothing_else() -> None:
-    there = {path.stem for path in PACKAGE.iterdir() if path.suffix == ".py" or (path / "__init__.py").exists()}
-    assert sorted(MAP) == sorted(there - {"__init__"})
+def test_the_picture_has_the_rooms_in_the_order_of_imports_and_fits_a_screen() -> None:
+    assert re.findall(r"^[├└]── (\w+)/", "\n".join(PICTURE), re.MULTILINE) == list(ROOMS)
+    assert len(PICTURE) <= 24
+    assert max(map(len, PICTURE)) <= 80
 
 
-@pytest.mark.parametrize("part", MAP)
-def test_imports_point_downwards_in_the_map(part: str) -> None:
-    below = set(MAP[MAP.index(part) + 1 :])
-    imported = {name.partition(".")[0] for name in TABLE[part]} - {part}
-    assert imported - below == set()
+def test_the_picture_has_every_domain_below_those_that_it_imports() -> None:
+    rows = re.findall(r"^│   [├└]── (\w+)/(?:.*may import ([\w, ]+))?", "\n".join(PICTURE), re.MULTILINE)
+    assert {name: " ".join(others.split(", ")) for name, others in rows if others} == DOMAINS
+    names = [name for name, _ in rows]
+    assert sorted(names) == sorted(THERE)
+    assert all(names.index(other) < names.index(name) for name, row in DOMAINS.items() for other in row.split())
+
+
+def test_the_lists_below_the_picture_have_every_room_and_every_domain() -> None:
+    named = [name for name, _ in ITEM.findall(MAP)]
+    assert [name for name in named if "/" not in name] == list(ROOMS)
+    assert {name.removeprefix("domains/") for name in named if "/" in name} == THERE
 
 
 def test_every_stage_is_a_function_of_the_file_that_is_named() -> None:
@@ -48,24 +58,29 @@ def test_every_stage_is_a_function_of_the_file_that_is_named() -> None:
 
 def test_the_compiler_calls_the_stages_in_this_order() -> None:
     names = [name for name, _ in STAGES]
-    called = [name for name in calls_of("compiler.py", "compile_robot") if name in names]
+    called = [name for name in calls_of("compiler/compile.py", "compile_robot") if name in names]
     assert called == names[:4]
 
 
 def test_up_compiles_and_then_runs_the_plan() -> None:
-    assert [name for name in calls_of("cli/up.py", "run") if name in ("compile_robot", "run_plan")] == [
+    assert [name for name in calls_of("tools/commands/up.py", "run") if name in ("compile_robot", "run_plan")] == [
         "compile_robot",
         "run_plan",
     ]
-    assert "start_supervisor" in calls_of("cli/robots/run_view.py", "run_plan")
+    assert "start_supervisor" in calls_of("tools/run_view.py", "run_plan")
 
 
-def test_every_family_of_codes_is_told_and_every_one_that_is_told_exists() -> None:
-    told = set(re.findall(r"^\| (RBX\d\d) \|", PAGE, re.MULTILINE))
-    assert told == {page.stem[:5] for page in (ROOT / "docs/findings").glob("RBX*.md")}
+def test_every_family_of_codes_has_a_row_and_every_row_a_family() -> None:
+    rows = set(re.findall(r"^\| (RBX\d\d) \|", PAGE, re.MULTILINE))
+    assert rows == {page.stem[:5] for page in (ROOT / "docs/findings").glob("RBX*.md")}
 
 
 def test_every_file_that_is_named_exists() -> None:
-    files = set(re.findall(r"`([\w/]+\.py)`", PAGE))
     homes = (PACKAGE, *(PACKAGE / room for room in ("runtime", "runtime/supervision", "runtime/process_group")), ROOT)
+    files = set(FILE.findall(ITEM.sub("", PAGE)))
     assert [file for file in files if not any((home / file).exists() for home in homes)] == []
+
+
+def test_every_file_that_an_item_of_the_map_names_is_in_its_room() -> None:
+    items = [(PACKAGE / room, FILE.findall(text)) for room, text in ITEM.findall(MAP)]
+    assert [f"{home}: {file}" for home, files in items for file in files if not any(home.rglob(file))] == []

@@ -9,6 +9,7 @@ import pytest
 from rbxcompose.commands import main as command
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.domains.arms.drafts import proposed_arms
+from tests.body.described import described
 from tests.body.kinematics import description_of
 from tests.conftest import ROOT
 from tests.importing.imports import EXAMPLES
@@ -21,8 +22,7 @@ LIFTER = (EXAMPLES / "srdf/lifter.urdf").read_text()
 def pi_robot() -> str:
     robot = compile_robot(str(ROOT / "robots/pi_robot"), environment={}).robot
     assert robot is not None
-    assert robot.manifest.body is not None
-    return robot.manifest.body.text
+    return described(robot.manifest).text
 
 
 @pytest.mark.parametrize(

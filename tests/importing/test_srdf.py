@@ -14,6 +14,7 @@ from rbxcompose.domains.body.link_pairs import digest_of
 from rbxcompose.domains.body.srdf import Semantics
 from rbxcompose.testing.golden import Golden
 from rbxcompose.tools.exporting.srdf import exported, semantics_of
+from tests.body.described import described
 from tests.conftest import ROOT
 from tests.importing.imports import EXAMPLES, Imported, import_files
 
@@ -42,8 +43,7 @@ def test_what_is_written_and_what_is_told(repository: Path, golden: Golden, tmp_
     compilation = compiled(tmp_path, found, LIFTER[1])
     assert [finding.code for finding in compilation.report if finding.severity == "error"] == []
     assert compilation.robot is not None
-    body = compilation.robot.manifest.body
-    assert body is not None
+    body = described(compilation.robot.manifest)
     assert body.matrix is not None
     assert body.matrix.digest == digest_of(body.body, body.meshes)
 

@@ -11,6 +11,8 @@ import pytest
 from rbxcompose.base.findings import Report
 from rbxcompose.compiler.composition.robot_file import load_robot, read_mission
 from rbxcompose.compiler.composition.robot_manifest import RobotManifest
+from rbxcompose.domains.diagnostics.sections.diagnostics import diagnostics
+from rbxcompose.domains.muxes.sections.muxes import muxes
 from rbxcompose.domains.power.components.battery_sim import BatterySimConfig
 from rbxcompose.manifest.tree import at
 
@@ -70,9 +72,9 @@ def test_the_turtlebot_has_no_mistakes_and_is_read_in_si(bench: Bench) -> None:
     assert values(robot, "battery")["warn"] == 0.5
     assert values(robot, "go_to")["speed"] == 0.3
     assert robot.places["corner_3"].heading == -math.pi / 2
-    assert robot.muxes["cmd_vel"].inputs["navigation"].source == "go_to"
+    assert robot.contents.of(muxes)["cmd_vel"].inputs["navigation"].source == "go_to"
     assert robot.missions["patrol"].path == bench.folder / "missions/patrol.yaml"
-    assert robot.diagnostics.analyzers["power"].match == ("battery", "charger")
+    assert robot.contents.of(diagnostics).analyzers["power"].match == ("battery", "charger")
     assert (robot.start, robot.values["battery"].port) == ("patrol", "battery.battery_level")
 
 
@@ -134,8 +136,8 @@ def test_a_component_with_mistakes_stays_as_far_as_it_could_be_read(bench: Bench
 def test_an_input_of_a_mux_with_mistakes_stays_in_its_mux(bench: Bench) -> None:
     robot = bench.load(("priority: 100", "priority: high"))
     assert robot
-    assert list(robot.muxes["cmd_vel"].inputs) == ["teleop", "navigation"]
-    assert robot.muxes["cmd_vel"].inputs["navigation"].source == "go_to"
+    assert list(robot.contents.of(muxes)["cmd_vel"].inputs) == ["teleop", "navigation"]
+    assert robot.contents.of(muxes)["cmd_vel"].inputs["navigation"].source == "go_to"
     assert bench.codes == ["RBX1003"]
 
 

@@ -17,6 +17,7 @@ from rbxcompose.domains.arms.motion.parametrisation import Trajectory
 from rbxcompose.domains.arms.motion.scene import PlacedObject, PlanningScene
 from rbxcompose.domains.arms.sections.scene import scene
 from rbxcompose.msgs.rbxcompose_msgs import MoveArm, PickObject, PlaceObject
+from tests.body.described import described
 from tests.conftest import ROOT
 
 FINGER = "right_gripper_finger_joint"
@@ -28,8 +29,7 @@ def made() -> tuple[ArmConfig, tuple[PlacedObject, ...], ArmWorks]:
     compiled = compile_robot(str(ROOT / "robots/pi_robot"), profiles=["table"], environment={})
     assert compiled.plan
     assert compiled.robot
-    description = compiled.robot.manifest.body
-    assert description
+    description = described(compiled.robot.manifest)
     configs: dict[str, Any] = {instance.type: instance.config for instance in compiled.plan.instances}
     objects = compiled.robot.manifest.contents.of(scene).on(description.body)
     return configs["arm"], objects, ArmWorks(configs["arm"], lambda: 0.0)

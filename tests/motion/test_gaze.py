@@ -13,6 +13,7 @@ from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.domains.arms.motion.gaze import ENOUGH, Gaze
 from rbxcompose.domains.body.model import Body
 from rbxcompose.domains.servos.limits import MotionLimits
+from tests.body.described import described
 from tests.conftest import ROOT
 
 PAN, TILT, CAMERA = "head_pan_joint", "head_tilt_joint", "camera_depth_frame"
@@ -25,8 +26,7 @@ PANS, TILTS = st.floats(-2.5, 2.5), st.floats(-1.5, 1.5)
 def body() -> Body:
     out = compile_robot(str(ROOT / "robots/pi_robot"), environment={})
     assert out.robot
-    assert out.robot.manifest.body
-    return out.robot.manifest.body.body
+    return described(out.robot.manifest).body
 
 
 def gaze(limits: dict[str, MotionLimits] = LIMITS) -> Gaze:
@@ -68,9 +68,8 @@ def test_what_keeps_it_from_looking_at_a_point_is_named() -> None:
 def test_joints_that_carry_the_head_count_where_they_are() -> None:
     tall = compile_robot(str(ROOT / "robots/porter"), environment={}).robot
     assert tall
-    assert tall.manifest.body
     tilts = [
-        Gaze(tall.manifest.body.body, CAMERA, LIMITS).aimed(AHEAD, {"torso_joint": lift}).positions[TILT]
+        Gaze(described(tall.manifest).body, CAMERA, LIMITS).aimed(AHEAD, {"torso_joint": lift}).positions[TILT]
         for lift in (0.0, 0.3)
     ]
     assert tilts[1] - tilts[0] > 0.1  # down is positive

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from rbxcompose.domains.muxes.sections.muxes import muxes
 from tests.parts.project import BATTERY, Project
 
 PLACES = "places:\n  dock: {x: 0 m, y: 0 m}\n"
@@ -177,7 +178,7 @@ def test_inputs_that_several_parts_bring_for_one_mux_stand_together(project: Pro
         """
     project.check(robot)
     assert project.findings == [], project.text
-    assert set(project.manifest.muxes["cmd_vel"].inputs) == {"navigation", "teleop", "keyboard", "script"}
+    assert set(project.manifest.contents.of(muxes)["cmd_vel"].inputs) == {"navigation", "teleop", "keyboard", "script"}
 
 
 def test_the_robot_changes_and_removes_what_a_part_brought(project: Project) -> None:

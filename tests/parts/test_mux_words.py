@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from rbxcompose.domains.muxes.sections.muxes import muxes
 from tests.parts.project import Project
 
 PICKER = """\
@@ -29,7 +30,7 @@ def test_the_first_selected_input_and_the_topic_of_a_lock_follow_their_new_names
     """
     checked = project.check(robot, {"picker": PICKER})
     assert checked.codes == [], checked.text
-    mux = project.manifest.muxes["cmd_vel"]
+    mux = project.manifest.contents.of(muxes)["cmd_vel"]
     assert (mux.initial, list(mux.inputs), mux.locks["pause"].topic) == ("first", ["by_hand", "first"], "halt")
 
 
@@ -48,4 +49,4 @@ def test_a_profile_of_the_robot_chooses_another_mode(project: Project) -> None:
     """
     checked = project.check(robot, {"picker": PICKER}, profiles=["turns"])
     assert checked.codes == [], checked.text
-    assert project.manifest.muxes["cmd_vel"].works_by == "latest"
+    assert project.manifest.contents.of(muxes)["cmd_vel"].works_by == "latest"

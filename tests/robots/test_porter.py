@@ -14,6 +14,7 @@ from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.domains.servos.bus_config import ServoBusConfig
 from rbxcompose.domains.servos.controllers.gripper import GripperConfig, model_of
 from rbxcompose.testing.bench import Ran, run_robot
+from tests.body.described import described
 from tests.conftest import ROOT
 from tests.soak import Soak
 
@@ -71,8 +72,7 @@ def test_its_fingers_are_as_far_apart_as_its_gripper_is_told() -> None:
     out = compiled()
     assert out.plan
     assert out.robot
-    assert out.robot.manifest.body
-    body = out.robot.manifest.body.body
+    body = described(out.robot.manifest).body
     [bus] = [instance.config for instance in out.plan.instances if isinstance(instance.config, ServoBusConfig)]
     hand = bus.controllers["right_gripper_controller"].config
     assert isinstance(hand, GripperConfig)

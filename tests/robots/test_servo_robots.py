@@ -14,6 +14,7 @@ from rbxcompose.msgs.std_msgs import Float64
 from rbxcompose.sdk.bound import Outcome
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench
+from tests.body.described import described
 from tests.conftest import ROOT
 
 ARM = ("shoulder_pan", "shoulder_lift", "shoulder_roll", "elbow_flex", "forearm_flex", "wrist_flex")
@@ -81,8 +82,7 @@ def test_the_arm_goes_where_it_is_commanded() -> None:
 def test_the_gripper_opens_its_tips_as_far_as_it_is_told(name: str) -> None:
     robot = compile_robot(str(ROOT / f"robots/{name}"), environment={}).robot
     assert robot
-    assert robot.manifest.body
-    body = robot.manifest.body.body
+    body = described(robot.manifest).body
     model = model_of(driver(name).config.controllers["right_gripper_controller"].config)
     for opening in (0.0, 0.04, 0.08, 0.11):
         poses = body.poses({"right_gripper_finger_joint": model.angles(opening)[0]})

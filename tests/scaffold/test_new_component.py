@@ -37,12 +37,12 @@ def installed(folder: Path) -> str:
     """Do what `pip install -e` does: its folder on the path, and its entry points beside it."""
     write_new(folder, component_files(read_component_name("thermo_meter")))
     project = tomllib.loads((folder / "thermo_meter/pyproject.toml").read_text(encoding="utf-8"))["project"]
-    points = project["entry-points"]["rbxcompose.base.plugins"]
+    points = project["entry-points"]["rbxcompose.plugins"]
     info = folder / "site/thermo_meter-0.1.0.dist-info"
     info.mkdir(parents=True)
     (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n")
     lines = [f"{name} = {module}" for name, module in points.items()]
-    (info / "entry_points.txt").write_text("\n".join(["[rbxcompose.base.plugins]", *lines, ""]))
+    (info / "entry_points.txt").write_text("\n".join(["[rbxcompose.plugins]", *lines, ""]))
     return f"{folder / 'site'}{os.pathsep}{folder / 'thermo_meter'}"
 
 

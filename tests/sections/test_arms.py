@@ -9,6 +9,7 @@ import pytest
 
 from rbxcompose.domains.arms.motion.inverse_kinematics import SolverSettings
 from rbxcompose.domains.body.link_pairs import digest_of
+from tests.body.described import described
 from tests.parts.project import Project
 
 ROBOT = """
@@ -127,8 +128,7 @@ WITH_PAIRS = ROBOT + "body: {collisions: pairs.yaml}\n"
 
 def digest(project: Project) -> str:
     project.check(ROBOT)
-    body = project.manifest.body
-    assert body is not None
+    body = described(project.manifest)
     return digest_of(body.body, body.meshes)
 
 

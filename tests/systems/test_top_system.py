@@ -58,6 +58,6 @@ def test_a_host_whose_command_ends_is_told_with_its_last_words() -> None:
     share = LiveShare("hall", "scout", _Host("hall", HostModel()))
     try:
         until(lambda: share.view().problem == "gone")
-        assert share.view().told is not None
+        assert share.view().answer is not None
     finally:
         share.close()

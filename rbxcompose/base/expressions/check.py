@@ -421,13 +421,7 @@ class _Typed:
 _NAMES = frozenset({TypeKind.TEXT, TypeKind.CHOICE, TypeKind.PLACE, TypeKind.UNKNOWN})
 _SUMS = {"+": "is added to", "-": "is reduced by"}
 _WHOLE = "write round(...) for a whole number"
-_RESULTS = {
-    "age": quantity_of(TIME),
-    "new": FLAG,
-    "count": COUNT,
-    "distance": quantity_of(LENGTH),
-    "round": COUNT,
-}
+_RESULTS = {"age": quantity_of(TIME), "new": FLAG, "count": COUNT, "distance": quantity_of(LENGTH), "round": COUNT}
 
 
 def _wider(type_: Type, other: Type) -> Type:

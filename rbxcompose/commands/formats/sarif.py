@@ -93,12 +93,7 @@ def _artifact(file: str) -> Data:
 
 
 def _region(span: Span) -> Data:
-    return {
-        "startLine": span.line,
-        "startColumn": span.column,
-        "endLine": span.end_line,
-        "endColumn": span.end_column,
-    }
+    return {"startLine": span.line, "startColumn": span.column, "endLine": span.end_line, "endColumn": span.end_column}
 
 
 def _fix(fix: Fix) -> Data:

@@ -13,19 +13,11 @@ from rbxcompose.base.findings import Finding, Report, Severity, Span, kind
 from rbxcompose.base.printable import FORBIDDEN, plain
 from rbxcompose.base.units import MOST
 from rbxcompose.commands.new_files import LONGEST_NAME, name_like
+from rbxcompose.manifest import validate
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.manifest.reader import read_source, read_text
 from rbxcompose.manifest.scalars import number_trouble, plain_value
 from rbxcompose.manifest.tree import KEY, MappingNode, ScalarNode, SequenceNode, TreeNode
-from rbxcompose.manifest.validate import (
-    KEYS,
-    MISSING_KEY,
-    OUT_OF_RANGE,
-    UNKNOWN_KEY,
-    WRONG_TYPE,
-    label_of,
-    not_a_choice,
-)
 from rbxcompose.manifest.walk import TAG
 
 
@@ -130,7 +122,7 @@ class ForeignMap:
         """Return a number of a size that manifests have."""
         found = self._scalar(key, float, "a number")
         if found is not None and not abs(found.value) < MOST:
-            self.tell(OUT_OF_RANGE.at(found.span, f"'{key}' of {self.what} must be below {MOST:g}"))
+            self.add(validate.OUT_OF_RANGE.at(found.span, f"'{key}' of {self.what} must be below {MOST:g}"))
             return None
         return found
 
@@ -138,7 +130,7 @@ class ForeignMap:
         """Return a number greater than 0."""
         found = self.number(key)
         if found is not None and not found.value > 0:
-            self.tell(OUT_OF_RANGE.at(found.span, f"'{key}' of {self.what} must be greater than 0"))
+            self.add(validate.OUT_OF_RANGE.at(found.span, f"'{key}' of {self.what} must be greater than 0"))
             return None
         return found
 
@@ -146,7 +138,7 @@ class ForeignMap:
         """Return a whole number within a range."""
         found = self._scalar(key, int, "a whole number")
         if found is not None and not least <= found.value <= most:
-            self.tell(OUT_OF_RANGE.at(found.span, f"'{key}' of {self.what} must be {least} to {most}"))
+            self.add(validate.OUT_OF_RANGE.at(found.span, f"'{key}' of {self.what} must be {least} to {most}"))
             return None
         return found
 
@@ -167,7 +159,7 @@ class ForeignMap:
         """Return one of a few words."""
         found = self.text(key)
         if found is not None and found.value not in (known := list(choices)):
-            self.tell(not_a_choice(found.span, key, self.node.get(key), known))
+            self.add(validate.not_a_choice(found.span, key, self.node.get(key), known))
             return None
         return found
 
@@ -200,19 +192,19 @@ class ForeignMap:
     def needs(self, key: str, found: T | None) -> T | None:
         """Return what was found under a key, after a finding if the key is not there at all."""
         if key not in self:
-            self.tell(MISSING_KEY.at(self.span, f"{self.what} needs the key '{key}'"))
+            self.add(validate.MISSING_KEY.at(self.span, f"{self.what} needs the key '{key}'"))
         return found
 
-    def tell(self, finding: Finding) -> None:
+    def add(self, finding: Finding) -> None:
         """Add a finding."""
         self.report.add(finding)
 
-    def tell_others(self) -> None:
+    def report_unknown_keys(self) -> None:
         """Add a finding for each key that nobody has asked for."""
         for key, entry in self.node.entries.items():
             if key not in self._asked:
                 message = f"unknown key '{plain(key, 60)}' in {self.what}"
-                self.tell(UNKNOWN_KEY.misspelt(entry.key.span, message, key, self._asked, KEYS))
+                self.add(validate.UNKNOWN_KEY.misspelt(entry.key.span, message, key, self._asked, validate.KEYS))
 
     def _ask(self, key: str) -> TreeNode | None:
         self._asked[key] = None
@@ -231,8 +223,8 @@ class ForeignMap:
     def _wrong(self, key: str, node: TreeNode, what: str) -> None:
         if isinstance(node, ScalarNode) and (number_trouble(node) or _is_refused(node.text)):
             return
-        label = "YAML takes this for an octal number" if _is_octal(node) else label_of(node)
-        self.tell(WRONG_TYPE.at(node.span, f"'{key}' of {self.what} must be {what}", label=label))
+        label = "YAML takes this for an octal number" if _is_octal(node) else validate.label_of(node)
+        self.add(validate.WRONG_TYPE.at(node.span, f"'{key}' of {self.what} must be {what}", label=label))
 
 
 def maps_in(node: MappingNode, what: str, report: Report) -> Iterator[tuple[str, ForeignMap]]:
@@ -244,7 +236,7 @@ def maps_in(node: MappingNode, what: str, report: Report) -> Iterator[tuple[str,
             yield name, ForeignMap(entry.value, f"{what} '{plain(name, 60)}'", entry.key.span, report)
         else:
             message = f"{what} '{plain(name, 60)}' must be a map of keys and values"
-            report.add(WRONG_TYPE.at(entry.value.span, message, label=label_of(entry.value)))
+            report.add(validate.WRONG_TYPE.at(entry.value.span, message, label=validate.label_of(entry.value)))
 
 
 def _is_refused(text: str) -> bool:

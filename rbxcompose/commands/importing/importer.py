@@ -69,7 +69,7 @@ def imported(program: str, files: Sequence[ForeignFile], name: str, report: Repo
 
 def broken_importers() -> list[Finding]:
     """Return a finding for each importer of another package that is left out."""
-    return [LEFT_OUT.at(None, told) for name in sorted(PLUGINS.third_party) if (told := _problem(name))]
+    return [LEFT_OUT.at(None, problem) for name in sorted(PLUGINS.third_party) if (problem := _problem(name))]
 
 
 def _problem(name: str) -> str:

@@ -32,7 +32,7 @@ def value_of(node: TreeNode) -> Given[ParameterData] | None:
 
 
 def _scalar(node: TreeNode) -> bool | int | float | str | None:
-    if not isinstance(node, ScalarNode) or is_told(node):
+    if not isinstance(node, ScalarNode) or was_refused(node):
         return None
     value = plain_value(node)
     if isinstance(value, int | float) and not isinstance(value, bool) and not abs(value) < MOST:
@@ -40,7 +40,7 @@ def _scalar(node: TreeNode) -> bool | int | float | str | None:
     return value
 
 
-def is_told(node: TreeNode) -> bool:
+def was_refused(node: TreeNode) -> bool:
     """Return whether a value was refused when the file was read."""
     return isinstance(node, ScalarNode) and bool(number_trouble(node) or FORBIDDEN.search(node.text))
 

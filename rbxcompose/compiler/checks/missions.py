@@ -26,8 +26,8 @@ from rbxcompose.base.rules import MISSIONS, OWN, WIRING
 from rbxcompose.base.units import TIME, format_quantity
 from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.composition.robot_file import MISSION
+from rbxcompose.compiler.model.mission_facts import blamed, constants, decided, ways_of
 from rbxcompose.compiler.model.robot import Robot, RobotMission
-from rbxcompose.domains.power.charge import blamed, constants, decided, ways_of
 from rbxcompose.manifest.files import files_named
 from rbxcompose.manifest.reader import read_file
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, at

@@ -12,8 +12,8 @@ from rbxcompose.base.expressions.tree import Comparison, ExpressionNode, Functio
 from rbxcompose.base.findings import Finding, Related, Severity
 from rbxcompose.base.units import ANGLE, ANGULAR_SPEED, LENGTH, SPEED, TIME, Dimension, format_quantity
 from rbxcompose.compiler.check_runner import check
+from rbxcompose.compiler.model.mission_facts import constants, ways_of
 from rbxcompose.compiler.model.robot import Robot, RobotComponent
-from rbxcompose.domains.power.charge import constants, ways_of
 from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.tree import ScalarNode, at
 from rbxcompose.missions.analysis.facts import place_in_text
@@ -122,11 +122,11 @@ def plain_number(robot: Robot) -> Iterator[Finding]:
     for component in robot.components.values():
         speeds: list[Drives | CommandsMotion] = [*component.declared(Drives), *component.declared(CommandsMotion)]
         for speed in speeds if component.is_sound else ():
-            yield from _told(robot, component, speed.max_speed, SPEED)
-            yield from _told(robot, component, speed.max_turn_rate, ANGULAR_SPEED)
+            yield from _limits(robot, component, speed.max_speed, SPEED)
+            yield from _limits(robot, component, speed.max_turn_rate, ANGULAR_SPEED)
 
 
-def _told(
+def _limits(
     robot: Robot, component: RobotComponent, setting: Setting[float] | None, dimension: Dimension
 ) -> Iterator[Finding]:
     most, unit, likely = _MOST[dimension]

@@ -14,8 +14,8 @@ from rbxcompose.base.expressions.values import EvaluationError, Value
 from rbxcompose.base.findings import Finding, Related, Severity
 from rbxcompose.base.rules import NAMES, OUR_CODES
 from rbxcompose.compiler.check_runner import all_checks, check
+from rbxcompose.compiler.model.mission_facts import constants
 from rbxcompose.compiler.model.robot import Robot, RobotComponent
-from rbxcompose.domains.power.charge import constants
 from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.missions.analysis.facts import Constants, constants_of

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from itertools import groupby
+from collections.abc import Iterator
 
 from rbxcompose.base.findings import Finding, Related, Severity, suggest
 from rbxcompose.base.rules import NAMES, WIRING
 from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.composition.robot_manifest import IncludedPart
 from rbxcompose.compiler.model.build import MISSION
-from rbxcompose.compiler.model.flow import is_written
 from rbxcompose.compiler.model.instances import answers, cycle_of, part_of, shared_names
-from rbxcompose.compiler.model.robot import PortEnd, Robot, RobotComponent, resolve
-from rbxcompose.domains.muxes.checks import missing
+from rbxcompose.compiler.model.robot import PortEnd, Robot, RobotComponent
 from rbxcompose.manifest.tree import at
-from rbxcompose.missions.analysis.effects import published
 from rbxcompose.msgs.definitions import parse_type
 from rbxcompose.sdk.capabilities import Drives, Forwards, RunsMissions
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Looks, Out, Qos, Serves, ServesAction, ServesTopic
@@ -48,7 +44,7 @@ SERVED_BY = {Calls: Serves, CallsAction: ServesAction, In: Out}
 def needed_port(robot: Robot) -> Iterator[Finding]:
     """A component needs something that nothing in the robot provides."""
     given = {(type(end.port), end.topic) for end in robot.ends}
-    lost = {end.type_name for ends in robot.writers.values() for end in ends if is_unheard(robot, end)}
+    lost = {end.type_name for ends in robot.writers.values() for end in ends if has_no_subscriber(robot, end)}
     for component in robot.components.values():
         if component.declared(RunsMissions):
             continue  # its values may come from outside, and its skills are those that exist
@@ -63,7 +59,7 @@ def needed_port(robot: Robot) -> Iterator[Finding]:
             yield _finding(robot, component, ends)
 
 
-def is_unheard(robot: Robot, end: PortEnd) -> bool:
+def has_no_subscriber(robot: Robot, end: PortEnd) -> bool:
     """Return whether this end publishes commands that nothing receives."""
     return isinstance(end.port, Out) and end.port.qos is Qos.COMMAND and end.topic not in robot.readers
 
@@ -94,56 +90,6 @@ def _such_as(ends: list[PortEnd]) -> str:
 def _fits(end: PortEnd, other: PortEnd) -> bool:
     is_another = other.instance != end.instance  # a component that subscribes to itself receives nothing
     return is_another and type(other.port) is SERVED_BY[type(end.port)] and other.type_name == end.type_name
-
-
-TYPE = "message"  # the setting of those whose type is chosen
-
-
-@check("RBX3002", closed=(WIRING,))
-def one_topic_two_types(robot: Robot) -> Iterator[Finding]:
-    """Two ports of one topic have different types."""
-    taken = {
-        (resolve(f"{mux}/{name}", robot.manifest.bus.namespace or ""), mux_input.source.partition(".")[0])
-        for mux, entry in robot.manifest.muxes.items()
-        for name, mux_input in entry.inputs.items()
-        if mux_input.source  # a type that does not fit there is reported where the mux names its source
-    }
-    ends = [end for end in robot.ends if not isinstance(end.port, Looks) and (end.topic, end.instance) not in taken]
-    for topic, group in groupby(sorted(ends, key=lambda end: end.topic), key=lambda end: end.topic):
-        first, *others = sorted(group, key=robot.end_span)
-        for other in others:
-            if other.type_name == first.type_name:
-                continue
-            if other.instance == first.instance and first.instance in robot.manifest.muxes:
-                yield _name_used_twice(robot, first.instance, topic.rpartition("/")[-1])
-            else:
-                yield one_topic_two_types.at(
-                    robot.end_span(other),
-                    f"'{topic}' is {first.type_name} for '{first.instance}', "
-                    f"but {other.type_name} for '{other.instance}'",
-                    label=f"its port '{other.name}'",
-                    help=_cure(robot, first, other),
-                    related=[Related(robot.end_span(first), f"its port '{first.name}'")],
-                )
-
-
-def _cure(robot: Robot, *ends: PortEnd) -> str:
-    """Return what helps: another type for the one whose type is a setting, else another topic."""
-    for end, wanted in zip(ends, (ends[1], ends[0]), strict=True):
-        if is_written(robot, robot.components[end.instance], TYPE):
-            return f"write '{TYPE}: {wanted.type_name.replace('/msg/', '/')}' in '{end.instance}', or another topic"
-    return "give one of them another topic with 'connect:'"
-
-
-def _name_used_twice(robot: Robot, mux: str, name: str) -> Finding:
-    """Return the finding for a mux that has an input and a lock of the same name, and so on one topic."""
-    return one_topic_two_types.at(
-        robot.key("muxes", mux, "locks", name),
-        f"mux '{mux}' uses the name '{name}' twice, for an input and for a lock: both are the topic '{mux}/{name}'",
-        label="the lock",
-        help="give the lock a name of its own",
-        related=[Related(robot.key("muxes", mux, "inputs", name), "the input")],
-    )
 
 
 _STATES = (Qos.STATE, Qos.LATCHED)
@@ -223,14 +169,16 @@ def _of_instances(robot: Robot, part: IncludedPart, earlier: IncludedPart) -> Fi
 
 def _own_names(robot: Robot, end: PortEnd, other: str) -> str:
     """Return what to write below `connect` for all that both instances write or serve."""
-    theirs = {port_end.topic for port_end in robot.components[other].ends if _tells(port_end)}
+    theirs = {port_end.topic for port_end in robot.components[other].ends if _has_state(port_end)}
     both = (
-        port_end for port_end in robot.components[end.instance].ends if port_end.topic in theirs and _tells(port_end)
+        port_end
+        for port_end in robot.components[end.instance].ends
+        if port_end.topic in theirs and _has_state(port_end)
     )
     return ", ".join(f"{port_end.name}: {end.instance}/{port_end.name}" for port_end in both)
 
 
-def _tells(end: PortEnd) -> bool:
+def _has_state(end: PortEnd) -> bool:
     return isinstance(end.port, Out) or answers(end)
 
 
@@ -251,74 +199,9 @@ def two_skills(robot: Robot) -> Iterator[Finding]:
             )
 
 
-@check("RBX3001", closed=(WIRING, NAMES))
-def two_writers(robot: Robot) -> Iterator[Finding]:
-    """Two components write commands on one topic without a mux."""
-    commands = sorted(commands_of(robot), key=lambda end: end.topic)
-    for topic, ends in groupby(commands, key=lambda end: end.topic):
-        mux = robot.manifest.muxes.get(topic.strip("/"))
-        if mux and any(mux_input.source and missing(robot, mux_input.source) for mux_input in mux.inputs.values()):
-            continue  # the mux was to take one of them, and its mistake is reported at its own place
-        writers = sorted(ends, key=lambda end: (end.instance == MISSION, robot.component_span(end.instance)))
-        first, *others = writers
-        related = [Related(robot.component_span(first.instance), "and this one")]
-        for other in others:
-            if other.instance == MISSION:
-                yield from _by_missions(robot, other, first, related)
-                continue
-            yield two_writers.at(
-                robot.component_span(other.instance),
-                f"'{other.instance}' and '{first.instance}' both write commands on '{topic}'",
-                label="this one",
-                help=_remedy(robot, topic, writers, (first.instance, other.instance)),
-                related=related,
-            )
-
-
-def commands_of(robot: Robot) -> Iterator[PortEnd]:
-    """Yield the ends that publish what somebody is commanded by, whatever they call it themselves."""
-    commanded = {(end.topic, end.type_name) for end in robot.ends if isinstance(end.port, In) and is_command(end)}
-    for end in robot.ends:
-        if isinstance(end.port, Out) and (is_command(end) or (end.topic, end.type_name) in commanded):
-            yield end
-
-
 def is_command(end: PortEnd) -> bool:
     """Return whether the messages at this end are commands."""
     return isinstance(end.port, In | Out) and end.port.qos is Qos.COMMAND
-
-
-def _by_missions(robot: Robot, end: PortEnd, writer: PortEnd, related: list[Related]) -> Iterator[Finding]:
-    """Yield a finding for each place where a mission publishes beside a component."""
-    forwards = robot.components[writer.instance].declared(Forwards)
-    free = [topic for forward in forwards for topic in _open_inputs(robot, writer.instance, forward)]
-    example = "give it an input, such as 'mission: {priority: 5, timeout: 0.5 s}', and publish there"
-    put = f"publish on an open input of the mux: {', '.join(free)}" if free else example
-    for mission in robot.missions.values():
-        for message in (template for node in mission.program.nodes for template in published(node)):
-            if resolve(message.target.text, robot.manifest.bus.namespace or "") == end.topic:
-                text = f"this mission and '{writer.instance}' both write commands on '{end.topic}'"
-                help_text = put if forwards else _new_mux(end.topic)
-                yield two_writers.at(message.target.span, text, help=help_text, related=related)
-
-
-def _open_inputs(robot: Robot, mux: str, forwards: Forwards) -> list[str]:
-    """Return the topics of a mux on which nothing in the robot publishes yet."""
-    ends = [end for end in robot.components[mux].ends if end.name in forwards.inputs]
-    return [end.port.topic for end in ends if not robot.writers.get(end.topic)]
-
-
-def _remedy(robot: Robot, topic: str, writers: Iterable[PortEnd], both: tuple[str, str]) -> str:
-    """Return how to combine two of the writers: in the mux that is also a writer, or else in a new one."""
-    mux = next((writer.instance for writer in writers if robot.components[writer.instance].declared(Forwards)), None)
-    if mux is None:
-        return _new_mux(topic)
-    missing = " and ".join(f"'from: {name}'" for name in both if name != mux)
-    return f"the mux '{mux}' has to decide: give it an input {missing}"
-
-
-def _new_mux(topic: str) -> str:
-    return f"put both into a mux: 'muxes: {{{topic.strip('/')}: ...}}' with an input 'from:' each"
 
 
 @check("RBX3016", Severity.WARNING, closed=())
@@ -360,16 +243,16 @@ _MOST_SHOWN = 8  # subscribers that are pointed at
 
 
 @check("RBX3011", Severity.WARNING, closed=(WIRING, NAMES))
-def unheard_command(robot: Robot) -> Iterator[Finding]:
+def command_without_subscriber(robot: Robot) -> Iterator[Finding]:
     """Commands are published on a topic without a subscriber."""
     waiting: dict[str, list[PortEnd]] = {}  # by the type of their messages
     for port_end in (one for topic, ends in robot.readers.items() if topic not in robot.writers for one in ends):
         waiting.setdefault(port_end.type_name, []).append(port_end)
     for end in robot.ends:
-        if is_unheard(robot, end):
+        if has_no_subscriber(robot, end):
             starving = [other for other in waiting.get(end.type_name, ()) if other.instance != end.instance]
             topics = [one.topic.strip("/") for one in starving]
-            yield unheard_command.at(
+            yield command_without_subscriber.at(
                 robot.end_span(end),
                 f"nothing subscribes to the commands of '{end.instance}' on '{end.topic}'",
                 help=_unheard_command_cure(robot, end, starving)
@@ -399,7 +282,7 @@ def _unheard_command_cure(robot: Robot, end: PortEnd, starving: list[PortEnd]) -
     topic = end.topic.strip("/")
     cure = f"let '{one.instance}' listen to '{topic}': write '{one.name}: {topic}' below its 'connect', or remove that"
     past = [writer.instance for writer in robot.writers.get(one.topic, ()) if writer.instance != end.instance]
-    if end.instance in robot.manifest.muxes and past:
+    if past and robot.components[end.instance].declared(Forwards):
         cure += f"; and let '{end.instance}' have an input with 'from: {past[0]}', which commands past it now"
     return cure
 
@@ -432,13 +315,13 @@ def instance_topics(robot: Robot) -> Iterator[Finding]:
     """Two instances of a part publish on the same topic."""
     first: dict[tuple[str, str], str] = {}  # file and topic -> instance
     for part in robot.manifest.parts.values():
-        told = {
+        shared_topics = {
             end.topic: end.port.topic
             for name in part.components & robot.components.keys()
             for end in robot.components[name].ends
             if isinstance(end.port, Out) and not is_command(end)
         }
-        for topic, short in sorted(told.items()):
+        for topic, short in sorted(shared_topics.items()):
             other = robot.manifest.parts[first.setdefault((part.file, topic), part.name)]
             if other is part or short.startswith("/"):
                 continue

@@ -18,12 +18,7 @@ from rbxcompose.compiler.sections.places import places
 from rbxcompose.compiler.sections.process import process
 from rbxcompose.compiler.sections.start import start
 from rbxcompose.compiler.sections.values import ValueModel, values
-from rbxcompose.domains.body.description import Description
-from rbxcompose.domains.body.sections.body import body
-from rbxcompose.domains.diagnostics.sections.diagnostics import diagnostics
-from rbxcompose.domains.diagnostics.settings import DiagnosticsModel
-from rbxcompose.domains.muxes.sections.muxes import MuxModel, muxes
-from rbxcompose.manifest.arguments import DeclaredArgument, size_of, told_where_given
+from rbxcompose.manifest.arguments import DeclaredArgument, at_its_argument, size_of
 from rbxcompose.manifest.section import Contents
 from rbxcompose.manifest.tree import BROKEN, KeyPath, MappingNode, ScalarNode, TreeNode, at
 
@@ -55,14 +50,14 @@ class Inclusions:
         """Add one instance."""
         self.of_file.setdefault(file, []).append(inclusion)
 
-    def told(self, findings: Iterable[Finding]) -> list[Finding]:
+    def located(self, findings: Iterable[Finding]) -> list[Finding]:
         """Return the findings, with the chain of includes added to each one inside a part.
 
         A mistake in a part with several instances is reported once; one in a given value, where it was given.
         """
         said: set[tuple[str, Span]] = set()
         out = []
-        for finding in map(told_where_given, findings):
+        for finding in map(at_its_argument, findings):
             inclusions = self.of_file.get(finding.span.file, []) if finding.span else []
             if not inclusions or finding.span is None:
                 out.append(finding)
@@ -240,11 +235,6 @@ class RobotManifest:
         return self.contents.of(components)
 
     @property
-    def muxes(self) -> Mapping[str, MuxModel]:
-        """Return the muxes."""
-        return self.contents.of(muxes)
-
-    @property
     def places(self) -> Mapping[str, Place]:
         """Return the places."""
         return self.contents.of(places)
@@ -260,11 +250,6 @@ class RobotManifest:
         return self.contents.of(missions)
 
     @property
-    def diagnostics(self) -> DiagnosticsModel:
-        """Return the groups of the components' diagnostics."""
-        return self.contents.of(diagnostics)
-
-    @property
     def bus(self) -> BusModel:
         """Return the settings of the bus."""
         return self.contents.of(bus)
@@ -273,11 +258,6 @@ class RobotManifest:
     def process(self) -> str | None:
         """Return the process group of components that do not name their own, if the robot has one."""
         return self.contents.of(process)
-
-    @property
-    def body(self) -> Description | None:
-        """Return the description of the body."""
-        return self.contents.of(body)
 
     @property
     def start(self) -> str | None:

@@ -77,10 +77,7 @@ def _own_value(name: str, declared: tuple[DeclaredArgument | None, Span], histor
 
 
 def _given_values(
-    instance: PartInstance,
-    declared: Mapping[str, tuple[DeclaredArgument | None, Span]],
-    names: Names,
-    report: Report,
+    instance: PartInstance, declared: Mapping[str, tuple[DeclaredArgument | None, Span]], names: Names, report: Report
 ) -> dict[str, Typed]:
     """Return the values of a part's arguments: those given by `with:`, else their defaults."""
     given = fill(instance.given, names, report)

@@ -85,7 +85,6 @@ def read_missions(
 
 MISSION = "mission"
 CHANGE = "rbxcompose_parameters/srv/ChangeParameters"  # of a setting, by a mission
-ALWAYS = ("transforms", "diagnostics")  # the components of every robot
 
 
 def build_robot(
@@ -183,13 +182,9 @@ class _Wires:
 
 def own_components(manifest: RobotManifest, written: Mapping[str, RobotComponent]) -> dict[str, RobotComponent]:
     """Return the components that every robot runs, except the one that runs missions."""
-    names = [*written, *ALWAYS, *([MISSION] if manifest.missions else [])]
-    groups = manifest.diagnostics
-    settings = {name: getattr(groups, name) for name in groups.model_fields_set}
-    return {
-        "transforms": _own(manifest, "transforms", {"urdf": manifest.body.text if manifest.body else ""}),
-        "diagnostics": _own(manifest, "diagnostics", {**settings, "expected": names}),
-    }
+    always = [section.always for section in sections(ROBOT) if section.always]
+    names = [*written, *(own.type_name for own in always), *([MISSION] if manifest.missions else [])]
+    return {own.type_name: _own(manifest, own.type_name, own.config(manifest.contents, names)) for own in always}
 
 
 def mission_component(robot: Robot) -> RobotComponent:
@@ -251,11 +246,16 @@ def values_of(manifest: RobotManifest, components: Mapping[str, RobotComponent])
     types: dict[str, str] = {}  # by topic
     for end in (end for component in components.values() for end in component.ends if end.type_name):
         types.setdefault(end.topic, end.type_name)
-    namespace, groups = manifest.bus.namespace or "", manifest.diagnostics.headers
+    namespace = manifest.bus.namespace or ""
+    levels = {
+        f"{section.name}.{name}": status
+        for section in sections(ROBOT)
+        for name, status in section.levels(manifest.contents).items()
+    }
     entries = {  # not those whose type is a mistake, which is told
         name: entry
         for name, entry in manifest.values.items()
         if entry.type is not None or at(manifest.root, ("values", name, "type")) is None
     }
-    found = {name: value_of(entry, components, types, namespace, groups) for name, entry in entries.items()}
+    found = {name: value_of(entry, components, types, namespace, levels) for name, entry in entries.items()}
     return {name: value for name, value in found.items() if value is not None}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Span
@@ -94,3 +94,13 @@ def setting_span(robot: Robot, *settings: tuple[RobotComponent, str]) -> Span:
 def is_written(robot: Robot, component: RobotComponent, name: str) -> bool:
     """Return whether a field of the configuration is written down in the manifest."""
     return bool(name) and at(robot.manifest.root, component.place(name)) is not None
+
+
+@dataclass(frozen=True, slots=True)
+class Wrong:
+    """An error in a source of messages: what may help, and the name in it that is not one of `valid`, if any."""
+
+    message: str
+    help: str = ""
+    name: str = ""
+    valid: Collection[str] = ()

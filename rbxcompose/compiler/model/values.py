@@ -18,7 +18,6 @@ from rbxcompose.sdk.ports import In, Out
 # The message for data from outside whose type nothing in the robot declares.
 STANDARD = {"text": "std_msgs/msg/String", "flag": "std_msgs/msg/Bool", "count": "std_msgs/msg/Int32"}
 NUMBER = "std_msgs/msg/Float32"
-DIAGNOSTICS = "diagnostics"  # the component whose groups have levels
 LEVELS_TOPIC, LEVELS_TYPE = "/diagnostics_agg", "diagnostic_msgs/msg/DiagnosticArray"
 LEVEL_WORDS = tuple(level.name.lower() for level in Level)
 DATA = "data"  # the field of the standard messages
@@ -29,17 +28,17 @@ def value_of(
     components: Mapping[str, RobotComponent],
     types: Mapping[str, str],
     namespace: str,
-    groups: Mapping[str, str],
+    levels: Mapping[str, str],
 ) -> ValueSource | None:
     """Return what a value refers to, None if its source does not exist (a check reports that).
 
-    `types` are the ROS types of the robot's topics; `groups` are the paths of the diagnostics groups, whose levels
-    are values, too.
+    `types` are the ROS types of the robot's topics; `levels` are the statuses whose levels are values, too, by
+    what `port` names.
     """
     if entry.port is not None:
+        if (status := levels.get(entry.port)) is not None:
+            return ValueSource(LEVELS_TOPIC, LEVELS_TYPE, "level", type=choice_of(*LEVEL_WORDS), group=status)
         component, _, port = entry.port.partition(".")
-        if component == DIAGNOSTICS and port in groups:
-            return ValueSource(LEVELS_TOPIC, LEVELS_TYPE, "level", type=choice_of(*LEVEL_WORDS), group=groups[port])
         end = components[component].end(port) if component in components else None
         return _of_port(end, entry) if end else None
     if entry.topic is None:

@@ -66,10 +66,7 @@ def stops_after_cut(robot: PlacedRobot) -> Iterator[StopAfterCut]:
 def _stop_of(base: RobotComponent, drives: Drives, host: str) -> StopAfterCut:
     cycles = CYCLES / (base.cls.rate_of(base.config) or SLOWEST)
     waiting = drives.stops_after.value + cycles if drives.stops_after else None
-    times = (
-        _braking(drives.max_speed, drives.acceleration),
-        _braking(drives.max_turn_rate, drives.turn_acceleration),
-    )
+    times = (_braking(drives.max_speed, drives.acceleration), _braking(drives.max_turn_rate, drives.turn_acceleration))
     known = [time for time in times if time is not None]
     return StopAfterCut(base.name, host, waiting, max(known) if len(known) == len(times) else None)
 
@@ -138,10 +135,10 @@ def every_stop(robot: PlacedRobot) -> Iterator[tuple[str, StopAfterCut | StopOfG
 
 def slow_stops(system: System, robot: PlacedRobot) -> Iterator[Finding]:
     """Yield the bases that move on for longer than the system allows."""
-    allowed, told = robot.model.stop_within, set[str]()
+    allowed, reported = robot.model.stop_within, set[str]()
     for base, one in every_stop(robot):
-        if base not in told and (one.time is None or one.time > allowed + 1e-9):
-            told.add(base)
+        if base not in reported and (one.time is None or one.time > allowed + 1e-9):
+            reported.add(base)
             written = "stop_within" in robot.model.model_fields_set
             span = robot.span(system.root, "stop_within" if written else "robot")
             message = f"after a link is cut, {one.text}; allowed is {format_quantity(allowed, TIME)}"

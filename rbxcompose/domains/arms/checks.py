@@ -13,6 +13,7 @@ from rbxcompose.base.printable import plain
 from rbxcompose.base.rules import MISSIONS, NAMES, WIRING
 from rbxcompose.base.units import LENGTH, format_quantity
 from rbxcompose.compiler.check_runner import check
+from rbxcompose.compiler.model.mission_facts import constants
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.domains.arms.mission_goals import WrittenReach, first_joint_in, length_of, word_of, written_reaches
 from rbxcompose.domains.arms.motion.grasps import grasps_of, least_width, reach_of, solid_of
@@ -23,7 +24,6 @@ from rbxcompose.domains.arms.sections.heads import heads
 from rbxcompose.domains.arms.sections.scene import scene
 from rbxcompose.domains.body.model import Body, BodyJoint, Geometry
 from rbxcompose.domains.body.sections.body import body
-from rbxcompose.domains.power.charge import constants
 from rbxcompose.domains.servos.checks import known_value
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions.analysis.facts import Constants
@@ -36,19 +36,19 @@ from rbxcompose.sdk.ports import Out
 
 @check("RBX2379", Severity.WARNING, closed=(WIRING, NAMES, "scene"))
 def frame_of_object(robot: Robot) -> Iterator[Finding]:
-    """A thing of the scene stands in a frame outside of a body that nobody places there."""
-    description, written = robot.manifest.body, robot.declared(WritesFrame)
+    """A thing of the scene is in a frame without a transform to the body."""
+    description, written = robot.manifest.contents.of(body), robot.declared(WritesFrame)
     if description is None or robot.declared(Drives):
         return  # RBX2286
-    body, placed = description.body, {frame.child.value for _, frame in written}
+    shape, placed = description.body, {frame.child.value for _, frame in written}
     known = placed | {frame.parent.value for _, frame in written}
-    for thing in robot.manifest.contents.of(scene).objects if body.root not in placed else ():
-        if thing.link not in body.links and thing.link in known:  # RBX2019 reports the others
+    for thing in robot.manifest.contents.of(scene).objects if shape.root not in placed else ():
+        if thing.link not in shape.links and thing.link in known:  # RBX2019 reports the others
             yield frame_of_object.at(
                 robot.value("scene", "objects", thing.name, "frame"),
-                f"nobody tells where '{body.root}' is in '{thing.link}'",
+                f"nobody tells where '{shape.root}' is in '{thing.link}'",
                 help="leave 'frame' out: what stands beside the robot counts from its root",
-                related=[Related(body.links[body.root].span, "the root of the body")],
+                related=[Related(shape.links[shape.root].span, "the root of the body")],
             )
 
 
@@ -86,7 +86,7 @@ def hand_without_gripper(robot: Robot) -> Iterator[Finding]:
 
 @check("RBX2376", Severity.WARNING, closed=(WIRING, MISSIONS, "scene"))
 def idle_grasps(robot: Robot) -> Iterator[Finding]:
-    """Grasps are those of an object that there is not."""
+    """Grasps are given for an object that does not exist."""
     contents = robot.manifest.contents
     objects = [object_.name for object_ in contents.of(scene).objects]
     if not objects or any(isinstance(end.port, Out) and end.port.interface is CollisionObject for end in robot.ends):
@@ -142,7 +142,7 @@ def _is_reversed(ends: list[TreeNode] | tuple[TreeNode, ...], known: Constants) 
 @check("RBX2377", closed=("heads", "scene"))
 def look_frame(robot: Robot) -> Iterator[Finding]:
     """A head is to look at a point in a frame that it does not know."""
-    contents, description = robot.manifest.contents, robot.manifest.body
+    contents, description = robot.manifest.contents, robot.manifest.contents.of(body)
     found = contents.of(heads)
     if description is None:
         return
@@ -170,15 +170,15 @@ def look_frame(robot: Robot) -> Iterator[Finding]:
 @check("RBX2378", Severity.WARNING, closed=())
 def moving_stand(robot: Robot) -> Iterator[Finding]:
     """Seen things are to stand in a frame that a joint moves."""
-    description = robot.manifest.body
+    description = robot.manifest.contents.of(body)
     for component, puts in robot.declared(PutsThings) if description else ():
-        body = description.body if description else Body("")
-        mover = next((joint for joint in body.joints_above(puts.stands_in.value) if joint.moves), None)
+        shape = description.body if description else Body("")
+        mover = next((joint for joint in shape.joints_above(puts.stands_in.value) if joint.moves), None)
         if mover is not None and component.is_sound:
             yield moving_stand.at(
                 robot.value(*component.place(puts.stands_in.field)),
                 f"'{mover.name}' moves '{puts.stands_in.value}', and with it all things that were seen",
-                help=f"write a link that it does not move, such as '{body.root}'",
+                help=f"write a link that it does not move, such as '{shape.root}'",
                 related=[Related(mover.span, "the joint")],
             )
 
@@ -251,20 +251,20 @@ _OPTICAL = "_optical"  # by REP 103, such a frame is that of its camera, with th
 @check("RBX2371", Severity.WARNING, closed=())
 def optical_camera(robot: Robot) -> Iterator[Finding]:
     """The camera of a head is an optical frame."""
-    contents, description = robot.manifest.contents, robot.manifest.body
+    contents, description = robot.manifest.contents, robot.manifest.contents.of(body)
     if description is None:
         return
-    body = description.body
+    shape = description.body
     for name, head in contents.of(heads).items():
         camera = head.model.camera
-        if _OPTICAL in camera and camera in body.joint_above:
+        if _OPTICAL in camera and camera in shape.joint_above:
             plain = camera.replace(_OPTICAL, "")
-            meant = plain if plain in body.links else body.joint_above[camera].parent
+            meant = plain if plain in shape.links else shape.joint_above[camera].parent
             yield optical_camera.at(
                 robot.value("heads", name, "camera"),
                 f"'{camera}' looks along its z, and a head points the x of its camera",
                 help=f"write 'camera: {meant}'",
-                related=[Related(body.links[camera].span, "the link")],
+                related=[Related(shape.links[camera].span, "the link")],
             )
 
 
@@ -290,7 +290,7 @@ _TURNS = ("roll", "pitch", "yaw")
 @check("RBX4167", Severity.WARNING, closed=(WIRING,))
 def reach_goal(robot: Robot) -> Iterator[Finding]:
     """An arm is to reach what it cannot reach."""
-    description = robot.manifest.body
+    description = robot.manifest.contents.of(body)
     for reach in written_reaches(robot) if description else ():
         if description:
             yield from _mistakes(robot, description.body, reach)
@@ -349,7 +349,7 @@ _SHOWN = 3
 @check("RBX2354", Severity.WARNING, closed=())
 def seen_only(robot: Robot) -> Iterator[Finding]:
     """A link is seen, and arms move through it."""
-    description = robot.manifest.body
+    description = robot.manifest.contents.of(body)
     if description is None or not robot.manifest.contents.of(arms):
         return
     found = [link for link in description.body.links.values() if link.visuals and not link.collisions]
@@ -428,7 +428,7 @@ _MOVES_THINGS = "moveit_msgs/msg/CollisionObject"
 @check("RBX2382", Severity.WARNING, closed=(WIRING, "scene"))
 def too_far(robot: Robot) -> Iterator[Finding]:
     """An arm is to pick or place something where it does not reach."""
-    description = robot.manifest.body
+    description = robot.manifest.contents.of(body)
     if description is not None:
         yield from _Reaches(robot, description.body).findings()
 
@@ -599,7 +599,7 @@ _BEARINGS = 16  # directions from which an arm may come
 @check("RBX2381", Severity.WARNING, closed=(WIRING, "scene"))
 def too_wide(robot: Robot) -> Iterator[Finding]:
     """A gripper is to pick what is wider than it opens."""
-    contents, description = robot.manifest.contents, robot.manifest.body
+    contents, description = robot.manifest.contents, robot.manifest.contents.of(body)
     if description is None:
         return
     things = {object_.name: object_ for object_ in contents.of(scene).objects}
@@ -676,25 +676,25 @@ _SOLID = ("box", "cylinder", "capsule", "sphere")
 @check("RBX2246", Severity.WARNING, closed=())
 def object_in_robot(robot: Robot) -> Iterator[Finding]:
     """A thing of the scene is where the robot is."""
-    contents, description = robot.manifest.contents, robot.manifest.body
+    contents, description = robot.manifest.contents, robot.manifest.contents.of(body)
     if description is None or not contents.of(arms):
         return
-    body = description.body
-    points = list(_fixed_points(body))
-    longest = max(length_of(robot, body, arm) for arm in contents.of(arms).values())
+    shape = description.body
+    points = list(_fixed_points(shape))
+    longest = max(length_of(robot, shape, arm) for arm in contents.of(arms).values())
     for one in contents.of(scene).objects:
-        into = body.still[one.link].compose(one.pose).inverse() if one.link in body.still else None
+        into = shape.still[one.link].compose(one.pose).inverse() if one.link in shape.still else None
         for link, point in points if into and one.shape.kind in ("box", "sphere", "cylinder") else ():
             if into and link not in one.touches and _contains(one.shape, into.apply(point)):
                 yield object_in_robot.at(
                     robot.key("scene", "objects", one.name),
                     f"'{one.name}' is where '{link}' always is, so every arm with this link collides at its start",
                     help=_UNIT if max(one.shape.size) > _TIMES * longest else _FARTHER,
-                    related=[Related(body.links[link].span, "the link")],
+                    related=[Related(shape.links[link].span, "the link")],
                 )
                 break
         else:
-            yield from _in_still_link(robot, body, one)
+            yield from _in_still_link(robot, shape, one)
 
 
 def _in_still_link(robot: Robot, body: Body, thing: PlacedObject) -> Iterator[Finding]:

@@ -16,13 +16,14 @@ from rbxcompose.base.files import replace_file
 from rbxcompose.base.findings import Report, kind, suggest
 from rbxcompose.base.units import ANGLE, LENGTH, Dimension
 from rbxcompose.commands.console import NotDoneError, misused, refuse, tell_report
-from rbxcompose.commands.targets import compiled, robot_path
+from rbxcompose.commands.targets import compiled, missing_extras, robot_path
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.domains.arms.arm_config import ArmConfig, ArmWorks
 from rbxcompose.domains.arms.sections.arms import ArmOfRobot, arms
 from rbxcompose.domains.arms.sections.scene import scene
 from rbxcompose.domains.body.description import Description
 from rbxcompose.domains.body.meshes import MissingLibraryError
+from rbxcompose.domains.body.sections.body import body
 from rbxcompose.domains.servos.sections.joints import JointPosition
 from rbxcompose.manifest.fields import FramePose
 from rbxcompose.manifest.reader import read_text
@@ -161,8 +162,6 @@ def chosen_robot(arguments: argparse.Namespace) -> Robot | None:
     report = Report()
     report.extend(finding for finding in compilation.report if finding.severity.value == "error")
     if compilation.robot is not None and not report.has_errors and arguments.action != "ls":
-        from rbxcompose.tools.run_view import missing_extras  # what starts robots
-
         report.extend(missing_extras(compilation.robot))
     tell_report(report, compilation.sources)
     return None if report.has_errors else compilation.robot
@@ -178,7 +177,7 @@ def chosen_arm(arguments: argparse.Namespace, *, is_fast: bool = False) -> tuple
     if name not in found:
         words = f"there is no arm '{name}'; {suggest(name, found, 'arms')}" if name else "name one with --arm"
         raise NotDoneError(NO_MOTION.at(None, words if found else "this robot has no arms"))
-    config, description = robot.components[name].config, robot.manifest.body
+    config, description = robot.components[name].config, robot.manifest.contents.of(body)
     if not isinstance(config, ArmConfig) or description is None:
         return None
     return found[name], works_of(robot, config, description, is_fast=is_fast)

@@ -17,7 +17,7 @@ from rbxcompose.base.findings import Finding, Report, Severity, Sources, kind
 from rbxcompose.base.printable import plain
 from rbxcompose.commands.console import FINDINGS, refuse, tell, tell_report
 from rbxcompose.commands.new_files import name_like, write_new
-from rbxcompose.commands.targets import compiled, robot_path
+from rbxcompose.commands.targets import compiled, missing_extras, robot_path
 from rbxcompose.compiler.compile import Compilation
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.domains.arms.arm_config import ArmConfig
@@ -27,6 +27,7 @@ from rbxcompose.domains.arms.motion.collisions import MeshChecker, adjacent_pair
 from rbxcompose.domains.arms.sections.arms import arms
 from rbxcompose.domains.body.description import Description
 from rbxcompose.domains.body.link_pairs import CollisionMatrix, LinkPair, read_matrix
+from rbxcompose.domains.body.sections.body import body
 from rbxcompose.domains.body.source import bare_body, is_description
 from rbxcompose.manifest.files import PREFIX, find, shown_name
 from rbxcompose.manifest.reader import read_source
@@ -62,7 +63,7 @@ def run_setup(arguments: argparse.Namespace) -> int:
     compilation = compiled(path, arguments)
     report = Report([finding for finding in compilation.report if finding.severity is Severity.ERROR])
     tell_report(report, compilation.sources)
-    description = compilation.robot.manifest.body if compilation.robot is not None else None
+    description = compilation.robot.manifest.contents.of(body) if compilation.robot is not None else None
     found = find(path)
     if report.has_errors or isinstance(found, Finding) or compilation.robot is None:
         return 1
@@ -116,8 +117,6 @@ def _propose(path: str, arguments: argparse.Namespace) -> int:
 
 
 def _checked(robot: Robot, compilation: Compilation, *, is_json: bool) -> int:
-    from rbxcompose.tools.run_view import missing_extras  # what starts robots
-
     lacking = Report([*missing_extras(robot)])
     if lacking.has_errors:
         tell_report(lacking, compilation.sources)
@@ -207,7 +206,7 @@ def run_check(robot: Robot, compilation: Compilation, *, is_json: bool) -> int:
 
 
 def _findings(robot: Robot) -> Iterator[tuple[str, str, list[tuple[str, str]], Finding]]:
-    contents, description = robot.manifest.contents, robot.manifest.body
+    contents, description = robot.manifest.contents, robot.manifest.contents.of(body)
     if description is None:
         return
     matrix = description.matrix.pairs if description.matrix is not None else {}

@@ -8,6 +8,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Vector3, rotate
 from rbxcompose.compiler.model.robot import Robot, RobotComponent
 from rbxcompose.domains.body.model import Body, BodyJoint
+from rbxcompose.domains.body.sections.body import body
 from rbxcompose.sdk.capabilities import RollsOn, Setting
 
 TOLERANCE = 0.02  # of a length, within which two count as the same
@@ -57,10 +58,11 @@ def differs(setting: Setting[float], length: float) -> bool:
 
 def rolling_bases(robot: Robot) -> Iterator[RollingBase]:
     """Yield the bases whose wheels are joints of the body."""
-    body = robot.manifest.body.body if robot.manifest.body else Body("")
+    description = robot.manifest.contents.of(body)
+    shape = description.body if description else Body("")
     for component, rolls in robot.declared(RollsOn):
         link = rolls.link.value if rolls.link else ""
-        found = [_wheel(body, setting, link) for setting in (rolls.left, rolls.right) if setting.value in body.joints]
+        found = [_wheel(shape, setting, link) for setting in (rolls.left, rolls.right) if setting.value in shape.joints]
         if len(found) == len((rolls.left, rolls.right)):
             yield RollingBase(component, rolls, *found)
 

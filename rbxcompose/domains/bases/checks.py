@@ -11,9 +11,10 @@ from rbxcompose.base.rules import NAMES, WIRING
 from rbxcompose.base.units import ANGULAR_SPEED, LENGTH, SPEED, TIME, Dimension, format_quantity
 from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.model.flow import OTHER_TYPE, Drive, MessageFlow, is_written, period_of, setting_span
+from rbxcompose.compiler.model.mission_facts import constants
 from rbxcompose.compiler.model.robot import PortEnd, Robot
 from rbxcompose.domains.bases.body_wheels import BodyWheel, differs, rolling_bases
-from rbxcompose.domains.power.charge import constants
+from rbxcompose.domains.body.sections.body import body
 from rbxcompose.domains.servos.sections.joints import joints
 from rbxcompose.missions.analysis.effects import published
 from rbxcompose.missions.analysis.facts import number_of
@@ -193,7 +194,7 @@ def _limit(robot: Robot, wheel: BodyWheel) -> float:
 
 @check("RBX2281", Severity.WARNING, closed=(WIRING,))
 def wheels_of_body(robot: Robot) -> Iterator[Finding]:
-    """The wheels of a base are others than those of its body."""
+    """The wheels of a base differ from those of its body."""
     for base in rolling_bases(robot):
         rolls, left = base.rolls, base.left
         lengths = [("wheels are %s apart", rolls.wheel_distance, abs(base.wheel_distance))]
@@ -232,21 +233,22 @@ def _moves(robot: Robot, end: PortEnd) -> bool:
 
 @check("RBX2286", Severity.WARNING, closed=(WIRING, NAMES))
 def unplaced_base(robot: Robot) -> Iterator[Finding]:
-    """Somebody looks up where the robot is, and nobody tells."""
-    description, bases = robot.manifest.body, robot.declared(Drives)
+    """A component looks up where the robot is, and nothing publishes it."""
+    description, bases = robot.manifest.contents.of(body), robot.declared(Drives)
     if description is None or not description.body.links or not bases:
         return
     links, root = description.body.links, description.body.root
     placed = {frame.child.value for _, frame in robot.declared(WritesFrame)}
     if root in placed or any(base.declared(WritesFrame) for base, _ in bases):
-        return  # a base that moves another frame is told as RBX2019
+        return  # a base that moves another frame is reported as RBX2019
     base, drives = bases[0]
     for component in robot.components.values():
         for port in (end.port for end in component.ends):
             if isinstance(port, Looks) and port.source in links and port.target not in links:
                 yield unplaced_base.at(
                     robot.entry_span(base.name, drives.commands),
-                    f"nobody tells where '{port.source}' is in '{port.target}', and '{component.name}' looks it up",
+                    f"no component publishes the transform from '{port.target}' to '{port.source}', "
+                    f"which '{component.name}' looks up",
                     help="let the base publish its frame, or add what localises the robot",
                     related=[Related(robot.entry_span(component.name), "it looks it up")],
                 )
@@ -254,22 +256,22 @@ def unplaced_base(robot: Robot) -> Iterator[Finding]:
 
 
 @check("RBX2352", Severity.WARNING, closed=(WIRING, NAMES))
-def untold_frame(robot: Robot) -> Iterator[Finding]:
-    """Nobody tells where the robot is in the frame of its virtual joint."""
-    description = robot.manifest.body
+def frame_without_publisher(robot: Robot) -> Iterator[Finding]:
+    """No component publishes the transform of a virtual joint."""
+    description = robot.manifest.contents.of(body)
     if description is None or description.virtual is None or description.virtual.kind == "fixed":
         return
     joint, root = description.virtual, description.body.root
     above = {frame.child.value: frame.parent.value for _, frame in robot.declared(WritesFrame)}
-    told, link = dict[str, None](), root
-    while (link := above.get(link, "")) and link not in told:
-        told[link] = None
-    if joint.frame not in told:
-        names = " or ".join(f"'frame: {name}'" for name in told)
-        yield untold_frame.at(
+    frames, link = dict[str, None](), root
+    while (link := above.get(link, "")) and link not in frames:
+        frames[link] = None
+    if joint.frame not in frames:
+        names = " or ".join(f"'frame: {name}'" for name in frames)
+        yield frame_without_publisher.at(
             joint.frame_span,
-            f"nobody tells where '{root}' is in '{joint.frame}'",
-            help=f"write {names}" if told else "write 'type: fixed' if it stands still, or add what localises it",
+            f"no component publishes the transform from '{joint.frame}' to '{root}'",
+            help=f"write {names}" if frames else "write 'type: fixed' if it stands still, or add what localises it",
             related=[Related(description.body.links[root].span, "the root of the body")],
         )
 

@@ -181,11 +181,7 @@ class WheelDrive:
     """Follows commands for the velocity of a base; without new ones it brakes within its limits."""
 
     def __init__(
-        self,
-        geometry: WheelGeometry,
-        limits: BaseLimits,
-        command_timeout: float = 0.5,
-        wheel_speed: float = math.inf,
+        self, geometry: WheelGeometry, limits: BaseLimits, command_timeout: float = 0.5, wheel_speed: float = math.inf
     ) -> None:
         """`command_timeout` [s] is how long a command holds; 0 is for ever. `wheel_speed` limits wheels [units/s]."""
         self.geometry = geometry
@@ -266,8 +262,8 @@ class WheelDrive:
 
 
 def _refusal(velocity: Velocity2, excess: float) -> str:
-    told = f"{velocity.linear:g} m/s and {velocity.angular:g} rad/s"
-    return f"{told} is {excess:.1f} times too fast" if velocity.is_finite else f"{told} is no velocity"
+    command = f"{velocity.linear:g} m/s and {velocity.angular:g} rad/s"
+    return f"{command} is {excess:.1f} times too fast" if velocity.is_finite else f"{command} is no velocity"
 
 
 def _scaled(velocity: Velocity2, factor: float) -> Velocity2:

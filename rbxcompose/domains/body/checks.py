@@ -11,6 +11,7 @@ from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.model.flow import is_written, setting_span
 from rbxcompose.compiler.model.robot import PortEnd, Robot, RobotComponent
 from rbxcompose.domains.body.model import Body
+from rbxcompose.domains.body.sections.body import body
 from rbxcompose.sdk.capabilities import Drives, Setting, WritesFrame
 from rbxcompose.sdk.ports import Looks
 
@@ -18,10 +19,10 @@ from rbxcompose.sdk.ports import Looks
 @check("RBX2019", Severity.WARNING, closed=(WIRING,))
 def frame_of_body(robot: Robot) -> Iterator[Finding]:
     """A component uses a frame that the body does not have."""
-    description = robot.manifest.body
+    description = robot.manifest.contents.of(body)
     if description is None or not description.body.links:
         return
-    body = description.body
+    shape = description.body
     placed = {
         frame
         for _, writes_frame in robot.declared(WritesFrame)
@@ -30,18 +31,18 @@ def frame_of_body(robot: Robot) -> Iterator[Finding]:
     placed |= {description.virtual.frame} if description.virtual else set()  # RBX2352
     for component in robot.components.values():
         for frame in component.declared(WritesFrame) if component.declared(Drives) else ():
-            if frame.child.value not in body.links:
+            if frame.child.value not in shape.links:
                 message = f"this moves the frame '{frame.child.value}', which the body does not have"
                 mover = robot.entry_span(component.name, frame.transforms)
                 is_own = is_written(robot, component, frame.child.field)
                 place = setting_span(robot, (component, frame.child.field)) if is_own else mover
-                yield _finding(body, place, message, _other_root(body, frame.child))
+                yield _finding(shape, place, message, _other_root(shape, frame.child))
         for port in (end.port for end in component.ends):
             for name in (port.source, port.target) if isinstance(port, Looks) else ():
-                if name not in placed and name not in body.links:
+                if name not in placed and name not in shape.links:
                     message = f"'{component.name}' looks up the frame '{name}', which nobody places"
-                    help_text = suggest(name, body.links, "its links")
-                    yield _finding(body, robot.entry_span(component.name), message, help_text)
+                    help_text = suggest(name, shape.links, "its links")
+                    yield _finding(shape, robot.entry_span(component.name), message, help_text)
 
 
 def _other_root(body: Body, moved: Setting[str]) -> str:
@@ -78,24 +79,27 @@ def one_frame_two_writers(robot: Robot) -> Iterator[Finding]:
 
 
 def _related(robot: Robot, other: FrameWriter) -> Iterator[Related]:
-    body = robot.manifest.body
+    description = robot.manifest.contents.of(body)
     if other.component.name in robot.written:
         yield Related(other.span(robot), "the other one")
-    elif body is not None and body.virtual is not None and other.frame.parent.value == body.body.frame:
-        yield Related(body.virtual.frame_span, "the virtual joint")
+    elif description and description.virtual and other.frame.parent.value == description.body.frame:
+        yield Related(description.virtual.frame_span, "the virtual joint")
 
 
 def _of_body(robot: Robot, written: WritesFrame) -> str:
     """Return what helps if a frame hangs on another one in the body: the root of the body is what moves."""
-    body, child = robot.manifest.body.body if robot.manifest.body else None, written.child
-    if body is not None and body.frame and child.value == body.own_root:
-        moving = f"write 'type: planar' and 'frame: {written.parent.value}' there, or leave it out"
-        return f"the virtual joint of the body fixes it in '{body.frame}': {moving}"
-    if body is None or child.value not in body.joint_above or not child.field:
+    description, child = robot.manifest.contents.of(body), written.child
+    if description is None:
         return ""
-    above = body.joint_above[child.value].parent
+    shape = description.body
+    if shape.frame and child.value == shape.own_root:
+        moving = f"write 'type: planar' and 'frame: {written.parent.value}' there, or leave it out"
+        return f"the virtual joint of the body fixes it in '{shape.frame}': {moving}"
+    if child.value not in shape.joint_above or not child.field:
+        return ""
+    above = shape.joint_above[child.value].parent
     key = child.field.rpartition(".")[-1]
-    return f"it hangs on '{above}' in the body: write '{key}: {body.root}', the root of the body"
+    return f"it hangs on '{above}' in the body: write '{key}: {shape.root}', the root of the body"
 
 
 @dataclass(frozen=True, slots=True)

@@ -253,12 +253,7 @@ class BodyPart:
 
 
 def describe(
-    name: str,
-    home: Path,
-    parts: Sequence[BodyPart],
-    sources: MutableMapping[str, str],
-    *,
-    covers_visuals: bool = False,
+    name: str, home: Path, parts: Sequence[BodyPart], sources: MutableMapping[str, str], *, covers_visuals: bool = False
 ) -> tuple[Description | None, list[Finding]]:
     """Return the body that files make together, None if there are errors; and what is wrong with it.
 

@@ -13,11 +13,11 @@ from pathlib import Path
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import replace_file
 from rbxcompose.base.findings import Finding, Report, Span, kind, one_compile
-from rbxcompose.commands.console import FINDINGS, misused, refuse, tell, tell_report
+from rbxcompose.commands.console import FINDINGS, emit, misused, refuse, write_report
 from rbxcompose.commands.targets import add_layer_options, compiled, robot_path
 from rbxcompose.domains.body.description import BodyPart, Description, describe
 from rbxcompose.domains.body.files import BodyFile
-from rbxcompose.domains.body.sections.body import as_xacro_text
+from rbxcompose.domains.body.sections.body import as_xacro_text, body
 from rbxcompose.manifest.files import find, shown_name
 
 URDF, XACRO = ".urdf", ".xacro"
@@ -66,7 +66,7 @@ def described(arguments: argparse.Namespace) -> DescribedBody:
     if not is_description(arguments.path):
         _refuse_options(arguments, _FILES, "is for .urdf and .xacro files; a robot names it in its 'body'")
         compilation = compiled(arguments.path, arguments)
-        description = compilation.robot.manifest.body if compilation.robot else None
+        description = compilation.robot.manifest.contents.of(body) if compilation.robot else None
         return DescribedBody(_usable(description), compilation.report, compilation.sources)
     _refuse_options(arguments, _LAYERS, "is for robots, not for .urdf and .xacro files")
     if arguments.with_ and arguments.path.endswith(URDF):
@@ -163,7 +163,7 @@ def read(arguments: argparse.Namespace, do: Read) -> int:
 
 def used(arguments: argparse.Namespace, found: DescribedBody, use: Use) -> int:
     """Write the findings to stderr, and use the body if there is one; return the exit code."""
-    tell_report(found.report, found.sources)
+    write_report(found.report, found.sources)
     if found.description is None:
         return FINDINGS if found.report.has_errors else refuse(no_body(arguments.path))
     return use(arguments, found.description) or (FINDINGS if found.report.has_errors else 0)
@@ -186,5 +186,5 @@ def write(file: Path, content: bytes) -> int:
         replace_file(file.resolve(), content)
     except OSError as error:
         return misused("body", f"'{file}' cannot be written: {error.strerror}")
-    tell(f"wrote {file}")
+    emit(f"wrote {file}")
     return 0

@@ -13,17 +13,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import MOST_COMPARED, Finding, Related, Span, kind
 from rbxcompose.base.geometry import Transform3, quaternion_from_rpy
 from rbxcompose.base.printable import plain
-from rbxcompose.domains.body.model import (
-    KINDS,
-    Body,
-    BodyJoint,
-    BodyLink,
-    Geometry,
-    Inertial,
-    JointLimits,
-    Mimic,
-    Shape,
-)
+from rbxcompose.domains.body import model
 from rbxcompose.domains.body.xml_reader import XmlElement, read_urdf
 
 NO_LINK = kind("RBX2005")
@@ -31,7 +21,7 @@ NO_TREE = kind("RBX2006")
 _SHOWN = 60
 
 
-def tree_mistakes(body: Body, whole: Span) -> Iterator[Finding]:
+def tree_mistakes(body: model.Body, whole: Span) -> Iterator[Finding]:
     """Yield what keeps a body from being one tree; unknown names come first, since the rest would follow from them."""
     if unknown := [*_unknown_links(body), *_wrong_mimics(body)]:
         yield from unknown
@@ -41,7 +31,7 @@ def tree_mistakes(body: Body, whole: Span) -> Iterator[Finding]:
         yield from _shape_mistakes(body)
 
 
-def _unknown_links(body: Body) -> Iterator[Finding]:
+def _unknown_links(body: model.Body) -> Iterator[Finding]:
     for joint in body.joints.values():
         spans = joint.link_spans or (joint.span, joint.span)
         for role, link, span in zip(("parent", "child"), (joint.parent, joint.child), spans, strict=True):
@@ -50,7 +40,7 @@ def _unknown_links(body: Body) -> Iterator[Finding]:
                 yield NO_LINK.misspelt(span, message, link, _that_may_be(body, joint, role), "links")
 
 
-def _that_may_be(body: Body, joint: BodyJoint, role: str) -> dict[str, BodyLink]:
+def _that_may_be(body: model.Body, joint: model.BodyJoint, role: str) -> dict[str, model.BodyLink]:
     """Return the links that a joint may name: none of those below it as its parent, none with a parent as its child."""
     if len(body.joints) > MOST_COMPARED:
         return dict(body.links)
@@ -68,7 +58,7 @@ def _that_may_be(body: Body, joint: BodyJoint, role: str) -> dict[str, BodyLink]
     return {name: link for name, link in body.links.items() if name not in taken} or dict(body.links)
 
 
-def _wrong_mimics(body: Body) -> Iterator[Finding]:
+def _wrong_mimics(body: model.Body) -> Iterator[Finding]:
     moving = [body_joint.name for body_joint in body.moving]
     for joint in body.joints.values():
         if joint.mimic is None:
@@ -84,8 +74,8 @@ def _wrong_mimics(body: Body) -> Iterator[Finding]:
             yield NO_LINK.at(joint.mimic.span, message, related=[Related(other.span, "the joint that is mimicked")])
 
 
-def _shape_mistakes(body: Body) -> Iterator[Finding]:
-    above: dict[str, BodyJoint] = {}
+def _shape_mistakes(body: model.Body) -> Iterator[Finding]:
+    above: dict[str, model.BodyJoint] = {}
     for joint in body.joints.values():
         if joint.child in above:
             message = f"link '{plain(joint.child, _SHOWN)}' is the child of two joints"
@@ -104,7 +94,7 @@ def _shape_mistakes(body: Body) -> Iterator[Finding]:
         yield from _circle(body)
 
 
-def _circle(body: Body) -> Iterator[Finding]:
+def _circle(body: model.Body) -> Iterator[Finding]:
     reached = {name for name, _ in body.walk()}
     lost = next((link for name, link in body.links.items() if name not in reached), None)
     if lost is not None:
@@ -121,10 +111,10 @@ _INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 LARGEST = 1e100  # so that sums and squares of numbers stay finite
 Colour = tuple[float, float, float, float]
 T = TypeVar("T")
-N = TypeVar("N", BodyLink, BodyJoint)
+N = TypeVar("N", model.BodyLink, model.BodyJoint)
 
 
-def read_body(root: XmlElement) -> tuple[Body, list[Finding]]:
+def read_body(root: XmlElement) -> tuple[model.Body, list[Finding]]:
     """Return the body that a URDF describes, and what is wrong with it; with findings, the body may not be a tree."""
     reader = _BodyReader()
     body = reader.body(root)
@@ -132,7 +122,7 @@ def read_body(root: XmlElement) -> tuple[Body, list[Finding]]:
 
 
 @lru_cache(maxsize=4)  # components are asked for their ports many times, which follow from the body
-def body_of(urdf: str) -> Body:
+def body_of(urdf: str) -> model.Body:
     """Return the body that a URDF of a plan describes.
 
     Raises:
@@ -155,13 +145,13 @@ class _BodyReader:
     findings: list[Finding] = field(default_factory=list)
     materials: dict[str, Colour] = field(default_factory=dict)
 
-    def body(self, root: XmlElement) -> Body:
+    def body(self, root: XmlElement) -> model.Body:
         for material in root.all("material"):
             if (colour := material.first("color")) is not None and "name" in material.attributes:
                 self.guarded(material, partial(self._remember, colour))
         links = self._named(root, "link", self._link)
         joints = self._named(root, "joint", self._joint)
-        return Body(root.attributes.get("name", ""), links, joints)
+        return model.Body(root.attributes.get("name", ""), links, joints)
 
     def _remember(self, colour: XmlElement, material: XmlElement) -> None:
         red, green, blue, opacity = numbers(colour, "rgba", 4)
@@ -189,9 +179,9 @@ class _BodyReader:
             self.findings.append(mistake.finding)
             return None
 
-    def _link(self, element: XmlElement) -> BodyLink:
+    def _link(self, element: XmlElement) -> model.BodyLink:
         inertial = element.first("inertial")
-        return BodyLink(
+        return model.BodyLink(
             text(element, "name"),
             element.span,
             _inertial(inertial) if inertial else None,
@@ -199,10 +189,10 @@ class _BodyReader:
             tuple(self._shape(xml_element) for xml_element in element.all("collision")),
         )
 
-    def _shape(self, element: XmlElement) -> Shape:
+    def _shape(self, element: XmlElement) -> model.Shape:
         geometry = needed(element, "geometry")
         size = next((child.span for child in geometry.children if child.name in _GEOMETRIES), None)
-        return Shape(_geometry(geometry), _origin(element), element.span, self._colour(element), size)
+        return model.Shape(_geometry(geometry), _origin(element), element.span, self._colour(element), size)
 
     def _colour(self, element: XmlElement) -> Colour | None:
         material = element.first("material")
@@ -213,11 +203,11 @@ class _BodyReader:
             return (red, green, blue, opacity)
         return self.materials.get(material.attributes.get("name", ""))
 
-    def _joint(self, element: XmlElement) -> BodyJoint:
+    def _joint(self, element: XmlElement) -> model.BodyJoint:
         name, kind_ = text(element, "name"), text(element, "type")
-        if kind_ not in KINDS:
+        if kind_ not in model.KINDS:
             words = f"a joint cannot be of type '{plain(kind_, _SHOWN)}'"
-            raise _MistakeError(WRONG_VALUE.misspelt(element.span, words, kind_, KINDS, "types of joints"))
+            raise _MistakeError(WRONG_VALUE.misspelt(element.span, words, kind_, model.KINDS, "types of joints"))
         parent, child = needed(element, "parent"), needed(element, "child")
         limit, mimic, axis = element.first("limit"), element.first("mimic"), element.first("axis")
         if kind_ in ("revolute", "prismatic") and limit is None:
@@ -225,7 +215,7 @@ class _BodyReader:
             raise _MistakeError(WRONG_VALUE.at(element.span, message, help="or make it 'continuous'"))
         if kind_ in ("fixed", "floating"):
             axis = None  # exporters write zeros, since nothing uses it
-        return BodyJoint(
+        return model.BodyJoint(
             name,
             kind_,
             text(parent, "link"),
@@ -240,27 +230,27 @@ class _BodyReader:
         )
 
 
-def _inertial(element: XmlElement) -> Inertial:
+def _inertial(element: XmlElement) -> model.Inertial:
     mass, inertia = needed(element, "mass"), needed(element, "inertia")
     moments = tuple(number(inertia, name) for name in _INERTIA)
-    return Inertial(number(mass, "value"), _origin(element), moments, element.span, mass.span, inertia.span)
+    return model.Inertial(number(mass, "value"), _origin(element), moments, element.span, mass.span, inertia.span)
 
 
-def _geometry(element: XmlElement) -> Geometry:
+def _geometry(element: XmlElement) -> model.Geometry:
     shape = next((child for child in element.children if child.name in _GEOMETRIES), None)
     if shape is None:
         raise _MistakeError(WRONG_VALUE.at(element.span, f"a geometry is one of {', '.join(_GEOMETRIES)}"))
     match shape.name:
         case "mesh":
             scale = numbers(shape, "scale", 3) if "scale" in shape.attributes else (1.0, 1.0, 1.0)
-            return Geometry("mesh", scale, text(shape, "filename"))
+            return model.Geometry("mesh", scale, text(shape, "filename"))
         case "box":
             size = numbers(shape, "size", 3)
         case name:
             size = tuple(number(shape, one) for one in _SIZES[name])
     if min(size) <= 0:
         raise _MistakeError(WRONG_VALUE.at(shape.span, f"the size of a {shape.name} must be positive"))
-    return Geometry(shape.name, size)
+    return model.Geometry(shape.name, size)
 
 
 def _origin(element: XmlElement) -> Transform3:
@@ -285,7 +275,7 @@ def _unit(element: XmlElement) -> tuple[float, float, float]:
     return (x / length, y / length, z / length)
 
 
-def _limits(element: XmlElement, joint: str) -> JointLimits:
+def _limits(element: XmlElement, joint: str) -> model.JointLimits:
     lower, upper, effort, velocity = (
         number(element, name) if name in element.attributes else None
         for name in ("lower", "upper", "effort", "velocity")
@@ -293,13 +283,13 @@ def _limits(element: XmlElement, joint: str) -> JointLimits:
     if lower is not None and upper is not None and lower > upper:
         message = f"the lower limit of joint '{plain(joint, _SHOWN)}' is above its upper one"
         raise _MistakeError(WRONG_VALUE.at(element.span, message))
-    return JointLimits(lower, upper, effort, velocity, element.span)
+    return model.JointLimits(lower, upper, effort, velocity, element.span)
 
 
-def _mimic(element: XmlElement) -> Mimic:
+def _mimic(element: XmlElement) -> model.Mimic:
     multiplier = number(element, "multiplier") if "multiplier" in element.attributes else 1.0
     offset = number(element, "offset") if "offset" in element.attributes else 0.0
-    return Mimic(text(element, "joint"), multiplier, offset, element.span)
+    return model.Mimic(text(element, "joint"), multiplier, offset, element.span)
 
 
 def needed(element: XmlElement, name: str) -> XmlElement:

@@ -256,7 +256,8 @@ class XacroFile:
 def expand_all(xacros: Sequence[XacroFile]) -> list[tuple[Expanded | Finding, Sequence[Path]]]:
     """Expand xacro files, or return why that is impossible; each with the files below its roots that were read."""
     return [
-        _told(xacro, answer) for xacro, answer in zip(xacros, answers([xacro.request for xacro in xacros]), strict=True)
+        _result(xacro, answer)
+        for xacro, answer in zip(xacros, answers([xacro.request for xacro in xacros]), strict=True)
     ]
 
 
@@ -267,7 +268,7 @@ def expand(
     return expand_all([XacroFile(path, arguments, packages, roots, span)])[0]
 
 
-def _told(xacro: XacroFile, answer: XacroAnswer | None) -> tuple[Expanded | Finding, Sequence[Path]]:
+def _result(xacro: XacroFile, answer: XacroAnswer | None) -> tuple[Expanded | Finding, Sequence[Path]]:
     if answer is None:
         message = f"'{plain(shown_name(xacro.path))}' does not end within its limits of time and memory"
         return NOT_EXPANDED.at(xacro.span, message, help="does a macro call itself?"), ()

@@ -60,8 +60,8 @@ def limited(answer: XacroAnswer, roots: Sequence[str]) -> XacroAnswer:
     """Return an answer as far as it is about files below the roots."""
     real = [Path(root).resolve() for root in roots]
     files, used = (
-        tuple(text for text in told if any(Path(text).is_relative_to(root) for root in real))
-        for told in (answer.files, answer.used)
+        tuple(text for text in files if any(Path(text).is_relative_to(root) for root in real))
+        for files in (answer.files, answer.used)
     )
     bare = {file: found for file, found in answer.bare.items() if file in files and found.tags}
     is_place = _PLACE.fullmatch(answer.place) and answer.place.rsplit("|", 3)[0] in files

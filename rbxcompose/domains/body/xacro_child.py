@@ -57,7 +57,7 @@ class BareTags:
                 if child.nodeType == child.ELEMENT_NODE:
                     self._look_at(child)
 
-    def told(self) -> dict[str, BareFile]:
+    def by_file(self) -> dict[str, BareFile]:
         """Return the files that have such tags."""
         found = {file: (tags, root) for file, (tags, root) in self._files.items() if tags}
         return {file: BareFile(tuple(tags[at] for at in sorted(tags)), root) for file, (tags, root) in found.items()}
@@ -243,7 +243,7 @@ def expand(request: dict[str, Any]) -> XacroAnswer:
     if len(text.encode(errors="replace")) > OUTPUT:
         return XacroAnswer(tuple(expansion.files), error=f"it expands to more than {OUTPUT:,} bytes")
     return XacroAnswer(
-        tuple(expansion.files), text, bare=expansion.bare.told(), arguments=tuple(sorted(expansion.arguments))
+        tuple(expansion.files), text, bare=expansion.bare.by_file(), arguments=tuple(sorted(expansion.arguments))
     )
 
 

@@ -151,10 +151,10 @@ class _Reader:
             return NOT_XML.at(span, _words(error))
         shown = plain(self.open[-1].name, _SHOWN)
         begun = Related(self.open[-1].span, f"'<{shown}>' starts here")
-        told = expat.ErrorString(error.code)
-        if told == expat.errors.XML_ERROR_TAG_MISMATCH:
+        problem = expat.ErrorString(error.code)
+        if problem == expat.errors.XML_ERROR_TAG_MISMATCH:
             return self._mismatch(span, shown, begun)
-        if told == expat.errors.XML_ERROR_NO_ELEMENTS:
+        if problem == expat.errors.XML_ERROR_NO_ELEMENTS:
             return NOT_XML.at(span, f"the file ends before '<{shown}>' does", related=[begun])
         return NOT_XML.at(span, _words(error))
 
@@ -180,5 +180,5 @@ class _Reader:
 
 
 def _words(error: expat.ExpatError) -> str:
-    told = expat.ErrorString(error.code)
-    return f"this is not XML: {_WORDS.get(told, told)}"
+    problem = expat.ErrorString(error.code)
+    return f"this is not XML: {_WORDS.get(problem, problem)}"

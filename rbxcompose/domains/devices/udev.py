@@ -99,8 +99,8 @@ def _parent(device: UsbDevice) -> Iterator[str]:
     yield 'SUBSYSTEMS=="usb"'
     if device.usb_port:
         yield f'KERNELS=="{device.usb_port}"'
-    told = {"idVendor": device.vendor, "idProduct": device.product, "serial": device.serial}
-    yield from (f'ATTRS{{{key}}}=="{_escaped(text)}"' for key, text in told.items() if text)
+    attributes = {"idVendor": device.vendor, "idProduct": device.product, "serial": device.serial}
+    yield from (f'ATTRS{{{key}}}=="{_escaped(text)}"' for key, text in attributes.items() if text)
 
 
 def _escaped(text: str) -> str:

@@ -44,8 +44,8 @@ class UsbDevice:
         found = _NAMED.fullmatch(port)
         if not found or not (found["vendor"] or found["usb_port"]):
             return None
-        told = {key: text for key, text in found.groupdict().items() if text and key != "interface"}
-        return cls(**told, interface=int(found["interface"]) if found["interface"] else None)
+        parts = {key: text for key, text in found.groupdict().items() if text and key != "interface"}
+        return cls(**parts, interface=int(found["interface"]) if found["interface"] else None)
 
     @property
     def port(self) -> str:

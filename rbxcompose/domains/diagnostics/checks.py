@@ -13,6 +13,7 @@ from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.checks.composition import dropped, taken_out
 from rbxcompose.compiler.model.flow import setting_span
 from rbxcompose.compiler.model.robot import Robot, RobotComponent
+from rbxcompose.domains.diagnostics.sections.diagnostics import diagnostics
 from rbxcompose.domains.diagnostics.settings import (
     SHOWN,
     AnalyzerModel,
@@ -35,7 +36,7 @@ REPORTS = 1.0  # [s] between two reports of a component's status
 @check("RBX5005")
 def analyzer_timeout(robot: Robot) -> Iterator[Finding]:
     """An analyzer treats its components as stale between two reports."""
-    for path, analyzer in each_analyzer(robot.manifest.diagnostics.analyzers):
+    for path, analyzer in each_analyzer(robot.manifest.contents.of(diagnostics).analyzers):
         if 0 < analyzer.timeout <= REPORTS:
             yield analyzer_timeout.at(
                 robot.value("diagnostics", "analyzers", *path, "timeout"),
@@ -48,7 +49,7 @@ def analyzer_timeout(robot: Robot) -> Iterator[Finding]:
 @check("RBX5012")
 def count_of_items(robot: Robot) -> Iterator[Finding]:
     """A group would need more items than it may have."""
-    for path, analyzer in each_analyzer(robot.manifest.diagnostics.analyzers):
+    for path, analyzer in each_analyzer(robot.manifest.contents.of(diagnostics).analyzers):
         least, most = analyzer.counted or (0, None)
         if most is not None and least > most:
             place = ("diagnostics", "analyzers", *path, "count")
@@ -63,7 +64,7 @@ def count_of_items(robot: Robot) -> Iterator[Finding]:
 @check("RBX5011")
 def empty_analyzer(robot: Robot) -> Iterator[Finding]:
     """An analyzer does not say what belongs to it."""
-    for path, analyzer in each_analyzer(robot.manifest.diagnostics.analyzers):
+    for path, analyzer in each_analyzer(robot.manifest.contents.of(diagnostics).analyzers):
         place = robot.key("diagnostics", "analyzers", *path)
         if analyzer.kind == "group" and not analyzer.analyzers:
             help_text = "write 'analyzers:' with the groups below it, or omit 'type: group' and write 'match:'"
@@ -78,10 +79,10 @@ def empty_analyzer(robot: Robot) -> Iterator[Finding]:
 @check("RBX5003", is_fixable=True, closed=(NAMES,))
 def expected_component(robot: Robot) -> Iterator[Finding]:
     """An analyzer expects a component that the robot does not have."""
-    if robot.manifest.diagnostics.profile == "ros1":
+    if robot.manifest.contents.of(diagnostics).profile == "ros1":
         return
     known = {*robot.components, *robot.written, *robot.brought}
-    for path, analyzer in each_analyzer(robot.manifest.diagnostics.analyzers):
+    for path, analyzer in each_analyzer(robot.manifest.contents.of(diagnostics).analyzers):
         for index, expected in enumerate(analyzer.expected):
             if expected.partition(": ")[0] not in known:
                 yield expected_component.misspelt(
@@ -126,8 +127,8 @@ _WITHOUT_EFFECT = {
 @check("RBX5010")
 def idle_analyzer_key(robot: Robot) -> Iterator[Finding]:
     """A key of an analyzer has no effect."""
-    is_ros1 = robot.manifest.diagnostics.profile == "ros1"
-    for path, analyzer in each_analyzer(robot.manifest.diagnostics.analyzers):
+    is_ros1 = robot.manifest.contents.of(diagnostics).profile == "ros1"
+    for path, analyzer in each_analyzer(robot.manifest.contents.of(diagnostics).analyzers):
         for key, why, cure in _idle(analyzer, is_ros1):
             place = robot.key("diagnostics", "analyzers", *path, key)
             yield idle_analyzer_key.at(place, f"'{key}' of analyzer '{path[-1]}' has no effect: {why}", help=cure)
@@ -152,9 +153,9 @@ def _idle(analyzer: AnalyzerModel, is_ros1: bool) -> Iterator[tuple[str, str, st
 @check("RBX5014", Severity.WARNING, closed=())
 def ignored_analyzer(robot: Robot) -> Iterator[Finding]:
     """What is to be ignored is shown in `Other`."""
-    if robot.manifest.diagnostics.profile != "ros1":
+    if robot.manifest.contents.of(diagnostics).profile != "ros1":
         return
-    for path, analyzer in each_analyzer(robot.manifest.diagnostics.analyzers):
+    for path, analyzer in each_analyzer(robot.manifest.contents.of(diagnostics).analyzers):
         if analyzer.kind == "ignore":
             yield ignored_analyzer.at(
                 robot.value("diagnostics", "analyzers", *path, "type"),
@@ -167,7 +168,7 @@ def ignored_analyzer(robot: Robot) -> Iterator[Finding]:
 def matched_twice(robot: Robot) -> Iterator[Finding]:
     """Two analyzers name the same component."""
     first: dict[str, tuple[tuple[str, ...], int]] = {}
-    for path, analyzer in each_analyzer(robot.manifest.diagnostics.analyzers):
+    for path, analyzer in each_analyzer(robot.manifest.contents.of(diagnostics).analyzers):
         shown = analyzer.conditions if analyzer.kind in SHOWN else ()
         for index, pattern in (
             (index, condition) for index, condition in enumerate(shown) if isinstance(condition, str)
@@ -190,7 +191,7 @@ GroupPath = tuple[str, ...]
 @check("RBX5013", is_fixable=True, closed=(ANALYZER,))
 def suppression(robot: Robot) -> Iterator[Finding]:
     """A group is silenced by one that does not exist, or by itself."""
-    groups = dict(_groups(robot.manifest.diagnostics.analyzers, ()))
+    groups = dict(_groups(robot.manifest.contents.of(diagnostics).analyzers, ()))
     for path, group in groups.items():
         name = group.suppressed_by
         if name is None:
@@ -249,7 +250,7 @@ def _circle(groups: Mapping[GroupPath, AnalyzerModel], start: GroupPath, first: 
 @check("RBX5015", Severity.WARNING, closed=(NAMES,))
 def too_few_items(robot: Robot) -> Iterator[Finding]:
     """A group needs more items than its components report."""
-    for path, analyzer in each_analyzer(robot.manifest.diagnostics.analyzers):
+    for path, analyzer in each_analyzer(robot.manifest.contents.of(diagnostics).analyzers):
         least, _ = analyzer.counted or (0, None)
         is_plain = all(
             isinstance(condition, str) and condition in robot.components for condition in analyzer.conditions
@@ -291,7 +292,7 @@ def unmatched_analyzer(robot: Robot) -> Iterator[Finding]:
         re.sub(r"\W+", by, name) for name in there - known for by in ("", "_")
     }  # names that are told where they stand
     compared = 0
-    for path, analyzer in each_analyzer(robot.manifest.diagnostics.analyzers):
+    for path, analyzer in each_analyzer(robot.manifest.contents.of(diagnostics).analyzers):
         patterns = [
             (index, condition) for index, condition in enumerate(analyzer.conditions) if isinstance(condition, str)
         ]
@@ -318,12 +319,12 @@ def unmatched_analyzer(robot: Robot) -> Iterator[Finding]:
 @check("RBX5002", Severity.WARNING)
 def unseen_component(robot: Robot) -> Iterator[Finding]:
     """A component belongs to no group of the diagnostics."""
-    settings = robot.manifest.diagnostics
+    settings = robot.manifest.contents.of(diagnostics)
     groups = [model for _, model in each_analyzer(settings.analyzers)]
-    told = [condition for group in groups for condition in (*group.conditions, *group.expected)]
+    named_conditions = [condition for group in groups for condition in (*group.conditions, *group.expected)]
     lost = taken_out(robot)
     meant = (name for name, step in lost.items() if isinstance(step.node, SequenceNode) and step.node.tag == REPLACE)
-    named = {*dropped(robot), *meant, *(condition for condition in told if isinstance(condition, str))}
+    named = {*dropped(robot), *meant, *(condition for condition in named_conditions if isinstance(condition, str))}
     for name in robot.written - named if groups else ():
         is_left = not any(fits(condition, name) for condition in settings.ignore) and not any(
             matches(g, name) for g in groups

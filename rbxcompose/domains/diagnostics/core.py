@@ -34,7 +34,7 @@ class Admission:
 
     def __init__(self) -> None:
         self.refused = 0
-        self._told: set[str] = set()
+        self._logged: set[str] = set()
         self._news: list[str] = []
 
     def takes(self, status: DiagnosticStatus, known: int) -> bool:
@@ -42,8 +42,8 @@ class Admission:
         reason = _reason(status.name, known)
         if reason:
             self.refused += 1
-            if reason not in self._told:
-                self._told.add(reason)
+            if reason not in self._logged:
+                self._logged.add(reason)
                 self._news.append(reason)
         return not reason
 
@@ -125,8 +125,8 @@ class GroupItem:
         status = self.item.status
         if status is None:
             return DiagnosticStatus(int(self.level), self.path, self.message())
-        is_told = self.level == status.level and not self.item.cause
-        message = status.message if is_told else self.message()
+        is_reported = self.level == status.level and not self.item.cause
+        message = status.message if is_reported else self.message()
         return DiagnosticStatus(int(self.level), self.path, message, status.hardware_id, status.values)
 
 
@@ -254,9 +254,9 @@ class Group:
             waits = self.analyzer.counted is None or self.analyzer.counted[0] > 0
             late = "nothing reported" if self._is_late(now) or self.had_items else "nothing reported yet"
             return self._wrong_count(now) or (late if waits else "OK")
-        found = list(self._told())
-        told = (row for row in found if row[0] is not OK)
-        worst = max(told, key=lambda row: self.rank(row[0]), default=None)  # the first one if several are equal
+        found = list(self._reports())
+        bad = (row for row in found if row[0] is not OK)
+        worst = max(bad, key=lambda row: self.rank(row[0]), default=None)  # the first one if several are equal
         if (wrong := self._wrong_count(now)) and (worst is None or self.rank(worst[0]) < self.rank(ERROR)):
             return wrong
         if worst is None and self.floor > OK and self.combined() is self.floor:
@@ -264,7 +264,7 @@ class Group:
             return f"{name} belongs to no group"
         return "OK" if worst is None else f"{worst[1]}: {worst[2]}"
 
-    def _told(self) -> Iterator[tuple[Level, str, str]]:
+    def _reports(self) -> Iterator[tuple[Level, str, str]]:
         yield from ((member.level, member.item.name, member.message()) for member in self.sorted_members)
         for child in self.children:
             if child.is_visible:

@@ -81,7 +81,7 @@ class Generic:
         self.items = {expected: _missing(expected, now) for expected in analyzer.expected}
         self._discards = analyzer.discard_stale and analyzer.timeout > 0
         self._prefixes = [prefix.replace("/", " ") for prefix in analyzer.strip_prefix]
-        self._told, self._told_at = OK, now  # the level of the header, and since when it has it
+        self._reported, self._reported_at = OK, now  # the level of the header, and since when it has it
 
     @property
     def is_sound(self) -> bool:
@@ -135,9 +135,9 @@ class Generic:
             values.append(KeyValue(name, item.status.message))
         level = _combined(levels, empty=STALE, is_classic=self._is_classic)
         level, message = self._counted(level)
-        was_stale = timeout > 0 and self._told is STALE and now - self._told_at > timeout
-        if level is not self._told:
-            self._told, self._told_at = level, now
+        was_stale = timeout > 0 and self._reported is STALE and now - self._reported_at > timeout
+        if level is not self._reported:
+            self._reported, self._reported_at = level, now
         if self._discards and not rows and was_stale:
             return []
         header = DiagnosticStatus(int(level), self.path, message, values=tuple(values))
@@ -244,9 +244,9 @@ class AnalyzerGroup:
             return [TreeRow(self.name or "AnalyzerGroup", _depth(self.path), is_group=True, status=status)]
         rows, levels, values = list[TreeRow](), list[int](), list[KeyValue]()
         for analyzer in self.analyzers:
-            told = analyzer.report(now)
-            rows += told
-            for header in (row.status for row in told if row.status.name == analyzer.path):
+            reported = analyzer.report(now)
+            rows += reported
+            for header in (row.status for row in reported if row.status.name == analyzer.path):
                 levels.append(header.level)
                 values.append(KeyValue(analyzer.name, header.message))
         level = _combined(levels, empty=OK, is_classic=self._is_classic)

@@ -19,8 +19,8 @@ def why(core: Core, now: float) -> str:
     """
     if (shut := _shut(core)) or not core.inputs:
         return shut or "no input"
-    told = [_who_holds(core, now), *_who_locks(core, now)]
-    return "; ".join(filter(None, told)) or _nobody(core)
+    parts = [_who_holds(core, now), *_who_locks(core, now)]
+    return "; ".join(filter(None, parts)) or _nobody(core)
 
 
 def state_of(core: Core, name: str, now: float) -> tuple[str, str]:
@@ -67,15 +67,15 @@ def _who_holds(core: Core, now: float) -> str:
 
 
 def _who_locks(core: Core, now: float) -> list[str]:
-    told: list[str] = []
+    parts: list[str] = []
     if not core.locks:
-        return told
+        return parts
     if hand := [name for name in core.locked_out(now) if name in core.locks.by_hand]:
-        told.append(f"{_listed(hand)} {_are(hand)} locked by hand")
+        parts.append(f"{_listed(hand)} {_are(hand)} locked by hand")
     if out := [name for name in core.locked_out(now) if core.locks.above(core.inputs[name], now)]:
         reasons = [core.locks.why(name, now) for name in core.locks.engaged(now)]
-        told.append(f"{_listed(reasons)}: {_listed(out)} {_are(out)} locked out")
-    return told
+        parts.append(f"{_listed(reasons)}: {_listed(out)} {_are(out)} locked out")
+    return parts
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -107,10 +107,7 @@ def lock_states(core: Core, topics: Mapping[str, str], now: float) -> tuple[MuxL
     """Return all locks."""
     return tuple(
         MuxLockState(
-            name,
-            topics[name],
-            int(entry.priority) if entry.priority < math.inf else None,
-            core.locks.why(name, now),
+            name, topics[name], int(entry.priority) if entry.priority < math.inf else None, core.locks.why(name, now)
         )
         for name, entry in core.locks.declared.items()
     )

@@ -1,29 +1,32 @@
-"""Rules about muxes: sources, ranks, timeouts, locks, and ways around them."""
+"""Rules about muxes: sources, ranks, timeouts, locks, and what meets on a topic without one or beside one."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Iterable, Iterator
+from itertools import groupby
 
-from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, Related, Severity, correction, suggest, surely_meant
 from rbxcompose.base.rules import NAMES, WIRING
 from rbxcompose.base.units import TIME, format_quantity
 from rbxcompose.compiler.check_runner import check
-from rbxcompose.compiler.model.flow import period_of, setting_span
-from rbxcompose.compiler.model.robot import Robot, RobotComponent
+from rbxcompose.compiler.checks.wiring import is_command
+from rbxcompose.compiler.model.build import MISSION
+from rbxcompose.compiler.model.flow import Wrong, is_written, period_of, setting_span
+from rbxcompose.compiler.model.robot import PortEnd, Robot, RobotComponent, resolve
 from rbxcompose.domains.muxes.config import MuxConfig
 from rbxcompose.domains.muxes.core import RAMPS
 from rbxcompose.domains.muxes.requests import NONE
-from rbxcompose.domains.muxes.sections.muxes import MuxModel
+from rbxcompose.domains.muxes.sections.muxes import MuxModel, muxes
 from rbxcompose.domains.muxes.words import HIGHEST, MODE_OF, OWN_NAMES, HoldFirst
+from rbxcompose.missions.analysis.effects import published
 from rbxcompose.sdk.capabilities import Drives, Forwards, Setting
-from rbxcompose.sdk.ports import In, Out, Qos
+from rbxcompose.sdk.ports import In, Looks, Out, Qos
 
 
 @check("RBX3130")
 def mux_heartbeat(robot: Robot) -> Iterator[Finding]:
     """A heartbeat of a mux has no timeout."""
-    for mux, entry in robot.manifest.muxes.items():
+    for mux, entry in robot.manifest.contents.of(muxes).items():
         for name, lock in entry.locks.items():
             if lock.timeout is None and lock.topic is None:
                 yield mux_heartbeat.at(
@@ -36,7 +39,7 @@ def mux_heartbeat(robot: Robot) -> Iterator[Finding]:
 @check("RBX3132", is_fixable=True)
 def mux_initial(robot: Robot) -> Iterator[Finding]:
     """What a mux selects first is not one of its inputs."""
-    for mux, entry in robot.manifest.muxes.items():
+    for mux, entry in robot.manifest.contents.of(muxes).items():
         if entry.works_by == "select" and entry.initial is not None and entry.initial not in (NONE, *entry.inputs):
             span = robot.value("muxes", mux, "initial")
             yield mux_initial.at(
@@ -50,7 +53,7 @@ def mux_initial(robot: Robot) -> Iterator[Finding]:
 @check("RBX3138")
 def mux_name(robot: Robot) -> Iterator[Finding]:
     """An input or a lock of a mux has a name that the mux needs itself."""
-    for mux, entry in robot.manifest.muxes.items():
+    for mux, entry in robot.manifest.contents.of(muxes).items():
         names = [("inputs", name) for name in entry.inputs] + [("locks", name) for name in entry.locks]
         for key, name in names:
             if name in OWN_NAMES or name.startswith("lock_"):
@@ -64,7 +67,7 @@ def mux_name(robot: Robot) -> Iterator[Finding]:
 @check("RBX3136")
 def mux_no_time(robot: Robot) -> Iterator[Finding]:
     """A timeout of a mux is 0."""
-    for mux, entry in robot.manifest.muxes.items():
+    for mux, entry in robot.manifest.contents.of(muxes).items():
         timeouts = [("inputs", name, mux_input.timeout) for name, mux_input in entry.inputs.items()]
         timeouts += [("locks", name, lock.timeout) for name, lock in entry.locks.items()]
         for key, name, timeout in timeouts:
@@ -79,15 +82,15 @@ def mux_no_time(robot: Robot) -> Iterator[Finding]:
 @check("RBX3111")
 def mux_of_mux(robot: Robot) -> Iterator[Finding]:
     """An input of a mux takes from a mux."""
-    muxes = robot.manifest.muxes
-    for mux, entry in muxes.items():
+    known = robot.manifest.contents.of(muxes)
+    for mux, entry in known.items():
         for name, mux_input in entry.inputs.items():
             source = mux if mux_input.topic == mux else (mux_input.source or "").partition(".")[0]
-            if source not in muxes:
+            if source not in known:
                 continue
             is_loop = source == mux
             message = "takes its own output" if is_loop else f"takes from the mux '{source}'"
-            inputs = ", ".join(f"'{each}'" for each in muxes[source].inputs)
+            inputs = ", ".join(f"'{each}'" for each in known[source].inputs)
             yield mux_of_mux.at(
                 robot.value("muxes", mux, "inputs", name, "topic" if mux_input.topic == mux else "from"),
                 f"input '{name}' of mux '{mux}' {message}",
@@ -99,7 +102,7 @@ def mux_of_mux(robot: Robot) -> Iterator[Finding]:
 @check("RBX3104")
 def mux_priority(robot: Robot) -> Iterator[Finding]:
     """Two inputs of a mux have the same priority."""
-    for mux, entry in robot.manifest.muxes.items():
+    for mux, entry in robot.manifest.contents.of(muxes).items():
         first: dict[int, str] = {}
         for name, priority in entry.ranks.items() if entry.profile == "default" else ():
             other = first.setdefault(priority, name)
@@ -116,7 +119,7 @@ def mux_priority(robot: Robot) -> Iterator[Finding]:
 @check("RBX3134", Severity.WARNING)
 def mux_rank_range(robot: Robot) -> Iterator[Finding]:
     """A priority beyond those of the profile `twist_mux`."""
-    for mux, entry in robot.manifest.muxes.items():
+    for mux, entry in robot.manifest.contents.of(muxes).items():
         if entry.profile != "twist_mux":
             continue
         for name, rank in entry.ranks.items():
@@ -132,7 +135,7 @@ def mux_rank_range(robot: Robot) -> Iterator[Finding]:
 @check("RBX3135", closed=(WIRING,))
 def mux_rest(robot: Robot) -> Iterator[Finding]:
     """A mux is to stop what zeros do not stop."""
-    for mux, entry in robot.manifest.muxes.items():
+    for mux, entry in robot.manifest.contents.of(muxes).items():
         config = _config(robot.components.get(mux))
         if config is None:
             continue
@@ -167,7 +170,7 @@ def _stops(entry: MuxModel) -> Iterator[tuple[str, ...]]:
 @check("RBX3137", Severity.WARNING)
 def mux_same_rank(robot: Robot) -> Iterator[Finding]:
     """Two inputs of a mux have the same priority, and the one that holds it keeps it."""
-    for mux, entry in robot.manifest.muxes.items():
+    for mux, entry in robot.manifest.contents.of(muxes).items():
         first: dict[int, str] = {}
         for name, rank in entry.ranks.items() if entry.profile == "yocs" else ():
             other = first.setdefault(rank, name)
@@ -183,7 +186,7 @@ def mux_same_rank(robot: Robot) -> Iterator[Finding]:
 @check("RBX3003", is_fixable=True, closed=(NAMES,))
 def mux_source(robot: Robot) -> Iterator[Finding]:
     """The `from:` of a mux input names no output."""
-    for mux, entry in robot.manifest.muxes.items():
+    for mux, entry in robot.manifest.contents.of(muxes).items():
         for name, source in entry.inputs.items():
             if source.source is None:
                 continue
@@ -192,16 +195,6 @@ def mux_source(robot: Robot) -> Iterator[Finding]:
                 fix = correction(wrong.name, wrong.valid, span, within=source.source)
                 message = f"input '{name}' of mux '{mux}' {wrong.message}"
                 yield mux_source.at(span, message, help=wrong.help, fix=fix)
-
-
-@dataclass(frozen=True, slots=True)
-class Wrong:
-    """An error in a source: what may help, and the name in it that is not one of `valid`, if any."""
-
-    message: str
-    help: str = ""
-    name: str = ""
-    valid: Collection[str] = ()
 
 
 def missing(robot: Robot, source: str) -> Wrong | None:
@@ -242,7 +235,7 @@ def unclear(robot: Robot, mux: str, source: str) -> Wrong | None:
 @check("RBX3101")
 def mux_timeout(robot: Robot) -> Iterator[Finding]:
     """An input of a mux times out between two of its messages."""
-    for mux, entry in robot.manifest.muxes.items():
+    for mux, entry in robot.manifest.contents.of(muxes).items():
         for name, source in entry.inputs.items():
             component = robot.components.get((source.source or "").partition(".")[0])
             period = period_of(component) if component else None
@@ -260,7 +253,7 @@ def mux_timeout(robot: Robot) -> Iterator[Finding]:
 @check("RBX3107", closed=(WIRING,))
 def mux_type(robot: Robot) -> Iterator[Finding]:
     """A mux input takes an output of another type."""
-    for mux, entry in robot.manifest.muxes.items():
+    for mux, entry in robot.manifest.contents.of(muxes).items():
         for name, mux_input in entry.inputs.items():
             own = robot.components[mux].end(name)
             component = (mux_input.source or "").partition(".")[0]
@@ -280,7 +273,7 @@ _MOST_SHOWN = 8  # inputs that are pointed at
 @check("RBX3133", Severity.WARNING)
 def mux_unreached(robot: Robot) -> Iterator[Finding]:
     """An input of a mux never gets through."""
-    for mux, entry in robot.manifest.muxes.items():
+    for mux, entry in robot.manifest.contents.of(muxes).items():
         ranks = entry.ranks if entry.profile == "twist_mux" else {}
         endless = [name for name, rank in ranks.items() if rank > 0 and not entry.inputs[name].timeout]
         top = max(endless, key=lambda name: ranks[name], default="")
@@ -303,7 +296,7 @@ def mux_unreached(robot: Robot) -> Iterator[Finding]:
 @check("RBX3131")
 def mux_word(robot: Robot) -> Iterator[Finding]:
     """A key of a mux has no meaning in its mode."""
-    for mux, entry in robot.manifest.muxes.items():
+    for mux, entry in robot.manifest.contents.of(muxes).items():
         if entry.profile != "default" and entry.works_by != MODE_OF[entry.profile]:
             message = f"the profile '{entry.profile}' of mux '{mux}' has the mode '{MODE_OF[entry.profile]}'"
             yield mux_word.at(robot.value("muxes", mux, "mode"), message, help="leave one of them out")
@@ -333,7 +326,7 @@ ENDINGS = ("on_idle", "on_lock")
 def idle_hold(robot: Robot) -> Iterator[Finding]:
     """A mux holds a command for longer than the base follows it."""
     bases = list(_bases(robot))
-    for mux, entry in robot.manifest.muxes.items():
+    for mux, entry in robot.manifest.contents.of(muxes).items():
         for ending in ENDINGS:
             written = getattr(entry, ending)
             brakes = [(base, after) for base, after, name in bases if name == mux]
@@ -363,7 +356,7 @@ def _bases(robot: Robot) -> Iterator[tuple[RobotComponent, Setting[float], str]]
 @check("RBX3105")
 def idle_lock(robot: Robot) -> Iterator[Finding]:
     """A lock of a mux blocks no input."""
-    for mux, entry in robot.manifest.muxes.items():
+    for mux, entry in robot.manifest.contents.of(muxes).items():
         ranks = entry.ranks
         lowest = min(ranks, key=lambda name: ranks[name], default="")
         for name, priority in entry.lock_ranks.items():
@@ -379,7 +372,7 @@ def idle_lock(robot: Robot) -> Iterator[Finding]:
 @check("RBX3109")
 def lock_timeout(robot: Robot) -> Iterator[Finding]:
     """A lock of a mux engages between two of its heartbeats."""
-    for mux, entry in robot.manifest.muxes.items():
+    for mux, entry in robot.manifest.contents.of(muxes).items():
         for name, lock in entry.locks.items():
             end = robot.components[mux].end(f"lock_{name}") if mux in robot.components else None
             for writer in robot.writers.get(end.topic, ()) if end else ():
@@ -401,7 +394,7 @@ LONGEST = 60.0  # [s]: commands come many times a second
 @check("RBX3108", Severity.WARNING, closed=(WIRING, NAMES))
 def long_timeout(robot: Robot) -> Iterator[Finding]:
     """An input of a mux stays live long after its source fell silent."""
-    for mux, entry in robot.manifest.muxes.items():
+    for mux, entry in robot.manifest.contents.of(muxes).items():
         for name, mux_input in entry.inputs.items():
             end = robot.components[mux].end(name)
             timeout = mux_input.timeout or 0.0
@@ -416,8 +409,8 @@ def long_timeout(robot: Robot) -> Iterator[Finding]:
 
 @check("RBX3141", Severity.WARNING)
 def no_take_over(robot: Robot) -> Iterator[Finding]:
-    """Nobody can take over from a component that drives."""
-    for mux, entry in robot.manifest.muxes.items():
+    """No input can take over from a component that drives."""
+    for mux, entry in robot.manifest.contents.of(muxes).items():
         ranks = entry.ranks if entry.profile == "default" else {}
         driving = {name: rank for name, rank in ranks.items() if entry.inputs[name].source}
         open_ones = [name for name in ranks if name not in driving]
@@ -438,7 +431,7 @@ def no_take_over(robot: Robot) -> Iterator[Finding]:
 @check("RBX3110", Severity.WARNING)
 def passed_lock(robot: Robot) -> Iterator[Finding]:
     """A lock of a mux does not hold back a component that drives."""
-    for mux, entry in robot.manifest.muxes.items():
+    for mux, entry in robot.manifest.contents.of(muxes).items():
         ranks = entry.ranks
         for name, priority in entry.lock_ranks.items():
             above = [key for key, rank in ranks.items() if entry.inputs[key].source and rank >= priority]
@@ -486,7 +479,7 @@ def _outputs(mux: RobotComponent) -> dict[str, str]:
 def taken_twice(robot: Robot) -> Iterator[Finding]:
     """Two mux inputs take the same output."""
     first: dict[str, tuple[str, str]] = {}
-    for mux, entry in robot.manifest.muxes.items():
+    for mux, entry in robot.manifest.contents.of(muxes).items():
         for name, mux_input in entry.inputs.items():
             if mux_input.source is None:
                 continue
@@ -498,3 +491,118 @@ def taken_twice(robot: Robot) -> Iterator[Finding]:
                     help="remove one of the two",
                     related=[Related(robot.value("muxes", other[0], "inputs", other[1], "from"), "taken here")],
                 )
+
+
+TYPE = "message"  # the setting of those whose type is chosen
+
+
+@check("RBX3002", closed=(WIRING,))
+def one_topic_two_types(robot: Robot) -> Iterator[Finding]:
+    """Two ports of one topic have different types."""
+    taken = {
+        (resolve(f"{mux}/{name}", robot.manifest.bus.namespace or ""), mux_input.source.partition(".")[0])
+        for mux, entry in robot.manifest.contents.of(muxes).items()
+        for name, mux_input in entry.inputs.items()
+        if mux_input.source  # a type that does not fit there is reported where the mux names its source
+    }
+    ends = [end for end in robot.ends if not isinstance(end.port, Looks) and (end.topic, end.instance) not in taken]
+    for topic, group in groupby(sorted(ends, key=lambda end: end.topic), key=lambda end: end.topic):
+        first, *others = sorted(group, key=robot.end_span)
+        for other in others:
+            if other.type_name == first.type_name:
+                continue
+            if other.instance == first.instance and first.instance in robot.manifest.contents.of(muxes):
+                yield _name_used_twice(robot, first.instance, topic.rpartition("/")[-1])
+            else:
+                yield one_topic_two_types.at(
+                    robot.end_span(other),
+                    f"'{topic}' is {first.type_name} for '{first.instance}', "
+                    f"but {other.type_name} for '{other.instance}'",
+                    label=f"its port '{other.name}'",
+                    help=_cure(robot, first, other),
+                    related=[Related(robot.end_span(first), f"its port '{first.name}'")],
+                )
+
+
+def _cure(robot: Robot, *ends: PortEnd) -> str:
+    """Return what helps: another type for the one whose type is a setting, else another topic."""
+    for end, wanted in zip(ends, (ends[1], ends[0]), strict=True):
+        if is_written(robot, robot.components[end.instance], TYPE):
+            return f"write '{TYPE}: {wanted.type_name.replace('/msg/', '/')}' in '{end.instance}', or another topic"
+    return "give one of them another topic with 'connect:'"
+
+
+def _name_used_twice(robot: Robot, mux: str, name: str) -> Finding:
+    """Return the finding for a mux that has an input and a lock of the same name, and so on one topic."""
+    return one_topic_two_types.at(
+        robot.key("muxes", mux, "locks", name),
+        f"mux '{mux}' uses the name '{name}' twice, for an input and for a lock: both are the topic '{mux}/{name}'",
+        label="the lock",
+        help="give the lock a name of its own",
+        related=[Related(robot.key("muxes", mux, "inputs", name), "the input")],
+    )
+
+
+@check("RBX3001", closed=(WIRING, NAMES))
+def two_writers(robot: Robot) -> Iterator[Finding]:
+    """Two components write commands on one topic without a mux."""
+    commands = sorted(commands_of(robot), key=lambda end: end.topic)
+    for topic, ends in groupby(commands, key=lambda end: end.topic):
+        mux = robot.manifest.contents.of(muxes).get(topic.strip("/"))
+        if mux and any(mux_input.source and missing(robot, mux_input.source) for mux_input in mux.inputs.values()):
+            continue  # the mux was to take one of them, and its mistake is reported at its own place
+        writers = sorted(ends, key=lambda end: (end.instance == MISSION, robot.component_span(end.instance)))
+        first, *others = writers
+        related = [Related(robot.component_span(first.instance), "and this one")]
+        for other in others:
+            if other.instance == MISSION:
+                yield from _by_missions(robot, other, first, related)
+                continue
+            yield two_writers.at(
+                robot.component_span(other.instance),
+                f"'{other.instance}' and '{first.instance}' both write commands on '{topic}'",
+                label="this one",
+                help=_remedy(robot, topic, writers, (first.instance, other.instance)),
+                related=related,
+            )
+
+
+def commands_of(robot: Robot) -> Iterator[PortEnd]:
+    """Yield the ends that publish what somebody is commanded by, whatever they call it themselves."""
+    commanded = {(end.topic, end.type_name) for end in robot.ends if isinstance(end.port, In) and is_command(end)}
+    for end in robot.ends:
+        if isinstance(end.port, Out) and (is_command(end) or (end.topic, end.type_name) in commanded):
+            yield end
+
+
+def _by_missions(robot: Robot, end: PortEnd, writer: PortEnd, related: list[Related]) -> Iterator[Finding]:
+    """Yield a finding for each place where a mission publishes beside a component."""
+    forwards = robot.components[writer.instance].declared(Forwards)
+    free = [topic for forward in forwards for topic in _open_inputs(robot, writer.instance, forward)]
+    example = "give it an input, such as 'mission: {priority: 5, timeout: 0.5 s}', and publish there"
+    put = f"publish on an open input of the mux: {', '.join(free)}" if free else example
+    for mission in robot.missions.values():
+        for message in (template for node in mission.program.nodes for template in published(node)):
+            if resolve(message.target.text, robot.manifest.bus.namespace or "") == end.topic:
+                text = f"this mission and '{writer.instance}' both write commands on '{end.topic}'"
+                help_text = put if forwards else _new_mux(end.topic)
+                yield two_writers.at(message.target.span, text, help=help_text, related=related)
+
+
+def _open_inputs(robot: Robot, mux: str, forwards: Forwards) -> list[str]:
+    """Return the topics of a mux on which nothing in the robot publishes yet."""
+    ends = [end for end in robot.components[mux].ends if end.name in forwards.inputs]
+    return [end.port.topic for end in ends if not robot.writers.get(end.topic)]
+
+
+def _remedy(robot: Robot, topic: str, writers: Iterable[PortEnd], both: tuple[str, str]) -> str:
+    """Return how to combine two of the writers: in the mux that is also a writer, or else in a new one."""
+    mux = next((writer.instance for writer in writers if robot.components[writer.instance].declared(Forwards)), None)
+    if mux is None:
+        return _new_mux(topic)
+    missing = " and ".join(f"'from: {name}'" for name in both if name != mux)
+    return f"the mux '{mux}' has to decide: give it an input {missing}"
+
+
+def _new_mux(topic: str) -> str:
+    return f"put both into a mux: 'muxes: {{{topic.strip('/')}: ...}}' with an input 'from:' each"

@@ -408,10 +408,7 @@ class StampedTwistRamp:
         self._ramp.end()
 
 
-RAMPS: dict[str, Callable[[float, float], Ramp[Any]]] = {
-    Twist.TYPE: TwistRamp,
-    TwistStamped.TYPE: StampedTwistRamp,
-}
+RAMPS: dict[str, Callable[[float, float], Ramp[Any]]] = {Twist.TYPE: TwistRamp, TwistStamped.TYPE: StampedTwistRamp}
 """By the name of the message type; there is none for other types."""
 
 

@@ -64,5 +64,5 @@ def input_at(text: str, topics: Mapping[str, str]) -> str | None:
 
 def noted(locked: Iterable[tuple[str, float]]) -> str:
     """Return what is locked by hand, and until which robot time [s]; empty if nothing is."""
-    told = [name if until == float("inf") else f"{name} until {until:.1f} s" for name, until in locked]
-    return f"locked by hand: {', '.join(told)}" if told else ""
+    locks = [name if until == float("inf") else f"{name} until {until:.1f} s" for name, until in locked]
+    return f"locked by hand: {', '.join(locks)}" if locks else ""

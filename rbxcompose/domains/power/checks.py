@@ -12,17 +12,9 @@ from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.checks.missions import bounds_of, implies
 from rbxcompose.compiler.checks.places import far_places
 from rbxcompose.compiler.model.flow import OTHER_TYPE, is_written, setting_span
+from rbxcompose.compiler.model.mission_facts import batteries, blamed, constants, navigator_of, ways_of
 from rbxcompose.compiler.model.robot import Robot, RobotComponent, RobotMission
-from rbxcompose.domains.power.charge import (
-    ChargeInterrupt,
-    batteries,
-    blamed,
-    calls,
-    charger_of,
-    constants,
-    navigator_of,
-    ways_of,
-)
+from rbxcompose.domains.power.charge import ChargeInterrupt, calls, charger_of
 from rbxcompose.missions.analysis.bounds import truth
 from rbxcompose.missions.analysis.facts import goal_place
 from rbxcompose.missions.analysis.travel_times import Ways, distance, too_short

@@ -14,8 +14,8 @@ from rbxcompose.base.rules import NAMES, WIRING
 from rbxcompose.base.units import ANGLE, BIT_RATE, FREQUENCY, LENGTH, TIME, UNITS, Quantity, format_quantity
 from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.model.flow import setting_span
+from rbxcompose.compiler.model.mission_facts import constants, is_served
 from rbxcompose.compiler.model.robot import PortEnd, Robot, RobotMission
-from rbxcompose.domains.power.charge import constants, is_served
 from rbxcompose.domains.servos.bus import FACTORY_DELAY
 from rbxcompose.domains.servos.driven_joints import BUSES, ROUNDED, DrivenBus, DrivenJoint, driven_buses, driven_joints
 from rbxcompose.domains.servos.models import COMMON_BAUDS, model_named, stall_torque
@@ -30,7 +30,7 @@ from rbxcompose.missions.engine.value_text import show
 from rbxcompose.missions.language.asked import WrittenArgument, expression_of
 from rbxcompose.missions.program.answers import NodeFlow
 from rbxcompose.missions.program.program import MissionNode
-from rbxcompose.sdk.capabilities import BoundsGoals
+from rbxcompose.sdk.capabilities import BoundsGoals, LocksInSilence
 from rbxcompose.sdk.ports import In, ServesAction
 
 
@@ -334,14 +334,14 @@ def late_safety(robot: Robot) -> Iterator[Finding]:
             f"the emergency stop may be silent for {format_quantity(care.estop.deadline, TIME)} until the robot stops",
             help="a few times the time between two of its messages is enough, such as '0.5 s'",
         )
-    for mux, entry in robot.manifest.muxes.items():
-        for name, lock in entry.locks.items():
-            if lock.timeout and lock.timeout > _LONGEST:
-                yield late_safety.at(
-                    robot.value("muxes", mux, "locks", name, "timeout"),
-                    f"lock '{name}' of mux '{mux}' engages after {format_quantity(lock.timeout, TIME)} of silence only",
-                    help="a few times the time between two heartbeats is enough, such as '0.5 s'",
-                )
+    for mux, lock in robot.declared(LocksInSilence):
+        if lock.timeout.value > _LONGEST:
+            silence = format_quantity(lock.timeout.value, TIME)
+            yield late_safety.at(
+                robot.value(*mux.place(lock.timeout.field)),
+                f"lock '{lock.name.value}' of mux '{mux.name}' engages after {silence} of silence only",
+                help="a few times the time between two heartbeats is enough, such as '0.5 s'",
+            )
 
 
 @check("RBX2248", Severity.WARNING, closed=())

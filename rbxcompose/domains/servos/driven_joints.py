@@ -10,6 +10,7 @@ from rbxcompose.base.findings import Span
 from rbxcompose.base.units import ANGLE, ANGULAR_SPEED, LENGTH, SPEED, format_quantity
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.domains.body.model import BodyJoint
+from rbxcompose.domains.body.sections.body import body
 from rbxcompose.domains.servos.bus import DYNAMIXEL
 from rbxcompose.domains.servos.joint_drive import ServoJoint
 from rbxcompose.domains.servos.models import ServoModel
@@ -88,7 +89,8 @@ def driven_buses(robot: Robot) -> Iterator[DrivenBus]:
 def driven_joints(robot: Robot) -> Iterator[DrivenJoint]:
     """Yield all joints that servos drive."""
     written = robot.manifest.contents.of(joints)
-    body = robot.manifest.body.body.joints if robot.manifest.body else {}
+    description = robot.manifest.contents.of(body)
+    known = description.body.joints if description else {}
     for component in robot.components.values():
         if component.path[:1] == BUSES:
             from rbxcompose.domains.servos.bus_config import drives_of  # slow to import, and most robots need none
@@ -97,5 +99,5 @@ def driven_joints(robot: Robot) -> Iterator[DrivenJoint]:
             for name, drive in drives_of(bus).items():
                 if name in written:
                     yield DrivenJoint(
-                        robot, bus.name, written[name], body.get(name), drive.joint, bus.joints[name].mimic
+                        robot, bus.name, written[name], known.get(name), drive.joint, bus.joints[name].mimic
                     )

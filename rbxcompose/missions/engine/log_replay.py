@@ -13,8 +13,8 @@ from rbxcompose.missions.engine.events import MissionEvent
 from rbxcompose.missions.engine.logbook import BEGIN, INPUTS, LogRecord, record_of
 from rbxcompose.missions.engine.snapshot import NoValue, from_plain
 from rbxcompose.missions.engine.world import PLAIN, Settings
+from rbxcompose.missions.program.outcomes import Result
 from rbxcompose.missions.program.program import Program, RobotNames
-from rbxcompose.missions.program.statuses import Result
 
 MOST_WORK = 600_000  # nodes that are started or continued, in all runs of a log: enough for all that a robot keeps
 _WORK_TO_BUILD = 5  # for one node
@@ -225,11 +225,7 @@ def _settings(entries: Mapping[str, Any]) -> Settings:
 def _known(key: str, value: Value) -> Value:
     """Return a value that was read, which must be a number for an age, and a whole one for a count of messages."""
     what, _, name = key.partition(" ")
-    is_fit = {
-        "value": True,
-        "age": value is NOT_ARRIVED or is_number(value),
-        "count": type(value) is int,
-    }
+    is_fit = {"value": True, "age": value is NOT_ARRIVED or is_number(value), "count": type(value) is int}
     if not name or not is_fit.get(what):
         raise _WrongRecordError("'read' does not hold values, ages or counts of messages")
     return value

@@ -20,7 +20,7 @@ from rbxcompose.missions.engine.course import Course
 from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.run import Run
 from rbxcompose.missions.engine.task import Task
-from rbxcompose.missions.program.statuses import Result
+from rbxcompose.missions.program.outcomes import Result
 
 VERSION = 2
 _CLASSES: Mapping[str, type[Any]] = {cls.__name__: cls for cls in (Place, Pose2, HeldNode, Result)}
@@ -35,19 +35,7 @@ _FIELDS: Mapping[str, Mapping[str, type | tuple[type, ...]]] = {
 _NUMBERS = ("nan", "inf", "-inf")  # that JSON cannot express
 _LEVELS = MOST_LEVELS + 10  # of a value as plain data: a result holds values, too
 _BITS = 64  # of the largest integer in a message
-_ENGINE = (
-    "status",
-    "outcome",
-    "now",
-    "time",
-    "lost",
-    "is_paused",
-    "draws",
-    "held_until",
-    "instant",
-    "ticks",
-    "wake",
-)
+_ENGINE = ("status", "outcome", "now", "time", "lost", "is_paused", "draws", "held_until", "instant", "ticks", "wake")
 _RUN = ("begun", "ending", "message")
 _COURSE = ("lost", "left")
 

@@ -42,10 +42,7 @@ _DECORATORS: dict[type[Modifier], Callable[[Modifier, Site, Task], Task]] = {}
 
 
 def modifier(
-    name: str,
-    task: Callable[[Site, M, Task], Task],
-    *,
-    only_states: bool = False,
+    name: str, task: Callable[[Site, M, Task], Task], *, only_states: bool = False
 ) -> Callable[[type[M]], type[M]]:
     """Register a modifier under its key, inside those that its module registered before.
 

@@ -20,12 +20,7 @@ KINDS: dict[str, StepType] = {}
 _TASKS: dict[StepType, Callable[[Site], Task]] = {}
 
 
-def kind(
-    name: str,
-    task: Callable[[Site, S], Task],
-    *,
-    is_inner: bool = False,
-) -> Callable[[type[S]], type[S]]:
+def kind(name: str, task: Callable[[Site, S], Task], *, is_inner: bool = False) -> Callable[[type[S]], type[S]]:
     """Register a kind under its word, with the task that runs it.
 
     A kind that `is_inner` has no word in the language.

@@ -55,11 +55,7 @@ class RecordingWriter:
         topic = message.topic
         self.declare(topic)
         self._writer.add_message(
-            self._channels[topic],
-            message.log_time,
-            message.payload,
-            message.publish_time,
-            message.sequence & _MASK,
+            self._channels[topic], message.log_time, message.payload, message.publish_time, message.sequence & _MASK
         )
         self.counts[topic] += 1
 

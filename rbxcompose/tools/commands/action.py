@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import argparse
 
-from rbxcompose.commands.guest import Guest, add_server_verbs, tell_list, visit
+from rbxcompose.commands.guest import Guest, add_server_verbs, visit, write_names
 from rbxcompose.commands.options import BUS
 
 ON_SYSTEM = BUS
@@ -26,7 +26,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _ls(guest: Guest, arguments: argparse.Namespace) -> int:
-    return tell_list(guest.graph().actions, ("servers", "clients"), arguments)
+    return write_names(guest.graph().actions, ("servers", "clients"), arguments)
 
 
 def _send(guest: Guest, arguments: argparse.Namespace) -> int:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 import json
 
-from rbxcompose.commands.console import FINDINGS, NotDoneError, refuse, tell, tell_report
+from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, refuse, write_report
 from rbxcompose.commands.lookup import answer_of, find_robot, show_answer
 from rbxcompose.commands.options import add_system_options, is_system
 from rbxcompose.commands.targets import add_layer_options, add_path_argument, chosen_layers, compiled, robot_path
@@ -47,12 +47,12 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.undo is not None:
         return _undo(path, arguments)
     compilation = compiled(path, arguments)
-    tell_report(compilation.report, compilation.sources)
+    write_report(compilation.report, compilation.sources)
     if compilation.plan is None or compilation.robot is None:
         return 1
     try:
         proposal = Proposal.of(compilation.plan, compilation.robot, chosen_layers(arguments))
-        tell(json.dumps(proposal.data) if arguments.json else proposal.text())
+        emit(json.dumps(proposal.data) if arguments.json else proposal.text())
         return carry_out(proposal, arguments)
     except NotDoneError as error:
         return refuse(error.finding)

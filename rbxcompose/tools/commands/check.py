@@ -22,7 +22,7 @@ from rbxcompose.base.findings import Finding, Fix, Report, Sources, nearest
 from rbxcompose.base.fixes import apply, safe_fixes
 from rbxcompose.base.formats import format_names, renderer
 from rbxcompose.base.printable import plain
-from rbxcompose.commands.console import FINDINGS, good, has_colour, tell
+from rbxcompose.commands.console import FINDINGS, emit, good, has_colour
 from rbxcompose.commands.targets import Targets, add_layer_options, compiled, projects_of, targets
 from rbxcompose.compiler.compile import Compilation
 from rbxcompose.compiler.plan.model import Plan, extent
@@ -64,9 +64,9 @@ def run(arguments: argparse.Namespace) -> int:
     """Compile the robots, apply fixes if requested, and write the findings to stdout."""
     wanted = targets(arguments.paths)
     if arguments.fix:
-        fix(lambda: _check(wanted, arguments), tell if arguments.format == TEXT else _whisper)
+        fix(lambda: _check(wanted, arguments), emit if arguments.format == TEXT else _whisper)
     checked = _check(wanted, arguments)
-    tell(_written(checked, arguments.format).rstrip("\n"))
+    emit(_written(checked, arguments.format).rstrip("\n"))
     is_wrong = checked.report.has_errors or (arguments.strict and any(checked.report))
     return FINDINGS if is_wrong else 0
 
@@ -198,13 +198,13 @@ def _apply(fixes: list[Fix], sources: Sources, say: PrintLine) -> bool:
     written = {file for file, text in out.texts.items() if text != texts[file] and _write(file, text, say)}
     for one in out.done:
         if all(edit.span.file in written for edit in one.edits):
-            say(f"fixed {_told(one)}")
+            say(f"fixed {_shown(one)}")
     for one in out.postponed:
-        say(f"not yet {_told(one)}: it overlaps with another fix")
+        say(f"not yet {_shown(one)}: it overlaps with another fix")
     return bool(written)
 
 
-def _told(one: Fix) -> str:
+def _shown(one: Fix) -> str:
     first = next(edit for edit in one.edits if edit.text != edit.old)
     return f"{plain(str(first.span))}: {plain(one.title, _WORDS)}"
 

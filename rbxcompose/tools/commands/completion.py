@@ -20,7 +20,7 @@ from typing import Protocol
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.bus.graph import Graph
-from rbxcompose.commands.console import NotDoneError, tell
+from rbxcompose.commands.console import NotDoneError, emit
 from rbxcompose.commands.lookup import BusPlace, answer_of, find_robot, known_state, place_of, robots_up
 from rbxcompose.commands.verbs import load, parser_of, verbs
 from rbxcompose.domains.muxes.requests import MUX, LookAtMux
@@ -65,7 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the script."""
-    tell(SCRIPTS[arguments.shell])
+    emit(SCRIPTS[arguments.shell])
     return 0
 
 
@@ -310,13 +310,13 @@ def complete(words: Sequence[str]) -> int:
 
 def _at_once(place: BusPlace) -> Graph:
     """Query a bus with a short timeout: a stopped router accepts connections but says nothing."""
-    told: list[Graph] = []
-    asking = Thread(target=lambda: told.extend(_ask(place)), daemon=True)
+    graphs: list[Graph] = []
+    asking = Thread(target=lambda: graphs.extend(_ask(place)), daemon=True)
     asking.start()
     asking.join(PATIENCE)
     if asking.is_alive():
         os._exit(0)  # nothing has been printed; the thread cannot be ended in another way
-    return told[0] if told else Graph((), (), (), ())
+    return graphs[0] if graphs else Graph((), (), (), ())
 
 
 def _ask(place: BusPlace) -> Iterable[Graph]:

@@ -13,7 +13,7 @@ import sys
 import time
 
 from rbxcompose.base.findings import Finding, Report
-from rbxcompose.commands.console import FINDINGS, NotDoneError, has_colour, refuse, tell, tell_report
+from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, has_colour, refuse, write_report
 from rbxcompose.commands.formats.text import render_text
 from rbxcompose.commands.guest import Guest, HeardMessage
 from rbxcompose.commands.lookup import add_robot_option, find_robot, place_of, robots_up
@@ -63,7 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
         ports=serial_ports(),
     )
     answers = examine_all(facts)
-    tell(to_json([result.to_data() for result in answers]) if arguments.json else _text(answers))
+    emit(to_json([result.to_data() for result in answers]) if arguments.json else _text(answers))
     return FINDINGS if has_errors(answers) else 0
 
 
@@ -87,7 +87,7 @@ def _described(path: str) -> Robot | None:
     """Return the robot that a file describes; if it cannot be read as one, report the findings."""
     compilation = compile_robot(path, environment=os.environ)
     if compilation.robot is None:
-        tell_report(compilation.report, compilation.sources)
+        write_report(compilation.report, compilation.sources)
     return compilation.robot
 
 
@@ -128,7 +128,9 @@ def _bus(folder: RobotFolder) -> BusFacts | None:
 def _text(answers: list[ExaminationResult]) -> str:
     """Return the examinations that passed, then the findings."""
     width = max(len(result.examination) for result in answers)
-    lines = [f"ok  {result.examination:<{width}}  {result.told}" for result in answers if isinstance(result.told, str)]
+    lines = [
+        f"ok  {result.examination:<{width}}  {result.answer}" for result in answers if isinstance(result.answer, str)
+    ]
     report = Report()
-    report.extend(result.told for result in answers if isinstance(result.told, Finding))
+    report.extend(result.answer for result in answers if isinstance(result.answer, Finding))
     return "\n".join([*lines, render_text(report, {}, has_colour(sys.stdout))]).rstrip("\n")

@@ -6,7 +6,7 @@ import argparse
 import json
 
 from rbxcompose.base.requests import Refused
-from rbxcompose.commands.console import FINDINGS, NotDoneError, refuse, tell
+from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, refuse
 from rbxcompose.commands.lookup import NO_ANSWER, NOT_UP, add_robot_option, find_robot, known_state
 from rbxcompose.commands.options import add_system_options, is_system
 from rbxcompose.runtime.control import NoAnswerError, ask, supervisor_of
@@ -39,15 +39,15 @@ def run(arguments: argparse.Namespace) -> int:
         return ask_all(shares, lambda robot: ["down", robot, *options], in_json=arguments.json, tolerates=NOT_UP.code)
     try:
         folder = find_robot(wanted)
-        told = _end(folder)
+        report = _end(folder)
     except NotDoneError as error:
         return refuse(error.finding)
     if arguments.json:
-        tell(json.dumps({"robot": folder.path.name, "told": told}))
+        emit(json.dumps({"robot": folder.path.name, "told": report}))
         return 0
-    for text in told:
-        tell(text)
-    tell(f"{folder.path.name} is down")
+    for text in report:
+        emit(text)
+    emit(f"{folder.path.name} is down")
     return 0
 
 
@@ -57,20 +57,20 @@ def _end(folder: RobotFolder) -> list[str]:
     Raises:
         NotDoneError: if someone else holds the robot and cannot be found.
     """
-    told: list[str] = []
+    report: list[str] = []
     state = known_state(folder)
     patience = _ORDERLY + (state.rest_time if state is not None else 1.0)
     if (supervisor := _supervisor(folder, state)) is not None:
         if not supervisor.is_stopped and _asked(folder) and not wait_until_ended([supervisor], patience):
-            return told
-        told.append("the supervisor did not answer and was killed")
+            return report
+        report.append("the supervisor did not answer and was killed")
         kill_supervisor(supervisor)
     lock = folder.lock()
     if lock is None:
         raise NotDoneError(NO_ANSWER.at(None, f"'{folder.path.name}' is held by a process that cannot be found"))
-    told += end_leftovers(folder)
+    report += end_leftovers(folder)
     folder.clear()
-    return told
+    return report
 
 
 def _supervisor(folder: RobotFolder, state: RobotState | None) -> Process | None:

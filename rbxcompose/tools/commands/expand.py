@@ -10,7 +10,7 @@ import argparse
 import json
 
 from rbxcompose.base.printable import escaped
-from rbxcompose.commands.console import FINDINGS, tell, tell_report
+from rbxcompose.commands.console import FINDINGS, emit, write_report
 from rbxcompose.commands.targets import add_layer_options, add_path_argument, layers_of, robot_path
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.tools.inspection.expand import expand, expand_data
@@ -30,11 +30,11 @@ def run(arguments: argparse.Namespace) -> int:
     if path is None:
         return FINDINGS
     compilation = compile_robot(path, **layers_of(arguments))
-    tell_report(compilation.report, compilation.sources)
+    write_report(compilation.report, compilation.sources)
     if compilation.robot is not None:
         manifest = compilation.robot.manifest
         if arguments.json:
-            tell(escaped(json.dumps(expand_data(manifest), indent=2, ensure_ascii=False)))
+            emit(escaped(json.dumps(expand_data(manifest), indent=2, ensure_ascii=False)))
         else:
-            tell(expand(manifest, has_origins=not arguments.no_origins).rstrip("\n"))
+            emit(expand(manifest, has_origins=not arguments.no_origins).rstrip("\n"))
     return FINDINGS if compilation.report.has_errors else 0

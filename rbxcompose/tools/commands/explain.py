@@ -9,7 +9,7 @@ import argparse
 import json
 
 from rbxcompose.base.findings import FindingKind, suggest
-from rbxcompose.commands.console import misused, tell
+from rbxcompose.commands.console import emit, misused
 from rbxcompose.commands.finding_pages import all_kinds, body_of, family_of, text_of, title_of
 
 _PREFIX = "RBX"
@@ -25,7 +25,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Write the page of one code, or the list of all codes."""
     kinds = all_kinds()
     if arguments.code is None:
-        tell(_as_json(list(kinds.values())) if arguments.json else _listed(kinds))
+        emit(_as_json(list(kinds.values())) if arguments.json else _listed(kinds))
         return 0
     written = arguments.code.upper()
     code = written if written in kinds else _PREFIX + written.removeprefix(_PREFIX)
@@ -33,7 +33,7 @@ def run(arguments: argparse.Namespace) -> int:
         family = [kind for kind in kinds if kind.startswith(code[: len(_PREFIX) + 2])]
         hint = suggest(code, family or kinds, "codes")
         return misused("explain", f"there is no code {arguments.code!r}; {hint}")
-    tell(_as_json(kinds[code]) if arguments.json else text_of(kinds[code]).rstrip("\n"))
+    emit(_as_json(kinds[code]) if arguments.json else text_of(kinds[code]).rstrip("\n"))
     return 0
 
 

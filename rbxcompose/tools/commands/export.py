@@ -18,7 +18,7 @@ from pathlib import Path
 
 from rbxcompose import __version__
 from rbxcompose.base.findings import Finding, kind
-from rbxcompose.commands.console import FINDINGS, refuse, tell, tell_report
+from rbxcompose.commands.console import FINDINGS, emit, refuse, write_report
 from rbxcompose.commands.options import is_system
 from rbxcompose.compiler.compile import Compilation, compile_robot
 from rbxcompose.compiler.systems.bundle import files_of
@@ -55,7 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
     if not is_system(arguments.path):
         return refuse(NOT_EXPORTED.at(None, f"'{arguments.path}' is not the file of a system"))
     system = compile_system(arguments.path, environment=os.environ, real=arguments.real, profiles=arguments.profile)
-    tell_report(system.report, system.sources)
+    write_report(system.report, system.sources)
     if system.report.has_errors:
         return FINDINGS
     if arguments.host is not None and arguments.host not in system.hosts:
@@ -77,7 +77,7 @@ def _ros2(arguments: argparse.Namespace) -> int:
     else:
         compiled = compile_robot(arguments.path, real=arguments.real, environment=os.environ)
         plans = [compiled.plan] if compiled.plan else []
-    tell_report(compiled.report, compiled.sources)
+    write_report(compiled.report, compiled.sources)
     if compiled.report.has_errors:
         return FINDINGS
     return _finish(arguments, _encoded(ros2.packages(plans, __version__)))
@@ -87,7 +87,7 @@ def _finish(arguments: argparse.Namespace, made: Mapping[str, bytes]) -> int:
     if (problem := _write(Path(arguments.out), made)) is not None:
         return refuse(problem)
     for name in made:
-        tell(str(Path(arguments.out, name)))
+        emit(str(Path(arguments.out, name)))
     return 0
 
 
@@ -96,7 +96,7 @@ def _export_robot(arguments: argparse.Namespace) -> int:
     from rbxcompose.tools.exporting.srdf import exported  # imports the sections of robots
 
     compilation = compile_robot(arguments.path, environment=os.environ, real=arguments.real)
-    tell_report(compilation.report, compilation.sources)
+    write_report(compilation.report, compilation.sources)
     if compilation.robot is None or compilation.report.has_errors:
         return FINDINGS
     manifest = compilation.robot.manifest
@@ -106,7 +106,7 @@ def _export_robot(arguments: argparse.Namespace) -> int:
     if (problem := _write(Path(arguments.out), _encoded(made))) is not None:
         return refuse(problem)
     for name in made:
-        tell(str(Path(arguments.out, name)))
+        emit(str(Path(arguments.out, name)))
     return 0
 
 

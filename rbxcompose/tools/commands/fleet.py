@@ -15,19 +15,8 @@ from typing import Any
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import kind
 from rbxcompose.base.levels import LOG_LEVELS
-from rbxcompose.commands.console import FINDINGS, refuse, table, tell
-from rbxcompose.commands.hosts import (
-    SSH_FAILED,
-    WHICH,
-    Running,
-    Shares,
-    answering,
-    ask_all,
-    compiled,
-    follow_all,
-    on_all,
-    shares_of,
-)
+from rbxcompose.commands import hosts
+from rbxcompose.commands.console import FINDINGS, emit, refuse, table
 from rbxcompose.commands.lookup import NOT_UP
 from rbxcompose.commands.options import add_system_options
 from rbxcompose.missions.execution.requests import MISSION
@@ -71,7 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
         return fleet
     match arguments.action:
         case "ls":
-            return fleet.tell(in_json=arguments.json)
+            return fleet.list_robots(in_json=arguments.json)
         case "run":
             return fleet.run(arguments.mission, arguments.sets, in_json=arguments.json)
         case _:
@@ -83,20 +72,20 @@ def run(arguments: argparse.Namespace) -> int:
 class Fleet:
     """The shares of the chosen robots, and among them those that run missions."""
 
-    shares: Shares
-    executives: Shares
+    shares: hosts.Shares
+    executives: hosts.Shares
 
     @classmethod
     def of(cls, paths: Sequence[str], arguments: argparse.Namespace) -> Fleet | int:
         """Return the robots of systems that have all labels of the command; the exit code after a finding."""
-        shares: Shares = {}
-        executives: Shares = {}
+        shares: hosts.Shares = {}
+        executives: hosts.Shares = {}
         known: set[str] = set()
         for path in paths:
-            system = compiled(path, arguments)
+            system = hosts.compiled(path, arguments)
             if system is None:
                 return FINDINGS
-            every = shares_of(system, arguments.ssh_config)
+            every = hosts.shares_of(system, arguments.ssh_config)
             for robot in system.robots.values():
                 known |= {*robot.labels}
                 if not {*robot.labels} >= {*arguments.labels}:
@@ -104,9 +93,9 @@ class Fleet:
                 own = {key: share for key, share in every.items() if key[1] == robot.name}
                 if own.keys() & shares.keys():
                     message = f"two of these systems have a robot '{robot.name}' on a host of the same name"
-                    return refuse(WHICH.at(None, message, help="name the systems in two commands"))
+                    return refuse(hosts.WHICH.at(None, message, help="name the systems in two commands"))
                 shares = {**shares, **own}
-                keys = ((host, robot.name) for host in answering(robot, MISSION))
+                keys = ((host, robot.name) for host in hosts.answering(robot, MISSION))
                 executives = {**executives, **{key: every[key] for key in keys}}
         if not shares:
             wrong = next((label for label in arguments.labels if label not in known), "")
@@ -114,17 +103,17 @@ class Fleet:
             return refuse(NO_LABEL.misspelt(None, message, wrong, sorted(known), "labels"))
         return cls(shares, executives)
 
-    def tell(self, *, in_json: bool) -> int:
+    def list_robots(self, *, in_json: bool) -> int:
         """List the robots; return the exit code, which is that of findings if a share cannot be reached or is down."""
-        asked = on_all(
+        asked = hosts.on_all(
             {" ".join(key): share.rbxcompose(["top", key[1], "--json"]) for key, share in self.shares.items()}
         )
         found = sorted((robot, host, _facts(asked[f"{host} {robot}"])) for host, robot in self.shares)
         rows = [_row(robot, list(shares)) for robot, shares in groupby(found, key=lambda row: row[0])]
         if in_json:
-            tell(json.dumps({"robots": rows}))
+            emit(json.dumps({"robots": rows}))
         else:
-            tell(table([_COLUMNS, *([str(row[column]) for column in _COLUMNS] for row in rows)]))
+            emit(table([_COLUMNS, *([str(row[column]) for column in _COLUMNS] for row in rows)]))
         return FINDINGS if any(row["state"] != _UP for row in rows) else 0
 
     def run(self, mission: str, sets: Sequence[str], *, in_json: bool) -> int:
@@ -132,38 +121,40 @@ class Fleet:
         words = [mission, *(word for set_ in sets for word in ("--set", set_)), *(["--json"] if in_json else [])]
         if not self.executives:
             return refuse(NO_LABEL.at(None, "none of these robots runs missions"))
-        return ask_all(self.executives, lambda robot: ["mission", "run", *words, "--robot", robot], in_json=in_json)
+        return hosts.ask_all(
+            self.executives, lambda robot: ["mission", "run", *words, "--robot", robot], in_json=in_json
+        )
 
     def follow(self, options: Sequence[str]) -> int:
         """Show the logs of all."""
-        return follow_all(self.shares, lambda robot: ["logs", robot, *options])
+        return hosts.follow_all(self.shares, lambda robot: ["logs", robot, *options])
 
 
 _UP = "up"
 
 
-def _facts(one: Running) -> dict[str, Any]:
+def _facts(one: hosts.Running) -> dict[str, Any]:
     """Return what is known of a share."""
-    told = one.answer
-    if isinstance(told, dict) and "components" in told:
-        return told
-    if one.wait() == SSH_FAILED:
+    answer = one.answer
+    if isinstance(answer, dict) and "components" in answer:
+        return answer
+    if one.wait() == hosts.SSH_FAILED:
         return {"state": "unreachable"}
     is_down = any(NOT_UP.code in line for line in one.lines)
     return {"state": "down" if is_down else one.lines[-1] if one.lines else "no answer"}
 
 
 def _row(robot: str, shares: Sequence[ShareFacts]) -> dict[str, str]:
-    told = [facts for _, _, facts in shares]
-    states = [_state(facts) for facts in told]
+    answers = [facts for _, _, facts in shares]
+    states = [_state(facts) for facts in answers]
     several = len(shares) > 1
     wrong = [f"{host} {state}" if several else state for (_, host, _), state in zip(shares, states, strict=True)]
     return {
         "robot": robot,
         "host": ", ".join(host for _, host, _ in shares),
         "state": _UP if set(states) == {_UP} else ", ".join(text for text in wrong if not text.endswith(_UP)),
-        "mission": "; ".join(_missions(told)),
-        "battery": ", ".join(text for facts in told for text in facts.get("batteries", {}).values()),
+        "mission": "; ".join(_missions(answers)),
+        "battery": ", ".join(text for facts in answers for text in facts.get("batteries", {}).values()),
     }
 
 
@@ -174,5 +165,5 @@ def _state(facts: Mapping[str, Any]) -> str:
     return f"{', '.join(off)} not active" if off else _UP
 
 
-def _missions(told: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    yield from (str(facts["mission"]) for facts in told if facts.get("mission"))
+def _missions(answers: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    yield from (str(facts["mission"]) for facts in answers if facts.get("mission"))

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 from rbxcompose.base.files import replace_file
-from rbxcompose.commands.console import FINDINGS, refuse, tell, tell_report
+from rbxcompose.commands.console import FINDINGS, emit, refuse, write_report
 from rbxcompose.commands.layout import NotDrawnError
 from rbxcompose.commands.targets import add_layer_options, add_path_argument, layers_of, robot_path
 from rbxcompose.compiler.compile import compile_robot
@@ -35,14 +35,14 @@ def run(arguments: argparse.Namespace) -> int:
     if path is None:
         return FINDINGS
     compilation = compile_robot(path, **layers_of(arguments))
-    tell_report(compilation.report, compilation.sources)
+    write_report(compilation.report, compilation.sources)
     if compilation.robot is not None:
         try:
             text = FORMATS[arguments.format](diagram_of(compilation.robot))
         except NotDrawnError as error:
             return refuse(error.finding)
         if arguments.out is None:
-            tell(text.rstrip("\n"))
+            emit(text.rstrip("\n"))
         elif problem := _write(Path(arguments.out), text):
             sys.stderr.write(f"rbxcompose graph: {problem}\n")
             return USAGE

@@ -13,7 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from rbxcompose.base.findings import Finding, Report, Sources
-from rbxcompose.commands.console import FINDINGS, refuse, tell, tell_report
+from rbxcompose.commands.console import FINDINGS, emit, refuse, write_report
 from rbxcompose.commands.formats.json_ import as_data
 from rbxcompose.commands.importing.foreign_files import read_files
 from rbxcompose.commands.importing.importer import ImportedFiles, broken_importers, imported, importers
@@ -44,11 +44,13 @@ def run(arguments: argparse.Namespace) -> int:
         return refuse(error.finding)
     files = read_files(map(Path, arguments.files), report, sources)
     made = imported(arguments.program, files, name, report)
-    told = Report([replace(one, fix=None) for one in report])  # fixes are for manifests, which `check --fix` corrects
+    findings = Report(
+        [replace(one, fix=None) for one in report]
+    )  # fixes are for manifests, which `check --fix` corrects
     if made.text and arguments.out is not None and (finding := _write(Path(arguments.out), made)) is not None:
-        told.add(finding)
+        findings.add(finding)
         made = ImportedFiles("")
-    return _answer(made, told, sources, arguments)
+    return _answer(made, findings, sources, arguments)
 
 
 def _name(arguments: argparse.Namespace) -> str:
@@ -68,18 +70,18 @@ def _answer(made: ImportedFiles, report: Report, sources: Sources, arguments: ar
     """Write the findings, and the manifest if there is one; return the exit code."""
     text = made.text
     if not text or not arguments.json:
-        tell_report(report, sources)
+        write_report(report, sources)
     if not text:
         return FINDINGS
     shown = shown_name(Path(arguments.out)) if arguments.out is not None else None
     if arguments.json:
         findings = [as_data(finding, sources) for finding in report]
         data = {"manifest": text, "file": shown, "beside": dict(made.beside), "findings": findings}
-        tell(json.dumps(data, ensure_ascii=False))
+        emit(json.dumps(data, ensure_ascii=False))
     elif shown is None:
-        tell("\n".join([text, *(f"--- # {name}\n{each}" for name, each in made.beside.items())]).rstrip("\n"))
+        emit("\n".join([text, *(f"--- # {name}\n{each}" for name, each in made.beside.items())]).rstrip("\n"))
     else:
         folder = Path(shown).parent
         for each in (Path(shown), *(folder / name for name in made.beside)):
-            tell(f"wrote {each}")
+            emit(f"wrote {each}")
     return FINDINGS if report.has_errors else 0

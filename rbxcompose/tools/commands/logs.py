@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 
 from rbxcompose.base.findings import suggest
 from rbxcompose.base.levels import LOG_LEVELS
-from rbxcompose.commands.console import FINDINGS, NotDoneError, has_colour, refuse, tell
+from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, has_colour, refuse
 from rbxcompose.commands.lookup import NOT_UP, add_robot_option, find_robot, known_state
 from rbxcompose.commands.options import add_system_options, is_system
 from rbxcompose.commands.story import StoryWriter
@@ -58,7 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     def show(records: Iterable[Record]) -> None:
         for record in records:
-            tell(record.to_json() if arguments.json else story.line(record))
+            emit(record.to_json() if arguments.json else story.line(record))
 
     shown = wanted(records)
     show(shown if arguments.lines is None else shown[max(0, len(shown) - arguments.lines) :])

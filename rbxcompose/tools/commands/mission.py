@@ -12,27 +12,14 @@ from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 from rbxcompose.base.requests import Command, Query, Refused, to_data
-from rbxcompose.commands.console import NotDoneError, refuse, tell
+from rbxcompose.commands.console import NotDoneError, emit, refuse
 from rbxcompose.commands.lookup import REFUSED, WHICH, add_asking_options, answer_of, find_robot, pass_on
 from rbxcompose.commands.options import Declare, Subcommand, add_actions, argument, run_action
-from rbxcompose.missions.execution.requests import (
-    MISSION,
-    CancelMission,
-    ListedMission,
-    ListMissions,
-    LookAtMission,
-    PauseMission,
-    ReadLog,
-    ResumeMission,
-    RunMission,
-    Seen,
-    ShowPicture,
-    settings,
-)
+from rbxcompose.missions.execution import requests
 
 A = TypeVar("A")
 
-ON_SYSTEM = MISSION
+ON_SYSTEM = requests.MISSION
 _PERIOD = 0.2  # [s] between two requests to a robot that is followed
 _FORMATS = "text", "mermaid", "dot", "html"
 
@@ -74,9 +61,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     table: tuple[tuple[str, str, Callable[[argparse.Namespace], int], tuple[Declare, ...]], ...] = (
         ("ls", "list the robot's missions with their states", _list, (add_asking_options,)),
         ("run", "start a mission beside those that run", _run, started),
-        ("cancel", "end a mission for good", _to(CancelMission), named),
-        ("pause", "hold a mission; its timers stand still", _to(PauseMission), named),
-        ("resume", "resume a mission where it was held", _to(ResumeMission), named),
+        ("cancel", "end a mission for good", _to(requests.CancelMission), named),
+        ("pause", "hold a mission; its timers stand still", _to(requests.PauseMission), named),
+        ("resume", "resume a mission where it was held", _to(requests.ResumeMission), named),
         ("status", "show where a mission is, with its data", _status, named),
         ("watch", "show a mission live", _watch, named),
         ("log", "print what missions did, as JSON, one line each", _log, logged),
@@ -105,19 +92,19 @@ def _to(command: Callable[[str], Command]) -> Callable[[argparse.Namespace], int
 def _run(arguments: argparse.Namespace) -> int:
     folder = find_robot(arguments.robot)
     try:
-        inputs = settings(arguments.sets)
+        inputs = requests.settings(arguments.sets)
     except Refused as refusal:
         return refuse(REFUSED.at(None, f"'{folder.path.name}' refuses: {refusal}"))
-    return pass_on(arguments, RunMission(arguments.name, inputs, arguments.start))
+    return pass_on(arguments, requests.RunMission(arguments.name, inputs, arguments.start))
 
 
 def _list(arguments: argparse.Namespace) -> int:
-    missions = ask(arguments.robot, ListMissions())
-    tell(json.dumps(to_data(missions)) if arguments.json else _table(missions))
+    missions = ask(arguments.robot, requests.ListMissions())
+    emit(json.dumps(to_data(missions)) if arguments.json else _table(missions))
     return 0
 
 
-def _table(missions: Sequence[ListedMission]) -> str:
+def _table(missions: Sequence[requests.ListedMission]) -> str:
     names = max((len(mission.name) for mission in missions), default=0)
     states = max((len(mission.state) for mission in missions), default=0)
     lines = [f"{mission.name:<{names}}  {mission.state:<{states}}  {mission.about}".rstrip() for mission in missions]
@@ -128,10 +115,10 @@ def _chosen(arguments: argparse.Namespace) -> str:
     """Return the addressed mission: the named one, else the only one that runs, or ran last."""
     if arguments.name:
         return str(arguments.name)
-    from rbxcompose.missions.program.statuses import IDLE, NAMES
+    from rbxcompose.missions.program.outcomes import IDLE, NAMES
     from rbxcompose.missions.view.replica import ACTIVE
 
-    known = [one for one in ask(arguments.robot, ListMissions()) if one.state != NAMES[IDLE]]
+    known = [one for one in ask(arguments.robot, requests.ListMissions()) if one.state != NAMES[IDLE]]
     active = [item for item in known if item.state in ACTIVE] or known
     if len(active) != 1:
         names = ", ".join(item.name for item in active)
@@ -142,19 +129,19 @@ def _chosen(arguments: argparse.Namespace) -> str:
 
 def _status(arguments: argparse.Namespace) -> int:
     name = _chosen(arguments)
-    seen = ask(arguments.robot, LookAtMission(name))
+    seen = ask(arguments.robot, requests.LookAtMission(name))
     if arguments.json:
-        tell(json.dumps(seen))
+        emit(json.dumps(seen))
         return 0
-    tell("\n".join(_drawn(name, arguments.robot, seen, 120)))
+    emit("\n".join(_drawn(name, arguments.robot, seen, 120)))
     return 0
 
 
-def _drawn(name: str, robot: str | None, seen: Seen, width: int, *, colour: bool = False) -> list[str]:
+def _drawn(name: str, robot: str | None, seen: requests.Seen, width: int, *, colour: bool = False) -> list[str]:
     from rbxcompose.missions.view.picture import picture_from_data
     from rbxcompose.tools.mission_view import lines_of
 
-    return lines_of(picture_from_data(ask(robot, ShowPicture(name))), seen, width, colour=colour)
+    return lines_of(picture_from_data(ask(robot, requests.ShowPicture(name))), seen, width, colour=colour)
 
 
 def _watch(arguments: argparse.Namespace) -> int:
@@ -171,12 +158,12 @@ def _log(arguments: argparse.Namespace) -> int:
     number = 0
     try:
         while True:
-            news = ask(arguments.robot, ReadLog(number))
+            news = ask(arguments.robot, requests.ReadLog(number))
             number = news.next
             for record in news.records:
                 is_meant = not arguments.name or record["mission"] == arguments.name
                 if is_meant and (arguments.all or record["event"] not in INPUTS):
-                    tell(json.dumps(record))
+                    emit(json.dumps(record))
             if not arguments.follow:
                 return 0
             time.sleep(_PERIOD)

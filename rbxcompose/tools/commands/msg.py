@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import rbxcompose
-from rbxcompose.commands.console import refuse, tell
+from rbxcompose.commands.console import emit, refuse
 from rbxcompose.commands.messages import NO_TYPE, to_json
 from rbxcompose.commands.new_files import write_new
 from rbxcompose.manifest.files import shown_name
@@ -46,9 +46,9 @@ def _show(wanted: str, as_json: bool) -> int:
         return refuse(NO_TYPE.misspelt(None, words, wanted, [*names, *map(short, names)], "known types"))
     hashed, text = type_hash(name, Structures()), whole_text(name)
     if as_json:
-        tell(to_json({"type": name, "hash": hashed, "text": text, "parts": parts_of(name)}))
+        emit(to_json({"type": name, "hash": hashed, "text": text, "parts": parts_of(name)}))
     else:
-        tell(f"# {name}\n# {hashed}\n{text}".rstrip("\n"))
+        emit(f"# {name}\n# {hashed}\n{text}".rstrip("\n"))
     return 0
 
 
@@ -58,7 +58,7 @@ def _export(folder: Path, as_json: bool) -> int:
     if finding is not None:
         return refuse(replace(finding, help="choose another folder"))
     if as_json:
-        tell(to_json({"package": OWN, "folder": str(target)}))
+        emit(to_json({"package": OWN, "folder": str(target)}))
     else:
-        tell(f"{shown_name(target)} is written; in the workspace: colcon build --packages-select {OWN}")
+        emit(f"{shown_name(target)} is written; in the workspace: colcon build --packages-select {OWN}")
     return 0

@@ -14,7 +14,7 @@ from importlib.util import find_spec
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Report, Severity
-from rbxcompose.commands.console import FINDINGS, table, tell, tell_report
+from rbxcompose.commands.console import FINDINGS, emit, table, write_report
 from rbxcompose.commands.options import add_json_option
 from rbxcompose.commands.targets import add_layer_options, compiled, targets
 from rbxcompose.compiler.model.robot import Robot
@@ -45,20 +45,20 @@ def run(arguments: argparse.Namespace) -> int:
     robots = list(_robots(arguments, report, sources))
     report = Report([finding for finding in report if finding.severity is Severity.ERROR])
     if report.has_errors:
-        tell_report(report, sources)
+        write_report(report, sources)
         return FINDINGS
     found = [one for one in needed(robots) if one.missing or not arguments.missing]
     if arguments.json:
-        tell(json.dumps([{"extra": item.name, "by": item.by, "missing": item.missing} for item in found]))
+        emit(json.dumps([{"extra": item.name, "by": item.by, "missing": item.missing} for item in found]))
     elif arguments.pip:
         extras = f"[{','.join(item.name for item in found)}]" if found else ""
-        tell("" if arguments.missing and not found else f"rbxcompose{extras}")
+        emit("" if arguments.missing and not found else f"rbxcompose{extras}")
     elif not found:
-        tell("nothing beside rbxcompose itself")
+        emit("nothing beside rbxcompose itself")
     else:
         state = [f"lacks {', '.join(item.missing)}" if item.missing else "installed" for item in found]
         rows = [(one.name, ", ".join(one.by), text) for one, text in zip(found, state, strict=True)]
-        tell(table([("extra", "needed by", "here"), *rows]))
+        emit(table([("extra", "needed by", "here"), *rows]))
     return 0
 
 

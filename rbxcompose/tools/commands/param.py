@@ -14,23 +14,13 @@ from functools import partial
 from importlib import import_module
 from pathlib import Path
 
+from rbxcompose.commands import options
 from rbxcompose.commands.guest import visit
 from rbxcompose.commands.hosts import SystemCommand
 from rbxcompose.commands.lookup import add_bus_options
-from rbxcompose.commands.options import (
-    BUS,
-    Declare,
-    Subcommand,
-    add_actions,
-    add_count_options,
-    add_json_option,
-    add_system_options,
-    add_timeout_option,
-    argument,
-)
 from rbxcompose.tools.parameters.nodes import ParameterNodes
 
-ON_SYSTEM = BUS
+ON_SYSTEM = options.BUS
 _WITH_FILES = ("load", "save", "diff", "reset")
 
 
@@ -38,7 +28,7 @@ def _home(module: str, action: str) -> Callable[[ParameterNodes, argparse.Namesp
     """Return what carries an action out; it imports its module, since some need the compiler and others do not."""
 
     def do(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
-        found = import_module(f"rbxcompose.tools.commands.parameters.{module}")
+        found = import_module(f"rbxcompose.tools.parameters.{module}")
         return int(getattr(found, f"param_{action}")(nodes, arguments))
 
     return do
@@ -46,20 +36,22 @@ def _home(module: str, action: str) -> Callable[[ParameterNodes, argparse.Namesp
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    only = argument("component", metavar="COMPONENT", nargs="?", help="only those of this component or node")
-    component = argument("component", metavar="COMPONENT", help="a component or node, such as battery")
-    name = argument("name", metavar="PARAMETER", help="the parameter, such as runtime")
-    any_name = argument("name", metavar="PARAMETER", nargs="?", help="the parameter, such as runtime; else all")
+    only = options.argument("component", metavar="COMPONENT", nargs="?", help="only those of this component or node")
+    component = options.argument("component", metavar="COMPONENT", help="a component or node, such as battery")
+    name = options.argument("name", metavar="PARAMETER", help="the parameter, such as runtime")
+    any_name = options.argument("name", metavar="PARAMETER", nargs="?", help="the parameter, such as runtime; else all")
     words = "COMPONENT PARAMETER VALUE, or several COMPONENT.PARAMETER=VALUE; values as in a manifest: '30 s', [1, 2]"
-    values = argument("words", metavar="COMPONENT|SETTING|PARAMETER", nargs="+", help=words)
+    values = options.argument("words", metavar="COMPONENT|SETTING|PARAMETER", nargs="+", help=words)
     words = "as `dump` writes it, or `ros2 param dump`; - is stdin"
-    file = argument("file", metavar="FILE", type=Path, help=words)
-    names = argument("names", metavar="COMPONENT|SETTING", nargs="*", help="only these: battery, battery.runtime")
+    file = options.argument("file", metavar="FILE", type=Path, help=words)
+    names = options.argument(
+        "names", metavar="COMPONENT|SETTING", nargs="*", help="only these: battery, battery.runtime"
+    )
     words = "this one, as `history` calls it: battery:3"
-    change = argument("--change", metavar="CHANGE", default="", help=words)
-    last = argument("-n", "--last", metavar="N", type=int, default=0, help="only the last N")
-    dry = argument("--dry-run", action="store_true", help="only show what would be written")
-    table: tuple[tuple[str, str, str, tuple[Declare, ...]], ...] = (
+    change = options.argument("--change", metavar="CHANGE", default="", help=words)
+    last = options.argument("-n", "--last", metavar="N", type=int, default=0, help="only the last N")
+    dry = options.argument("--dry-run", action="store_true", help="only show what would be written")
+    table: tuple[tuple[str, str, str, tuple[options.Declare, ...]], ...] = (
         ("ls", "nodes", "list parameters with their values", (only,)),
         ("get", "nodes", "print the value of a parameter", (component, name)),
         ("describe", "nodes", "tell what a parameter is, its limits, and whether it may change", (component, any_name)),
@@ -68,14 +60,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ("reset", "files", "set parameters to the values in the manifest", (names,)),
         ("undo", "changes", "take back the last change, or another one", (change,)),
         ("history", "history", "list the changes: who, when, from what to what", (only, last)),
-        ("watch", "history", "follow the changes", (only, add_count_options)),
+        ("watch", "history", "follow the changes", (only, options.add_count_options)),
         ("diff", "files", "show what is not as in the manifest", ()),
         ("dump", "files", "write the live parameters as YAML, for `load`", (only,)),
         ("save", "files", "write changed values into the manifest, each at its place", (names, dry)),
     )
-    actions = (Subcommand(verb, words, _home(module, verb), own) for verb, module, words, own in table)
-    timeout = partial(add_timeout_option, default="5s")
-    add_actions(parser, actions, timeout, add_json_option, add_bus_options, add_system_options)
+    actions = (options.Subcommand(verb, words, _home(module, verb), own) for verb, module, words, own in table)
+    timeout = partial(options.add_timeout_option, default="5s")
+    options.add_actions(parser, actions, timeout, options.add_json_option, add_bus_options, options.add_system_options)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from rbxcompose.base.files import read_regular
 from rbxcompose.base.findings import Finding, kind
-from rbxcompose.commands.console import FINDINGS, refuse, tell, tell_report
+from rbxcompose.commands.console import FINDINGS, emit, refuse, write_report
 from rbxcompose.commands.options import is_system
 from rbxcompose.commands.targets import add_layer_options, add_path_argument, layers_of, robot_path
 from rbxcompose.compiler.compile import compile_robot
@@ -48,13 +48,13 @@ def run(arguments: argparse.Namespace) -> int:
     if after is None:
         return FINDINGS
     if arguments.diff is None:
-        tell(dump(after).rstrip("\n") if arguments.json else plan_text(after, with_keys=arguments.keys))
+        emit(dump(after).rstrip("\n") if arguments.json else plan_text(after, with_keys=arguments.keys))
         return 0
     before = _other(arguments.diff, arguments)
     if before is None or isinstance(before, Finding):
         return refuse(before) if before else FINDINGS
     found = difference(before, after)
-    tell(json.dumps(found.data(), indent=2, ensure_ascii=False) if arguments.json else found.text())
+    emit(json.dumps(found.data(), indent=2, ensure_ascii=False) if arguments.json else found.text())
     return 0
 
 
@@ -66,13 +66,13 @@ def _show_system(path: str, arguments: argparse.Namespace) -> int:
         sys.stderr.write("rbxcompose plan: --diff, -f and --set are for robots, not for systems\n")
         return USAGE
     system = compile_system(path, environment=os.environ, real=arguments.real, profiles=arguments.profile)
-    tell_report(system.report, system.sources)
+    write_report(system.report, system.sources)
     if system.report.has_errors:
         return FINDINGS
     if arguments.json:
-        tell(json.dumps(system_data(system), indent=2, ensure_ascii=False))
+        emit(json.dumps(system_data(system), indent=2, ensure_ascii=False))
     else:
-        tell(system_text(system, with_keys=arguments.keys))
+        emit(system_text(system, with_keys=arguments.keys))
     return 0
 
 
@@ -82,7 +82,7 @@ def _compiled(path: str, arguments: argparse.Namespace, *, is_layered: bool) -> 
     if not is_layered:
         layers = {**layers, "profiles": (), "overlays": (), "sets": ()}
     compilation = compile_robot(path, **layers)
-    tell_report(compilation.report, compilation.sources)
+    write_report(compilation.report, compilation.sources)
     return None if compilation.report.has_errors else compilation.plan
 
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 from rbxcompose.base.requests import to_data
-from rbxcompose.commands.console import NotDoneError, refuse, tell
+from rbxcompose.commands.console import NotDoneError, emit, refuse
 from rbxcompose.commands.lookup import add_robot_option, answer_of, find_robot, known_state, robots_up
 from rbxcompose.commands.options import EACH, add_system_options
 from rbxcompose.runtime.folder import SUSPENDED, ClockOffset, ComponentState, RobotFolder, RobotState
@@ -41,7 +41,7 @@ def run(arguments: argparse.Namespace) -> int:
         shown = _shown(find_robot(wanted))
     except NotDoneError as error:
         return refuse(error.finding)
-    tell(json.dumps(shown) if arguments.json else _table(shown))
+    emit(json.dumps(shown) if arguments.json else _table(shown))
     return 0
 
 
@@ -54,7 +54,7 @@ def _tell_all(folders: Iterable[RobotFolder], *, in_json: bool) -> int:
         except NotDoneError as error:
             lost.append(error.finding)
     if shown:
-        tell(json.dumps({"robots": shown}) if in_json else "\n\n".join(map(_table, shown)))
+        emit(json.dumps({"robots": shown}) if in_json else "\n\n".join(map(_table, shown)))
     return max((refuse(item) for item in lost), default=0)
 
 

@@ -22,7 +22,7 @@ from rbxcompose.base.printable import plain
 from rbxcompose.bus.names import data_key, decode_attachment
 from rbxcompose.bus.tokens import SPACE, EndpointToken, parse_token
 from rbxcompose.bus.transport import Arrival
-from rbxcompose.commands.console import NotDoneError, refuse, table, tell, tell_report
+from rbxcompose.commands.console import NotDoneError, emit, refuse, table, write_report
 from rbxcompose.commands.guest import Guest
 from rbxcompose.commands.lookup import BusPlace, add_bus_options, find_place, find_robot
 from rbxcompose.commands.options import add_json_option, seconds
@@ -69,7 +69,7 @@ def _record(arguments: argparse.Namespace, place: BusPlace, path: Path) -> int:
             return refuse(UNWRITABLE.at(None, f"'{plain(str(path))}' cannot be written: {_reason(error)}"))
         tap = Tap(guest, selection_of(arguments))
         if not arguments.json:
-            tell(f"recording to {recorder.paths[0]}; Ctrl-C ends it")
+            emit(f"recording to {recorder.paths[0]}; Ctrl-C ends it")
         end = math.inf if arguments.duration is None else start + arguments.duration
         return _write(recorder, tap, guest, end, is_json=arguments.json)
 
@@ -89,7 +89,7 @@ def _write(recorder: Recorder, tap: Tap, guest: Guest, end: float, *, is_json: b
         warn(LOST.at(None, f"{tap.lost:,} messages came too fast to be recorded", help="choose fewer with '--topics'"))
     counts = recorder.counts
     if is_json:
-        tell(
+        emit(
             json.dumps(
                 {
                     "files": [str(path) for path in recorder.paths],
@@ -99,7 +99,7 @@ def _write(recorder: Recorder, tap: Tap, guest: Guest, end: float, *, is_json: b
         )
         return 0
     paths = ", ".join(map(str, recorder.paths))
-    tell(f"{count_table(counts)}\nrecorded {counts.total():,} messages to {paths}")
+    emit(f"{count_table(counts)}\nrecorded {counts.total():,} messages to {paths}")
     return 0
 
 
@@ -174,7 +174,7 @@ def warn(finding: Finding) -> None:
     """Report a finding that does not end the command."""
     report = Report()
     report.add(finding)
-    tell_report(report, {})
+    write_report(report, {})
 
 
 def count_table(counts: Mapping[RecordedTopic, int]) -> str:

@@ -31,23 +31,14 @@ from rbxcompose.bus.tokens import EntityKind, NodeToken, gid
 from rbxcompose.bus.transport import RemotePublisher
 from rbxcompose.bus.wire import WIRE_PROFILES, ros_qos
 from rbxcompose.bus.zenoh_session import open_router
-from rbxcompose.commands.console import NotDoneError, misused, refuse, tell, tell_report
+from rbxcompose.commands.console import NotDoneError, emit, misused, refuse, write_report
 from rbxcompose.commands.guest import NO_ROUTER, Guest
 from rbxcompose.commands.lookup import BusPlace, add_bus_options, find_place, robots_up
 from rbxcompose.commands.options import seconds
 from rbxcompose.commands.targets import add_layer_options, compiled
 from rbxcompose.compiler.plan.dump import PlanTextError, dump, load
 from rbxcompose.compiler.plan.model import Instance, Plan
-from rbxcompose.runtime.recording.codes import (
-    DAMAGED,
-    DIFFERENT,
-    NOT_ENOUGH,
-    NOT_REPLAYED,
-    NOTHING,
-    SENT_ALREADY,
-    UNREADABLE,
-    UNWRITABLE,
-)
+from rbxcompose.runtime.recording import codes
 from rbxcompose.runtime.recording.files import PART, Recorder, write_problem
 from rbxcompose.runtime.recording.reader import (
     NotARecordingError,
@@ -139,7 +130,7 @@ def run(arguments: argparse.Namespace) -> int:
                 return run_again(arguments, path, reader)
         summary = _look_through(path)
         if arguments.info:
-            tell(json.dumps(_fields(summary)) if arguments.json else _text(path, summary))
+            emit(json.dumps(_fields(summary)) if arguments.json else _text(path, summary))
             return 0
         return _replay(arguments, path, summary)
     except NotDoneError as error:
@@ -163,7 +154,7 @@ def _look_through(path: Path) -> RecordingSummary:
         summary = summary_of(reader.messages())
     if reader.damage:
         place = f"after {summary.messages:,} messages"
-        warn(DAMAGED.at(None, f"'{plain(str(path))}' is damaged {place}: {reader.damage}"))
+        warn(codes.DAMAGED.at(None, f"'{plain(str(path))}' is damaged {place}: {reader.damage}"))
     return summary
 
 
@@ -173,12 +164,14 @@ def _opened(path: Path) -> Iterator[RecordingReader]:
         with open_regular(path) as file:
             yield RecordingReader(file)
     except NotRegularError as error:
-        raise NotDoneError(UNREADABLE.at(None, f"'{plain(str(path))}' is not a recording: it is not a file")) from error
+        raise NotDoneError(
+            codes.UNREADABLE.at(None, f"'{plain(str(path))}' is not a recording: it is not a file")
+        ) from error
     except OSError as error:
         reason = plain(error.strerror or str(error))
-        raise NotDoneError(UNREADABLE.at(None, f"'{plain(str(path))}' cannot be read: {reason}")) from error
+        raise NotDoneError(codes.UNREADABLE.at(None, f"'{plain(str(path))}' cannot be read: {reason}")) from error
     except NotARecordingError as error:
-        finding = UNREADABLE.at(None, f"'{plain(str(path))}' is not a recording: {error}")
+        finding = codes.UNREADABLE.at(None, f"'{plain(str(path))}' is not a recording: {error}")
         raise NotDoneError(finding) from error
 
 
@@ -186,7 +179,7 @@ def _replay(arguments: argparse.Namespace, path: Path, summary: RecordingSummary
     topics = _chosen(summary, selection_of(arguments))
     if not topics or arguments.start > summary.duration:
         why = "none of the chosen topics can be replayed" if not topics else f"it lasts {summary.duration:.1f} s"
-        return refuse(NOTHING.at(None, f"nothing of '{plain(str(path))}' is replayed: {why}"))
+        return refuse(codes.NOTHING.at(None, f"nothing of '{plain(str(path))}' is replayed: {why}"))
     with replay_bus(arguments) as place:
         if not arguments.over:
             with Guest(place) as looking:  # its router knows all; a guest that stays has to make its own links first
@@ -204,11 +197,11 @@ def _replay_on(place: BusPlace, topics: list[RecordedTopic], arguments: argparse
     with Guest(place, stays=True) as guest, guest.interruptible():
         player = Player(guest, topics, arguments.namespace or "")
         player.wait_for_subscribers()
-        tell(f"replaying {len(topics)} topics of {plain(str(path))}; Ctrl-C ends it")
+        emit(f"replaying {len(topics)} topics of {plain(str(path))}; Ctrl-C ends it")
         count = _play(path, player, topics, arguments, guest)
         while arguments.loop and _wait(guest.clock.now() + _PAUSE, guest):  # even if the recording has no duration
             count += _play(path, player, topics, arguments, guest)
-    tell(f"replayed {count:,} messages")
+    emit(f"replayed {count:,} messages")
     return 0
 
 
@@ -221,7 +214,7 @@ def _sent_already(guest: Guest, topics: list[RecordedTopic], namespace: str) -> 
 def _left_out(names: list[str]) -> Finding:
     rest = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
     message = f"these topics are being published now: {plain(', '.join(names[:MOST_NAMES]))}{rest}"
-    return SENT_ALREADY.at(None, message, help="'--namespace old' keeps them apart, '--over' mixes them")
+    return codes.SENT_ALREADY.at(None, message, help="'--namespace old' keeps them apart, '--over' mixes them")
 
 
 def _chosen(summary: RecordingSummary, wanted: Selection) -> list[RecordedTopic]:
@@ -230,10 +223,12 @@ def _chosen(summary: RecordingSummary, wanted: Selection) -> list[RecordedTopic]
     unfit = [topic.name for topic in topics if not is_replayable(topic)]
     commands = [topic.name for topic in topics if topic.qos is Qos.COMMAND and not wanted.patterns]
     if unfit:
-        warn(NOT_REPLAYED.at(None, f"topics that the bus cannot carry: {plain(', '.join(unfit))}"))
+        warn(codes.NOT_REPLAYED.at(None, f"topics that the bus cannot carry: {plain(', '.join(unfit))}"))
     if commands:
         names = plain(", ".join(commands))
-        warn(NOT_REPLAYED.at(None, f"topics that make a robot move: {names}", help="'--topics NAME' replays them"))
+        warn(
+            codes.NOT_REPLAYED.at(None, f"topics that make a robot move: {names}", help="'--topics NAME' replays them")
+        )
     return [topic for topic in topics if topic.name not in {*unfit, *commands}]
 
 
@@ -321,7 +316,7 @@ def replay_bus(arguments: argparse.Namespace) -> Iterator[BusPlace]:
         yield find_place(arguments)
         return
     with _own_router() as endpoint:
-        tell(f"a router of its own is at {endpoint}: 'rbxcompose topic echo TOPIC --router {endpoint}'")
+        emit(f"a router of its own is at {endpoint}: 'rbxcompose topic echo TOPIC --router {endpoint}'")
         yield BusPlace(endpoint, arguments.domain or 0)
 
 
@@ -355,27 +350,29 @@ def run_again(arguments: argparse.Namespace, path: Path, reader: RecordingReader
     instance = _instance(plan, arguments.into)
     if missing := missing_topics(plan, instance, reader.topics):
         names = plain(", ".join(missing))
-        raise NotDoneError(NOT_ENOUGH.at(None, f"'{plain(str(path))}' lacks inputs of '{instance.name}': {names}"))
+        raise NotDoneError(
+            codes.NOT_ENOUGH.at(None, f"'{plain(str(path))}' lacks inputs of '{instance.name}': {names}")
+        )
     with open_regular(path) as file, _kept(arguments.write) as keep:
         found = replayed(plan, instance, RecordingReader(file).messages(), keep)
-    return _told(arguments, instance.name, found)
+    return _report(arguments, instance.name, found)
 
 
 def _plan(arguments: argparse.Namespace, path: Path, reader: RecordingReader) -> Plan:
     if PLAN not in reader.attachments:
         message = f"'{plain(str(path))}' was not recorded within a stepped run"
-        raise NotDoneError(NOT_ENOUGH.at(None, message, help=HOW))
+        raise NotDoneError(codes.NOT_ENOUGH.at(None, message, help=HOW))
     if arguments.robot is not None:
         compilation = compiled(arguments.robot, arguments)
-        tell_report(compilation.report, compilation.sources)
+        write_report(compilation.report, compilation.sources)
         if compilation.plan is None:
-            raise NotDoneError(NOT_ENOUGH.at(None, f"'{plain(arguments.robot)}' has errors"))
+            raise NotDoneError(codes.NOT_ENOUGH.at(None, f"'{plain(arguments.robot)}' has errors"))
         return compilation.plan
     try:
         return load(reader.attachments[PLAN].decode())
     except ValueError as error:
         reason = str(error) if isinstance(error, PlanTextError) else "its plan is not text"
-        raise NotDoneError(NOT_ENOUGH.at(None, f"'{plain(str(path))}': {plain(reason)}")) from error
+        raise NotDoneError(codes.NOT_ENOUGH.at(None, f"'{plain(str(path))}': {plain(reason)}")) from error
 
 
 def _instance(plan: Plan, name: str) -> Instance:
@@ -383,10 +380,10 @@ def _instance(plan: Plan, name: str) -> Instance:
     if instance is None:
         names = [one.name for one in plan.instances]
         message = f"the robot '{plain(plan.robot)}' has no component '{plain(name, 60)}'"
-        raise NotDoneError(NOT_ENOUGH.at(None, message, help=suggest(name, names, "components")))
+        raise NotDoneError(codes.NOT_ENOUGH.at(None, message, help=suggest(name, names, "components")))
     if HIDDEN in _settings(plan, instance):
         message = f"'{name}' has a secret, which a recording does not hold"
-        raise NotDoneError(NOT_ENOUGH.at(None, message, help="'--robot PATH' takes it from the robot's file"))
+        raise NotDoneError(codes.NOT_ENOUGH.at(None, message, help="'--robot PATH' takes it from the robot's file"))
     return instance
 
 
@@ -413,25 +410,25 @@ def _kept(path: Path | None) -> Iterator[Callable[[Recorded], None] | None]:
         yield None
         return
     if problem := write_problem(path):
-        raise NotDoneError(UNWRITABLE.at(None, problem))
+        raise NotDoneError(codes.UNWRITABLE.at(None, problem))
     try:
         recorder = Recorder(path, 0.0)
         yield recorder.add
         recorder.finish()
     except OSError as error:
         reason = plain(error.strerror or str(error))
-        raise NotDoneError(UNWRITABLE.at(None, f"'{plain(str(path))}' cannot be written: {reason}")) from error
+        raise NotDoneError(codes.UNWRITABLE.at(None, f"'{plain(str(path))}' cannot be written: {reason}")) from error
 
 
-def _told(arguments: argparse.Namespace, name: str, found: ReplayResult) -> int:
+def _report(arguments: argparse.Namespace, name: str, found: ReplayResult) -> int:
     for text in found.errors:
-        tell(plain(text))
+        emit(plain(text))
     if arguments.json:
-        tell(json.dumps({"component": name, "equal": found.equal, "difference": _difference_fields(found.difference)}))
+        emit(json.dumps({"component": name, "equal": found.equal, "difference": _difference_fields(found.difference)}))
     elif found.difference is None:
-        tell(f"'{name}' sends the same as recorded: {found.equal:,} messages")
+        emit(f"'{name}' sends the same as recorded: {found.equal:,} messages")
     else:
-        return refuse(DIFFERENT.at(None, _difference_text(name, found.difference, found.equal)))
+        return refuse(codes.DIFFERENT.at(None, _difference_text(name, found.difference, found.equal)))
     return 0 if found.difference is None else 1
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import argparse
 
-from rbxcompose.commands.console import tell
+from rbxcompose.commands.console import emit
 from rbxcompose.compiler.schema.documents import MAKERS, as_text, installed_schema
 
 
@@ -20,5 +20,5 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Print the schema."""
     kind = next(kind for kind in MAKERS if kind.lower() == arguments.kind)
-    tell(as_text(installed_schema(kind)).rstrip("\n"))
+    emit(as_text(installed_schema(kind)).rstrip("\n"))
     return 0

@@ -19,26 +19,11 @@ from pathlib import Path
 from rbxcompose.base.files import read_regular
 from rbxcompose.base.findings import Finding, Report, Severity, kind
 from rbxcompose.base.requests import to_data
-from rbxcompose.commands.console import FINDINGS, refuse, tell, tell_report
+from rbxcompose.commands.console import FINDINGS, emit, refuse, write_report
 from rbxcompose.commands.options import add_system_options, is_system
 from rbxcompose.compiler.plan.model import LinkTls
+from rbxcompose.compiler.systems import certificates
 from rbxcompose.compiler.systems.audit import listeners, reachable_keys
-from rbxcompose.compiler.systems.certificates import (
-    AUTHORITY,
-    CERTIFICATE,
-    KEY,
-    LARGEST,
-    NO_SECURITY,
-    CertificateError,
-    OpensslError,
-    common_name,
-    days_left,
-    folder_of,
-    make_authority,
-    make_certificate,
-    missing,
-    tls_of,
-)
 from rbxcompose.compiler.systems.model import System
 from rbxcompose.compiler.systems.reader import compile_system
 
@@ -68,7 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
     if not is_system(arguments.path):
         return refuse(NOT_MADE.at(None, f"'{arguments.path}' is not the file of a system"))
     system = compile_system(arguments.path, environment=os.environ, profiles=arguments.profile)
-    tell_report(system.report, system.sources)
+    write_report(system.report, system.sources)
     if system.report.has_errors:
         return FINDINGS
     return (
@@ -79,19 +64,19 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _init(system: System, arguments: argparse.Namespace) -> int:
-    folder = folder_of(system.name, os.environ)
+    folder = certificates.folder_of(system.name, os.environ)
     try:
-        make_authority(folder, system.name)
+        certificates.make_authority(folder, system.name)
         for name, host in system.hosts.items():
-            make_certificate(folder, system.name, name, host.address)
+            certificates.make_certificate(folder, system.name, name, host.address)
             if host.ssh is not None and (problem := _bring(system, name, folder / name, arguments)):
                 return refuse(problem)
             there = f", brought to {host.ssh}" if host.ssh else ""
-            tell(f"{name}: {folder / name}{there}")
-    except (OpensslError, OSError) as error:
+            emit(f"{name}: {folder / name}{there}")
+    except (certificates.OpensslError, OSError) as error:
         return refuse(NOT_MADE.at(None, f"the certificates cannot be made: {error}"))
-    if system.security == NO_SECURITY:
-        tell("the system does not use them yet: it has no 'security: mtls'")
+    if system.security == certificates.NO_SECURITY:
+        emit("the system does not use them yet: it has no 'security: mtls'")
     return 0
 
 
@@ -101,7 +86,10 @@ def _bring(system: System, host: str, folder: Path, arguments: argparse.Namespac
 
     remote = Remote(host, system.hosts[host], arguments.ssh_config)
     script = _RECEIVE.replace("NAME", system.name).replace("HOST", host)
-    files = {name: read_regular(folder / name, LARGEST) for name in (AUTHORITY, CERTIFICATE, KEY)}
+    files = {
+        name: read_regular(folder / name, certificates.LARGEST)
+        for name in (certificates.AUTHORITY, certificates.CERTIFICATE, certificates.KEY)
+    }
     done = subprocess.run(remote.ssh(script), input=archive_of(files, mode=0o600), capture_output=True, check=False)
     if done.returncode == 0:
         return None
@@ -114,7 +102,7 @@ def _audit(system: System, path: str, *, in_json: bool) -> int:
     report = Report()
     report.extend(_certificates(system, path))
     if in_json:
-        tell(
+        emit(
             json.dumps(
                 {"listeners": [to_data(endpoint) for endpoint in endpoints], "keys": [to_data(key) for key in keys]}
             )
@@ -122,39 +110,38 @@ def _audit(system: System, path: str, *, in_json: bool) -> int:
     else:
         for end in endpoints:
             warning = "  OPEN TO STRANGERS" if end.is_open else ""
-            tell(f"{end.host}  {end.robot}  {end.endpoint}  {end.reached_by}, {end.proof}{warning}")
+            emit(f"{end.host}  {end.robot}  {end.endpoint}  {end.reached_by}, {end.proof}{warning}")
         for (host, robot, whom), same in groupby(keys, key=lambda key: (key.host, key.robot, key.written_by)):
             who = " and ".join((*whom, "programs there"))
-            tell(f"{host}  {robot}  written, called or answered by {who}: {', '.join(item.name for item in same)}")
-    tell_report(report, {})
+            emit(f"{host}  {robot}  written, called or answered by {who}: {', '.join(item.name for item in same)}")
+    write_report(report, {})
     return FINDINGS if report.has_errors or any(endpoint.is_open for endpoint in endpoints) else 0
 
 
 def _certificates(system: System, path: str) -> Iterator[Finding]:
     """Yield what is wrong with the certificates that are on this machine."""
-    folder = folder_of(system.name, os.environ)
-    for host in system.hosts if system.security != NO_SECURITY else ():
+    folder = certificates.folder_of(system.name, os.environ)
+    for host in system.hosts if system.security != certificates.NO_SECURITY else ():
         if (folder / host).is_dir():
-            yield from certificate_findings(tls_of(folder, host, system.security), common_name(system.name, host), path)
+            yield from certificate_findings(
+                certificates.tls_of(folder, host, system.security), certificates.common_name(system.name, host), path
+            )
 
 
 SOON = 30.0  # [days] before a certificate expires
 NO_CERTIFICATE = kind("RBX6117")
 REFUSED_CERTIFICATE = kind("RBX6143")
-SOON_EXPIRED = kind(
-    "RBX6144",
-    Severity.WARNING,
-)
+SOON_EXPIRED = kind("RBX6144", Severity.WARNING)
 
 
 def certificate_findings(tls: LinkTls, name: str, path: str) -> Iterator[Finding]:
     """Yield what keeps other hosts from accepting the certificate of a host, or soon will; `name` must be in it."""
     again = f"rbxcompose security init {path}"
-    if lacking := missing(tls):
+    if lacking := certificates.missing(tls):
         yield NO_CERTIFICATE.at(None, f"'{lacking[0]}' cannot be read", help=again)
         return
     try:
-        if (days := days_left(tls, name)) < SOON:
+        if (days := certificates.days_left(tls, name)) < SOON:
             yield SOON_EXPIRED.at(None, f"'{tls.certificate}' expires in {days:.0f} days", help=again)
-    except (CertificateError, OSError) as error:
+    except (certificates.CertificateError, OSError) as error:
         yield REFUSED_CERTIFICATE.at(None, f"other hosts will refuse '{tls.certificate}': {error}", help=again)

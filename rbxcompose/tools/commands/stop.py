@@ -8,16 +8,8 @@ from __future__ import annotations
 
 import argparse
 
+from rbxcompose.commands import lookup
 from rbxcompose.commands.console import NotDoneError, refuse
-from rbxcompose.commands.lookup import (
-    NO_ANSWER,
-    add_asking_options,
-    answer_of,
-    find_robot,
-    known_state,
-    place_of,
-    show_answer,
-)
 from rbxcompose.commands.options import EACH
 from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.runtime.requests import StopRobot
@@ -27,27 +19,27 @@ ON_SYSTEM = EACH
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    add_asking_options(parser)
+    lookup.add_asking_options(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Stop the robot, over the bus if its supervisor does not answer."""
     try:
-        folder = find_robot(arguments.robot)
+        folder = lookup.find_robot(arguments.robot)
         answer = _stopped(folder)
     except NotDoneError as error:
         return refuse(error.finding)
-    show_answer(arguments, folder, answer)
+    lookup.show_answer(arguments, folder, answer)
     return 0
 
 
 def _stopped(folder: RobotFolder) -> str:
-    state = known_state(folder)
+    state = lookup.known_state(folder)
     if state is None or not state.supervisor.is_stopped:  # waste no time on a stopped supervisor
         try:
-            return answer_of(folder, StopRobot())
+            return lookup.answer_of(folder, StopRobot())
         except NotDoneError as error:
-            if error.finding.code != NO_ANSWER.code:
+            if error.finding.code != lookup.NO_ANSWER.code:
                 raise
     return stop_by_bus(folder)
 
@@ -65,11 +57,11 @@ def stop_by_bus(folder: RobotFolder) -> str:
     from rbxcompose.commands.guest import Guest  # importing the bus takes time
     from rbxcompose.runtime.process_group.group import stop_key
 
-    name, state = folder.path.name, known_state(folder)
-    with Guest(place_of(folder)) as guest:
-        told = sorted(answer.decode() for answer in guest.ask(stop_key(name), _ANSWER))
-    missing = sorted({*(state.alive() if state else ())} - {*told, *_OTHERS})
-    if not told:
-        raise NotDoneError(NO_ANSWER.at(None, f"'{name}' does not answer, nor does any of its processes"))
+    name, state = folder.path.name, lookup.known_state(folder)
+    with Guest(lookup.place_of(folder)) as guest:
+        stopped = sorted(answer.decode() for answer in guest.ask(stop_key(name), _ANSWER))
+    missing = sorted({*(state.alive() if state else ())} - {*stopped, *_OTHERS})
+    if not stopped:
+        raise NotDoneError(lookup.NO_ANSWER.at(None, f"'{name}' does not answer, nor does any of its processes"))
     rest = f"; NOT stopped: {', '.join(missing)}" if missing else ""
-    return f"the supervisor does not answer: stopped over the bus: {', '.join(told)}{rest}"
+    return f"the supervisor does not answer: stopped over the bus: {', '.join(stopped)}{rest}"

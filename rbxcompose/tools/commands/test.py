@@ -16,7 +16,7 @@ from pathlib import Path
 
 from rbxcompose.base.findings import Report
 from rbxcompose.base.printable import plain
-from rbxcompose.commands.console import FINDINGS, has_colour, misused, tell, tell_report
+from rbxcompose.commands.console import FINDINGS, emit, has_colour, misused, write_report
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.tools.mission_tests.coverage import Coverage
 from rbxcompose.tools.mission_tests.finding_files import tests_of
@@ -61,7 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
             coverage.add(outcome.verdict.trial.linked, outcome.verdict.trial.names, outcome.verdict.seen.keys)
         if not arguments.json:
             _tell(outcome, teller, arguments.verbose)
-    tell_report(_findings(reading, outcomes) if outcomes else unreadable, reading.sources)
+    write_report(_findings(reading, outcomes) if outcomes else unreadable, reading.sources)
     if not outcomes:
         return misused("test", f"no test has '{plain(arguments.filter)}' in its name")
     _finish(outcomes, coverage, teller, arguments)
@@ -78,9 +78,9 @@ def _outcome(written: WrittenTrial, reading: TrialReader, began: float) -> FileO
 
 
 def _tell(outcome: FileOutcome, teller: Teller, verbose: bool) -> None:
-    tell(teller.line(outcome))
+    emit(teller.line(outcome))
     if outcome.verdict and (verbose or not outcome.passed):
-        tell(teller.trace(outcome.verdict))
+        emit(teller.trace(outcome.verdict))
 
 
 def _findings(reading: TrialReader, outcomes: Sequence[FileOutcome]) -> Report:
@@ -93,8 +93,8 @@ def _finish(outcomes: Sequence[FileOutcome], coverage: Coverage, teller: Teller,
     if arguments.junit:
         arguments.junit.write_text(junit(outcomes), encoding="utf-8")
     if arguments.json:
-        tell(json.dumps(as_json(outcomes, coverage), indent=1))
+        emit(json.dumps(as_json(outcomes, coverage), indent=1))
         return
     if arguments.coverage and coverage.ways:
-        tell(coverage_text(coverage))
-    tell(teller.summary(outcomes, coverage))
+        emit(coverage_text(coverage))
+    emit(teller.summary(outcomes, coverage))

@@ -17,7 +17,7 @@ from functools import partial
 from typing import Any
 
 from rbxcompose.base.printable import plain
-from rbxcompose.commands.console import NotDoneError, has_colour, refuse, tell
+from rbxcompose.commands.console import NotDoneError, emit, has_colour, refuse
 from rbxcompose.commands.guest import Guest
 from rbxcompose.commands.hosts import Remote, Shares, SystemCommand
 from rbxcompose.commands.lookup import NOT_UP, add_robot_option, find_robot, place_of
@@ -74,7 +74,7 @@ def _once(guest: Guest, sampler: Sampler, as_json: bool) -> int:
     guest.run(lambda: sampler.is_complete, _PERIOD)  # the awaited messages come once in a period
     picture = _sampled(sampler)
     colour = has_colour(sys.stdout)
-    tell(to_json(picture.to_data()) if as_json else "\n".join(lines_of(picture, _WIDTH, _HEIGHT, colour=colour)))
+    emit(to_json(picture.to_data()) if as_json else "\n".join(lines_of(picture, _WIDTH, _HEIGHT, colour=colour)))
     return 0
 
 
@@ -82,7 +82,7 @@ def _follow(guest: Guest, sampler: Sampler) -> int:
     """Tell a picture as a line of JSON once a second."""
     with guest.interruptible():
         while True:
-            tell(to_json(_sampled(sampler).to_data()))
+            emit(to_json(_sampled(sampler).to_data()))
             sys.stdout.flush()
             if guest.run(lambda: guest.is_interrupted, _PERIOD):
                 return 0
@@ -115,7 +115,7 @@ class LiveShare:
     def __init__(self, host: str, robot: str, remote: Remote) -> None:
         self._host, self._robot = host, robot
         self._command = remote.rbxcompose(["top", robot, "--json", "--follow"])
-        self._told: Mapping[str, Any] | None = None
+        self._answer: Mapping[str, Any] | None = None
         self._since = self._ended = time.monotonic()
         self._problem = self._last = ""
         self._started()
@@ -136,12 +136,12 @@ class LiveShare:
     def _read(self, process: subprocess.Popen[str]) -> None:
         for line in process.stdout or ():
             try:
-                told = json.loads(line)
+                answer = json.loads(line)
             except ValueError:
                 self._last = self._last or plain(line.strip())
                 continue
-            if isinstance(told, dict) and "components" in told:
-                self._told, self._since, self._problem, self._last = told, time.monotonic(), "", ""
+            if isinstance(answer, dict) and "components" in answer:
+                self._answer, self._since, self._problem, self._last = answer, time.monotonic(), "", ""
         if process.stdout is not None:
             process.stdout.close()
         process.wait()
@@ -152,7 +152,7 @@ class LiveShare:
         now = time.monotonic()
         if not self._thread.is_alive() and now - self._ended > _AGAIN:
             self._started()
-        return ShareView(self._robot, self._host, self._told, now - self._since, self._problem)
+        return ShareView(self._robot, self._host, self._answer, now - self._since, self._problem)
 
     def close(self) -> None:
         """End the command."""

@@ -16,48 +16,45 @@ from itertools import pairwise
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.bus.graph import GraphEnd
-from rbxcompose.commands.console import table, tell
-from rbxcompose.commands.guest import Guest, described, tell_list, visit, wanted
+from rbxcompose.commands import options
+from rbxcompose.commands.console import emit, table
+from rbxcompose.commands.guest import Guest, described, visit, wanted, write_names
 from rbxcompose.commands.lookup import add_bus_options
-from rbxcompose.commands.options import (
-    BUS,
-    Subcommand,
-    add_actions,
-    add_count_options,
-    add_json_option,
-    add_ls_options,
-    add_system_options,
-    add_timeout_option,
-    argument,
-    count,
-    hertz,
-    seconds,
-)
 
-ON_SYSTEM = BUS
+ON_SYSTEM = options.BUS
 _ENDS = ("publishers", "subscriptions")
 _WINDOW = 100  # messages
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    topic = argument("topic", metavar="TOPIC", help="its name, such as /odom")
-    window = argument("--window", type=count, default=_WINDOW, metavar="N", help=f"over so many messages ({_WINDOW})")
-    duration = argument("--for", dest="duration", type=seconds, metavar="T", help="end after this time")
-    type_ = argument("type", metavar="TYPE", help="such as geometry_msgs/Twist")
-    message = argument("message", metavar="MESSAGE", nargs="?", default="", help="YAML; missing fields are zero")
-    rate = argument("--rate", type=hertz, metavar="10Hz", help="publish again and again, until interrupted")
-    most = argument("-n", "--count", type=count, metavar="N", help="end after this many")
-    timeout = partial(add_timeout_option, default="2s")
-    sent = (topic, type_, message, rate, most, timeout, add_json_option)
-    actions = (
-        Subcommand("ls", "list the topics with their types", _ls, (add_ls_options,)),
-        Subcommand("show", "show publishers and subscribers", _show, (add_json_option, topic)),
-        Subcommand("echo", "print the messages", _echo, (add_count_options, add_json_option, topic)),
-        Subcommand("hz", "measure how often messages arrive", measure, (window, duration, add_json_option, topic)),
-        Subcommand("pub", "publish a message, by default once", _pub, sent),
+    topic = options.argument("topic", metavar="TOPIC", help="its name, such as /odom")
+    window = options.argument(
+        "--window", type=options.count, default=_WINDOW, metavar="N", help=f"over so many messages ({_WINDOW})"
     )
-    add_actions(parser, actions, add_bus_options, add_system_options)
+    duration = options.argument("--for", dest="duration", type=options.seconds, metavar="T", help="end after this time")
+    type_ = options.argument("type", metavar="TYPE", help="such as geometry_msgs/Twist")
+    message = options.argument(
+        "message", metavar="MESSAGE", nargs="?", default="", help="YAML; missing fields are zero"
+    )
+    rate = options.argument(
+        "--rate", type=options.hertz, metavar="10Hz", help="publish again and again, until interrupted"
+    )
+    most = options.argument("-n", "--count", type=options.count, metavar="N", help="end after this many")
+    timeout = partial(options.add_timeout_option, default="2s")
+    sent = (topic, type_, message, rate, most, timeout, options.add_json_option)
+    actions = (
+        options.Subcommand("ls", "list the topics with their types", _ls, (options.add_ls_options,)),
+        options.Subcommand("show", "show publishers and subscribers", _show, (options.add_json_option, topic)),
+        options.Subcommand(
+            "echo", "print the messages", _echo, (options.add_count_options, options.add_json_option, topic)
+        ),
+        options.Subcommand(
+            "hz", "measure how often messages arrive", measure, (window, duration, options.add_json_option, topic)
+        ),
+        options.Subcommand("pub", "publish a message, by default once", _pub, sent),
+    )
+    options.add_actions(parser, actions, add_bus_options, options.add_system_options)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -66,19 +63,19 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _ls(guest: Guest, arguments: argparse.Namespace) -> int:
-    return tell_list(guest.graph().topics, _ENDS, arguments)
+    return write_names(guest.graph().topics, _ENDS, arguments)
 
 
 def _show(guest: Guest, arguments: argparse.Namespace) -> int:
     topic = wanted(guest.graph().topics, arguments.topic, "topic")
     if arguments.json:
-        tell(json.dumps(described(topic, _ENDS)))
+        emit(json.dumps(described(topic, _ENDS)))
         return 0
-    tell(f"{topic.name}: {', '.join(topic.types)}")
+    emit(f"{topic.name}: {', '.join(topic.types)}")
     if topic.clash:
-        tell(f"! {topic.clash}")
+        emit(f"! {topic.clash}")
     ends = (("publisher", topic.givers), ("subscription", topic.takers))
-    tell(table([(what, end.node, end.kind.type, _qos(end)) for what, given in ends for end in given]))
+    emit(table([(what, end.node, end.kind.type, _qos(end)) for what, given in ends for end in given]))
     return 0
 
 
@@ -163,9 +160,9 @@ def measure(guest: Guest, arguments: argparse.Namespace) -> int:
 def _tell_pace(meter: PaceMeter, as_json: bool) -> None:
     pace = meter.take()
     if as_json:
-        tell(json.dumps(asdict(pace) if pace else None))
+        emit(json.dumps(asdict(pace) if pace else None))
     elif pace is None:
-        tell("nothing new")
+        emit("nothing new")
     else:
         intervals = f"min {pace.shortest:.4f} s, max {pace.longest:.4f} s, jitter {pace.jitter:.4f} s"
-        tell(f"{pace.rate:.2f} Hz, {intervals}, {pace.messages} messages")
+        emit(f"{pace.rate:.2f} Hz, {intervals}, {pace.messages} messages")

@@ -12,16 +12,9 @@ import sys
 from pathlib import Path
 
 from rbxcompose.base.units import TIME, UnitError, to_si
-from rbxcompose.commands.console import FINDINGS, refuse, tell_report
+from rbxcompose.commands import targets
+from rbxcompose.commands.console import FINDINGS, refuse, write_report
 from rbxcompose.commands.options import add_system_options, is_system
-from rbxcompose.commands.targets import (
-    add_layer_options,
-    add_path_argument,
-    chosen_layers,
-    compiled,
-    layers_of,
-    robot_path,
-)
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.runtime.folder import RunOptions
 from rbxcompose.runtime.recording.codes import UNWRITABLE
@@ -34,8 +27,8 @@ USAGE = 2
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    add_path_argument(parser)
-    add_layer_options(parser)
+    targets.add_path_argument(parser)
+    targets.add_layer_options(parser)
     parser.add_argument(
         "--rate", type=_rate, default=RunOptions(), metavar="20x|max|1x", help="robot time per real time, reproducible"
     )
@@ -59,7 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
         other = "-d" if arguments.detach else "--rate"
         sys.stderr.write(f"rbxcompose up: --watch is for the foreground in real time, without {other}\n")
         return USAGE
-    path = robot_path(arguments.path, may_run=False)
+    path = targets.robot_path(arguments.path, may_run=False)
     if path is None:
         return FINDINGS
     if is_system(path):
@@ -67,8 +60,8 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.host or arguments.robot:
         sys.stderr.write("rbxcompose up: --host and --robot are for systems\n")
         return USAGE
-    compilation = compile_robot(path, **layers_of(arguments))
-    tell_report(compilation.report, compilation.sources)
+    compilation = compile_robot(path, **targets.layers_of(arguments))
+    write_report(compilation.report, compilation.sources)
     if compilation.plan is None or compilation.robot is None or compilation.report.has_errors:
         return 1
     if compilation.plan.follows_clock and arguments.rate.is_stepped:
@@ -89,7 +82,7 @@ def run(arguments: argparse.Namespace) -> int:
         return FINDINGS
     reload = None
     if arguments.watch:
-        reload = LiveReload(lambda: compiled(path, arguments), compilation, options.layers)
+        reload = LiveReload(lambda: targets.compiled(path, arguments), compilation, options.layers)
     return run_plan(compilation.plan, options, LiveRules(compilation.robot), reload)
 
 
@@ -100,7 +93,7 @@ def _options(arguments: argparse.Namespace) -> RunOptions:
         duration=arguments.duration,
         is_detached=arguments.detach,
         record=arguments.record.absolute() if arguments.record else None,
-        layers=chosen_layers(arguments),
+        layers=targets.chosen_layers(arguments),
     )
 
 

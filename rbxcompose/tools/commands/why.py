@@ -10,7 +10,7 @@ import argparse
 import json
 
 from rbxcompose.base.findings import Finding
-from rbxcompose.commands.console import FINDINGS, refuse, tell, tell_report
+from rbxcompose.commands.console import FINDINGS, emit, refuse, write_report
 from rbxcompose.commands.targets import add_layer_options, layers_of, robot_path
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.tools.inspection.why import why
@@ -33,10 +33,10 @@ def run(arguments: argparse.Namespace) -> int:
         return FINDINGS
     compilation = compile_robot(robot, **layers_of(arguments))
     if compilation.robot is None:
-        tell_report(compilation.report, compilation.sources)
+        write_report(compilation.report, compilation.sources)
         return FINDINGS
     answer = why(compilation.robot, arguments.path)
     if isinstance(answer, Finding):
         return refuse(answer)
-    tell(json.dumps(answer.data(), indent=2, ensure_ascii=False) if arguments.json else answer.text())
+    emit(json.dumps(answer.data(), indent=2, ensure_ascii=False) if arguments.json else answer.text())
     return 0

@@ -1,4 +1,4 @@
-"""Devices that components name."""
+"""The devices that components name, and the USB adapters that are plugged in."""
 
 from __future__ import annotations
 
@@ -8,11 +8,13 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from rbxcompose.base.findings import Finding, Span, kind
+from rbxcompose.base.findings import Finding, Severity, Span, kind
 from rbxcompose.base.printable import plain
 from rbxcompose.compiler.model.flow import setting_span
 from rbxcompose.compiler.model.robot import Robot
-from rbxcompose.domains.devices.serial_ports import PortError, port_path
+from rbxcompose.domains.devices.sections.devices import devices as device_section
+from rbxcompose.domains.devices.serial_ports import PortError, port_path, slow_adapter
+from rbxcompose.domains.devices.udev import names_of
 from rbxcompose.tools.doctor import HostFacts, examination
 
 _PREFIXES = "/dev/", "usb:", "usb@", "dev:"
@@ -71,3 +73,35 @@ def _group(path: Path) -> str:
         return grp.getgrgid(number).gr_name
     except KeyError:
         return str(number)
+
+
+UNKNOWN = kind("RBX9412", Severity.WARNING)
+
+
+@examination
+def adapters(facts: HostFacts) -> Iterator[str | Finding]:
+    """Tell which device each adapter is; one that is none is only wrong for a robot that names its devices."""
+    contents = [robot.manifest.contents for robot in facts.robots]
+    named = [device.wanted(name) for one in contents for name, device in one.of(device_section).items()]
+    for port in facts.ports:
+        if port.device is None:
+            continue
+        shown = f"{port.path} ({port.device.shown}{f', {plain(port.about)}' if port.about else ''})"
+        if names := names_of(port, named):
+            yield f"{shown} is {' and '.join(repr(name) for name in names)}"
+        elif named:
+            words = f"{shown} is none of the devices: {', '.join(sorted({item.name for item in named}))}"
+            yield UNKNOWN.at(None, words, help="'rbxcompose udev scan' writes an entry for it")
+        else:
+            yield f"{shown} is plugged in; 'rbxcompose udev scan' gives it a name"
+    if not any(port.device for port in facts.ports):
+        yield "no USB adapter with a serial port is plugged in"
+
+
+@examination
+def latency(facts: HostFacts) -> Iterator[str | Finding]:
+    """Check the latency timer of each adapter that has one."""
+    for path, seconds in sorted(facts.latencies.items()):
+        yield slow_adapter(path, seconds) or f"the adapter of {path} passes replies on after {1000 * seconds:.0f} ms"
+    if not facts.latencies:
+        yield "no USB adapter has a latency timer"

@@ -11,15 +11,7 @@ from typing import Any
 import yaml
 
 from rbxcompose.manifest.secrets import VARIABLE
-from rbxcompose.tools.exporting.exported_share import (
-    CERTIFICATES,
-    CONFIGURATION,
-    FILE,
-    GRACE,
-    MEMORY,
-    PROCESSES,
-    ExportedShare,
-)
+from rbxcompose.tools.exporting import exported_share
 
 PROJECT = "/robot"  # the folder of the manifests in the image
 _DOCKERFILE = """FROM python:3.11-slim
@@ -34,10 +26,10 @@ ENTRYPOINT ["rbxcompose"]
 
 def dockerfile(version: str) -> str:
     """Return the Dockerfile; the system's files are in the folder `project` beside it."""
-    return _DOCKERFILE.format(version=version, project=PROJECT, configuration=CONFIGURATION)
+    return _DOCKERFILE.format(version=version, project=PROJECT, configuration=exported_share.CONFIGURATION)
 
 
-def compose_file(shares: Iterable[ExportedShare], *, system: str, file: str) -> str:
+def compose_file(shares: Iterable[exported_share.ExportedShare], *, system: str, file: str) -> str:
     """Return the Compose file; `file` is that of the system in the project. Routers need the network of the host."""
     given = list(shares)
     made: dict[str, Any] = {
@@ -50,29 +42,33 @@ def compose_file(shares: Iterable[ExportedShare], *, system: str, file: str) -> 
     return f"# On each host: docker compose --profile HOST up -d\n{text}"
 
 
-def _certificates(share: ExportedShare) -> Iterator[tuple[str, str, str]]:
+def _certificates(share: exported_share.ExportedShare) -> Iterator[tuple[str, str, str]]:
     """Yield name of a secret, file on the host, and file in the container."""
-    for name in CERTIFICATES if share.has_certificates else ():
+    for name in exported_share.CERTIFICATES if share.has_certificates else ():
         path = f"{share.certificates}/{name}"
-        yield f"{share.name}-{name.partition('.')[0]}", f"${{HOME}}/.config/{path}", f"{CONFIGURATION}/{path}"
+        yield (
+            f"{share.name}-{name.partition('.')[0]}",
+            f"${{HOME}}/.config/{path}",
+            f"{exported_share.CONFIGURATION}/{path}",
+        )
 
 
-def _service(share: ExportedShare, file: str) -> dict[str, Any]:
+def _service(share: exported_share.ExportedShare, file: str) -> dict[str, Any]:
     service: dict[str, Any] = {
         "build": ".",
         "profiles": [share.host],
-        "command": [file if word == FILE else word for word in share.command],
+        "command": [file if word == exported_share.FILE else word for word in share.command],
         "network_mode": "host",
         "init": True,
         "read_only": True,
         "tmpfs": ["/run/robot:mode=0700,uid=1000", "/tmp"],  # noqa: S108 - of the container
         "shm_size": "256mb",
-        "mem_limit": MEMORY.lower(),
-        "pids_limit": PROCESSES,
+        "mem_limit": exported_share.MEMORY.lower(),
+        "pids_limit": exported_share.PROCESSES,
         "cap_drop": ["ALL"],
         "security_opt": ["no-new-privileges:true"],
         "restart": "on-failure:5",
-        "stop_grace_period": f"{share.rest_time + GRACE:g}s",
+        "stop_grace_period": f"{share.rest_time + exported_share.GRACE:g}s",
         "healthcheck": {
             "test": ["CMD", "rbxcompose", "ps", share.robot],
             "interval": "5s",

@@ -18,11 +18,11 @@ from rbxcompose.commands.importing.ros_parameters import (
     NodeParameters,
     ParameterData,
     argument_type,
-    is_told,
     parameters_of,
     scalars_of,
     shown_name,
     value_of,
+    was_refused,
     written,
 )
 from rbxcompose.compiler.composition.dump import exact
@@ -159,7 +159,7 @@ def _add(known: GivenValues, node: NodeParameters, report: Report) -> None:
         if path[0] in _OF_ROS:
             continue
         value = value_of(entry.value)
-        if value is None and is_told(entry.value):
+        if value is None and was_refused(entry.value):
             continue
         if value is None:
             words = f"{shown} is not carried over: it is neither a value nor a list of values"

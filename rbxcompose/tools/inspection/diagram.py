@@ -13,6 +13,7 @@ from rbxcompose.bus.names import ActionNames, data_key, resolve
 from rbxcompose.bus.wire import WIRE_PROFILES
 from rbxcompose.compiler.model.robot import PortEnd, Robot, RobotComponent, RobotMission
 from rbxcompose.compiler.plan.model import BusPlan
+from rbxcompose.domains.muxes.sections.muxes import muxes
 from rbxcompose.missions.analysis.effects import sent_by
 from rbxcompose.missions.engine.world import POSE
 from rbxcompose.missions.sources import SkillWay
@@ -245,7 +246,7 @@ def _kind(end: PortEnd) -> WireContent | None:
 
 def _note(robot: Robot, component: RobotComponent, end: PortEnd) -> str:
     """Return the priority of an input or a lock of a mux."""
-    mux = robot.manifest.muxes.get(component.name)
+    mux = robot.manifest.contents.of(muxes).get(component.name)
     if mux is None or not isinstance(end.port, In):
         return ""
     entry = mux.inputs.get(end.name) or mux.locks.get(end.name.removeprefix("lock_"))
@@ -366,10 +367,7 @@ _ARROWS = {
     WireContent.LOOK_UP: "-.-o",
 }
 _GRAPH_MERMAID_SHAPES = {BoxShape.COMPONENT: ("[", "]"), BoxShape.MUX: ("{{", "}}"), BoxShape.PROGRAM: ("([", "])")}
-_GRAPH_MERMAID_STYLES = (
-    "classDef wire fill:none,stroke-dasharray:2 2",
-    "classDef mux stroke-width:2px",
-)
+_GRAPH_MERMAID_STYLES = ("classDef wire fill:none,stroke-dasharray:2 2", "classDef mux stroke-width:2px")
 
 
 def mermaid(diagram: Diagram) -> str:

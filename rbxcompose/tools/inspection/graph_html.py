@@ -155,7 +155,7 @@ def _wire(layout: Layout, key: str, wire: DiagramWire) -> Iterator[str]:
     is_open = "" if wire.sources and wire.targets else " open"
     rect = layout.places[key]
     yield f'<g class="wire {wire.kind}{is_open}" data-kind="{wire.kind}" data-boxes="{escape(boxes)}">'
-    yield f"<title>{escape(_told(wire))}</title>"
+    yield f"<title>{escape(_title(wire))}</title>"
     for tip in wire.sources:
         yield from _line(layout, tip.box, key, str(wire.kind), boxes, has_arrow=not wire.targets)
     for tip in wire.targets:
@@ -170,7 +170,7 @@ def _second_line(wire: DiagramWire) -> str:
     return f"{wire.short_type}, {wire.note}" if wire.note else wire.short_type
 
 
-def _told(wire: DiagramWire) -> str:
+def _title(wire: DiagramWire) -> str:
     """Return a description of a wire."""
     lines = [f"{wire.kind} {wire.name}", wire.type, *([f"quality of service: {wire.qos}"] if wire.qos else [])]
     lines += [f"from {_names(wire.sources) or wire.about or 'outside'}", f"to {_names(wire.targets) or 'nothing here'}"]

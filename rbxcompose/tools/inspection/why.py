@@ -17,6 +17,7 @@ from rbxcompose.compiler.model.robot import PortEnd, Robot, RobotComponent, reso
 from rbxcompose.compiler.plan.model import BusPlan
 from rbxcompose.compiler.schema.documents import installed_schema
 from rbxcompose.compiler.schema.guide import Guide
+from rbxcompose.domains.muxes.sections.muxes import muxes
 from rbxcompose.manifest.tree import KeyPath, MappingNode, ScalarNode, TreeNode, at, key_span
 from rbxcompose.missions.engine.value_text import show as show_value
 from rbxcompose.missions.program.machines import Input
@@ -189,7 +190,7 @@ def _port(robot: Robot, component: RobotComponent, end: PortEnd) -> PathAnswer:
 
 def _reason(robot: Robot, component: RobotComponent, end: PortEnd) -> str:
     namespace = robot.manifest.bus.namespace or ""
-    for mux, entry in robot.manifest.muxes.items():
+    for mux, entry in robot.manifest.contents.of(muxes).items():
         for name, source in entry.inputs.items():
             is_taken = (source.source or "").partition(".")[0] == component.name and isinstance(end.port, Out)
             if is_taken and end.topic == resolve(source.topic or f"{mux}/{name}", namespace):

@@ -12,20 +12,10 @@ from rbxcompose.base.findings import Span
 from rbxcompose.base.units import Quantity, format_quantity
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.sections.args import args
+from rbxcompose.manifest import tree
 from rbxcompose.manifest.documents import ManifestHeader
 from rbxcompose.manifest.files import resolve, shown_name
 from rbxcompose.manifest.registry import naming
-from rbxcompose.manifest.tree import (
-    BROKEN,
-    Entry,
-    KeyPath,
-    MappingNode,
-    ScalarNode,
-    SequenceNode,
-    TreeNode,
-    at,
-    key_span,
-)
 from rbxcompose.missions.analysis.scope_types import base_names, views
 from rbxcompose.missions.engine.world import POSE
 from rbxcompose.missions.language.grammar import Takes
@@ -63,14 +53,14 @@ def variable_span(spot: Spot, name: str) -> Span | None:
     """Return where a `$name` comes from; the file is empty for the text itself."""
     root, robot = spot.cursor.root, spot.known.robot
     for section in ("inputs", "data"):
-        if at(root, (section, name)) is not None:
-            return key_span(root, (section, name))
+        if tree.at(root, (section, name)) is not None:
+            return tree.key_span(root, (section, name))
     for length in range(len(spot.cursor.path), -1, -1):
-        word = at(root, (*spot.cursor.path[:length], "for"))
-        if isinstance(word, ScalarNode) and word.text == name:
+        word = tree.at(root, (*spot.cursor.path[:length], "for"))
+        if isinstance(word, tree.ScalarNode) and word.text == name:
             return word.span
     if robot is not None and name in robot.manifest.values:
-        return key_span(robot.manifest.root, ("values", name))
+        return tree.key_span(robot.manifest.root, ("values", name))
     return None
 
 
@@ -81,12 +71,12 @@ def _program(spot: Spot) -> Program | None:
     return next((mission.program for mission in missions if entries[mission.name].path == path), None)
 
 
-def _declared(spot: Spot, root: MappingNode, section: str) -> Iterator[tuple[str, str]]:
+def _declared(spot: Spot, root: tree.MappingNode, section: str) -> Iterator[tuple[str, str]]:
     named, program = root.get(section), _program(spot)
-    for name in named.entries if isinstance(named, MappingNode) else ():
+    for name in named.entries if isinstance(named, tree.MappingNode) else ():
         known = base_names(program, spot.known.robot.names).get(name) if program and spot.known.robot else None
-        word = at(named, (name, "type")) if isinstance(named, MappingNode) else None
-        yield name, known.phrase if known else word.text if isinstance(word, ScalarNode) else UNKNOWN.phrase
+        word = tree.at(named, (name, "type")) if isinstance(named, tree.MappingNode) else None
+        yield name, known.phrase if known else word.text if isinstance(word, tree.ScalarNode) else UNKNOWN.phrase
 
 
 def _items(spot: Spot) -> Iterator[tuple[str, str]]:
@@ -98,8 +88,8 @@ def _items(spot: Spot) -> Iterator[tuple[str, str]]:
             if view.node.parent is not None and (item := program.nodes[view.node.parent].item):
                 types[item] = view.scope.names[item].phrase
     for length in range(len(spot.cursor.path) + 1):
-        word = at(spot.cursor.root, (*spot.cursor.path[:length], "for"))
-        if isinstance(word, ScalarNode):
+        word = tree.at(spot.cursor.root, (*spot.cursor.path[:length], "for"))
+        if isinstance(word, tree.ScalarNode):
             yield word.text, types.get(word.text, UNKNOWN.phrase)
 
 
@@ -123,52 +113,52 @@ class OutlineEntry:
 def outline(text: str) -> list[OutlineEntry]:
     """Return the outline of a text; empty while it is no YAML."""
     root = quick_tree(text)
-    if not isinstance(root, MappingNode):
+    if not isinstance(root, tree.MappingNode):
         return []
     is_mission = kind_of(text) == MISSION
     sections = ((name, entry) for name, entry in root.entries.items() if name not in ManifestHeader.model_fields)
     return [_section(name, entry, is_mission) for name, entry in sections]
 
 
-def _section(name: str, entry: Entry, is_mission: bool) -> OutlineEntry:
+def _section(name: str, entry: tree.Entry, is_mission: bool) -> OutlineEntry:
     if is_mission and name in _BODIES:
         return _made(entry, "section", tuple(_of_body(name, entry.value, 1)))
     return _made(entry, "section", tuple(_named(entry.value)))
 
 
-def _named(node: TreeNode) -> Iterator[OutlineEntry]:
-    for entry in node.entries.values() if isinstance(node, MappingNode) else ():
-        below = entry.value.entries if isinstance(entry.value, MappingNode) else {}
-        inner = (one for one in below.values() if not isinstance(one.value, ScalarNode))
+def _named(node: tree.TreeNode) -> Iterator[OutlineEntry]:
+    for entry in node.entries.values() if isinstance(node, tree.MappingNode) else ():
+        below = entry.value.entries if isinstance(entry.value, tree.MappingNode) else {}
+        inner = (one for one in below.values() if not isinstance(one.value, tree.ScalarNode))
         yield _made(entry, "name", tuple(_made(item, "value", tuple(_named(item.value))) for item in inner))
 
 
-def _of_body(key: str, node: TreeNode, level: int) -> Iterator[OutlineEntry]:
+def _of_body(key: str, node: tree.TreeNode, level: int) -> Iterator[OutlineEntry]:
     """Yield what stands below a key of a mission: steps, or names with steps."""
     if level > DEEPEST:
         return
-    if isinstance(node, SequenceNode) and key in keys_taking(Takes.STEP, Takes.STEPS, Takes.BRANCHES):
+    if isinstance(node, tree.SequenceNode) and key in keys_taking(Takes.STEP, Takes.STEPS, Takes.BRANCHES):
         for item in node.items:
             yield from _step(item, level)
-    elif isinstance(node, MappingNode) and key in keys_taking(Takes.STATES, Takes.INTERRUPTS):
+    elif isinstance(node, tree.MappingNode) and key in keys_taking(Takes.STATES, Takes.INTERRUPTS):
         for entry in node.entries.values():
             yield _made(entry, "state", tuple(_inside(entry.value, level)))
-    elif isinstance(node, MappingNode) and key in keys_taking(Takes.BRANCHES, Takes.CASES):
+    elif isinstance(node, tree.MappingNode) and key in keys_taking(Takes.BRANCHES, Takes.CASES):
         for entry in node.entries.values():
             yield _made(entry, "state", tuple(_step(entry.value, level + 1)))
-    elif isinstance(node, MappingNode) and key == "machine":
+    elif isinstance(node, tree.MappingNode) and key == "machine":
         for name, entry in node.entries.items():
             yield from _of_body(name, entry.value, level)
     elif key in keys_taking(Takes.STEP):
         yield from _step(node, level)
 
 
-def _step(node: TreeNode, level: int) -> Iterator[OutlineEntry]:
-    if isinstance(node, ScalarNode) and node.text:
+def _step(node: tree.TreeNode, level: int) -> Iterator[OutlineEntry]:
+    if isinstance(node, tree.ScalarNode) and node.text:
         yield OutlineEntry(node.text, "step", "", node.span, node.span)
-    elif isinstance(node, SequenceNode):
+    elif isinstance(node, tree.SequenceNode):
         yield from _of_body("sequence", node, level)
-    elif isinstance(node, MappingNode):
+    elif isinstance(node, tree.MappingNode):
         own = [key for key in node.entries if key not in ("name", *modifier_keys())]
         word = next((key for key in own if key in kinds()), own[0] if own else "")
         if word:
@@ -178,21 +168,21 @@ def _step(node: TreeNode, level: int) -> Iterator[OutlineEntry]:
             )
 
 
-def _inside(node: TreeNode, level: int) -> Iterator[OutlineEntry]:
-    if isinstance(node, MappingNode):
+def _inside(node: tree.TreeNode, level: int) -> Iterator[OutlineEntry]:
+    if isinstance(node, tree.MappingNode):
         for key, entry in node.entries.items():
             yield from _of_body(key, entry.value, level + 1)
     else:
         yield from _step(node, level + 1)
 
 
-def _made(entry: Entry, sort: str, below: tuple[OutlineEntry, ...]) -> OutlineEntry:
+def _made(entry: tree.Entry, sort: str, below: tuple[OutlineEntry, ...]) -> OutlineEntry:
     key, value = entry.key.span, entry.value.span
     span = Span(key.file, key.line, key.column, *max(_end(key), _end(value)))
     return OutlineEntry(entry.key.text, sort, _detail(entry.value), span, key, below)
 
 
-def _around(node: MappingNode) -> Span:
+def _around(node: tree.MappingNode) -> Span:
     first = next(iter(node.entries.values())).key.span
     return Span(first.file, first.line, first.column, *max(_end(node.span), _end(first)))
 
@@ -201,10 +191,10 @@ def _end(span: Span) -> tuple[int, int]:
     return span.end_line, span.end_column
 
 
-def _detail(node: TreeNode) -> str:
-    if isinstance(node, MappingNode) and isinstance(word := node.get("type"), ScalarNode):
+def _detail(node: tree.TreeNode) -> str:
+    if isinstance(node, tree.MappingNode) and isinstance(word := node.get("type"), tree.ScalarNode):
         node = word
-    text = " ".join(node.text.split()) if isinstance(node, ScalarNode) else ""
+    text = " ".join(node.text.split()) if isinstance(node, tree.ScalarNode) else ""
     return text if len(text) <= _DETAIL else f"{text[: _DETAIL - 3]}..."
 
 
@@ -266,13 +256,13 @@ def _of_kind(spot: Spot, kind: str, word: str) -> Span | None:
     return next((span for path in paths if (span := _own(spot, path))), None)
 
 
-def _own(spot: Spot, path: KeyPath) -> Span | None:
+def _own(spot: Spot, path: tree.KeyPath) -> Span | None:
     """Return the place of an entry: in the text itself, else in the composed robot."""
-    if not spot.document.is_mission and at(spot.cursor.root, path) is not None:
-        return key_span(spot.cursor.root, path)
+    if not spot.document.is_mission and tree.at(spot.cursor.root, path) is not None:
+        return tree.key_span(spot.cursor.root, path)
     robot = spot.known.robot
-    if robot is not None and at(robot.manifest.root, path) is not None:
-        return key_span(robot.manifest.root, path)
+    if robot is not None and tree.at(robot.manifest.root, path) is not None:
+        return tree.key_span(robot.manifest.root, path)
     return None
 
 
@@ -299,19 +289,19 @@ def _name(spot: Spot) -> str:
     word, cursor = word_at(spot), spot.cursor
     if word.startswith("${"):
         name = word.removeprefix("${").strip()
-        return _told(f"${{{name}}}", fills(spot).get(name, ""))
+        return _described(f"${{{name}}}", fills(spot).get(name, ""))
     if word.startswith("$"):
-        return _told(word, variables(spot).get(word.removeprefix("$").partition(".")[0], ""))
+        return _described(word, variables(spot).get(word.removeprefix("$").partition(".")[0], ""))
     if spot.document.is_mission:
-        skill = _told(word, spot.known.of(SKILL).get(word, ""))
-        return skill or ("" if cursor.is_key else _told(word, spot.known.of(PLACE).get(word, "")))
+        skill = _described(word, spot.known.of(SKILL).get(word, ""))
+        return skill or ("" if cursor.is_key else _described(word, spot.known.of(PLACE).get(word, "")))
     if cursor.is_key:
         return ""
     kind = spot.guide.value(cursor.path).names
-    return _told(word, spot.known.of(kind, cursor.path).get(word, "")) if kind else ""
+    return _described(word, spot.known.of(kind, cursor.path).get(word, "")) if kind else ""
 
 
-def _told(name: str, about: str) -> str:
+def _described(name: str, about: str) -> str:
     return f"`{name}`: {about}" if about else ""
 
 
@@ -328,8 +318,8 @@ def _field(spot: Spot) -> str:
 def _type(spot: Spot) -> str:
     """Return what the type of the entry named at the position is."""
     place = (*spot.cursor.place, "type")
-    word = at(spot.cursor.root, place)
-    return spot.guide.value(place).words.get(word.text, "") if isinstance(word, ScalarNode) else ""
+    word = tree.at(spot.cursor.root, place)
+    return spot.guide.value(place).words.get(word.text, "") if isinstance(word, tree.ScalarNode) else ""
 
 
 def _value(spot: Spot) -> str:
@@ -338,16 +328,16 @@ def _value(spot: Spot) -> str:
     if robot is None or spot.document.is_mission:
         return ""
     path = below_profile(spot.cursor.place)
-    node = at(robot.manifest.root, path)
-    if not isinstance(node, ScalarNode) or node.filled is BROKEN or not node.text:
+    node = tree.at(robot.manifest.root, path)
+    if not isinstance(node, tree.ScalarNode) or node.filled is tree.BROKEN or not node.text:
         return ""
     filled = node.filled
     shown = format_quantity(filled.value, filled.dimension) if isinstance(filled, Quantity) else filled
     return f"`{node.text}`{'' if filled is None else f' = `{shown}`'} from {node.span}{''.join(_lost(robot, path))}"
 
 
-def _lost(robot: Robot, path: KeyPath) -> Iterator[str]:
+def _lost(robot: Robot, path: tree.KeyPath) -> Iterator[str]:
     """Yield the values that a later layer has replaced, latest first."""
     for step in reversed(robot.manifest.history.of(path)[:-1]):
-        if isinstance(step.node, ScalarNode):
+        if isinstance(step.node, tree.ScalarNode):
             yield f"; {step.layer} had `{step.node.text}` ({step.node.span})"

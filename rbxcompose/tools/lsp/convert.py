@@ -17,10 +17,7 @@ from rbxcompose.tools.lsp.rename import CodeAction, Renamed, TextChange
 from rbxcompose.tools.lsp.symbols import Mention, ScalarPlaces
 
 SOURCE = "rbxcompose"
-_SEVERITIES = {
-    Severity.ERROR: types.DiagnosticSeverity.Error,
-    Severity.WARNING: types.DiagnosticSeverity.Warning,
-}
+_SEVERITIES = {Severity.ERROR: types.DiagnosticSeverity.Error, Severity.WARNING: types.DiagnosticSeverity.Warning}
 _SORTS = {
     "key": types.CompletionItemKind.Property,
     "name": types.CompletionItemKind.Reference,

@@ -184,9 +184,9 @@ class Newest:
     always comes from the newest texts. All methods belong to the thread of the event loop.
     """
 
-    def __init__(self, project: Project, told: Callable[[FoundByFile], None]) -> None:
+    def __init__(self, project: Project, publish: Callable[[FoundByFile], None]) -> None:
         self.project = project
-        self._told = told
+        self._publish = publish
         self._waiting: dict[Path, str | None] = {}
         self._number = 0  # count of changes so far
         self._due = 0.0  # in loop time
@@ -246,7 +246,7 @@ class Newest:
             if number == self._number:
                 self.project = project
                 self._waiting.clear()
-                self._told(found)
+                self._publish(found)
 
     def _copy(self, number: int) -> Project:
         """Return a copy of the project that becomes outdated with the first change after `number`."""

@@ -13,7 +13,7 @@ from rbxcompose.compiler.compile import Compilation, compile_robot
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.manifest.registry import section_named
 from rbxcompose.manifest.tree import NOWHERE, ScalarNode
-from rbxcompose.missions.language.names import NAME, no_name
+from rbxcompose.missions.language.value_reader import NAME, no_name
 from rbxcompose.missions.program.registry import kinds
 from rbxcompose.tools.lsp.mentions import SymbolIndex
 from rbxcompose.tools.lsp.project import Project
@@ -198,8 +198,8 @@ def _where(index: SymbolIndex, symbols: list[Symbol]) -> str:
 
 def _refuse_name(new: str) -> None:
     if not NAME.fullmatch(new):
-        told = no_name(ScalarNode(new, NOWHERE))
-        raise CannotRenameError(f"{told.message}: {told.help}")
+        finding = no_name(ScalarNode(new, NOWHERE))
+        raise CannotRenameError(f"{finding.message}: {finding.help}")
     if new in kinds() or new in ("true", "false", "null"):
         raise CannotRenameError(f"'{new}' is a word of the language")
 
@@ -253,9 +253,9 @@ def _refuse_other(robot: Path, old: Compilation, new: Compilation) -> None:
     was, now = (Counter((finding.code, finding.severity) for finding in made.report) for made in (old, new))
     if more := now - was:
         code = next(iter(more))[0]
-        told = next(finding for finding in new.report if finding.code == code)
-        place = f"{told.span}: " if told.span else ""
-        raise CannotRenameError(f"then `check` would say: {place}{told.message}")
+        finding = next(finding for finding in new.report if finding.code == code)
+        place = f"{finding.span}: " if finding.span else ""
+        raise CannotRenameError(f"then `check` would say: {place}{finding.message}")
     if was - now:
         code, severity = next(iter(was - now))
         what = "error" if severity is Severity.ERROR else "warning"

@@ -32,13 +32,14 @@ from rbxcompose.missions.engine.story import MissionStory
 from rbxcompose.missions.engine.task import Task
 from rbxcompose.missions.engine.value_text import show_briefly
 from rbxcompose.missions.engine.world import POSE
+from rbxcompose.missions.program.outcomes import IDLE, RUNNING, Result
 from rbxcompose.missions.program.program import Program, RobotNames
-from rbxcompose.missions.program.statuses import IDLE, RUNNING, Result
 from rbxcompose.tools.mission_tests.model import FAILS, SUCCEEDS, missions_in
 
 MOST_PLACES = 3  # where the robot may be
 BESIDE = 0.1  # distance of the outermost values from a limit, as a fraction of it
 OTHER = "something else"  # a text that no comparison contains
+WAITS_FOR_EVER = "the mission waits for ever: nothing runs, nothing is due, and no value can end the wait"
 
 
 def representatives(linked: Program, robot: RobotNames, inputs: Mapping[str, Value]) -> dict[str, tuple[Value, ...]]:
@@ -252,7 +253,7 @@ class Explorer:
     def look(self, script: tuple[str, ...]) -> None:
         """Report the faults at this moment, and keep it if the mission continues."""
         for text in self.world.reports:
-            self.tell(text, script)
+            self.record(text, script)
         if self.engine.held_until is not None:
             self.out.states += 1
             return  # an endless loop, which was reported
@@ -266,7 +267,7 @@ class Explorer:
         moment = Moment(save(self.engine), world.now, dict(world.values), dict(world.calls), held, script)
         waits_for = self.engine.reads() & self.values.keys()
         if not moment.calls and self.engine.next_wake() is None and not waits_for:
-            self.tell("the mission waits for ever: nothing runs, nothing is due, and no value can end the wait", script)
+            self.record(WAITS_FOR_EVER, script)
         self.keep(moment)
 
     def keep(self, moment: Moment) -> None:
@@ -277,7 +278,7 @@ class Explorer:
             self.out.states += 1
             self.waiting.append(moment)
 
-    def tell(self, what: str, script: tuple[str, ...]) -> None:
+    def record(self, what: str, script: tuple[str, ...]) -> None:
         """Record a fault, with the first script that leads to it."""
         if what not in self.said:
             self.said.add(what)
@@ -347,7 +348,7 @@ class ExploredWorld:
 
     def say(self, event: MissionEvent, /) -> None:
         """Record faults, and the texts of calls."""
-        _, text = self.story.tell(event) if isinstance(event, SkillStarted) else (None, "")
+        _, text = self.story.line(event) if isinstance(event, SkillStarted) else (None, "")
         match event:
             case SkillStarted(leaf=leaf):
                 self.calls[leaf] = text
@@ -386,7 +387,7 @@ def _state(task: Task, state: Sequence[Any], now: float, runs: bool) -> list[Any
     counting = []
     for name, value in zip(("current", *task.saved), state, strict=True):
         is_time = name in task.times and isinstance(value, float)
-        if name not in task.told and (runs or name not in task.fresh):
+        if name not in task.reported and (runs or name not in task.fresh):
             counting.append(round(value - now, 6) if is_time else value)
     return counting
 

@@ -159,9 +159,9 @@ def _nearest(step: ExpectedStep, later: Iterable[tuple[int, Done]], before: Iter
     pairs = ((one, _differences(step, one)) for _, one in later)
     near, differences = min(pairs, key=lambda pair: ("" in pair[1], len(pair[1])), default=(None, []))
     if near and not (earlier and "" in differences):
-        told = [difference for difference in differences if difference and not difference.startswith("started")]
+        others = [difference for difference in differences if difference and not difference.startswith("started")]
         return f"the nearest is {near.text} at {at(near.began)}" + "".join(
-            f", which {difference}" for difference in told
+            f", which {difference}" for difference in others
         )
     if earlier:
         return f"it was done only earlier, at {at(earlier.began)}"
@@ -198,9 +198,10 @@ def _data(expect: Expectations, record: TrialRecord, types: Mapping[str, Type]) 
     for expected_value in expect.data:
         happened, kind = record.data.get(expected_value.name, NOT_ARRIVED), types.get(expected_value.name)
         if not agrees(expected_value.value, happened):
-            told = "it has no value" if happened is NOT_ARRIVED else f"it is {show(kind, happened)}"
+            actual = "it has no value" if happened is NOT_ARRIVED else f"it is {show(kind, happened)}"
             yield UnmetExpectation(
-                f"expected {expected_value.name} to be {show(kind, expected_value.value)}, {told}", expected_value.span
+                f"expected {expected_value.name} to be {show(kind, expected_value.value)}, {actual}",
+                expected_value.span,
             )
 
 
@@ -218,8 +219,8 @@ def _published(expect: Expectations, record: TrialRecord, effort: _Effort) -> It
             return
         if found is None:
             others = [show(None, fields) for _, fields in all_sent[:3]]
-            told = f"; on it were: {', '.join(others)}" if others else "; nothing was published on it"
-            yield UnmetExpectation(f"expected {show(None, sent.fields)} on {sent.topic}{told}", sent.span)
+            actual = f"; on it were: {', '.join(others)}" if others else "; nothing was published on it"
+            yield UnmetExpectation(f"expected {show(None, sent.fields)} on {sent.topic}{actual}", sent.span)
         else:
             behind = found + 1
 

@@ -519,8 +519,8 @@ class TrialReader:
         """Return the test of a file, None if the test or its robot has errors; and the findings for all its robots."""
         every = self.every(path)
         trials = [self.understand(trial) for trial in every]
-        told = dict.fromkeys(finding for trial in every for finding in trial.report)
-        return trials[0], Report([*told])
+        findings = dict.fromkeys(finding for trial in every for finding in trial.report)
+        return trials[0], Report([*findings])
 
     def every(self, path: Path) -> list[WrittenTrial]:
         """Return the contents of a file for each robot with which it runs; the names of further ones are told."""
@@ -535,8 +535,8 @@ class TrialReader:
         names = first.root.entries
         own = names["robot"].key if "robot" in names else names["also"].key
         roots = [replace(first.root, entries={**names, "robot": Entry(own, robot)}) for robot in robots]
-        told = [f"{first.name} ({_name_of(robot)})" for robot in robots if isinstance(robot, ScalarNode)]
-        return [first, *(WrittenTrial(path, name, root, Report()) for name, root in zip(told, roots, strict=True))]
+        shown = [f"{first.name} ({_name_of(robot)})" for robot in robots if isinstance(robot, ScalarNode)]
+        return [first, *(WrittenTrial(path, name, root, Report()) for name, root in zip(shown, roots, strict=True))]
 
     def open(self, path: Path) -> WrittenTrial:
         """Return the contents of a file for its first robot; a test without a name gets that of its file."""

@@ -8,17 +8,7 @@ from dataclasses import field
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions.values import Value
 from rbxcompose.base.levels import Level
-from rbxcompose.missions.engine.events import (
-    Logged,
-    MissionEnded,
-    MissionEvent,
-    NodeEnded,
-    NodeStarted,
-    Published,
-    Reported,
-    SkillEnded,
-    SkillStarted,
-)
+from rbxcompose.missions.engine import events
 from rbxcompose.missions.engine.story import MissionStory
 from rbxcompose.missions.program.program import Skill
 from rbxcompose.tools.mission_tests.model import RUNS
@@ -61,7 +51,7 @@ class TrialRecord:
     published: list[tuple[str, Mapping[str, Value]]] = field(default_factory=list)
     reports: list[str] = field(default_factory=list)
     data: Mapping[str, Value] = field(default_factory=dict)
-    end: MissionEnded | None = None
+    end: events.MissionEnded | None = None
     trouble: str = ""  # why the run itself could not be completed
     late: int = 0  # events of the test that were never reached
     _story: MissionStory = field(init=False)
@@ -75,28 +65,28 @@ class TrialRecord:
         """Add a line on an action of the test."""
         self.lines.append(TraceLine(self.now, f"* {text}"))
 
-    def hear(self, event: MissionEvent) -> None:
+    def hear(self, event: events.MissionEvent) -> None:
         """Record an event."""
-        level, text = self._story.tell(event)
+        level, text = self._story.line(event)
         if text:
             self.lines.append(TraceLine(self.now, text, level))
         match event:
-            case SkillStarted(leaf=node, skill=name, arguments=arguments):
+            case events.SkillStarted(leaf=node, skill=name, arguments=arguments):
                 self._begin(node, Done(name, text, dict(arguments), self.now, len(self.lines) - 1))
-            case NodeStarted(node=node, name=name):
+            case events.NodeStarted(node=node, name=name):
                 self._begin(-1 - node, Done(name, name, {}, self.now, len(self.lines) - 1))
-            case SkillEnded(leaf=node, result=result, message=told):
+            case events.SkillEnded(leaf=node, result=result, message=message):
                 self._end(node, result)
-                self.reports += [told, text] if told else []
-            case NodeEnded(node=node, result=result):
+                self.reports += [message, text] if message else []
+            case events.NodeEnded(node=node, result=result):
                 self._end(-1 - node, result)
-            case Published(topic=topic, fields=fields):
+            case events.Published(topic=topic, fields=fields):
                 self.published.append((topic, fields))
-            case Logged(text=told) | Reported(message=told):
-                self.reports += [told, text]  # alone, and as the trace shows it
-            case MissionEnded(message=told):
+            case events.Logged(text=message) | events.Reported(message=message):
+                self.reports += [message, text]  # alone, and as the trace shows it
+            case events.MissionEnded(message=message):
                 self.end = event
-                self.reports += [told, text] if told else []
+                self.reports += [message, text] if message else []
 
     def _begin(self, key: int, step: Done) -> None:
         self._open[key] = step

@@ -81,8 +81,8 @@ class Teller:
     def _step(self, record: TrialRecord, index: int) -> str:
         line = record.lines[index]
         text = plain(line.text)
-        told = text if line.level is Level.OK else self.paint("warn", text)
-        return f"  {self.paint('time', f'{line.time:9.2f}')}  {told}"
+        shown = text if line.level is Level.OK else self.paint("warn", text)
+        return f"  {self.paint('time', f'{line.time:9.2f}')}  {shown}"
 
     def _problem(self, problem: UnmetExpectation) -> str:
         where = f"  [{plain(problem.span.file)}:{problem.span.line}]" if problem.span else ""

@@ -12,21 +12,15 @@ from pathlib import Path
 
 from rbxcompose.base.findings import Finding, Report, Span, kind
 from rbxcompose.base.units import written_unit
-from rbxcompose.commands.console import NotDoneError, misused, refuse, tell, tell_report
+from rbxcompose.commands.console import NotDoneError, emit, misused, refuse, write_report
 from rbxcompose.commands.guest import NO_NAME, SAID_NO
 from rbxcompose.commands.messages import to_json
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.manifest.reader import read_file, read_text
 from rbxcompose.manifest.tree import MappingNode, TreeNode
 from rbxcompose.manifest.validate import to_plain
+from rbxcompose.msgs import rcl_interfaces
 from rbxcompose.msgs.rbxcompose_parameters import ChangeParameters, NodeChange, ParameterChange
-from rbxcompose.msgs.rcl_interfaces import (
-    GetParameters,
-    Parameter,
-    ParameterType,
-    ParameterValue,
-    SetParametersAtomically,
-)
 from rbxcompose.runtime.settings_history import NothingToUndoError, to_undo
 from rbxcompose.sdk.parameters import SEPARATOR, to_message
 from rbxcompose.tools.parameters.history import CHANGE, changes_of
@@ -37,16 +31,16 @@ PIPED = "-"
 _ROS = "ros__parameters"
 
 
-def value_of(text: str) -> ParameterValue:
+def value_of(text: str) -> rcl_interfaces.ParameterValue:
     """Read a number, a flag or a list in YAML; anything else is text."""
     root, findings = read_text(text, "VALUE")
     data = text if root is None or findings or isinstance(root, MappingNode) else to_plain(root)
-    return to_message(text if data is None else data) or ParameterValue(
-        type=ParameterType.PARAMETER_STRING, string_value=text
+    return to_message(text if data is None else data) or rcl_interfaces.ParameterValue(
+        type=rcl_interfaces.ParameterType.PARAMETER_STRING, string_value=text
     )
 
 
-def file_values(path: Path, report: Report, sources: dict[str, str]) -> dict[str, tuple[Parameter, ...]]:
+def file_values(path: Path, report: Report, sources: dict[str, str]) -> dict[str, tuple[rcl_interfaces.Parameter, ...]]:
     """Return the parameters in a file, by component, or `-` in what is piped in; mistakes go into `report`."""
     if str(path) == PIPED:
         sources[PIPED] = sys.stdin.read()
@@ -54,7 +48,7 @@ def file_values(path: Path, report: Report, sources: dict[str, str]) -> dict[str
     else:
         root, findings = read_file(path, shown_name(path), sources)
     report.extend(findings)
-    found: dict[str, tuple[Parameter, ...]] = {}
+    found: dict[str, tuple[rcl_interfaces.Parameter, ...]] = {}
     if root is None:
         return found
     if not isinstance(root, MappingNode):
@@ -71,7 +65,7 @@ def file_values(path: Path, report: Report, sources: dict[str, str]) -> dict[str
     return found
 
 
-def _parameters(node: MappingNode, above: str, report: Report) -> list[Parameter]:
+def _parameters(node: MappingNode, above: str, report: Report) -> list[rcl_interfaces.Parameter]:
     found = []
     for name, entry in node.entries.items():
         path = f"{above}{SEPARATOR}{name}" if above else name
@@ -80,11 +74,11 @@ def _parameters(node: MappingNode, above: str, report: Report) -> list[Parameter
         elif (value := _message(entry.value)) is None:
             report.add(NO_VALUES.at(entry.value.span, f"no parameter can have this value, as '{path}' has"))
         else:
-            found.append(Parameter(path, value))
+            found.append(rcl_interfaces.Parameter(path, value))
     return found
 
 
-def _message(node: TreeNode) -> ParameterValue | None:
+def _message(node: TreeNode) -> rcl_interfaces.ParameterValue | None:
     value = to_plain(node)
     return None if value is None else to_message(value)
 
@@ -93,13 +87,9 @@ def _no_map(span: Span, what: str) -> Finding:
     return NO_VALUES.at(span, f"{what} must be a map", help="'rbxcompose param dump' shows the form")
 
 
-HALF_DONE = kind(
-    "RBX9047",
-)
-BREAKS_RULE = kind(
-    "RBX9030",
-)
-Wanted = Mapping[str, Sequence[Parameter]]  # by node
+HALF_DONE = kind("RBX9047")
+BREAKS_RULE = kind("RBX9030")
+Wanted = Mapping[str, Sequence[rcl_interfaces.Parameter]]  # by node
 
 
 def change_values(
@@ -142,20 +132,20 @@ def _change_foreign(nodes: ParameterNodes, wanted: Wanted, ours: Sequence[str]) 
     if len(wanted) > 1:
         message = f"'{node}' cannot change together with others: it is no component with live settings"
         raise NotDoneError(SAID_NO.at(None, message, help="set its parameters alone"))
-    atomically = SetParametersAtomically.Request(parameters=tuple(wanted[node]))
-    (answer,) = nodes.ask([node], "set_parameters_atomically", SetParametersAtomically, [atomically])
+    atomically = rcl_interfaces.SetParametersAtomically.Request(parameters=tuple(wanted[node]))
+    (answer,) = nodes.ask([node], "set_parameters_atomically", rcl_interfaces.SetParametersAtomically, [atomically])
     if not answer.result.successful:
         raise NotDoneError(SAID_NO.at(None, f"'{node}': {answer.result.reason}"))
 
 
 def _require_names(nodes: ParameterNodes, wanted: Wanted) -> None:
-    requests = [GetParameters.Request(names=tuple(one.name for one in each)) for each in wanted.values()]
-    answers = nodes.ask(list(wanted), "get_parameters", GetParameters, requests)
+    requests = [rcl_interfaces.GetParameters.Request(names=tuple(one.name for one in each)) for each in wanted.values()]
+    answers = nodes.ask(list(wanted), "get_parameters", rcl_interfaces.GetParameters, requests)
     for (node, each), answer in zip(wanted.items(), answers, strict=True):
         if len(answer.values) != len(each):
             raise NotDoneError(SAID_NO.at(None, f"'{node}' does not tell its parameters"))
         for parameter, value in zip(each, answer.values, strict=True):
-            if value.type == ParameterType.PARAMETER_NOT_SET:
+            if value.type == rcl_interfaces.ParameterType.PARAMETER_NOT_SET:
                 require_name(nodes, node, parameter.name)
 
 
@@ -178,11 +168,11 @@ def param_set(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
         pairs = [_pair(word) for word in words]
     else:
         return misused("param", "write COMPONENT PARAMETER VALUE, or COMPONENT.PARAMETER=VALUE for each")
-    wanted: dict[str, list[Parameter]] = {}
+    wanted: dict[str, list[rcl_interfaces.Parameter]] = {}
     for component, name, text in pairs:
-        wanted.setdefault(nodes.find(component), []).append(Parameter(name, value_of(text)))
+        wanted.setdefault(nodes.find(component), []).append(rcl_interfaces.Parameter(name, value_of(text)))
     change_values(nodes, wanted, "set")
-    return tell_values(nodes, wanted, arguments, [written_unit(text) for _, _, text in pairs])
+    return write_values(nodes, wanted, arguments, [written_unit(text) for _, _, text in pairs])
 
 
 def param_load(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
@@ -190,11 +180,11 @@ def param_load(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
     report, sources = Report(), dict[str, str]()
     found = file_values(arguments.file, report, sources)
     if report.has_errors:
-        tell_report(report, sources)
+        write_report(report, sources)
         return 1
     wanted = {nodes.find(name): list(each) for name, each in found.items() if each}
     change_values(nodes, wanted, "load")
-    return tell_values(nodes, wanted, arguments)
+    return write_values(nodes, wanted, arguments)
 
 
 def param_undo(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
@@ -205,12 +195,12 @@ def param_undo(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
         found = to_undo([parameter_change for each in known.values() for parameter_change in each], arguments.change)
     except NothingToUndoError as error:
         return refuse(NO_NAME.at(None, str(error), help="'rbxcompose param history' lists the changes"))
-    wanted: dict[str, list[Parameter]] = {}
+    wanted: dict[str, list[rcl_interfaces.Parameter]] = {}
     for change in sorted(found, key=lambda each: each.component):  # processes tell of a change in any order
-        wanted.setdefault(homes[change.component], []).append(Parameter(change.name, change.before))
-    expected: dict[str, list[Parameter]] = {}
+        wanted.setdefault(homes[change.component], []).append(rcl_interfaces.Parameter(change.name, change.before))
+    expected: dict[str, list[rcl_interfaces.Parameter]] = {}
     for change in found:
-        expected.setdefault(homes[change.component], []).append(Parameter(change.name, change.after))
+        expected.setdefault(homes[change.component], []).append(rcl_interfaces.Parameter(change.name, change.after))
     change_values(
         nodes,
         wanted,
@@ -218,7 +208,7 @@ def param_undo(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
         {homes[parameter_change.component]: _first(parameter_change, found) for parameter_change in found},
         expected,
     )
-    return tell_values(nodes, wanted, arguments)
+    return write_values(nodes, wanted, arguments)
 
 
 def _first(change: ParameterChange, found: Sequence[ParameterChange]) -> int:
@@ -236,14 +226,14 @@ def _pair(word: str) -> tuple[str, str, str]:
     return component, name, value
 
 
-def message_of(value: object) -> ParameterValue:
+def message_of(value: object) -> rcl_interfaces.ParameterValue:
     """Return a value as a message; one that has no message counts as not set."""
-    return to_message(value) or ParameterValue()
+    return to_message(value) or rcl_interfaces.ParameterValue()
 
 
-def tell_values(
+def write_values(
     nodes: ParameterNodes,
-    wanted: dict[str, list[Parameter]],
+    wanted: dict[str, list[rcl_interfaces.Parameter]],
     arguments: argparse.Namespace,
     units: Sequence[str | None] = (),
 ) -> int:
@@ -251,11 +241,11 @@ def tell_values(
     found = described(nodes, {node: tuple(parameter.name for parameter in each) for node, each in wanted.items()})
     if len(found) == 1 and arguments.action == "set":
         one, unit = found[0], (units or (None,))[0]
-        tell(to_json(one.value) if arguments.json else one.text(one.value, unit))
+        emit(to_json(one.value) if arguments.json else one.text(one.value, unit))
         return 0
     if arguments.json:
-        tell(to_json([{"node": item.node, "name": item.about.name, "value": item.value} for item in found]))
+        emit(to_json([{"node": item.node, "name": item.about.name, "value": item.value} for item in found]))
         return 0
     for one in found:
-        tell(f"{one.node.removeprefix('/')}.{one.about.name} = {one.text(one.value)}")
+        emit(f"{one.node.removeprefix('/')}.{one.about.name} = {one.text(one.value)}")
     return 0

@@ -21,7 +21,7 @@ from rbxcompose.base.fixes import apply
 from rbxcompose.base.printable import plain
 from rbxcompose.base.units import Dimension
 from rbxcompose.bus.names import resolve
-from rbxcompose.commands.console import NotDoneError, refuse, tell
+from rbxcompose.commands.console import NotDoneError, emit, refuse
 from rbxcompose.commands.guest import NO_NAME
 from rbxcompose.commands.hosts import UNREACHED, Remote, on_all
 from rbxcompose.commands.lookup import NO_ANSWER, answer_of, find_robot, known_state
@@ -41,7 +41,7 @@ from rbxcompose.runtime.requests import ComparePlan
 from rbxcompose.sdk.parameters import UnsettableError, changed, dimension_of, from_message, settings, to_message
 from rbxcompose.tools.inspection.origin import origin_of
 from rbxcompose.tools.live_rules import compiled_with
-from rbxcompose.tools.parameters.changes import PIPED, change_values, message_of, tell_values
+from rbxcompose.tools.parameters.changes import PIPED, change_values, message_of, write_values
 from rbxcompose.tools.parameters.history import changes_of
 from rbxcompose.tools.parameters.nodes import ParameterNodes, listed
 from rbxcompose.tools.up_system import layers_of
@@ -122,9 +122,9 @@ def live_configs(nodes: ParameterNodes, robot: Robot) -> dict[str, Config]:
     requests = [GetParameters.Request(names=tuple(live[node])) for node in asked]
     for node, answer in zip(asked, nodes.ask(asked, "get_parameters", GetParameters, requests), strict=True):
         pairs = zip(live[node], answer.values, strict=True)
-        told = [Parameter(name=name, value=value) for name, value in pairs if value.type]
+        values = [Parameter(name=name, value=value) for name, value in pairs if value.type]
         with suppress(UnsettableError):  # its file has changed meanwhile
-            configs[node] = changed(configs[node], told)
+            configs[node] = changed(configs[node], values)
     return {name: configs[node] for node, name in wanted.items()}
 
 
@@ -273,12 +273,12 @@ def _require_nothing_else(
         )
     side_effects = difference(live.plan_with(wanted), found.plan)
     if not side_effects.is_empty:
-        message = f"nothing is saved: {_told(side_effects)} would change, too, which is written at the same place"
+        message = f"nothing is saved: {_keys_of(side_effects)} would change, too, which is written at the same place"
         help_text = "set that as well, or write the value into the component by hand"
         raise NotDoneError(NOT_SAVED.at(texts.fix.edits[0].span, message, help=help_text))
 
 
-def _told(found: Difference) -> str:
+def _keys_of(found: Difference) -> str:
     keys = [f"{name}.{change.key}" for name, each in found.changed.items() for change in each]
     keys += [change.key for change in found.plan]
     return ", ".join(f"'{key}'" for key in keys) or "the robot"
@@ -309,17 +309,17 @@ def manifest_of(nodes: ParameterNodes, arguments: argparse.Namespace) -> tuple[L
 def param_diff(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
     """Show what is not as in the manifest; the exit code is 1 if there is anything."""
     live, _, _ = manifest_of(nodes, arguments)
-    return tell_differences(live, arguments)
+    return write_differences(live, arguments)
 
 
-def tell_differences(live: LiveSettings, arguments: argparse.Namespace) -> int:
+def write_differences(live: LiveSettings, arguments: argparse.Namespace) -> int:
     """Tell what is not as in the manifest, and return the exit code."""
     found = list(live.changes)
     if arguments.json:
-        tell(json.dumps([{**_data(change), "place": str(place(live, change))} for change in found]))
+        emit(json.dumps([{**_data(change), "place": str(place(live, change))} for change in found]))
     else:
         lines = [f"{_change_text(change)}  # {place(live, change)}" for change in found]
-        tell("\n".join(lines) or "all values are those of the manifest")
+        emit("\n".join(lines) or "all values are those of the manifest")
     return 1 if found else 0
 
 
@@ -330,10 +330,10 @@ def param_reset(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
     for change in chosen(list(live.changes), live, arguments.names):
         wanted.setdefault(live.node(change.component), []).append(Parameter(change.name, message_of(change.written)))
     if not wanted:
-        tell("[]" if arguments.json else "all values are those of the manifest")
+        emit("[]" if arguments.json else "all values are those of the manifest")
         return 0
     change_values(nodes, wanted, "reset")
-    return tell_values(nodes, wanted, arguments)
+    return write_values(nodes, wanted, arguments)
 
 
 def exact_text(value: object, dimension: Dimension | None) -> str:
@@ -349,14 +349,14 @@ def param_dump(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
         data: dict[str, dict[str, object]] = {}
         for one in found:
             data.setdefault(one.node.removeprefix("/"), {})[one.about.name] = one.value
-        tell(to_json(data))
+        emit(to_json(data))
         return 0
     lines, node = [], ""
     for one in found:
         lines += [f"{one.node.removeprefix('/')}:"] if one.node != node else []
         node = one.node
         lines.append(f"  {one.about.name}: {exact_text(one.value, one.dimension)}")
-    tell("\n".join(lines) or "{}")
+    emit("\n".join(lines) or "{}")
     return 0
 
 
@@ -390,7 +390,7 @@ def save(live: LiveSettings, changes: Sequence[LiveChange], compiled: Compiled, 
             write(texts)
         places = sorted(str(edit.span) for edit in texts.fix.edits)
     if arguments.json:
-        tell(
+        emit(
             json.dumps(
                 {
                     "saved": [_data(live_change) for live_change in changes],
@@ -401,9 +401,9 @@ def save(live: LiveSettings, changes: Sequence[LiveChange], compiled: Compiled, 
         )
         return 0
     for change in changes:
-        tell(_change_text(change))
+        emit(_change_text(change))
     verb = "would be written" if arguments.dry_run else "written"
-    tell("\n".join(f"{verb}: {one}" for one in places) or "nothing to save: all values are those of the manifest")
+    emit("\n".join(f"{verb}: {one}" for one in places) or "nothing to save: all values are those of the manifest")
     return 0
 
 
@@ -466,7 +466,7 @@ class RemoteParameters:
         live = self._live()
         match arguments.action:
             case "diff":
-                return tell_differences(live, arguments)
+                return write_differences(live, arguments)
             case "reset":
                 return self._reset(chosen(list(live.changes), live, arguments.names), arguments)
             case _:
@@ -486,7 +486,7 @@ class RemoteParameters:
     def _reset(self, changes: Sequence[LiveChange], arguments: argparse.Namespace) -> int:
         """Set what is other than in the manifest."""
         if not changes:
-            tell("[]" if arguments.json else "all values are those of the manifest")
+            emit("[]" if arguments.json else "all values are those of the manifest")
             return 0
         pairs = [f"{change.path}={json.dumps(change.written, default=str)}" for change in changes]
         return subprocess.run(
@@ -518,10 +518,10 @@ class RemoteParameters:
         Raises:
             NotDoneError: if the robot does not tell them.
         """
-        found, told = self._compiled({}), self._ask("param", "dump")
+        found, dumped = self._compiled({}), self._ask("param", "dump")
         if found.robot is None or found.plan is None:
             raise NotDoneError(NO_FILES.at(None, f"the files of '{self.robot.name}' have errors"))
-        return LiveSettings(found.robot, found.plan, found.sources, dict(_configs(found.robot, told)))
+        return LiveSettings(found.robot, found.plan, found.sources, dict(_configs(found.robot, dumped)))
 
     def _compiled(self, unsaved: Mapping[Path, str]) -> Compilation:
         """Return the robot as it is by itself, with other texts of its files."""
@@ -544,10 +544,10 @@ class RemoteParameters:
         return self.remote.rbxcompose([*words, "--robot", self.robot.name])
 
 
-def _configs(robot: Robot, told: Mapping[str, Mapping[str, object]]) -> Iterator[tuple[str, Config]]:
+def _configs(robot: Robot, dumped: Mapping[str, Mapping[str, object]]) -> Iterator[tuple[str, Config]]:
     """Yield the components that were told of, with the live values of each."""
     for node, name in nodes_of(robot).items():
-        values = told.get(node.removeprefix("/"))
+        values = dumped.get(node.removeprefix("/"))
         if values is None:
             continue
         config = robot.components[name].config

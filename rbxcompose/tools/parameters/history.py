@@ -8,7 +8,7 @@ from datetime import datetime
 
 from rbxcompose.base.units import Dimension
 from rbxcompose.bus.graph import find
-from rbxcompose.commands.console import table, tell
+from rbxcompose.commands.console import emit, table
 from rbxcompose.commands.guest import HeardMessage
 from rbxcompose.commands.messages import to_json
 from rbxcompose.msgs.cdr import CdrError, decode
@@ -16,7 +16,7 @@ from rbxcompose.msgs.rbxcompose_parameters import ChangeParameters, ParameterCha
 from rbxcompose.msgs.rcl_interfaces import ParameterEvent
 from rbxcompose.msgs.stamps import to_nanoseconds
 from rbxcompose.runtime.settings_history import MARK, ROS_TOOL, identity, in_order
-from rbxcompose.sdk.parameters import from_message, shown, told_dimension
+from rbxcompose.sdk.parameters import dimension_in, from_message, shown
 from rbxcompose.tools.parameters.nodes import ParameterNodes, described
 
 CHANGE = "change_parameters"
@@ -40,10 +40,12 @@ def param_history(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
     by_node = {node: changes_of(nodes, [node]) for node in wanted}
     found = in_order(change for each in by_node.values() for change in each)[-arguments.last :]
     if arguments.json:
-        tell(to_json([_data(item) for item in found]))
+        emit(to_json([_data(item) for item in found]))
         return 0
-    dimensions = {key: told for node, each in by_node.items() for key, told in _dimensions(nodes, node, each).items()}
-    tell(table([_HEAD, *(_row(item, dimensions) for item in found)]) if found else "nothing was changed")
+    dimensions = {
+        key: dimension for node, each in by_node.items() for key, dimension in _dimensions(nodes, node, each).items()
+    }
+    emit(table([_HEAD, *(_row(item, dimensions) for item in found)]) if found else "nothing was changed")
     return 0
 
 
@@ -62,19 +64,19 @@ def param_watch(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
         if not wanted or event.node == wanted:
             events.append(event)
 
-    guest, told = nodes.guest, 0
+    guest, printed = nodes.guest, 0
     topic = find(guest.graph().topics, _EVENTS)
     if topic is None:
         return 0
     guest.listen(topic, heard)
-    while arguments.count is None or told < arguments.count:
+    while arguments.count is None or printed < arguments.count:
         guest.run(lambda: bool(events))
         event = events.pop(0)
         new = _of_event(nodes, event, seen)
         dimensions = _dimensions(nodes, event.node, new)
-        for change in new[: None if arguments.count is None else arguments.count - told]:
-            told += 1
-            tell(to_json(_data(change)) if arguments.json else _line(change, dimensions))
+        for change in new[: None if arguments.count is None else arguments.count - printed]:
+            printed += 1
+            emit(to_json(_data(change)) if arguments.json else _line(change, dimensions))
     return 0
 
 
@@ -99,7 +101,7 @@ def _last_number(changes: Sequence[ParameterChange]) -> int:
 def _dimensions(nodes: ParameterNodes, node: str, changes: Iterable[ParameterChange]) -> Dimensions:
     names = {change.name: change.component for change in changes}
     found = described(nodes, {node: tuple(names)})
-    return {(names[item.about.name], item.about.name): told_dimension(item.about.description) for item in found}
+    return {(names[item.about.name], item.about.name): dimension_in(item.about.description) for item in found}
 
 
 def _row(change: ParameterChange, dimensions: Dimensions) -> tuple[str, ...]:

@@ -10,14 +10,14 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.units import UNITS, Dimension
 from rbxcompose.bus.graph import GraphName
 from rbxcompose.bus.services import Client
-from rbxcompose.commands.console import NotDoneError, refuse, table, tell
+from rbxcompose.commands.console import NotDoneError, emit, refuse, table
 from rbxcompose.commands.guest import NAME, NO_NAME, NOBODY, SAID_NO, Guest
 from rbxcompose.commands.messages import to_json, type_of
 from rbxcompose.msgs import rcl_interfaces as rcl
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.types import Message, Service
 from rbxcompose.sdk.bound import Reply
-from rbxcompose.sdk.parameters import TYPE_WORDS, from_message, shown, told_dimension
+from rbxcompose.sdk.parameters import TYPE_WORDS, dimension_in, from_message, shown
 
 Q = TypeVar("Q", bound=Message)
 R = TypeVar("R", bound=Message)
@@ -101,7 +101,7 @@ class ListedParameter:
     @property
     def dimension(self) -> Dimension | None:
         """Return its dimension, None if it is not a quantity or that of a foreign node."""
-        return told_dimension(self.about.description)
+        return dimension_in(self.about.description)
 
     def text(self, value: object, unit: str | None = None) -> str:
         """Return a value of it for people."""
@@ -130,10 +130,10 @@ def described(nodes: ParameterNodes, names: dict[str, tuple[str, ...]]) -> list[
     gets = [rcl.GetParameters.Request(names=each) for each in having.values()]
     describes = [rcl.DescribeParameters.Request(names=each) for each in having.values()]
     values = nodes.ask(list(having), "get_parameters", rcl.GetParameters, gets)
-    told = nodes.ask(list(having), "describe_parameters", rcl.DescribeParameters, describes)
+    descriptions = nodes.ask(list(having), "describe_parameters", rcl.DescribeParameters, describes)
     return [
         ListedParameter(node, from_message(value), about)
-        for node, got, one in zip(having, values, told, strict=True)
+        for node, got, one in zip(having, values, descriptions, strict=True)
         for value, about in zip(got.values, one.descriptors, strict=False)
     ]
 
@@ -161,7 +161,7 @@ def param_ls(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
             )
             for parameter in found
         ]
-        tell(to_json([dict(zip(_KEYS, row, strict=True)) for row in rows]))
+        emit(to_json([dict(zip(_KEYS, row, strict=True)) for row in rows]))
         return 0
     cells = [
         (
@@ -173,7 +173,7 @@ def param_ls(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
         )
         for parameter in found
     ]
-    tell(table([("component", "parameter", "value", "", "about"), *cells]))
+    emit(table([("component", "parameter", "value", "", "about"), *cells]))
     return 0
 
 
@@ -184,7 +184,7 @@ def param_get(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
     if parameter is None or parameter.about.type == rcl.ParameterType.PARAMETER_NOT_SET or parameter.value is None:
         require_name(nodes, node, arguments.name)
         return refuse(NO_NAME.at(None, f"'{node}' has no value for the parameter '{arguments.name}'"))
-    tell(to_json(parameter.value) if arguments.json else parameter.text(parameter.value))
+    emit(to_json(parameter.value) if arguments.json else parameter.text(parameter.value))
     return 0
 
 
@@ -197,11 +197,11 @@ def param_describe(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
     else:
         found = listed(nodes, [node])
     if arguments.json:
-        tell(to_json([_data(listed_parameter) for listed_parameter in found]))
+        emit(to_json([_data(listed_parameter) for listed_parameter in found]))
         return 0
     for parameter in found:
-        tell(f"{parameter.node.removeprefix('/')}.{parameter.about.name} = {parameter.text(parameter.value)}")
-        tell("\n".join(f"  {label:<10}{text}" for label, text in _lines(parameter) if text))
+        emit(f"{parameter.node.removeprefix('/')}.{parameter.about.name} = {parameter.text(parameter.value)}")
+        emit("\n".join(f"  {label:<10}{text}" for label, text in _lines(parameter) if text))
     return 0
 
 

@@ -379,7 +379,7 @@ def _move(guest: Guest, arguments: argparse.Namespace) -> dict[str, Any]:
     keep = read_written(KeepModel, arguments.keep or "{}").message()
     if not arguments.goal.startswith("{"):
         return {"pose": arguments.goal, "keep": keep}
-    from rbxcompose.domains.body.live_body import DESCRIPTION, described, described_body
+    from rbxcompose.domains.body.command_body import DESCRIPTION, described, described_body
 
     action = wanted([name for name in guest.graph().actions if name.givers], arguments.name, "action")
     namespace = action.name.removesuffix(f"/{arguments.name.lstrip('/')}")

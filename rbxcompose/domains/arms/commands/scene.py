@@ -191,7 +191,7 @@ def _view(arguments: argparse.Namespace, *between: str) -> scene_view.ArmView:
 
 
 def _watch(arguments: argparse.Namespace) -> int:
-    from rbxcompose.domains.arms.scene_watch import watch  # a visitor on the bus, which other actions are not
+    from rbxcompose.domains.arms.command_watch import watch  # a visitor on the bus, which other actions are not
 
     return watch(find_robot(arguments.robot), as_json=arguments.json)
 

@@ -291,7 +291,7 @@ class Arm(PicksAndPlaces, LocationService, KinematicsServices, sdk.Component[Arm
             if task.difference is not None and self.scene.value is not None:
                 self.on_scene(self.scene.value)
         self.stage, self.ended = "", scene_view.ended_words(failure)
-        self.feed.tell(self.parts())
+        self.feed.update(self.parts())
         if failure is None:
             goal.succeeded(result)
         elif goal.cancel_requested:
@@ -358,7 +358,7 @@ class Arm(PicksAndPlaces, LocationService, KinematicsServices, sdk.Component[Arm
         if self.goal is not None:
             within = self.task.stage if isinstance(self.task, HandTask) else stage
             self.stage = words = stage if stage == within else f"{within}: {stage}"
-            self.feed.tell(self.parts())
+            self.feed.update(self.parts())
             self.goal.feedback(arm_goals.feedback_of(self.goal.request, words))
 
 

@@ -16,7 +16,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.units import ANGULAR_SPEED, SPEED
 from rbxcompose.bus.graph import GraphName
 from rbxcompose.bus.topics import Publisher
-from rbxcompose.commands.console import NotDoneError, refuse, tell
+from rbxcompose.commands.console import NotDoneError, emit, refuse
 from rbxcompose.commands.guest import NAME, NO_NAME, NOBODY, Guest, visit
 from rbxcompose.commands.lookup import add_bus_options, find_robot, known_state
 from rbxcompose.commands.options import add_timeout_option, positive
@@ -56,7 +56,7 @@ def _drive(guest: Guest, arguments: argparse.Namespace) -> int:
         wheel.pressed(screen, screen.typed_early())  # such keys move nothing, but may end driving
         if screen.is_over:
             return 0
-        tell(_HELP)
+        emit(_HELP)
         try:
             guest.watch(screen.keyboard, lambda: wheel.read(screen))
             guest.run(lambda: screen.is_over or guest.is_interrupted)
@@ -218,8 +218,8 @@ def _only(names: Sequence[str], inputs: Mapping[str, str]) -> str:
     if not names:
         raise NotDoneError(NO_NAME.at(None, "no topic is free for the velocities of a person", help=_OPEN_ONE))
     bases = {topic: base for base, topic in inputs.items()}
-    told = ", ".join(f"{name} ('{bases[name]}')" if name in bases else name for name in names)
-    raise NotDoneError(NO_NAME.at(None, f"several topics take velocities: {told}", help="choose one with '--topic'"))
+    listed = ", ".join(f"{name} ('{bases[name]}')" if name in bases else name for name in names)
+    raise NotDoneError(NO_NAME.at(None, f"several topics take velocities: {listed}", help="choose one with '--topic'"))
 
 
 def _is_forwarded(topic: GraphName, taking: Sequence[GraphName]) -> bool:

@@ -46,8 +46,8 @@ class Estop(Component[EstopConfig]):
 
     def configure(self) -> None:
         """Know nothing yet."""
-        self.heard_at, self.is_pressed, self.has_heard = math.inf, False, False
-        self.told: str | None = None  # the last reason, None if nothing was told
+        self.heard_at, self.is_pressed, self.has_input = math.inf, False, False
+        self.reported: str | None = None  # the last reason, None if nothing was told
 
     def start(self) -> None:
         """Wait for the first message."""
@@ -57,7 +57,7 @@ class Estop(Component[EstopConfig]):
 
     def on_pressed(self, message: Bool) -> None:
         """Take a message of the button."""
-        self.heard_at, self.is_pressed, self.has_heard = self.now, message.data, True
+        self.heard_at, self.is_pressed, self.has_input = self.now, message.data, True
         self.look()
 
     def wake(self) -> None:
@@ -72,7 +72,7 @@ class Estop(Component[EstopConfig]):
     def release(self) -> None:
         """Stop again if there still is a reason."""
         if self.reason:
-            self.told = None
+            self.reported = None
         self.look()
 
     @property
@@ -88,10 +88,10 @@ class Estop(Component[EstopConfig]):
         reason = self.reason
         if not reason:
             self.context.wake_at(self.heard_at + self.config.deadline)
-        if reason == self.told or not (reason or self.has_heard):
+        if reason == self.reported or not (reason or self.has_input):
             return
-        is_news = reason and not self.told
-        self.told = reason
+        is_news = reason and not self.reported
+        self.reported = reason
         self.status(Level.ERROR if reason else Level.OK, reason or "not pressed")
         self.context.notify(RobotHeld(self.name, reason))
         if is_news:

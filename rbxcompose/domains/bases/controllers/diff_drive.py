@@ -117,17 +117,17 @@ class DiffDriveController(Controller[DiffDriveConfig]):
     @classmethod
     def ports(cls, name: str, config: DiffDriveConfig) -> dict[str, Port[Any]]:
         """Return its commands, and what it tells."""
-        told = config.odometry
+        odometry = config.odometry
         ports: dict[str, Port[Any]] = {
             "commands": In(geometry.Twist, config.commands, qos="command"),
-            "odometry": Out(Odometry, told.topic),
+            "odometry": Out(Odometry, odometry.topic),
         }
-        return {**ports, "tf": Out(TFMessage, "/tf")} if told.tf else ports
+        return {**ports, "tf": Out(TFMessage, "/tf")} if odometry.tf else ports
 
     @classmethod
     def capabilities(cls, name: str, config: DiffDriveConfig) -> tuple[Capability, ...]:
         """Declare its limits, its wheels and the frame that it moves."""
-        told, timeout = config.odometry, config.command_timeout
+        odometry, timeout = config.odometry, config.command_timeout
         base = Drives(
             "commands",
             "odometry",
@@ -144,12 +144,12 @@ class DiffDriveController(Controller[DiffDriveConfig]):
             Setting(config.right, "right"),
             Setting(config.wheel_distance, "wheel_distance"),
             Setting(radius, "wheel_radius") if radius else None,
-            Setting(told.child, "odometry.child"),
+            Setting(odometry.child, "odometry.child"),
         )
-        frame = WritesFrame("tf", Setting(told.frame, "odometry.frame"), Setting(told.child, "odometry.child"))
+        frame = WritesFrame("tf", Setting(odometry.frame, "odometry.frame"), Setting(odometry.child, "odometry.child"))
         if config.start == "inactive":
             return (wheels,)  # another one drives, which may have the same commands and frames
-        return (base, wheels, frame) if told.tf else (base, wheels)
+        return (base, wheels, frame) if odometry.tf else (base, wheels)
 
     @classmethod
     def mistake(cls, config: DiffDriveConfig) -> tuple[str, str] | None:
@@ -259,8 +259,8 @@ class DiffDriveController(Controller[DiffDriveConfig]):
 
     def publish(self) -> None:
         """Publish where the base is, and how it moves."""
-        told, known = self.config.odometry, self.odometry
-        header = Header(stamp=to_time(self.site.stamp), frame_id=told.frame)
+        odometry, known = self.config.odometry, self.odometry
+        header = Header(stamp=to_time(self.site.stamp), frame_id=odometry.frame)
         at = Transform3.from_pose2(known.pose)
         x, y, z = at.translation
         turn = geometry.Quaternion(*at.rotation)
@@ -273,14 +273,14 @@ class DiffDriveController(Controller[DiffDriveConfig]):
             "odometry",
             Odometry(
                 header=header,
-                child_frame_id=told.child,
+                child_frame_id=odometry.child,
                 pose=geometry.PoseWithCovariance(pose=pose, covariance=planar(known.covariance)),
                 twist=geometry.TwistWithCovariance(twist=twist, covariance=planar(spread)),
             ),
         )
-        if told.tf:
+        if odometry.tf:
             placed = geometry.Transform(translation=geometry.Vector3(x, y, z), rotation=turn)
-            link = geometry.TransformStamped(header=header, child_frame_id=told.child, transform=placed)
+            link = geometry.TransformStamped(header=header, child_frame_id=odometry.child, transform=placed)
             self.site.send("tf", TFMessage(transforms=(link,)))
 
 

@@ -14,24 +14,15 @@ from pathlib import Path
 from rbxcompose.base.files import replace_file
 from rbxcompose.base.findings import Finding, Report, Severity, Sources, kind
 from rbxcompose.base.printable import plain
-from rbxcompose.commands.console import FINDINGS, has_colour, misused, refuse, table, tell, tell_report
+from rbxcompose.commands import options
+from rbxcompose.commands.console import FINDINGS, emit, has_colour, misused, refuse, table, write_report
 from rbxcompose.commands.formats.json_ import as_data
 from rbxcompose.commands.formats.text import render_text
 from rbxcompose.commands.layout import NotDrawnError
 from rbxcompose.commands.lookup import add_bus_options
-from rbxcompose.commands.options import (
-    Declare,
-    Subcommand,
-    add_actions,
-    add_json_option,
-    add_timeout_option,
-    argument,
-    run_action,
-    seconds,
-)
+from rbxcompose.domains.body.command_pose import sliders_of
 from rbxcompose.domains.body.description import Description
 from rbxcompose.domains.body.files import FORMATS as MESHES
-from rbxcompose.domains.body.live_pose import sliders_of
 from rbxcompose.domains.body.meshes import LEAST_FACES, MissingLibraryError, Scale, SimplifiedMesh, simplify
 from rbxcompose.domains.body.model import Body
 from rbxcompose.domains.body.picture import draw
@@ -65,31 +56,31 @@ from rbxcompose.manifest.files import find, shown_name
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    out = argument("--out", metavar="FILE", help="write it to this file")
+    out = options.argument("--out", metavar="FILE", help="write it to this file")
     words = "lines, or a picture as a graph"
-    form = argument("--format", choices=(TEXT, *FORMATS), default=TEXT, help=words)
+    form = options.argument("--format", choices=(TEXT, *FORMATS), default=TEXT, help=words)
     words = "write it to this file (default of a PDF: NAME.pdf)"
-    out_or_pdf = argument("--out", metavar="FILE", help=words)
-    picture = argument("--out", metavar="FILE", help="the picture (default: NAME.png)")
+    out_or_pdf = options.argument("--out", metavar="FILE", help=words)
+    picture = options.argument("--out", metavar="FILE", help="the picture (default: NAME.png)")
     words = "a joint's position, such as '35 deg'; a bare number is in rad or m"
-    joint = argument("--joint", action="append", default=[], metavar="NAME=POSITION", help=words)
+    joint = options.argument("--joint", action="append", default=[], metavar="NAME=POSITION", help=words)
     tree = "show which link hangs on which, by which joint"
     check = "report what is wrong with the body alone: findings RBX20.., or the errors that keep it from being read"
     source = add_source_options
-    table: tuple[tuple[str, str, Do, tuple[Declare, ...]], ...] = (
+    table: tuple[tuple[str, str, Do, tuple[options.Declare, ...]], ...] = (
         ("show", "list links and joints with masses and limits", using(_show), (source,)),
         ("tree", tree, using(_tree), (source, form, out_or_pdf)),
-        ("check", check, reading(_check), (source, add_json_option)),
+        ("check", check, reading(_check), (source, options.add_json_option)),
         ("expand", "print the URDF, with nothing of xacro left", using(_expand), (source, out)),
         ("picture", "draw it as a PNG", using(_picture), (source, picture, joint)),
         ("simplify", _SIMPLIFY, _run, (_add_simplify_options,)),
         ("pose", _POSE, _pose, (_add_pose_options,)),
     )
     more = {"simplify": _SIMPLIFY_MORE, "pose": _POSE_MORE}
-    add_actions(
+    options.add_actions(
         parser,
         (
-            Subcommand(
+            options.Subcommand(
                 name, words, do, own, f"{words[:1].upper()}{words[1:]}.\n\n{more[name]}" if name in more else words
             )
             for name, words, do, own in table
@@ -99,15 +90,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the chosen action."""
-    return run_action(arguments)
+    return options.run_action(arguments)
 
 
 def _show(arguments: argparse.Namespace, description: Description) -> int:
     body = description.body
-    tell(f"{extent_of(body)}\n")
-    tell(table([LINKS, *links_of(body)]))
-    tell("")
-    tell(table([JOINTS, *joints_of(body)]))
+    emit(f"{extent_of(body)}\n")
+    emit(table([LINKS, *links_of(body)]))
+    emit("")
+    emit(table([JOINTS, *joints_of(body)]))
     return 0
 
 
@@ -123,7 +114,7 @@ def _tree(arguments: argparse.Namespace, description: Description) -> int:
         return write(Path(arguments.out), content)
     if arguments.format == PDF:
         return write(file_of(arguments, description, ".pdf"), content)
-    tell(content.decode().rstrip("\n"))
+    emit(content.decode().rstrip("\n"))
     return 0
 
 
@@ -142,9 +133,9 @@ def _check(arguments: argparse.Namespace, found: DescribedBody) -> int:
         return _refused(report, found.sources, arguments.json)
     body = found.description.body
     if arguments.json:
-        tell(json.dumps(_data(body, report, found.sources), ensure_ascii=False))
+        emit(json.dumps(_data(body, report, found.sources), ensure_ascii=False))
     else:
-        tell(f"{_findings(report, found.sources)}{summary_of(body, report)}")
+        emit(f"{_findings(report, found.sources)}{summary_of(body, report)}")
     return FINDINGS if report.has_errors else 0
 
 
@@ -174,9 +165,9 @@ def _findings(report: Report, sources: Sources) -> str:
 def _refused(report: Report, sources: Sources, as_json: bool) -> int:
     """Tell why there is no body; the document for JSON is written as for any command that fails."""
     if as_json:
-        tell_report(report, sources)
+        write_report(report, sources)
     else:
-        tell(render_text(report, sources, has_colour(sys.stdout)).rstrip("\n"))
+        emit(render_text(report, sources, has_colour(sys.stdout)).rstrip("\n"))
     return FINDINGS
 
 
@@ -199,7 +190,7 @@ def _counts(report: Report) -> tuple[int, int]:
 
 def _expand(arguments: argparse.Namespace, description: Description) -> int:
     if arguments.out is None:
-        tell(description.published.rstrip("\n"))
+        emit(description.published.rstrip("\n"))
         return 0
     return write(Path(arguments.out), description.published.encode())
 
@@ -311,7 +302,7 @@ def _written(arguments: argparse.Namespace, meshes: Mapping[str, Path], scales: 
             replace_file(files[meshes[name]].resolve(), mesh.data)
     except OSError as error:
         return misused("body", f"'{folder}' cannot be written: {error.strerror}")
-    tell(table([_HEAD, *(_row(name, mesh, files[meshes[name]]) for name, mesh in made.items())]))
+    emit(table([_HEAD, *(_row(name, mesh, files[meshes[name]]) for name, mesh in made.items())]))
     return 0
 
 
@@ -374,13 +365,13 @@ def _add_pose_options(parser: argparse.ArgumentParser) -> None:
     words = "publish this position and end: 0.6 (rad or m), '35 deg', '5 cm'; no terminal is needed"
     parser.add_argument("--joint", action="append", default=[], metavar="NAME=POSITION", help=words)
     words = "publish the positions of --joint for this long (default: once)"
-    parser.add_argument("--duration", type=seconds, metavar="T", help=words)
+    parser.add_argument("--duration", type=options.seconds, metavar="T", help=words)
     parser.add_argument("--topic", metavar="TOPIC", help="the topic with the URDF (default: robot_description)")
-    add_timeout_option(parser, "2s")
+    options.add_timeout_option(parser, "2s")
     add_bus_options(parser)
 
 
 def _pose(arguments: argparse.Namespace) -> int:
-    from rbxcompose.domains.body.live_pose import pose  # imports the bus, which no other action needs
+    from rbxcompose.domains.body.command_pose import pose  # imports the bus, which no other action needs
 
     return pose(arguments)

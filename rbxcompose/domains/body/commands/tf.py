@@ -17,30 +17,19 @@ from rbxcompose.base.geometry import Transform3, quaternion_from_rpy, yaw_of
 from rbxcompose.base.printable import plain
 from rbxcompose.base.transforms import SPAN, TransformError, TransformTree, UnknownFrameError
 from rbxcompose.base.units import ANGLE, LENGTH, TIME
-from rbxcompose.commands.console import NotDoneError, refuse, tell
+from rbxcompose.commands import options
+from rbxcompose.commands.console import NotDoneError, emit, refuse
 from rbxcompose.commands.guest import NAME, NO_NAME, NOBODY, Guest, visit
 from rbxcompose.commands.lookup import BusPlace, add_bus_options, find_place
 from rbxcompose.commands.messages import shown, to_json
-from rbxcompose.commands.options import (
-    BUS,
-    Subcommand,
-    add_actions,
-    add_count_options,
-    add_json_option,
-    add_system_options,
-    add_timeout_option,
-    argument,
-    hertz,
-    signed,
-)
-from rbxcompose.domains.body.live_body import HeardFrames
+from rbxcompose.domains.body.command_body import HeardFrames
 from rbxcompose.msgs.geometry_msgs import Quaternion, Transform, TransformStamped, Vector3
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.msgs.tf2_msgs import TFMessage
 from rbxcompose.sdk.ports import Qos
 
-ON_SYSTEM = BUS
+ON_SYSTEM = options.BUS
 _DIGITS = 4  # decimal places of metres and degrees
 
 
@@ -50,20 +39,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "where it was so long before the newest known time; it collects that long first (default: newest of each frame)"
     )
     echoed = (
-        argument("parent", metavar="PARENT", help="the frame to look from, such as map"),
-        argument("frame", metavar="FRAME", help="the frame to find, such as base_link"),
-        argument("--at", type=_past, metavar="-0.5s", help=words),
-        argument("--rate", type=hertz, default=1.0, metavar="1Hz", help="how often (default: 1 Hz)"),
-        add_count_options,
+        options.argument("parent", metavar="PARENT", help="the frame to look from, such as map"),
+        options.argument("frame", metavar="FRAME", help="the frame to find, such as base_link"),
+        options.argument("--at", type=_past, metavar="-0.5s", help=words),
+        options.argument("--rate", type=options.hertz, default=1.0, metavar="1Hz", help="how often (default: 1 Hz)"),
+        options.add_count_options,
     )
-    shared = (partial(add_timeout_option, default="2s"), add_bus_options, add_system_options)
+    shared = (partial(options.add_timeout_option, default="2s"), add_bus_options, options.add_system_options)
     place = "place CHILD in PARENT until Ctrl-C; who has heard of it keeps it there"
     actions = (
-        Subcommand("tree", "show the tree of frames", _tree, (*shared, add_json_option)),
-        Subcommand("echo", "print where FRAME is in PARENT", _echo, (*echoed, *shared, add_json_option)),
-        Subcommand("static", place, publish_static, (add_static_arguments, *shared)),
+        options.Subcommand("tree", "show the tree of frames", _tree, (*shared, options.add_json_option)),
+        options.Subcommand(
+            "echo", "print where FRAME is in PARENT", _echo, (*echoed, *shared, options.add_json_option)
+        ),
+        options.Subcommand("static", place, publish_static, (add_static_arguments, *shared)),
     )
-    add_actions(parser, actions)
+    options.add_actions(parser, actions)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -87,10 +78,10 @@ def _tree(guest: Guest, arguments: argparse.Namespace) -> int:
             if parent is not None
             for frame in below
         ]
-        tell(to_json(found))
+        emit(to_json(found))
         return 0
     lines = list(_lines(tree, children, None, ""))
-    tell("\n".join(lines or ["no frames"]))
+    emit("\n".join(lines or ["no frames"]))
     return 0
 
 
@@ -142,9 +133,9 @@ def _echo(guest: Guest, arguments: argparse.Namespace) -> int:
     tree, past = frames.tree, -(at or 0)
     waits = arguments.timeout + (past / NANOSECONDS if past <= SPAN else 0.0)  # more is never remembered
     guest.run(lambda: _is_known(tree, parent, frame, at), waits)
-    told = 0
-    while arguments.count is None or told < arguments.count:
-        if told:
+    printed = 0
+    while arguments.count is None or printed < arguments.count:
+        if printed:
             guest.run(lambda: False, 1 / arguments.rate)
         try:
             placed = _placed(tree, parent, frame, at)
@@ -152,8 +143,8 @@ def _echo(guest: Guest, arguments: argparse.Namespace) -> int:
             return refuse(_finding(problem, tree))
         age = tree.age(parent, frame, guest.clock.now()) or 0.0
         text = shown({**placed, "age": round(age, _DIGITS)}, arguments.json)
-        tell(text if arguments.json else f"{text}\n---")
-        told += 1
+        emit(text if arguments.json else f"{text}\n---")
+        printed += 1
     return 0
 
 
@@ -174,7 +165,7 @@ def _finding(problem: TransformError, tree: TransformTree) -> Finding:
 
 def _past(text: str) -> int:
     """Read `-0.5s` [ns]."""
-    time = signed(TIME)(text)
+    time = options.signed(TIME)(text)
     if time > 0:
         raise argparse.ArgumentTypeError("must not be in the future: write '-0.5s'")
     return round(time * NANOSECONDS)
@@ -190,10 +181,12 @@ def add_static_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("parent", metavar="PARENT", help="the frame in which it is placed, such as base_link")
     parser.add_argument("frame", metavar="CHILD", help="the frame to place, such as laser")
     for axis, words in (("x", "forward"), ("y", "left"), ("z", "up")):
-        parser.add_argument(f"--{axis}", type=signed(LENGTH), default=0.0, metavar="20cm", help=f"{words} (default: 0)")
+        parser.add_argument(
+            f"--{axis}", type=options.signed(LENGTH), default=0.0, metavar="20cm", help=f"{words} (default: 0)"
+        )
     for angle, axis in (("roll", "x"), ("pitch", "y"), ("yaw", "z")):
         words = f"turned about {axis} (default: 0)"
-        parser.add_argument(f"--{angle}", type=signed(ANGLE), default=0.0, metavar="90deg", help=words)
+        parser.add_argument(f"--{angle}", type=options.signed(ANGLE), default=0.0, metavar="90deg", help=words)
 
 
 def publish_static(arguments: argparse.Namespace) -> int:
@@ -236,6 +229,6 @@ def _hold(place: BusPlace, frames: HeardFrames, parent: str, child: str, pose: T
             transform=Transform(translation=Vector3(*pose.translation), rotation=Quaternion(*pose.rotation)),
         )
         publisher(TFMessage(transforms=(link,)))
-        tell(f"'{plain(child)}' is in '{plain(parent)}'; Ctrl-C ends it")
+        emit(f"'{plain(child)}' is in '{plain(parent)}'; Ctrl-C ends it")
         guest.run(lambda: guest.is_interrupted)
     return 0

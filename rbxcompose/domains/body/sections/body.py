@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -21,7 +21,7 @@ from rbxcompose.manifest.fields import FileName, PieceAttachment
 from rbxcompose.manifest.files import project_of, resolve, shown_name
 from rbxcompose.manifest.reader import UNREADABLE, read_source
 from rbxcompose.manifest.registry import section
-from rbxcompose.manifest.section import Contents, Reading, WantedComponent, Wiring
+from rbxcompose.manifest.section import AlwaysRun, Contents, Reading, WantedComponent, Wiring
 from rbxcompose.manifest.tree import BROKEN, Entry, KeyPath, MappingNode, ScalarNode, TreeNode, at, key_span, value_span
 from rbxcompose.manifest.validate import WRONG_TYPE
 
@@ -124,6 +124,12 @@ def _names(read: Description | None) -> Mapping[str, Mapping[str, object]]:
     return {LINK: read.body.links, JOINT: read.body.joints} if read else {}
 
 
+def _transforms(contents: Contents, names: Sequence[str]) -> dict[str, object]:
+    """Return the configuration of the component that publishes where links are."""
+    found = contents.of(body)
+    return {"urdf": found.text if found else ""}
+
+
 @section(
     "body",
     BodyModel,
@@ -133,6 +139,7 @@ def _names(read: Description | None) -> Mapping[str, Mapping[str, object]]:
     entry="piece",
     shared=((), (PIECES,)),
     brings=(DESCRIPTION,),
+    always=AlwaysRun("transforms", _transforms),
     wires=True,
     brought=_brought,
     defines=(LINK, JOINT),

@@ -19,38 +19,17 @@ from typing import Any
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import read_regular, replace_file
 from rbxcompose.base.findings import Finding, Report, Sources, kind
-from rbxcompose.commands.console import (
-    FINDINGS,
-    NotDoneError,
-    good,
-    has_colour,
-    misused,
-    refuse,
-    table,
-    tell,
-    tell_report,
-)
+from rbxcompose.commands import console
+from rbxcompose.commands.console import table
 from rbxcompose.commands.formats.json_ import as_data
 from rbxcompose.commands.formats.text import render_text
 from rbxcompose.commands.importing.manifest_text import key
 from rbxcompose.commands.options import Declare, Subcommand, add_actions, add_json_option, argument, run_action
 from rbxcompose.commands.targets import add_layer_options, add_path_argument, compiled, only_path, robot_path
+from rbxcompose.domains.devices import udev
 from rbxcompose.domains.devices.openable import look_at
 from rbxcompose.domains.devices.sections.devices import devices
 from rbxcompose.domains.devices.serial_ports import ROOT, SerialPort, serial_ports
-from rbxcompose.domains.devices.udev import (
-    GROUP,
-    RELOAD,
-    Named,
-    device_answers,
-    group_answer,
-    names_of,
-    proposed,
-    rules_answer,
-    rules_file,
-    rules_text,
-    this_account,
-)
 from rbxcompose.domains.devices.usb import UsbDevice
 from rbxcompose.manifest.tree import key_span
 
@@ -60,8 +39,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     words = "look at the /sys, /dev and /etc below this folder, such as a mounted image"
     root = argument("--root", type=_folder, default=ROOT, metavar="DIR", help=words)
     shared = (add_path_argument, add_layer_options, root, add_json_option)
-    words = f"the group that may open the devices (default: {GROUP})"
-    group = argument("--group", type=_group, default=GROUP, metavar="NAME", help=words)
+    words = f"the group that may open the devices (default: {udev.GROUP})"
+    group = argument("--group", type=_group, default=udev.GROUP, metavar="NAME", help=words)
     yes = argument("-y", "--yes", action="store_true", help="do not ask")
     install = "show the rules that would be written below /etc/udev/rules.d, ask, and write them"
     table: tuple[tuple[str, str, Do, tuple[Declare, ...]], ...] = (
@@ -93,18 +72,18 @@ class RobotDevices:
     """The devices of a robot: by name, with their places; and whether the robot has no error."""
 
     robot: str
-    named: Named
+    named: udev.Named
     sources: Sources
     is_right: bool
 
     def rules(self, group: str) -> str:
         """Return the rules for them."""
-        return rules_text(self.robot, (device for device, _ in self.named.values()), group)
+        return udev.rules_text(self.robot, (device for device, _ in self.named.values()), group)
 
     @property
     def file(self) -> Path:
         """Return the path of their rules below the root."""
-        return rules_file(self.robot)
+        return udev.rules_file(self.robot)
 
 
 def _folder(text: str) -> Path:
@@ -130,7 +109,7 @@ def read_devices(path: str, arguments: argparse.Namespace) -> RobotDevices | Non
     """Return the devices of a robot, and tell its findings; None if it cannot be read."""
     found = compiled(path, arguments)
     if found.report.has_errors:
-        tell_report(found.report, found.sources)
+        console.write_report(found.report, found.sources)
     if found.robot is None:
         return None
     contents = found.robot.manifest.contents
@@ -151,14 +130,14 @@ def _scan(arguments: argparse.Namespace) -> int:
     if path is not None:
         read = read_devices(path, arguments)
         if read is None:
-            return FINDINGS
+            return console.FINDINGS
         found = read
     ports = serial_ports(arguments.root)
     named = [device for device, _ in found.named.values()]
     if arguments.json:
-        tell(json.dumps([_data(port, ports, named) for port in ports], ensure_ascii=False))
+        console.emit(json.dumps([_data(port, ports, named) for port in ports], ensure_ascii=False))
     else:
-        tell("\n".join(_lines(ports, named, found.named)))
+        console.emit("\n".join(_lines(ports, named, found.named)))
     return 0
 
 
@@ -166,7 +145,7 @@ def _own() -> str | None:
     """Return the only robot of this folder, if it has one: what is plugged in is worth knowing without any."""
     try:
         return only_path(may_run=False)
-    except NotDoneError:
+    except console.NotDoneError:
         return None
 
 
@@ -175,7 +154,7 @@ def _lines(ports: Sequence[SerialPort], named: Sequence[UsbDevice], names: Itera
         yield "no serial port is plugged in"
     else:
         yield table([_HEAD, *(_row(port, ports, named) for port in ports)])
-    there = Counter(name for port in ports for name in names_of(port, named))
+    there = Counter(name for port in ports for name in udev.names_of(port, named))
     for name in names:
         if there[name] != 1:
             yield f"'{name}' means {there[name]} of these" if there[name] else f"'{name}' is not plugged in"
@@ -187,14 +166,14 @@ def _lines(ports: Sequence[SerialPort], named: Sequence[UsbDevice], names: Itera
 
 def _name(port: SerialPort, ports: Sequence[SerialPort], named: Sequence[UsbDevice]) -> str:
     """Return the names that mean this port and no other one."""
-    others = {name for serial_port in ports if serial_port != port for name in names_of(serial_port, named)}
-    return ", ".join(name for name in names_of(port, named) if name not in others)
+    others = {name for serial_port in ports if serial_port != port for name in udev.names_of(serial_port, named)}
+    return ", ".join(name for name in udev.names_of(port, named) if name not in others)
 
 
 def _row(port: SerialPort, ports: Sequence[SerialPort], named: Sequence[UsbDevice]) -> tuple[str, ...]:
     own = port.device or UsbDevice()
     part = f" interface {own.interface}" if own.interface else ""
-    several = ", ".join(f"{name}?" for name in names_of(port, named))
+    several = ", ".join(f"{name}?" for name in udev.names_of(port, named))
     return (
         port.path,
         own.vendor,
@@ -209,7 +188,7 @@ def _row(port: SerialPort, ports: Sequence[SerialPort], named: Sequence[UsbDevic
 
 def entry_of(port: SerialPort, ports: Sequence[SerialPort]) -> str:
     """Return the entry of `devices:` that means a port, in one line."""
-    keys = proposed(port, ports)
+    keys = udev.proposed(port, ports)
     return f"{{{', '.join(f'{name}: {text if name in _NUMBERS else key(text)}' for name, text in keys.items())}}}"
 
 
@@ -225,17 +204,17 @@ def _data(port: SerialPort, ports: Sequence[SerialPort], named: Sequence[UsbDevi
         "interface": own.interface,
         "driver": port.driver,
         "about": port.about,
-        "devices": names_of(port, named),
-        "entry": dict(proposed(port, ports)),
+        "devices": udev.names_of(port, named),
+        "entry": dict(udev.proposed(port, ports)),
     }
 
 
 def _generate(arguments: argparse.Namespace) -> int:
     found = devices_of(arguments)
     if found is None or not found.is_right:
-        return FINDINGS
+        return console.FINDINGS
     rules = found.rules(arguments.group)
-    tell(json.dumps({"file": f"/{found.file}", "rules": rules}) if arguments.json else rules.rstrip("\n"))
+    console.emit(json.dumps({"file": f"/{found.file}", "rules": rules}) if arguments.json else rules.rstrip("\n"))
     return 0
 
 
@@ -245,21 +224,21 @@ _MOST = 1 << 20  # [B] of rules
 def _check(arguments: argparse.Namespace) -> int:
     found = devices_of(arguments)
     if found is None or not found.is_right:
-        return FINDINGS
+        return console.FINDINGS
     ports = serial_ports(arguments.root)
-    rules = rules_answer(found.rules(arguments.group), installed(arguments.root / found.file), f"/{found.file}")
+    rules = udev.rules_answer(found.rules(arguments.group), installed(arguments.root / found.file), f"/{found.file}")
     are_right = isinstance(rules, str)
-    answers = list(device_answers(found.named, ports, look_at, rules_are_right=are_right))
+    answers = list(udev.device_answers(found.named, ports, look_at, rules_are_right=are_right))
     if found.named:
-        answers += [group_answer(this_account(), arguments.group), rules]
+        answers += [udev.group_answer(udev.this_account(), arguments.group), rules]
     report = Report([answer for answer in answers if isinstance(answer, Finding)])
     fine = [answer for answer in answers if isinstance(answer, str)]
     if arguments.json:
-        tell(json.dumps({"fine": fine, "findings": [as_data(finding, found.sources) for finding in report]}))
+        console.emit(json.dumps({"fine": fine, "findings": [as_data(finding, found.sources) for finding in report]}))
     else:
-        told = render_text(report, found.sources, has_colour(sys.stdout))
-        tell("\n".join([*(f"ok  {answer}" for answer in fine), told]).rstrip("\n"))
-    return FINDINGS if report.has_errors else 0
+        text = render_text(report, found.sources, console.has_colour(sys.stdout))
+        console.emit("\n".join([*(f"ok  {answer}" for answer in fine), text]).rstrip("\n"))
+    return console.FINDINGS if report.has_errors else 0
 
 
 def installed(file: Path) -> str | None:
@@ -279,29 +258,31 @@ _YES = ("y", "yes")
 def _install(arguments: argparse.Namespace) -> int:
     found = devices_of(arguments)
     if found is None or not found.is_right:
-        return FINDINGS
+        return console.FINDINGS
     if not found.named:
-        return refuse(NO_DEVICES.at(None, f"the robot '{found.robot}' has no devices, so there are no rules to write"))
+        return console.refuse(
+            NO_DEVICES.at(None, f"the robot '{found.robot}' has no devices, so there are no rules to write")
+        )
     path, rules = arguments.root / found.file, found.rules(arguments.group)
     before = installed(path)
     if before == rules:
         return _done(arguments, path, written=False)
     if not arguments.yes:
         if arguments.json or not sys.stdin.isatty():
-            return misused("udev install", "there is nobody to ask: give '--yes'")
-        tell(_change(path, before, rules))
+            return console.misused("udev install", "there is nobody to ask: give '--yes'")
+        console.emit(_change(path, before, rules))
         if not _agreed():
-            tell("nothing was written")
-            return FINDINGS
+            console.emit("nothing was written")
+            return console.FINDINGS
     elif not arguments.json:
-        tell(_change(path, before, rules))
+        console.emit(_change(path, before, rules))
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         replace_file(path, rules.encode(), mode=_MODE)
     except OSError as error:
         words = f"'{path}' cannot be written: {error.strerror}"
         tee = f"rbxcompose udev generate | sudo tee {path}"
-        return refuse(NOT_INSTALLED.at(None, words, help=f"run it with sudo, or: {tee}"))
+        return console.refuse(NOT_INSTALLED.at(None, words, help=f"run it with sudo, or: {tee}"))
     return _done(arguments, path, written=True)
 
 
@@ -314,7 +295,7 @@ def _change(path: Path, before: str | None, after: str) -> str:
 
 
 def _agreed() -> bool:
-    from rbxcompose.tools.commands.new import Asker, CancelledError  # the compiler of manifests, only to ask
+    from rbxcompose.commands.new_files import Asker, CancelledError  # with templates, only to ask
 
     try:
         return Asker(is_asking=True).ask("write it?", lambda text: text.casefold() in _YES, "no")
@@ -324,9 +305,9 @@ def _agreed() -> bool:
 
 def _done(arguments: argparse.Namespace, path: Path, *, written: bool) -> int:
     if arguments.json:
-        tell(json.dumps({"file": str(path), "written": written, "reload": RELOAD}))
+        console.emit(json.dumps({"file": str(path), "written": written, "reload": udev.RELOAD}))
     elif written:
-        tell(good(f"wrote {path}; it takes effect with: {RELOAD}"))
+        console.emit(console.good(f"wrote {path}; it takes effect with: {udev.RELOAD}"))
     else:
-        tell(f"{path} has these rules already")
+        console.emit(f"{path} has these rules already")
     return 0

@@ -17,22 +17,14 @@ from typing import Any
 from rbxcompose.base.levels import Level
 from rbxcompose.base.printable import fitted, plain
 from rbxcompose.base.requests import to_data
-from rbxcompose.commands.console import has_colour, tell
+from rbxcompose.commands.console import emit, has_colour
 from rbxcompose.commands.lookup import add_asking_options, answer_of, find_robot, pass_on
 from rbxcompose.commands.options import Subcommand, add_actions, argument, run_action
 from rbxcompose.commands.terminal import LiveScreen, is_terminal
-from rbxcompose.domains.diagnostics.requests import (
-    TYPE,
-    Acknowledge,
-    DiagnosticsTree,
-    LevelChange,
-    ListChanges,
-    ShowDiagnostics,
-    TreeLine,
-)
+from rbxcompose.domains.diagnostics import requests
 from rbxcompose.runtime.folder import RobotFolder
 
-ON_SYSTEM = TYPE
+ON_SYSTEM = requests.TYPE
 _PERIOD = 0.2  # [s] between two requests to a robot that is followed
 
 
@@ -59,16 +51,16 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _tree(arguments: argparse.Namespace) -> int:
     folder = find_robot(arguments.robot)
-    tree = answer_of(folder, ShowDiagnostics())
+    tree = answer_of(folder, requests.ShowDiagnostics())
     if arguments.json:
-        tell(_document(folder, tree))
+        emit(_document(folder, tree))
     else:
-        tell("\n".join(tree_lines(folder.path.name, tree, values=arguments.values, colour=has_colour(sys.stdout))))
+        emit("\n".join(tree_lines(folder.path.name, tree, values=arguments.values, colour=has_colour(sys.stdout))))
     return int(tree.level)
 
 
-def _document(folder: RobotFolder, tree: DiagnosticsTree) -> str:
-    return json.dumps({"robot": folder.path.name, **told_tree(tree)})
+def _document(folder: RobotFolder, tree: requests.DiagnosticsTree) -> str:
+    return json.dumps({"robot": folder.path.name, **tree_data(tree)})
 
 
 def _watch(arguments: argparse.Namespace) -> int:
@@ -86,13 +78,13 @@ def _watch(arguments: argparse.Namespace) -> int:
 
 
 def _follow_tree(folder: RobotFolder) -> int:
-    told: list[tuple[str, int]] | None = None
+    printed: list[tuple[str, int]] | None = None
     while True:
-        tree = answer_of(folder, ShowDiagnostics())
+        tree = answer_of(folder, requests.ShowDiagnostics())
         levels = [(line.path, int(line.level)) for line in tree.lines]
-        if levels != told:
-            tell(_document(folder, tree))
-        told = levels
+        if levels != printed:
+            emit(_document(folder, tree))
+        printed = levels
         time.sleep(_PERIOD)
 
 
@@ -100,14 +92,14 @@ def _show_live(folder: RobotFolder, *, values: bool) -> int:
     colour = has_colour(sys.stdout)
     with LiveScreen() as screen:
         while not screen.is_over:
-            tree = answer_of(folder, ShowDiagnostics())
+            tree = answer_of(folder, requests.ShowDiagnostics())
             screen.draw(partial(_tree_picture, folder.path.name, tree, values, colour))
             screen.wait(_PERIOD)
     return 0
 
 
 def _tree_picture(
-    robot: str, tree: DiagnosticsTree, values: bool, colour: bool, width: int, height: int
+    robot: str, tree: requests.DiagnosticsTree, values: bool, colour: bool, width: int, height: int
 ) -> Sequence[str]:
     return list(tree_lines(robot, tree, values=values, colour=colour, width=width))
 
@@ -119,16 +111,16 @@ def _echo(arguments: argparse.Namespace) -> int:
     try:
         while True:
             for change in _changes(folder, number):
-                tell(json.dumps(told_change(change)) if arguments.json else change_line(change, has_colour(sys.stdout)))
+                emit(json.dumps(change_data(change)) if arguments.json else change_line(change, has_colour(sys.stdout)))
                 number = change.number
             time.sleep(_PERIOD)
     except KeyboardInterrupt:
         return 0
 
 
-def _changes(folder: RobotFolder, number: int = 0) -> Iterator[LevelChange]:
+def _changes(folder: RobotFolder, number: int = 0) -> Iterator[requests.LevelChange]:
     """Yield all known changes after one, as many at a time as an answer holds."""
-    while some := answer_of(folder, ListChanges(number)):
+    while some := answer_of(folder, requests.ListChanges(number)):
         yield from some
         number = some[-1].number
 
@@ -138,16 +130,16 @@ def _history(arguments: argparse.Namespace) -> int:
     known = _changes(find_robot(arguments.robot))
     changes = [change for change in known if f"{change.path}/".startswith(f"{above}/")]
     if arguments.json:
-        tell(json.dumps([told_change(change) for change in changes]))
+        emit(json.dumps([change_data(change) for change in changes]))
     elif not changes:
-        tell("no level has changed")
+        emit("no level has changed")
     else:
-        tell("\n".join(change_line(change, has_colour(sys.stdout)) for change in changes))
+        emit("\n".join(change_line(change, has_colour(sys.stdout)) for change in changes))
     return 0
 
 
 def _acknowledge(arguments: argparse.Namespace) -> int:
-    return pass_on(arguments, Acknowledge(arguments.path))
+    return pass_on(arguments, requests.Acknowledge(arguments.path))
 
 
 _RESET, _FAINT = "\x1b[0m", "\x1b[2m"
@@ -158,7 +150,7 @@ _LONGEST = 1000  # characters of a message
 
 
 def tree_lines(
-    robot: str, tree: DiagnosticsTree, *, values: bool = False, colour: bool = False, width: int = 0
+    robot: str, tree: requests.DiagnosticsTree, *, values: bool = False, colour: bool = False, width: int = 0
 ) -> Iterator[str]:
     """Yield the robot with its level and the cause, then a line for each group and part; `width` 0 cuts nothing."""
     names = [f"{_STEP * (tree_line.depth + 1)}{plain(tree_line.name)}" for tree_line in tree.lines]
@@ -185,7 +177,7 @@ def _row(name: str, level: Level, message: str, column: int, colour: bool, width
     return f"{text[:start]}{_COLOURS[level]}{word}{_RESET}{text[start + 5 :]}"
 
 
-def _values(line: TreeLine, colour: bool, width: int) -> Iterator[str]:
+def _values(line: requests.TreeLine, colour: bool, width: int) -> Iterator[str]:
     pairs = [*((("hardware_id", line.hardware_id),) if line.hardware_id else ()), *line.values]
     keys = max((len(plain(key)) for key, _ in pairs), default=0)
     for key, value in pairs:
@@ -194,7 +186,7 @@ def _values(line: TreeLine, colour: bool, width: int) -> Iterator[str]:
         yield f"{_FAINT}{text}{_RESET}" if colour else text
 
 
-def change_line(change: LevelChange, colour: bool) -> str:
+def change_line(change: requests.LevelChange, colour: bool) -> str:
     """Return a change as a line: `   12.30  /power  OK -> WARN  battery: Medium battery`."""
     old, new = (
         f"{_COLOURS[level]}{level.name}{_RESET}" if colour else level.name for level in (change.old, change.new)
@@ -203,12 +195,12 @@ def change_line(change: LevelChange, colour: bool) -> str:
     return f"{change.time:8.2f}  {plain(change.path)}  {old} -> {new}  {cause}".rstrip()
 
 
-def told_change(change: LevelChange) -> dict[str, Any]:
+def change_data(change: requests.LevelChange) -> dict[str, Any]:
     """Return a change as data for JSON; levels are words."""
     return {**to_data(change), "old": change.old.name.lower(), "new": change.new.name.lower()}
 
 
-def told_tree(tree: DiagnosticsTree) -> dict[str, Any]:
+def tree_data(tree: requests.DiagnosticsTree) -> dict[str, Any]:
     """Return the tree as data for JSON: levels are words, values a map."""
     lines = [{**to_data(line), "level": line.level.name.lower(), "values": dict(line.values)} for line in tree.lines]
     return {**to_data(tree), "level": tree.level.name.lower(), "lines": lines}

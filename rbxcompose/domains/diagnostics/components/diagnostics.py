@@ -7,15 +7,8 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from rbxcompose.base.findings import suggest
 from rbxcompose.base.levels import Level
+from rbxcompose.domains.diagnostics import requests
 from rbxcompose.domains.diagnostics.core import Aggregator, TreeRow
-from rbxcompose.domains.diagnostics.requests import (
-    Acknowledge,
-    DiagnosticsTree,
-    LevelChange,
-    ListChanges,
-    ShowDiagnostics,
-    TreeLine,
-)
 from rbxcompose.domains.diagnostics.ros1 import Ros1Aggregator
 from rbxcompose.domains.diagnostics.settings import DiagnosticsModel
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -25,7 +18,7 @@ from rbxcompose.sdk import Component, In, Out, Refused, answers, component
 
 PAUSE = 0.05  # [s] between two reports at least, so that flapping levels cost little
 MOST_ARRAYS, LARGEST_ARRAY = 30.0, 200_000  # [Hz], [B] of one publisher: to read more takes too much of a core
-MOST_TOLD = 100_000  # characters of an answer to people
+MOST_LOGGED = 100_000  # characters of an answer to people
 ROUNDING = 1e-9  # [s]
 PAUSE_PER_ROW = 0.0001  # [s]; a row is about 20 us of work, so reports never take more than a fifth of a core
 
@@ -56,7 +49,7 @@ class Diagnostics(Component[DiagnosticsConfig]):
         """Build the core."""
         made = Ros1Aggregator if self.config.profile == "ros1" else Aggregator
         self.core: Aggregator | Ros1Aggregator = made(self.config, self.config.expected, started=self.now)
-        self.told: dict[str, Level] = {}
+        self.levels: dict[str, Level] = {}
         self.is_going_down = False
         self.reported = self.alarmed = -math.inf  # the last report, and the last immediate one
         self.rows = 0  # of the last report
@@ -64,7 +57,7 @@ class Diagnostics(Component[DiagnosticsConfig]):
 
     def take_over(self, old: Diagnostics) -> None:
         """Keep what is known: statuses, levels of groups that stay, and the history."""
-        self.told, self.published = old.told, old.published
+        self.levels, self.published = old.levels, old.published
         match self.core, old.core:
             case (Aggregator() as core, Aggregator() as before):
                 core.take_over(before, self.now)
@@ -129,20 +122,20 @@ class Diagnostics(Component[DiagnosticsConfig]):
             self.diagnostics_changes(DiagnosticArray(header=header, status=tuple(map(_as_status, changes))))
         for row in rows:
             if row.is_group and row.depth == 0:
-                self.tell(row.status)
+                self.log_level(row.status)
 
-    def tell(self, group: DiagnosticStatus) -> None:
+    def log_level(self, group: DiagnosticStatus) -> None:
         """Log a new level of a group."""
-        level, told = Level(group.level), self.told.get(group.name, Level.OK)
-        if self.is_going_down and level < told:
+        level, reported = Level(group.level), self.levels.get(group.name, Level.OK)
+        if self.is_going_down and level < reported:
             return
-        if level is not told:
+        if level is not reported:
             cause = "" if group.message == level.name else f": {group.message}"
             self.context.log(level, f"{group.name} is {level.name}{cause}")
-        self.told[group.name] = level
+        self.levels[group.name] = level
 
-    @answers(ShowDiagnostics)
-    def show(self, request: ShowDiagnostics) -> DiagnosticsTree:
+    @answers(requests.ShowDiagnostics)
+    def show(self, request: requests.ShowDiagnostics) -> requests.DiagnosticsTree:
         """Return the tree as it is now; of too many lines, groups and the worst."""
         self.core.advance(self.now)
         rows = self.core.report(self.now)
@@ -152,19 +145,19 @@ class Diagnostics(Component[DiagnosticsConfig]):
         lines = [_line(row) for row in rows]
         worst_first = sorted(range(len(lines)), key=lambda index: (not lines[index].is_group, -lines[index].level))
         kept = sorted(_within(worst_first, [_size(line) for line in lines]))
-        told = tuple(lines[index] for index in kept)
+        shown = tuple(lines[index] for index in kept)
         refused = self.core.admission.refused
-        return DiagnosticsTree(self.now, level, cause, told, len(lines) - len(told), refused)
+        return requests.DiagnosticsTree(self.now, level, cause, shown, len(lines) - len(shown), refused)
 
-    @answers(ListChanges)
-    def changes(self, request: ListChanges) -> tuple[LevelChange, ...]:
+    @answers(requests.ListChanges)
+    def changes(self, request: requests.ListChanges) -> tuple[requests.LevelChange, ...]:
         """Return the first of the changes that are still known."""
         known = list(self.core.history.after(request.after))
         kept = _within(range(len(known)), [len(change.path) + len(change.cause) + 100 for change in known])
         return tuple(known[index] for index in kept)
 
-    @answers(Acknowledge)
-    def acknowledge(self, request: Acknowledge) -> str:
+    @answers(requests.Acknowledge)
+    def acknowledge(self, request: requests.Acknowledge) -> str:
         """Let latched levels follow the present."""
         path = f"/{request.path.strip('/')}" if request.path else ""
         known = self.core.paths()
@@ -177,21 +170,23 @@ class Diagnostics(Component[DiagnosticsConfig]):
         return f"acknowledged: {', '.join(done)}"
 
 
-def _line(row: TreeRow) -> TreeLine:
+def _line(row: TreeRow) -> requests.TreeLine:
     status = row.status
     values = () if row.is_group else tuple((pair.key, pair.value) for pair in status.values)  # those of a group repeat
     level = Level(status.level)
-    return TreeLine(status.name, row.name, row.depth, row.is_group, level, status.message, status.hardware_id, values)
+    return requests.TreeLine(
+        status.name, row.name, row.depth, row.is_group, level, status.message, status.hardware_id, values
+    )
 
 
-def _size(line: TreeLine) -> int:
+def _size(line: requests.TreeLine) -> int:
     texts = (line.path, line.name, line.message, line.hardware_id, *(text for pair in line.values for text in pair))
     return 150 + sum(map(len, texts))
 
 
 def _within(order: Iterable[int], sizes: Sequence[int]) -> Iterator[int]:
     """Yield the first of `order` whose sizes an answer can hold."""
-    left = MOST_TOLD
+    left = MOST_LOGGED
     for index in order:
         left -= sizes[index]
         if left < 0:
@@ -199,8 +194,8 @@ def _within(order: Iterable[int], sizes: Sequence[int]) -> Iterator[int]:
         yield index
 
 
-def _as_status(change: LevelChange) -> DiagnosticStatus:
-    told = (("number", change.number), ("time", f"{change.time:.3f}"), ("old", change.old.name.lower()))
+def _as_status(change: requests.LevelChange) -> DiagnosticStatus:
+    values = (("number", change.number), ("time", f"{change.time:.3f}"), ("old", change.old.name.lower()))
     return DiagnosticStatus(
-        int(change.new), change.path, change.cause, values=tuple(KeyValue(key, str(value)) for key, value in told)
+        int(change.new), change.path, change.cause, values=tuple(KeyValue(key, str(value)) for key, value in values)
     )

@@ -75,5 +75,5 @@ class TopicMonitor(Component[TopicMonitorConfig]):
 
     def step(self, dt: float) -> None:
         """Report."""
-        told = self.task.status(self.now)
-        self.status(told.level, told.message, **told.values)
+        report = self.task.status(self.now)
+        self.status(report.level, report.message, **report.values)

@@ -106,62 +106,62 @@ def _aggregator(node: NodeParameters, report: Report) -> ForeignAggregator:
     root = node.root
     analyzers = _analyzers(root)
     others = {name: entry for name, entry in root.entries.items() if name not in (*_BELOW, *analyzers)}
-    told = ForeignMap(MappingNode(others, root.span), f"'{plain(node.node, 60)}'", node.span, report)
-    base = told.text("base_path")
-    other = told.text("path")
-    found = ForeignAggregator(node.span, told.above_zero("pub_rate"), base or other, told.flag("other_as_errors"))
-    told.flag("use_sim_time")
-    for key, span in told.places(*_ELSEWHERE).items():
+    entries = ForeignMap(MappingNode(others, root.span), f"'{plain(node.node, 60)}'", node.span, report)
+    base = entries.text("base_path")
+    other = entries.text("path")
+    found = ForeignAggregator(node.span, entries.above_zero("pub_rate"), base or other, entries.flag("other_as_errors"))
+    entries.flag("use_sim_time")
+    for key, span in entries.places(*_ELSEWHERE).items():
         report.add(NOT_CARRIED_OVER.at(span, f"'{key}' is not carried over: {_ELSEWHERE[key]}"))
-    told.tell_others()
+    entries.report_unknown_keys()
     found.analyzers = list(_read(analyzers, report))
     return found
 
 
 def _read(analyzers: dict[str, Entry], report: Report) -> Iterator[ForeignAnalyzer]:
-    for name, told in maps_in(MappingNode(analyzers), "analyzer", report):
-        if (found := _analyzer(name, told)) is not None:
+    for name, entries in maps_in(MappingNode(analyzers), "analyzer", report):
+        if (found := _analyzer(name, entries)) is not None:
             yield found
 
 
-def _analyzer(name: str, told: ForeignMap) -> ForeignAnalyzer | None:
+def _analyzer(name: str, entries: ForeignMap) -> ForeignAnalyzer | None:
     """Return an analyzer; None after the finding that says why it is left out."""
-    type_ = _type(told)
+    type_ = _type(entries)
     if type_ is None:
         return None
-    analyzer = ForeignAnalyzer(name, told.span, type_, told.text("path"))
+    analyzer = ForeignAnalyzer(name, entries.span, type_, entries.text("path"))
     for key in MATCHERS:
-        analyzer.matched[key] = [each for each in _texts(told, key) if key != "regex" or _is_regex(each, told)]
-    analyzer.expected, analyzer.stripped = _texts(told, "expected"), _texts(told, "find_and_remove_prefix")
-    for key, span in told.places("remove_prefix").items():
-        words = f"'{key}' of {told.what} is not carried over: 'find_and_remove_prefix' strips what it matches"
-        told.tell(NOT_CARRIED_OVER.at(span, words))
-    analyzer.timeout, analyzer.discards = told.number("timeout"), told.flag("discard_stale")
-    analyzer.count = told.whole("num_items", -1, _MOST)
-    below = _analyzers(told.node) if type_ == "group" else {}
-    told.places(*_BELOW, *below)
-    told.tell_others()
-    analyzer.below = list(_read(below, told.report))
+        analyzer.matched[key] = [each for each in _texts(entries, key) if key != "regex" or _is_regex(each, entries)]
+    analyzer.expected, analyzer.stripped = _texts(entries, "expected"), _texts(entries, "find_and_remove_prefix")
+    for key, span in entries.places("remove_prefix").items():
+        words = f"'{key}' of {entries.what} is not carried over: 'find_and_remove_prefix' strips what it matches"
+        entries.add(NOT_CARRIED_OVER.at(span, words))
+    analyzer.timeout, analyzer.discards = entries.number("timeout"), entries.flag("discard_stale")
+    analyzer.count = entries.whole("num_items", -1, _MOST)
+    below = _analyzers(entries.node) if type_ == "group" else {}
+    entries.places(*_BELOW, *below)
+    entries.report_unknown_keys()
+    analyzer.below = list(_read(below, entries.report))
     if type_ == "ignore":
-        words = f"{told.what} is not carried over: it matches nothing in ROS either, so its items are in Other"
-        told.tell(NOT_CARRIED_OVER.at(told.span, words))
+        words = f"{entries.what} is not carried over: it matches nothing in ROS either, so its items are in Other"
+        entries.add(NOT_CARRIED_OVER.at(entries.span, words))
         return None
     why = _why_refused(analyzer)
     if why:
-        told.tell(REFUSED.at(told.span, f"{told.what} is left out: {why}"))
+        entries.add(REFUSED.at(entries.span, f"{entries.what} is left out: {why}"))
         return None
     return analyzer
 
 
-def _type(told: ForeignMap) -> str | None:
-    given = told.text("type")
+def _type(entries: ForeignMap) -> str | None:
+    given = entries.text("type")
     if given is None:
-        told.tell(REFUSED.at(told.span, f"{told.what} is left out: it has no type"))
+        entries.add(REFUSED.at(entries.span, f"{entries.what} is left out: it has no type"))
         return None
     name = given.value.rpartition("/")[2].rpartition(":")[2]
     if name not in TYPES:
-        words = f"{told.what} is not carried over: '{plain(given.value, 60)}' is an analyzer of another package"
-        told.tell(NOT_CARRIED_OVER.at(given.span, words))
+        words = f"{entries.what} is not carried over: '{plain(given.value, 60)}' is an analyzer of another package"
+        entries.add(NOT_CARRIED_OVER.at(given.span, words))
         return None
     return TYPES[name]
 
@@ -181,19 +181,19 @@ def _matches(analyzer: ForeignAnalyzer) -> bool:
     return bool(any(analyzer.matched.values()) or analyzer.expected or analyzer.stripped)
 
 
-def _texts(told: ForeignMap, key: str) -> list[Given[str]]:
+def _texts(entries: ForeignMap, key: str) -> list[Given[str]]:
     """Return a text, or the texts of a list."""
-    if isinstance(told.node.get(key), SequenceNode):
-        return told.texts(key)
-    found = told.text(key)
+    if isinstance(entries.node.get(key), SequenceNode):
+        return entries.texts(key)
+    found = entries.text(key)
     return [] if found is None else [found]
 
 
-def _is_regex(given: Given[str], told: ForeignMap) -> bool:
+def _is_regex(given: Given[str], entries: ForeignMap) -> bool:
     try:
         re.compile(given.value)
     except (re.error, RecursionError, OverflowError) as error:
-        told.tell(NO_REGEX.at(given.span, f"'regex' of {told.what} is left out: {error}"))
+        entries.add(NO_REGEX.at(given.span, f"'regex' of {entries.what} is left out: {error}"))
         return False
     return True
 

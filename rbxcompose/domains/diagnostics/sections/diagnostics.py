@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
 
 from rbxcompose.base.config import ANALYZER
 from rbxcompose.domains.diagnostics.settings import AnalyzerModel, DiagnosticsModel
 from rbxcompose.manifest.registry import section
-from rbxcompose.manifest.section import Reading, Renames
+from rbxcompose.manifest.section import AlwaysRun, Contents, Reading, Renames
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.manifest.validate import validate
 
@@ -60,6 +61,16 @@ def _pattern(renames: Renames, pattern: str) -> list[str]:
     return others if len(others) == len(matched) else [f"{renames.prefix}{pattern}", *others]
 
 
+def _settings(contents: Contents, names: Sequence[str]) -> dict[str, object]:
+    """Return the configuration of the aggregator, which expects a status of all that runs."""
+    groups = contents.of(diagnostics)
+    return {**{name: getattr(groups, name) for name in groups.model_fields_set}, "expected": names}
+
+
+def _levels(contents: Contents) -> dict[str, str]:
+    return contents.of(diagnostics).headers
+
+
 @section(
     "diagnostics",
     DiagnosticsModel,
@@ -68,6 +79,8 @@ def _pattern(renames: Renames, pattern: str) -> list[str]:
     at=("analyzers",),
     shared=((), ("analyzers",)),
     rename=_rename,
+    always=AlwaysRun("diagnostics", _settings),
+    levels=_levels,
 )
 def diagnostics(reading: Reading[DiagnosticsModel]) -> DiagnosticsModel:
     """How the states of components are grouped: each group is OK, WARN, ERROR or STALE.

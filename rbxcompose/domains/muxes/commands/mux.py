@@ -13,24 +13,13 @@ from collections.abc import Callable, Iterator
 
 from rbxcompose.base.findings import suggest
 from rbxcompose.base.requests import Command, to_data
-from rbxcompose.commands.console import NotDoneError, table, tell
+from rbxcompose.commands.console import NotDoneError, emit, table
 from rbxcompose.commands.lookup import REFUSED, add_asking_options, answer_of, find_robot, known_state, show_answer
 from rbxcompose.commands.options import Subcommand, add_actions, argument, count, run_action, seconds
-from rbxcompose.domains.muxes.requests import (
-    MUX,
-    AddMuxInput,
-    DeleteMuxInput,
-    LockMuxInputs,
-    LookAtMux,
-    MuxInputState,
-    MuxState,
-    ReadMuxChanges,
-    SelectMuxInput,
-    UnlockMuxInputs,
-)
+from rbxcompose.domains.muxes import requests
 from rbxcompose.runtime.folder import RobotFolder
 
-ON_SYSTEM = MUX
+ON_SYSTEM = requests.MUX
 _LOOK = 0.2  # [s] between two looks of `watch`; no change is missed between them
 
 
@@ -67,7 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _names(folder: RobotFolder) -> list[str]:
     """Return the muxes of a robot."""
     state = known_state(folder)
-    return [component.name for component in state.components if component.type == MUX] if state else []
+    return [component.name for component in state.components if component.type == requests.MUX] if state else []
 
 
 def _chosen(arguments: argparse.Namespace, folder: RobotFolder) -> tuple[str, list[str]]:
@@ -93,28 +82,28 @@ def _only_mux(arguments: argparse.Namespace, folder: RobotFolder) -> str:
 
 def _ls(arguments: argparse.Namespace) -> int:
     folder = find_robot(arguments.robot)
-    found = [answer_of(folder, LookAtMux(name)) for name in _names(folder)]
+    found = [answer_of(folder, requests.LookAtMux(name)) for name in _names(folder)]
     if arguments.json:
-        tell(json.dumps([to_data(item) for item in found]))
+        emit(json.dumps([to_data(item) for item in found]))
     elif not found:
-        tell("this robot has no muxes")
+        emit("this robot has no muxes")
     else:
         rows = [
             (state.name, state.mode, state.profile, ", ".join(each.name for each in state.inputs), state.why)
             for state in found
         ]
-        tell(table([("mux", "mode", "profile", "inputs", ""), *rows]))
+        emit(table([("mux", "mode", "profile", "inputs", ""), *rows]))
     return 0
 
 
 def _why(arguments: argparse.Namespace) -> int:
     folder = find_robot(arguments.robot)
-    state = answer_of(folder, LookAtMux(_only_mux(arguments, folder)))
-    tell(json.dumps(to_data(state)) if arguments.json else "\n".join(_account(state)))
+    state = answer_of(folder, requests.LookAtMux(_only_mux(arguments, folder)))
+    emit(json.dumps(to_data(state)) if arguments.json else "\n".join(_account(state)))
     return 0
 
 
-def _account(state: MuxState) -> Iterator[str]:
+def _account(state: requests.MuxState) -> Iterator[str]:
     """Yield the lines that tell who holds an output, who waits for what, and which locks are engaged."""
     until = f", for another {state.until - state.time:.2f} s unless it sends again" if state.until else ""
     yield f"{state.name}: {state.why}{until}"
@@ -128,7 +117,7 @@ def _account(state: MuxState) -> Iterator[str]:
         yield f"lock {lock.name}: {f'{lock.why}, {below} are locked out' if lock.why else 'open'}"
 
 
-def _heard(state: MuxInputState) -> str:
+def _heard(state: requests.MuxInputState) -> str:
     return "never" if state.silent_for is None else f"{state.silent_for:.2f} s ago"
 
 
@@ -136,9 +125,9 @@ def _watch(arguments: argparse.Namespace) -> int:
     folder = find_robot(arguments.robot)
     mux, after, shown = _only_mux(arguments, folder), 0, 0
     while True:
-        changes = answer_of(folder, ReadMuxChanges(mux, after))
+        changes = answer_of(folder, requests.ReadMuxChanges(mux, after))
         for change in changes if after else changes[-1:]:
-            tell(
+            emit(
                 json.dumps({"mux": mux, **to_data(change)})
                 if arguments.json
                 else f"{change.time:9.2f} s  {change.text}"
@@ -164,23 +153,23 @@ def _one(mux: str, inputs: list[str]) -> str:
 
 
 def _select(arguments: argparse.Namespace) -> int:
-    return _order(arguments, lambda mux, inputs: SelectMuxInput(mux, _one(mux, inputs)))
+    return _order(arguments, lambda mux, inputs: requests.SelectMuxInput(mux, _one(mux, inputs)))
 
 
 def _add(arguments: argparse.Namespace) -> int:
     def made(mux: str, inputs: list[str]) -> Command:
-        return AddMuxInput(mux, _one(mux, inputs), arguments.topic, arguments.priority, arguments.timeout)
+        return requests.AddMuxInput(mux, _one(mux, inputs), arguments.topic, arguments.priority, arguments.timeout)
 
     return _order(arguments, made)
 
 
 def _delete(arguments: argparse.Namespace) -> int:
-    return _order(arguments, lambda mux, inputs: DeleteMuxInput(mux, _one(mux, inputs)))
+    return _order(arguments, lambda mux, inputs: requests.DeleteMuxInput(mux, _one(mux, inputs)))
 
 
 def _lock(arguments: argparse.Namespace) -> int:
-    return _order(arguments, lambda mux, inputs: LockMuxInputs(mux, tuple(inputs), arguments.seconds))
+    return _order(arguments, lambda mux, inputs: requests.LockMuxInputs(mux, tuple(inputs), arguments.seconds))
 
 
 def _unlock(arguments: argparse.Namespace) -> int:
-    return _order(arguments, lambda mux, inputs: UnlockMuxInputs(mux, tuple(inputs)))
+    return _order(arguments, lambda mux, inputs: requests.UnlockMuxInputs(mux, tuple(inputs)))

@@ -9,28 +9,18 @@ from typing import Any
 
 from rbxcompose.base.findings import suggest
 from rbxcompose.base.requests import Refused, answers
+from rbxcompose.domains.muxes import requests
 from rbxcompose.domains.muxes.account import lock_states, states_of, why
 from rbxcompose.domains.muxes.config import NOBODY, MuxConfig, MuxInputConfig, core_of, handover_limits, source_of
 from rbxcompose.domains.muxes.core import NEVER
 from rbxcompose.domains.muxes.orders import MuxOrders, input_at, noted
-from rbxcompose.domains.muxes.requests import (
-    NONE,
-    AddMuxInput,
-    DeleteMuxInput,
-    LockMuxInputs,
-    LookAtMux,
-    MuxChange,
-    MuxState,
-    ReadMuxChanges,
-    SelectMuxInput,
-    UnlockMuxInputs,
-)
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.fields import is_finite
 from rbxcompose.msgs.std_msgs import Bool, Empty, String
 from rbxcompose.msgs.topic_tools_interfaces import MuxAdd, MuxDelete, MuxList, MuxSelect
 from rbxcompose.msgs.types import Message
 from rbxcompose.sdk import Capability, Component, ComponentNoted, Forwards, In, Level, Out, Port, Serves, component
+from rbxcompose.sdk.capabilities import LocksInSilence, Setting
 
 LOCK = "lock_"  # prefix of the ports of locks
 ANNOUNCED = "announced"  # the port at which it tells who holds the output
@@ -69,22 +59,27 @@ class Mux(Component[MuxConfig]):
 
     @classmethod
     def capabilities(cls, config: MuxConfig) -> tuple[Capability, ...]:
-        """Declare which inputs it forwards."""
+        """Declare which inputs it forwards, and which locks have a heartbeat."""
         ranked = sorted(config.inputs, key=lambda name: config.inputs[name].priority, reverse=True)
-        return (Forwards(tuple(ranked), "output"),)
+        locks = (
+            LocksInSilence(Setting(name, f"locks.{name}"), Setting(lock.timeout, f"locks.{name}.timeout"))
+            for name, lock in config.locks.items()
+            if lock.timeout is not None
+        )
+        return (Forwards(tuple(ranked), "output"), *locks)
 
     def configure(self) -> None:
         """Build the core; a mux restarted while the robot is stopped starts closed."""
         self.core = core_of(self.config, is_stopped=self.context.is_stopped)
         self.topics = {name: self.config.topic_of(name) for name in self.config.inputs}
-        self.told: object = None
+        self.reported: object = None
         self.announced: str | None = None
         self.noted = ""
         self.wakes_at = math.inf  # [s], the first of the wakes to come
         self.refused: list[str] = []
         self.broken: set[str] = set()  # inputs whose last message had a number that is none
         self.heard_at: dict[str, float] = {}  # when an input last sent
-        self.changes: deque[MuxChange] = deque(maxlen=KEPT)
+        self.changes: deque[requests.MuxChange] = deque(maxlen=KEPT)
         self.orders = MuxOrders()
         self.listening = set(self.config.inputs)
         self.listen()
@@ -173,12 +168,12 @@ class Mux(Component[MuxConfig]):
 
     # Orders of people
 
-    @answers(LookAtMux)
-    def look(self, request: LookAtMux) -> MuxState:
+    @answers(requests.LookAtMux)
+    def look(self, request: requests.LookAtMux) -> requests.MuxState:
         """Return who holds the output and who waits."""
         core, config, now = self.core, self.config, self.now
         until = core.live_until(core.active) if core.active is not None else math.inf
-        return MuxState(
+        return requests.MuxState(
             self.name,
             config.output,
             config.message,
@@ -193,28 +188,28 @@ class Mux(Component[MuxConfig]):
             lock_states(core, {name: config.topic_of(name) for name in config.locks}, now),
         )
 
-    @answers(ReadMuxChanges)
-    def read_changes(self, request: ReadMuxChanges) -> tuple[MuxChange, ...]:
+    @answers(requests.ReadMuxChanges)
+    def read_changes(self, request: requests.ReadMuxChanges) -> tuple[requests.MuxChange, ...]:
         """Return what changed after a number."""
         return tuple(change for change in self.changes if change.number > request.after)
 
-    @answers(SelectMuxInput)
-    def select(self, request: SelectMuxInput) -> str:
+    @answers(requests.SelectMuxInput)
+    def select(self, request: requests.SelectMuxInput) -> str:
         """Select an input, or none."""
         if self.config.mode != "select":
             raise Refused(f"the inputs of '{self.name}' are not selected: its mode is '{self.config.mode}'")
-        name = None if request.input == NONE else self.known(request.input)
+        name = None if request.input == requests.NONE else self.known(request.input)
         self.core.select(name, self.now)
-        self.orders.keep(SelectMuxInput(self.name, name or NONE))
+        self.orders.keep(requests.SelectMuxInput(self.name, name or requests.NONE))
         self.changed()
         return self.tell(f"'{name}' is selected" if name else "no input is selected")
 
-    @answers(AddMuxInput)
-    def add(self, request: AddMuxInput) -> str:
+    @answers(requests.AddMuxInput)
+    def add(self, request: requests.AddMuxInput) -> str:
         """Add an input."""
         if any(text and input_at(text, self.topics) is not None for text in (request.input, request.topic)):
             raise Refused(f"'{self.name}' already has the input '{request.input}'")
-        if request.input == NONE or request.input in self.bound or LOCK + request.input in self.bound:
+        if request.input == requests.NONE or request.input in self.bound or LOCK + request.input in self.bound:
             raise Refused(f"'{request.input}' cannot be the name of an input")
         if self.config.has_priorities and (request.priority is None or request.timeout is None):
             raise Refused("an input needs a priority and a timeout")
@@ -223,31 +218,31 @@ class Mux(Component[MuxConfig]):
         self.changed()
         return self.tell(f"input '{request.input}' takes '{self.topics[request.input]}'")
 
-    @answers(DeleteMuxInput)
-    def delete(self, request: DeleteMuxInput) -> str:
+    @answers(requests.DeleteMuxInput)
+    def delete(self, request: requests.DeleteMuxInput) -> str:
         """Delete an input."""
         name = self.known(request.input)
         if name == self.core.arbiter.selected:
             raise Refused(f"'{name}' is selected: select another one first")
         self.core.delete(name, self.now)
         del self.topics[name]
-        self.orders.keep(DeleteMuxInput(self.name, name))
+        self.orders.keep(requests.DeleteMuxInput(self.name, name))
         self.changed()
         return self.tell(f"input '{name}' is gone")
 
-    @answers(LockMuxInputs)
-    def lock(self, request: LockMuxInputs) -> str:
+    @answers(requests.LockMuxInputs)
+    def lock(self, request: requests.LockMuxInputs) -> str:
         """Lock inputs by hand; what they had commanded ends as with any lock."""
         names = [self.known(name) for name in request.inputs] or list(self.core.inputs)
         self.core.lock(names, NEVER if request.seconds is None else self.now + request.seconds, self.now)
-        self.orders.keep(LockMuxInputs(self.name, tuple(names), request.seconds))
+        self.orders.keep(requests.LockMuxInputs(self.name, tuple(names), request.seconds))
         self.send(self.core.tick(self.now))
         self.changed()
         limit = "until they are unlocked" if request.seconds is None else f"for {request.seconds:g} s"
         return self.tell(f"locked by hand {limit}: {', '.join(names)}")
 
-    @answers(UnlockMuxInputs)
-    def unlock(self, request: UnlockMuxInputs) -> str:
+    @answers(requests.UnlockMuxInputs)
+    def unlock(self, request: requests.UnlockMuxInputs) -> str:
         """End what was locked by hand; an input that still commands motion must come to rest once."""
         names = [self.known(name) for name in request.inputs] or list(self.core.locks.by_hand)
         if not (locked := [name for name in names if name in self.core.locks.by_hand]):
@@ -261,17 +256,21 @@ class Mux(Component[MuxConfig]):
     def on_select(self, request: MuxSelect.Request) -> MuxSelect.Response:
         """Select an input by its name or topic, as `topic_tools` does."""
         before = self.core.arbiter.selected
-        done = self.does(lambda: self.select(SelectMuxInput(self.name, request.topic)))
+        done = self.does(lambda: self.select(requests.SelectMuxInput(self.name, request.topic)))
         return MuxSelect.Response(prev_topic=self.topics.get(before or "", ""), success=done)
 
     def on_add(self, request: MuxAdd.Request) -> MuxAdd.Response:
         """Add a topic as an input."""
         topic = request.topic
-        return MuxAdd.Response(success=self.does(lambda: self.add(AddMuxInput(self.name, topic.strip("/"), topic))))
+        return MuxAdd.Response(
+            success=self.does(lambda: self.add(requests.AddMuxInput(self.name, topic.strip("/"), topic)))
+        )
 
     def on_delete(self, request: MuxDelete.Request) -> MuxDelete.Response:
         """Delete an input by its name or topic."""
-        return MuxDelete.Response(success=self.does(lambda: self.delete(DeleteMuxInput(self.name, request.topic))))
+        return MuxDelete.Response(
+            success=self.does(lambda: self.delete(requests.DeleteMuxInput(self.name, request.topic)))
+        )
 
     def on_list(self, request: MuxList.Request) -> MuxList.Response:
         """Return the topics of all inputs."""
@@ -288,7 +287,7 @@ class Mux(Component[MuxConfig]):
 
     # Inputs
 
-    def add_input(self, request: AddMuxInput) -> None:
+    def add_input(self, request: requests.AddMuxInput) -> None:
         """Add an input to the core."""
         config = MuxInputConfig(topic=request.topic or None, priority=request.priority or 0, timeout=request.timeout)
         self.core.add(request.input, source_of(config, self.config), self.now)
@@ -337,12 +336,12 @@ class Mux(Component[MuxConfig]):
         active = "stop" if self.core.is_stopped else self.core.active
         locked, refused = self.core.locked_out(self.now), self.core.refused(self.now)
         text = why(self.core, self.now)
-        if (text, active, locked) != self.told:
-            self.told = text, active, locked
+        if (text, active, locked) != self.reported:
+            self.reported = text, active, locked
             level = Level.WARN if locked else Level.OK
             self.status(level, text, active=active or "none", locked_out=", ".join(locked) or "none")
             number = self.changes[-1].number + 1 if self.changes else 1
-            self.changes.append(MuxChange(number, self.now, text))
+            self.changes.append(requests.MuxChange(number, self.now, text))
         if refused and not self.refused:
             self.warn(f"commands are blocked: {text}")
         self.refused = refused
@@ -353,7 +352,7 @@ class Mux(Component[MuxConfig]):
         """Publish who holds the output, if that has changed; in the profile of `topic_tools`, what is selected."""
         is_selection = self.config.profile == "topic_tools"
         name = self.core.arbiter.selected if is_selection else self.core.active
-        text = NOBODY.get(self.config.profile, NONE)
+        text = NOBODY.get(self.config.profile, requests.NONE)
         if name is not None:
             text = self.topics[name] if is_selection else name
         if text != self.announced:

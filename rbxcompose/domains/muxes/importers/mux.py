@@ -66,51 +66,51 @@ def _program(root: MappingNode) -> str:
 
 
 def _mux(node: NodeParameters, program: str, report: Report) -> ForeignMux:
-    told = ForeignMap(node.root, f"'{plain(node.node, 60)}'" if node.node else "this file", node.span, report)
+    given = ForeignMap(node.root, f"'{plain(node.node, 60)}'" if node.node else "this file", node.span, report)
     mux = ForeignMux(program, node.node, node.span)
-    mux.inputs = _sources(told, _INPUTS[program], "input", program)
+    mux.inputs = _sources(given, _INPUTS[program], "input", program)
     if program == TWIST_MUX:
-        mux.locks = _sources(told, _LOCKS, "lock", program)
-        if (stamped := told.flag("use_stamped")) is not None and stamped.value:
+        mux.locks = _sources(given, _LOCKS, "lock", program)
+        if (stamped := given.flag("use_stamped")) is not None and stamped.value:
             words = "'use_stamped' is not carried over: the type of a mux follows from who sends and receives"
             report.add(NOT_CARRIED_OVER.at(stamped.span, words))
     else:
-        mux.output = told.text("publisher")
-    if (time := told.flag("use_sim_time")) is not None and time.value:
+        mux.output = given.text("publisher")
+    if (time := given.flag("use_sim_time")) is not None and time.value:
         words = "'use_sim_time' is not carried over: 'bus: {clock: external}' makes robot time follow '/clock'"
         report.add(NOT_CARRIED_OVER.at(time.span, words))
-    told.tell_others()
+    given.report_unknown_keys()
     return mux
 
 
-def _sources(told: ForeignMap, key: str, what: str, program: str) -> dict[str, ForeignSource]:
+def _sources(given: ForeignMap, key: str, what: str, program: str) -> dict[str, ForeignSource]:
     """Return inputs or locks by name, in the order in which the program takes them."""
     found: dict[str, ForeignSource] = {}
-    for name, foreign_map in _entries(told, key, what):
+    for name, foreign_map in _entries(given, key, what):
         source = _source(name, foreign_map, program)
         if source is None:
             continue
         if (other := found.setdefault(name, source)) is not source:
             words = f"there is another {what} '{plain(name, 60)}'; the first one counts"
-            told.tell(DISAGREES.at(source.span, words, related=[Related(other.span, "the first one")]))
+            given.add(DISAGREES.at(source.span, words, related=[Related(other.span, "the first one")]))
     ranks = [foreign_source.priority.value for foreign_source in found.values()]
-    if isinstance(told.node.get(key), MappingNode) and len(set(ranks)) < len(ranks):
+    if isinstance(given.node.get(key), MappingNode) and len(set(ranks)) < len(ranks):
         return dict(sorted(found.items()))  # ROS 2 lists parameters by their names, and the first of equals wins
     return found
 
 
-def _entries(told: ForeignMap, key: str, what: str) -> Iterator[tuple[str, ForeignMap]]:
+def _entries(given: ForeignMap, key: str, what: str) -> Iterator[tuple[str, ForeignMap]]:
     """Yield entries by name, of a map or of a list of maps with a `name`."""
-    node = told.node.get(key)
+    node = given.node.get(key)
     if not isinstance(node, SequenceNode):
-        yield from told.maps(key, what)
+        yield from given.maps(key, what)
         return
-    told.places(key)  # it is known
+    given.places(key)  # it is known
     for item in node.items:
         if not isinstance(item, MappingNode):
-            told.tell(_no_map(item, what))
+            given.add(_no_map(item, what))
             continue
-        foreign_map = ForeignMap(item, f"this {what}", item.span, told.report)
+        foreign_map = ForeignMap(item, f"this {what}", item.span, given.report)
         name = foreign_map.needs("name", foreign_map.text("name"))
         if name is not None:
             foreign_map.what = f"{what} '{plain(name.value, 60)}'"
@@ -127,10 +127,10 @@ def _source(name: str, foreign_map: ForeignMap, program: str) -> ForeignSource |
     timeout = foreign_map.needs("timeout", foreign_map.number("timeout"))
     priority = foreign_map.needs("priority", foreign_map.whole("priority", -_MOST, _MOST))
     about = foreign_map.text("short_desc") if program == YOCS else None
-    foreign_map.tell_others()
+    foreign_map.report_unknown_keys()
     if timeout is not None and timeout.value < 0:
         if program == YOCS:
-            foreign_map.tell(OUT_OF_RANGE.at(timeout.span, f"'timeout' of {foreign_map.what} must be 0 or more"))
+            foreign_map.add(OUT_OF_RANGE.at(timeout.span, f"'timeout' of {foreign_map.what} must be 0 or more"))
             return None
         timeout = replace(timeout, value=0.0)  # as 0, it never expires there
     if topic is None or timeout is None or priority is None:

@@ -66,7 +66,7 @@ class BatterySim(Component[BatterySimConfig]):
     def configure(self) -> None:
         """Fill the battery."""
         self.core = BatteryCore(settings_of(self.config), self.config.initial)
-        self.told = Level.OK
+        self.reported = Level.OK
 
     def reconfigure(self, old: BatterySimConfig) -> None:
         """Apply the new runtime and thresholds; the charge stays unchanged."""
@@ -96,9 +96,9 @@ class BatterySim(Component[BatterySimConfig]):
         level, message = self.core.status
         self.battery_level(Float32(data=percent))
         self.status(level, message, level=f"{percent:.1f} %")
-        if level is not self.told:
+        if level is not self.reported:
             self.context.log(level, f"{message}: {percent:.0f} %")
-            self.told = level
+            self.reported = level
 
 
 def settings_of(config: BatterySimConfig) -> BatterySettings:

@@ -61,10 +61,10 @@ def read_controller(name: str, told: ForeignMap) -> FollowController | DiffContr
     if type_ is None:
         return None
     if type_.value in _LINEAR:
-        told.tell(NOT_CARRIED_OVER.at(type_.span, f"{told.what} is not carried over: {_WHY_NOT_LINEAR}"))
+        told.add(NOT_CARRIED_OVER.at(type_.span, f"{told.what} is not carried over: {_WHY_NOT_LINEAR}"))
         return None
     found = _follow(name, told) if type_.value == FOLLOW else _diff(name, told)
-    told.tell_others()
+    told.report_unknown_keys()
     return found
 
 
@@ -73,7 +73,7 @@ def _follow(name: str, told: ForeignMap) -> FollowController | None:
     told.places("rate", "index")  # that of the bus counts, and nothing has a number here
     if told.is_set("onboard"):
         words = f"'onboard' of {told.what} is not carried over: trajectories are interpolated here, not on a board"
-        told.tell(NOT_CARRIED_OVER.at(told.places("onboard")["onboard"], words))
+        told.add(NOT_CARRIED_OVER.at(told.places("onboard")["onboard"], words))
     _tell_action(name, told)
     return FollowController(name, told.span, tuple(joints)) if joints else None
 
@@ -85,7 +85,7 @@ def _tell_action(name: str, told: ForeignMap) -> None:
     if old.strip("/") != ours:
         words = f"the name '{old}' of the action of {told.what} is not carried over: it is '{ours}' here"
         span = given.span if given else told.span
-        told.tell(NOT_CARRIED_OVER.at(span, words, help="send goals to that name"))
+        told.add(NOT_CARRIED_OVER.at(span, words, help="send goals to that name"))
 
 
 def _diff(name: str, told: ForeignMap) -> DiffController:
@@ -93,11 +93,11 @@ def _diff(name: str, told: ForeignMap) -> DiffController:
         frame = told.text(key)
         if frame is not None and frame.value.strip("/") != ours:
             words = f"'{key}' of {told.what} is not carried over: the frame is '{ours}' here"
-            told.tell(NOT_CARRIED_OVER.at(frame.span, words))
+            told.add(NOT_CARRIED_OVER.at(frame.span, words))
     kept = {key: found for key in _OF_THE_BOARD if (found := told.number(key)) is not None}
     base = DiffController(name, told.span, told.above_zero("accel_limit"), told.above_zero("timeout"), kept)
     words = f"{told.what} becomes a simulated base: the ArbotiX board drives the real one by its own firmware"
-    told.tell(SIMULATED_BASE.at(told.span, words, help=_figures(base)))
+    told.add(SIMULATED_BASE.at(told.span, words, help=_figures(base)))
     return base
 
 
@@ -144,7 +144,7 @@ def read_gripper(name: str, told: ForeignMap) -> ArbotixGripper | None:
     lines |= {key: (out.word(joint.value), out.place(joint.span)) for key, joint in zip(keys, joints, strict=True)}
     lines |= _scale(told) if kind_of == "parallel" else _geometry(told)
     lines |= _two_sides(told) if kind_of == "dual" else _one_side(told, kind_of)
-    told.tell_others()
+    told.report_unknown_keys()
     return ArbotixGripper(name, told.span, joints, lines, tuple(value for value, _ in lines.values()))
 
 
@@ -173,14 +173,14 @@ def _opening(told: ForeignMap, furthest: float) -> Lines:
     reason = "the least is below 0" if low < 0 else f"the fingers open from 0 m to {out.number(round(furthest, 6))} m"
     words = f"{told.what} cannot open from {out.number(low)} m to {out.number(high)} m, so that is left out: {reason}"
     help_text = "openings are distances between the pads in metres; these look like angles of the joint in radians"
-    told.tell(NO_OPENING.at(given_at.span if given_at else told.span, words, help=help_text))
+    told.add(NO_OPENING.at(given_at.span if given_at else told.span, words, help=help_text))
     return {}
 
 
 def _scale(told: ForeignMap) -> Lines:
     scale = told.number("scale")
     if scale is not None and not scale.value:
-        told.tell(OUT_OF_RANGE.at(scale.span, f"'scale' of {told.what} must not be 0", help="it is left out"))
+        told.add(OUT_OF_RANGE.at(scale.span, f"'scale' of {told.what} must not be 0", help="it is left out"))
         scale = None
     value = scale.value if scale else 1.0
     where = out.place(scale.span) if scale else _DRIVER
@@ -262,7 +262,7 @@ def read_joint(name: str, told: ForeignMap) -> ArbotixJoint | None:
     """Return a joint, or None after the finding that says why it is left out."""
     type_ = told.choice("type", (DYNAMIXEL, *OTHER_TYPES))
     if type_ is not None and type_.value in OTHER_TYPES:
-        told.tell(NOT_CARRIED_OVER.at(type_.span, f"{told.what} is not carried over: {OTHER_TYPES[type_.value]}"))
+        told.add(NOT_CARRIED_OVER.at(type_.span, f"{told.what} is not carried over: {OTHER_TYPES[type_.value]}"))
         return None
     id_ = told.needs("id", told.whole("id", 0, _LAST_ID))
     found = _model(told)
@@ -273,14 +273,14 @@ def read_joint(name: str, told: ForeignMap) -> ArbotixJoint | None:
     readable = told.flag("readable")
     if readable is not None and not readable.value:
         words = f"'readable' of {told.what} is not carried over: all servos of a bus are read"
-        told.tell(NOT_CARRIED_OVER.at(readable.span, words))
-    told.tell_others()
+        told.add(NOT_CARRIED_OVER.at(readable.span, words))
+    told.report_unknown_keys()
     if id_ is None or found is None or (type_ is None and "type" in told):
         return None
     model, turn = found
     joint = ArbotixJoint(name, told.span, id_, model, turn, neutral, is_inverted, least, greatest, speed)
     for finding in _unreachable(joint, told.what):
-        told.tell(finding)
+        told.add(finding)
     return joint
 
 
@@ -298,7 +298,7 @@ def _model(told: ForeignMap) -> tuple[ServoModel, float] | None:
     span = given.span if given else ticks.span if ticks else told.span
     known = ", ".join(f"{guess}: {_ticks(guess)}" for guess in GUESSES)
     words = f"no servo has {count} ticks over {out.number(turn)} degrees, so {told.what} is left out"
-    told.tell(NO_SUCH_SERVO.at(span, words, help=known))
+    told.add(NO_SUCH_SERVO.at(span, words, help=known))
     return None
 
 
@@ -312,7 +312,7 @@ def _limits(told: ForeignMap, half: float) -> tuple[Given[float] | None, Given[f
     given = greatest or least
     if given and (least.value if least else -half) >= (greatest.value if greatest else half):
         words = f"'max_angle' of {told.what} must be greater than its 'min_angle'"
-        told.tell(OUT_OF_RANGE.at(given.span, words, help="both are left out"))
+        told.add(OUT_OF_RANGE.at(given.span, words, help="both are left out"))
         return None, None
     return least, greatest
 
@@ -433,8 +433,8 @@ def _driver(told: ForeignMap) -> ArbotixDriver:
     )
     for key, span in told.places(*_DRIVER_OF_THE_BOARD).items():
         words = f"'{key}' are not carried over: they are pins of the ArbotiX board, which is not spoken to here"
-        told.tell(NOT_CARRIED_OVER.at(span, words))
-    told.tell_others()
+        told.add(NOT_CARRIED_OVER.at(span, words))
+    told.report_unknown_keys()
     return driver
 
 
@@ -453,7 +453,7 @@ def _rate(told: ForeignMap) -> Given[float] | None:
         return None
     rate = max(given, key=lambda one: one.value)
     if rate.value > _FASTEST:
-        told.tell(OUT_OF_RANGE.at(rate.span, f"a bus has at most {_FASTEST:g} Hz", help="the rate is left out"))
+        told.add(OUT_OF_RANGE.at(rate.span, f"a bus has at most {_FASTEST:g} Hz", help="the rate is left out"))
         return None
     return rate if len(given) == 2 or rate.value >= USUAL_RATE else replace(rate, value=USUAL_RATE)
 

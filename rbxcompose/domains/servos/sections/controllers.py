@@ -58,6 +58,7 @@ def _details(read: Mapping[str, ControllerConfig]) -> dict[str, str]:
     entry="controller",
     needs="type",
     models=_models,
+    types=lambda: {name: controller_type(name) for name in controller_names()},
     details=_details,
 )
 def controllers(reading: Reading[ControllerConfig]) -> dict[str, ControllerConfig]:

@@ -17,10 +17,10 @@ from rbxcompose.base.printable import columns, fitted, plain
 from rbxcompose.base.units import ANGLE, LENGTH, NUMBER, Dimension, UnitError, example, format_number, parse_quantity
 from rbxcompose.bus.graph import find
 from rbxcompose.bus.topics import Publisher
-from rbxcompose.commands.console import NotDoneError, misused, refuse, tell
+from rbxcompose.commands.console import NotDoneError, emit, misused, refuse
 from rbxcompose.commands.guest import NAME, NOBODY, Guest, visit
 from rbxcompose.commands.terminal import NO_TERMINAL, LiveScreen, is_terminal
-from rbxcompose.domains.body.live_body import HeardFrames, described, described_body
+from rbxcompose.domains.body.command_body import HeardFrames, described, described_body
 from rbxcompose.domains.body.model import Body, BodyJoint
 from rbxcompose.domains.body.source import UNKNOWN
 from rbxcompose.msgs.sensor_msgs import JointState
@@ -281,7 +281,7 @@ def _send(
             publisher(_message(guest, positions))
             sent += 1
             guest.run(lambda: guest.is_interrupted, min(PERIOD, max(0.0, end - guest.clock.now())))
-    tell(f"{name}: {sent} sent")
+    emit(f"{name}: {sent} sent")
     return 0
 
 
