@@ -120,7 +120,7 @@ class _SystemChange:
         return 0 if len(done) == len(generations) else FINDINGS
 
     def _undo(self, key: Key, generation: int, *, may_be_unchanged: bool = False) -> None:
-        """Take the change of a share in this generation back, and tell it."""
+        """Take the change of a share in this generation back, and report it."""
         words = ["apply", key[1], "--undo", str(generation), "--yes", "--json"]
         label = " ".join(key)
         answer = _answer(on_all({label: self._shares[key].rbxcompose(words)})[label])

@@ -220,7 +220,7 @@ SILENT = 3.0  # [s] after which a host does not answer
 
 @dataclass(frozen=True, slots=True)
 class ShareView:
-    """What is known of a share: what its host told last, as `top --json` does, how long ago [s], and what is wrong."""
+    """A share: the last answer of its host, as `top --json` writes it, its age [s], and what is wrong."""
 
     robot: str
     host: str

@@ -27,7 +27,7 @@ from rbxcompose.tools.run_view import is_fit, run_plan
 
 
 def up_everywhere(path: str, system: System, arguments: argparse.Namespace) -> int:
-    """Bring the files to all hosts, start all shares, and show what they tell until the robots are down."""
+    """Bring the files to all hosts, start all shares, and show what they write until the robots are down."""
     if not is_reachable(system):
         return FINDINGS
     shares = shares_of(system, arguments.ssh_config)

@@ -86,7 +86,7 @@ def _named(root: XmlElement, name: str) -> Iterator[str]:
 
 
 def _first_link(root: XmlElement) -> str | None:
-    """Return the link that is no joint's child; if there are several, the rest is told when the tree is checked."""
+    """Return the link that is no joint's child; if there are several, the rest is reported when the tree is checked."""
     children = {child.attributes.get("link") for joint in root.all("joint") for child in joint.all("child")}
     return next((link for link in _named(root, "link") if link not in children), None)
 

@@ -1,4 +1,4 @@
-"""What a robot on the bus tells of its body: the description, and the tree of frames."""
+"""What a robot on the bus publishes about its body: the description, and the tree of frames."""
 
 from __future__ import annotations
 

@@ -233,7 +233,7 @@ def _posed(guest: Guest, arguments: argparse.Namespace) -> int:
 
 
 def _start(guest: Guest, body: Body) -> dict[str, float]:
-    """Return where the joints are now, as far as transforms tell: opening the sliders must not move anything."""
+    """Return where the joints are now, as far as they are published: opening the sliders moves nothing."""
     frames = HeardFrames(guest)
     guest.run(lambda: all(frames.tree.parent_of(joint.child) for joint in body.moving), HEARD)
     found = ((joint, frames.tree.lookup(joint.parent, joint.child)) for joint in body.moving)

@@ -290,7 +290,7 @@ def unmatched_analyzer(robot: Robot) -> Iterator[Finding]:
     known = {name for name in there if name.isidentifier()}
     meant = {
         re.sub(r"\W+", by, name) for name in there - known for by in ("", "_")
-    }  # names that are told where they stand
+    }  # names that are reported where they stand
     compared = 0
     for path, analyzer in each_analyzer(robot.manifest.contents.of(diagnostics).analyzers):
         patterns = [

@@ -109,7 +109,7 @@ class GroupItem:
         return Level(item.level) if OK <= item.level <= STALE else ERROR
 
     def message(self) -> str:
-        """Return what the item tells, or why it is STALE."""
+        """Return what the item reports, or why it is STALE."""
         item, status = self.item, self.item.status
         if item.cause:
             return item.cause
@@ -148,14 +148,14 @@ class Group:
         self.counts = [0, 0, 0, 0]
         self.index = 0
         self.level = OK
-        self.message = "OK"  # of the header, as of the last `tell`
+        self.message = "OK"  # of the header, as of the last `update_message`
         self.is_visible = True
         self.counted: Level | None = None  # as what its parent counts it
         self.is_classic = False
         self.floor = OK  # the least level with items that are not the robot's own
         self._now = OK  # the level of the last update without delay or latch
         self.latched_at = math.inf
-        self._latched = ""  # what there was to tell when the level was latched
+        self._latched = ""  # the message when the level was latched
         self.check_at = math.inf  # [s], after which time alone may change it
         self.is_urgent = False  # a level counts at once, whatever `debounce` says
         self.had_items = False
@@ -288,11 +288,11 @@ class Group:
             self.check_at = min(self.check_at, self._leaving + hold)
         self.is_urgent = False
         if self.level is not before:
-            self.tell(now)
+            self.update_message(now)
         return self.level is not before
 
-    def tell(self, now: float) -> None:
-        """Put what there is to tell at `now` into `message`."""
+    def update_message(self, now: float) -> None:
+        """Put what there is to report at `now` into `message`."""
         present, cause = self.present(now), self.cause(now)
         is_better = self.rank(present) < self.rank(self.level)
         if present is self.level:
@@ -330,7 +330,7 @@ class Group:
             self.latched_at = math.inf
 
     def shown(self) -> DiagnosticStatus:
-        """Return the header, with what each item and group below it tells."""
+        """Return the header, with what each item and group below it reports."""
         items = tuple(KeyValue(member.item.name, member.message()) for member in self.sorted_members)
         groups = tuple(
             KeyValue(child.analyzer.path or child.key[-1], child.message) for child in self.children if child.is_visible
@@ -533,7 +533,7 @@ class Aggregator:
     def report(self, now: float) -> tuple[TreeRow, ...]:
         """Return the tree: the header of each group, followed by its items by name and the groups below it."""
         for group in self._layout.groups:
-            group.tell(now)
+            group.update_message(now)
         return tuple(row for top in self._layout.tops() for row in _rows(top, 0))
 
     def take_over(self, old: Aggregator, now: float) -> None:

@@ -238,7 +238,7 @@ class AnalyzerGroup:
                 analyzer.take(item)
 
     def report(self, now: float) -> list[TreeRow]:
-        """Return what the analyzers tell, followed by the header, followed by the analyzers that are broken."""
+        """Return what the analyzers report, followed by the header, followed by the analyzers that are broken."""
         if not self.analyzers:
             status = DiagnosticStatus(int(ERROR), "/AnalyzerGroup" if self.path == "/" else self.path, "No analyzers")
             return [TreeRow(self.name or "AnalyzerGroup", _depth(self.path), is_group=True, status=status)]

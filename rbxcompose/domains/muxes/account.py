@@ -1,4 +1,4 @@
-"""What a mux tells about itself: who holds the output, who waits, and why."""
+"""What a mux reports about itself: who holds the output, who waits, and why."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def _are(names: Sequence[str]) -> str:
 def states_of(
     core: Core, topics: Mapping[str, str], heard: Mapping[str, float], now: float, *, has_priorities: bool
 ) -> tuple[MuxInputState, ...]:
-    """Return all inputs; `heard` tells when each was last heard."""
+    """Return all inputs; `heard` has the time of the last message of each."""
     return tuple(
         MuxInputState(
             name,

@@ -110,7 +110,7 @@ _AGAIN = 3.0  # [s] after a command has ended until it is started again
 
 
 class LiveShare:
-    """Follows what a host tells of a share; a command that ends is started again."""
+    """Follows what a host reports about a share; a command that ends is started again."""
 
     def __init__(self, host: str, robot: str, remote: Remote) -> None:
         self._host, self._robot = host, robot

@@ -43,7 +43,7 @@ def _router(robot: RunningRobot, facts: HostFacts) -> Iterator[str | Finding]:
     if robot.state is None or robot.state.router is None or "router" not in robot.state.processes:
         return  # it uses a router from elsewhere, or none is known
     if not robot.state.is_supervised:
-        return  # that the robot has ended is told by `leftovers`
+        return  # `leftovers` reports that the robot has ended
     if is_private(robot.state.router):
         yield f"the bus of {robot.name} takes programs of this user only"
         return

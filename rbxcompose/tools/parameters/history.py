@@ -81,7 +81,7 @@ def param_watch(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
 
 
 def _of_event(nodes: ParameterNodes, event: ParameterEvent, seen: dict[str, int]) -> list[ParameterChange]:
-    """Return the changes that an event reports; a foreign node does not tell who did it, nor what was before."""
+    """Return the changes that an event reports; a foreign node reports neither who did it nor what was before."""
     if not nodes.serves(event.node, CHANGE):
         name = event.node.removeprefix("/")
         each = (*event.new_parameters, *event.changed_parameters)

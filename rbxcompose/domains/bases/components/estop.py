@@ -18,7 +18,7 @@ class EstopConfig(Config):
     """An emergency stop."""
 
     topic: str = "estop"
-    """Where it tells whether it is pressed."""
+    """The topic that says whether it is pressed."""
     deadline: Time = Field(0.5, gt=0)
     """Silence after which the robot is stopped, counted from the start."""
     relaxes: list[str] = []
@@ -47,7 +47,7 @@ class Estop(Component[EstopConfig]):
     def configure(self) -> None:
         """Know nothing yet."""
         self.heard_at, self.is_pressed, self.has_input = math.inf, False, False
-        self.reported: str | None = None  # the last reason, None if nothing was told
+        self.reported: str | None = None  # the last reason, None if nothing was reported
 
     def start(self) -> None:
         """Wait for the first message."""

@@ -23,7 +23,7 @@ from rbxcompose.sdk import Capability, Component, ComponentNoted, Forwards, In, 
 from rbxcompose.sdk.capabilities import LocksInSilence, Setting
 
 LOCK = "lock_"  # prefix of the ports of locks
-ANNOUNCED = "announced"  # the port at which it tells who holds the output
+ANNOUNCED = "announced"  # the port at which it publishes who holds the output
 KEPT = 200  # changes that can be read later
 
 
@@ -202,7 +202,7 @@ class Mux(Component[MuxConfig]):
         self.core.select(name, self.now)
         self.orders.keep(requests.SelectMuxInput(self.name, name or requests.NONE))
         self.changed()
-        return self.tell(f"'{name}' is selected" if name else "no input is selected")
+        return self.log(f"'{name}' is selected" if name else "no input is selected")
 
     @answers(requests.AddMuxInput)
     def add(self, request: requests.AddMuxInput) -> str:
@@ -216,7 +216,7 @@ class Mux(Component[MuxConfig]):
         self.add_input(request)
         self.orders.keep(request)
         self.changed()
-        return self.tell(f"input '{request.input}' takes '{self.topics[request.input]}'")
+        return self.log(f"input '{request.input}' takes '{self.topics[request.input]}'")
 
     @answers(requests.DeleteMuxInput)
     def delete(self, request: requests.DeleteMuxInput) -> str:
@@ -228,7 +228,7 @@ class Mux(Component[MuxConfig]):
         del self.topics[name]
         self.orders.keep(requests.DeleteMuxInput(self.name, name))
         self.changed()
-        return self.tell(f"input '{name}' is gone")
+        return self.log(f"input '{name}' is gone")
 
     @answers(requests.LockMuxInputs)
     def lock(self, request: requests.LockMuxInputs) -> str:
@@ -239,7 +239,7 @@ class Mux(Component[MuxConfig]):
         self.send(self.core.tick(self.now))
         self.changed()
         limit = "until they are unlocked" if request.seconds is None else f"for {request.seconds:g} s"
-        return self.tell(f"locked by hand {limit}: {', '.join(names)}")
+        return self.log(f"locked by hand {limit}: {', '.join(names)}")
 
     @answers(requests.UnlockMuxInputs)
     def unlock(self, request: requests.UnlockMuxInputs) -> str:
@@ -251,7 +251,7 @@ class Mux(Component[MuxConfig]):
         self.settle()
         resting = [name for name in locked if name in self.core.waiting]
         rest = f"; {' and '.join(resting)} must come to rest once before it moves anything" if resting else ""
-        return self.tell(f"unlocked: {', '.join(locked)}{rest}")
+        return self.log(f"unlocked: {', '.join(locked)}{rest}")
 
     def on_select(self, request: MuxSelect.Request) -> MuxSelect.Response:
         """Select an input by its name or topic, as `topic_tools` does."""
@@ -314,7 +314,7 @@ class Mux(Component[MuxConfig]):
             self.context.listen(_input(name, self.topics[name], self.config, input_.max_rate if input_ else None))
         self.listening = wanted
 
-    # What it tells
+    # What it reports
 
     def changed(self) -> None:
         """Follow an order of a person, now and after a restart."""
@@ -322,7 +322,7 @@ class Mux(Component[MuxConfig]):
         self.listen()
         self.settle()
 
-    def tell(self, text: str) -> str:
+    def log(self, text: str) -> str:
         """Log what somebody ordered, and return it as the answer."""
         self.info(text)
         return text
