@@ -13,8 +13,7 @@ from rbxcompose.compiler.sections.components import components
 from rbxcompose.compiler.sections.profiles import profiles
 from rbxcompose.manifest import section as files
 from rbxcompose.manifest.documents import ManifestHeader
-from rbxcompose.manifest.file_models import file_model
-from rbxcompose.manifest.registry import sections
+from rbxcompose.manifest.registry import file_model, sections
 from rbxcompose.manifest.section import ComponentOptions, Section
 
 COMPONENTS = "\nEach type also has settings of its own: see [components](components.md).\n"

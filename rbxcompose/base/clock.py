@@ -100,7 +100,7 @@ class ExternalClock(SteppedClock):
         self._outside: int | None = None  # [ns], last value received
         self._shift = 0  # [ns] of outside time at robot time 0
         self._moved_at = 0.0  # [s] of real time, at the last advance
-        self._has_told = False  # it has been reported that time stands still
+        self._is_reported = False  # it has been reported that time stands still
         self._jumps: deque[float] = deque(maxlen=JUMPS)  # [s] of real time, of the last jumps
         self._is_disputed = False
 
@@ -113,7 +113,7 @@ class ExternalClock(SteppedClock):
         self.advance_to(t)
         self.limit = t
 
-    def hear(self, outside: int, *, real: float) -> Turn | None:
+    def receive(self, outside: int, *, real: float) -> Turn | None:
         """Receive the outside time [ns]; return what has changed, if anything."""
         before, self._outside = self._outside, outside
         if before is None:
@@ -121,7 +121,7 @@ class ExternalClock(SteppedClock):
             return None
         if outside == before:
             return None
-        self._moved_at, self._has_told = real, False
+        self._moved_at, self._is_reported = real, False
         if not 0 < outside - before <= LEAP * NANOSECONDS:
             self._begin_here(outside)
             return self._jumped(real)
@@ -136,9 +136,9 @@ class ExternalClock(SteppedClock):
 
     def look(self, *, real: float) -> Turn | None:
         """Return `STANDS`, once, when the last advance was too long ago."""
-        if self._has_told or real - self._moved_at < PATIENCE:
+        if self._is_reported or real - self._moved_at < PATIENCE:
             return None
-        self._has_told = self.is_standing = True
+        self._is_reported = self.is_standing = True
         self._is_disputed = False
         return Turn.STANDS
 

@@ -104,14 +104,14 @@ class Refers:
     """Marks a field that takes the name of something; `kind` is the kind of thing it names.
 
     A name that does not exist is a finding if the validation context knows the names of that kind, unless a check
-    reports it in more detail (`is_told`). A field that is not text holds the thing named.
+    reports it in more detail (`is_reported`). A field that is not text holds the thing named.
     """
 
     kind: str
-    is_told: bool = False
+    is_reported: bool = False
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        if self.is_told:
+        if self.is_reported:
             return handler(source)
         if isinstance(source, type) and not issubclass(source, str):
             word = core_schema.str_schema()

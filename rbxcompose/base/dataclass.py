@@ -29,7 +29,7 @@ _MISSING = dataclasses.MISSING
 def _made(cls: type, *, frozen: bool = False, slots: bool = False, eq: bool = True, **others: Any) -> type:
     if others or hasattr(cls, "__dataclass_fields__"):
         return dataclasses.dataclass(frozen=frozen, slots=slots, eq=eq, **others)(cls)
-    is_told = {name for name in ("__init__", "__repr__", "__eq__", "__hash__") if vars(cls).get(name) is not None}
+    given = {name for name in ("__init__", "__repr__", "__eq__", "__hash__") if vars(cls).get(name) is not None}
     made: Any = dataclasses.dataclass(init=False, repr=False, eq=False, slots=slots)(cls)
     fields = dataclasses.fields(made)
     methods = {
@@ -38,12 +38,12 @@ def _made(cls: type, *, frozen: bool = False, slots: bool = False, eq: bool = Tr
         **(_comparing(fields, frozen) if eq else {}),
     }
     for name, method in methods.items():
-        if name not in is_told:
+        if name not in given:
             setattr(made, name, method)
     if frozen:
         _freeze(made, [field.name for field in fields], slots)
-    told = made.__dataclass_params__  # what the standard library asks when a class inherits from this one
-    told.init, told.repr, told.eq, told.frozen = True, True, eq, frozen
+    params = made.__dataclass_params__  # what the standard library asks when a class inherits from this one
+    params.init, params.repr, params.eq, params.frozen = True, True, eq, frozen
     return made  # type: ignore[no-any-return]
 
 

@@ -1,4 +1,4 @@
-"""Formats of findings: each is one file in `rendering/`, declared by one decorator, found by its name.
+"""Formats of findings: each is one file in `formats/`, declared by one decorator, found by its name.
 
 A file whose name would clash with one of Python's ends in an underscore, which is not part of the format's name.
 """

@@ -2,7 +2,7 @@
 
 Each room of the package, that is each package at its top and each domain, may have a folder for each family of plug-ins
 (`components/`, `sections/`, `commands/`, ...): a file is a plug-in, and its name is that of the plug-in. Rules are an
-exception: all of them run, so a room has them in `checks.py` or in files of `checks/`, many in one.
+exception: all of them run, so a room has them in `checks.py` or in files of `checks/`, many in one, whatever its name.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ from collections.abc import Iterator
 from functools import cache
 
 _PACKAGE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-_NAME, _DOMAINS = "rbxcompose", "domains"
+_NAME, _DOMAINS, _RULES = "rbxcompose", "domains", "checks"
 
 
 @cache
 def modules_of(folder: str) -> dict[str, str]:
-    """Return the modules of a family, sorted, by their files; one that is a room's only file has the room's name."""
+    """Return the modules of a family by the names of their plug-ins, sorted; those of rules by their own names."""
     return dict(sorted(_found(folder)))
 
 
@@ -31,11 +31,12 @@ def _found(folder: str) -> Iterator[tuple[str, str]]:
         try:
             files = os.listdir(os.path.join(path, folder))
         except FileNotFoundError:
-            if os.path.exists(os.path.join(path, f"{folder}.py")):
-                yield room.rpartition(".")[2], f"{room}.{folder}"
+            if folder == _RULES and os.path.exists(os.path.join(path, f"{folder}.py")):
+                yield f"{room}.{folder}", f"{room}.{folder}"
             continue
-        stems = (file.removesuffix(".py") for file in files if file.endswith(".py") and file != "__init__.py")
-        yield from ((stem, f"{room}.{folder}.{stem}") for stem in stems)
+        for stem in (file.removesuffix(".py") for file in files if file.endswith(".py") and file != "__init__.py"):
+            module = f"{room}.{folder}.{stem}"
+            yield (module if folder == _RULES else stem), module
 
 
 @cache

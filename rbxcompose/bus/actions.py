@@ -51,7 +51,7 @@ class ServedGoal(Generic[G, R, F]):
 
     def feedback(self, message: F, /) -> None:
         """Send the client feedback."""
-        self._server.tell(self._goal, message)
+        self._server.publish_feedback(self._goal, message)
 
     def succeeded(self, result: R | None = None, /) -> None:
         """End the goal as succeeded; without a result, send its zero value."""
@@ -88,8 +88,8 @@ class ActionServer(Generic[G, R, F]):
         self._process, self._owner = node.process, node.owner
         self._goals: Goals[G, R] = Goals()
         self._asked: dict[bytes, list[ServedRequest[Any, Any]]] = {}  # result requests, by unfinished goal
-        self._may_tell = Allowance(1 / STATUS_PERIOD, GATE_BURST)
-        self._will_tell: ScheduledCallback | None = None
+        self._status_allowance = Allowance(1 / STATUS_PERIOD, GATE_BURST)
+        self._pending_status: ScheduledCallback | None = None
         self._may_log, self._unlogged = Allowance(1 / LOG_PERIOD, LOG_BURST), 0
         self._will_log: ScheduledCallback | None = None
         self._feedback = Publisher(topics, node, names.feedback, action.FeedbackMessage, Qos.STATE)
@@ -112,9 +112,9 @@ class ActionServer(Generic[G, R, F]):
     def cancel_all(self) -> None:
         """Request the cancellation of the current goal."""
         self._goals.cancel()
-        self._tell_status()
+        self._update_status()
 
-    def tell(self, goal: Goal[G, R], message: F) -> None:
+    def publish_feedback(self, goal: Goal[G, R], message: F) -> None:
         """Publish feedback on a goal that has not ended."""
         if goal is self._goals.current:
             self._feedback(self._action.FeedbackMessage(goal_id=UUID(goal.id), feedback=message))
@@ -126,7 +126,7 @@ class ActionServer(Generic[G, R, F]):
         self.current = None
         if reason:
             self._log(f"a goal was aborted: {reason}")
-        self._tell_status()
+        self._update_status()
         for request in self._asked.pop(goal.id, []):
             self._reply_result(request, goal)
 
@@ -136,7 +136,7 @@ class ActionServer(Generic[G, R, F]):
             # The result is not sent, so that the client does not mistake this for a failure of the goal itself.
             self._goals.end(self._goals.current, GoalState.ABORTED, self._action.Result(), self._now)
             self._publish_status()
-        for timer in (self._will_tell, self._will_log):
+        for timer in (self._pending_status, self._will_log):
             if timer is not None:
                 timer.cancel()
         self.current = None
@@ -177,7 +177,7 @@ class ActionServer(Generic[G, R, F]):
         self._goals.accept(goal)
         self.current = ServedGoal(self, goal)
         self.began()
-        self._tell_status()
+        self._update_status()
         request.reply(response(accepted=True, stamp=to_time(goal.accepted)))
 
     def _replace(self, goal: Goal[G, R]) -> None:
@@ -189,7 +189,7 @@ class ActionServer(Generic[G, R, F]):
     def _on_cancel(self, request: ServedRequest[CancelGoal.Request, CancelGoal.Response]) -> None:
         info = request.message.goal_info
         code, goals = self._goals.cancel(info.goal_id.uuid, to_nanoseconds(info.stamp))
-        self._tell_status()
+        self._update_status()
         request.reply(CancelGoal.Response(return_code=code, goals_canceling=tuple(map(_info, goals))))
 
     def _on_get_result(self, request: ServedRequest[Any, Any]) -> None:
@@ -205,22 +205,22 @@ class ActionServer(Generic[G, R, F]):
     def _on_client_left(self, client: bytes) -> None:
         if self._goals.cancel_from(client):
             self._log("its goal is cancelled: the client is gone")
-            self._tell_status()
+            self._update_status()
 
     def _reply_result(self, request: ServedRequest[Any, Any], goal: Goal[G, R]) -> None:
         request.reply(self._action.GetResult.Response(status=goal.state, result=goal.result))
 
-    def _tell_status(self) -> None:
+    def _update_status(self) -> None:
         """Publish the states of all goals: immediately, or a little later during a flood of goals."""
-        if self._will_tell is None:
-            if self._may_tell.takes(self._now):
+        if self._pending_status is None:
+            if self._status_allowance.takes(self._now):
                 self._publish_status()
             else:
                 due = self._process.scheduler.now + STATUS_PERIOD
-                self._will_tell = self._process.scheduler.at(due, self._owner, self._publish_status)
+                self._pending_status = self._process.scheduler.at(due, self._owner, self._publish_status)
 
     def _publish_status(self) -> None:
-        self._will_tell = None
+        self._pending_status = None
         statuses = (GoalStatus(goal_info=_info(goal), status=goal.state) for goal in self._goals)
         self._status(GoalStatusArray(status_list=tuple(statuses)))
 

@@ -154,7 +154,7 @@ class Bus:
         process, transport, writers = self._process, self._transport, Writers(self._transport.session)
 
         def take(change: tuple[str, bool]) -> None:
-            writers.heard(change[0], process.clock.now(), is_there=change[1])
+            writers.apply(change[0], process.clock.now(), is_there=change[1])
 
         inbox = Inbox(owner, None, take, process.scheduler.post)
         pattern = publishers_pattern(process.domain)

@@ -165,7 +165,7 @@ class Writers:
         self._session = session
         self._by_topic: dict[str, dict[str, TopicWriter]] = {}
 
-    def heard(self, key: str, now: float, *, is_there: bool) -> None:
+    def apply(self, key: str, now: float, *, is_there: bool) -> None:
         """Apply a token that appeared or went."""
         token = parse_token(key)
         if not isinstance(token, EndpointToken) or token.kind is not EntityKind.PUBLISHER:

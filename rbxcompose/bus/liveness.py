@@ -42,14 +42,14 @@ class Probe:
         """Return whether the last probe was missed, so that the next goes to all; else it goes to the nearest."""
         return self._misses > 0
 
-    def judge(self, heard: ProbeResult, *, is_router_up: bool) -> bool:
+    def judge(self, received: ProbeResult, *, is_router_up: bool) -> bool:
         """Evaluate the result of a probe; return whether the session is stuck and must be reopened.
 
         After a renewal that did not help, it waits for twice as many misses.
         """
-        if heard is ProbeResult.ANSWER:
+        if received is ProbeResult.ANSWER:
             self._misses, self._bound = 0, MISSES
-        elif heard is ProbeResult.NOTHING or (self._expects_router and is_router_up):
+        elif received is ProbeResult.NOTHING or (self._expects_router and is_router_up):
             self._misses += 1
         if self._misses < self._bound:
             return False
@@ -65,7 +65,7 @@ def roll_key(robot: str, host: str) -> str:
     return admin_key(robot, f"roll/{host or 'here'}")
 
 
-class RollCall:
+class PeerCheck:
     """The roll as the process `name` calls it; `answer` is what it answers to others."""
 
     def __init__(self, name: str) -> None:
@@ -76,11 +76,11 @@ class RollCall:
 
     def judge(self, answers: Iterable[bytes]) -> list[str]:
         """Take all answers to a call; return the processes for whose sake the session must be opened again."""
-        heard_by = dict(filter(None, map(_told, answers)))
-        heard_by.pop(self._name, None)
-        self.answer = _answer(self._name, heard_by)
-        known = {message for heard in heard_by.values() for message in heard} - {self._name}
-        self._missed = {one: self._missed.get(one, 0) + 1 for one in known - heard_by.keys()}
+        received_by = dict(filter(None, map(_parsed, answers)))
+        received_by.pop(self._name, None)
+        self.answer = _answer(self._name, received_by)
+        known = {message for received in received_by.values() for message in received} - {self._name}
+        self._missed = {one: self._missed.get(one, 0) + 1 for one in known - received_by.keys()}
         if not self._missed:
             self._calls = CALLS if known else self._calls
             return []
@@ -92,17 +92,17 @@ class RollCall:
         return lost
 
 
-def _answer(name: str, heard: Iterable[str]) -> bytes:
-    return json.dumps([name, sorted(heard)]).encode()
+def _answer(name: str, received: Iterable[str]) -> bytes:
+    return json.dumps([name, sorted(received)]).encode()
 
 
-def _told(answer: bytes) -> tuple[str, list[str]] | None:
+def _parsed(answer: bytes) -> tuple[str, list[str]] | None:
     """Return who answered and whom it has heard; None from another version."""
     try:
-        told = json.loads(answer)
+        data = json.loads(answer)
     except (ValueError, RecursionError):
         return None
-    match told:
-        case [str(name), [*heard]]:
-            return name, [message for message in heard if isinstance(message, str)]
+    match data:
+        case [str(name), [*received]]:
+            return name, [message for message in received if isinstance(message, str)]
     return None

@@ -87,8 +87,8 @@ class Refusals:
     def __init__(self) -> None:
         self._numbers = {reason: count(1) for reason in RefusalReason}  # `next` is atomic
         self._counted = dict.fromkeys(RefusalReason, 0)
-        self._told = dict.fromkeys(RefusalReason, 0)
-        self._told_total = 0
+        self._reported = dict.fromkeys(RefusalReason, 0)
+        self._reported_total = 0
 
     def add(self, reason: RefusalReason) -> None:
         """Count one more."""
@@ -101,11 +101,11 @@ class Refusals:
 
     def news(self) -> dict[RefusalReason, int]:
         """Return how many messages were refused since the last call, by reason."""
-        if self.total == self._told_total:
+        if self.total == self._reported_total:
             return {}
         counted = dict(self._counted)
-        new = {reason: counted[reason] - self._told[reason] for reason in RefusalReason}
-        self._told, self._told_total = counted, sum(counted.values())
+        new = {reason: counted[reason] - self._reported[reason] for reason in RefusalReason}
+        self._reported, self._reported_total = counted, sum(counted.values())
         return {reason: number for reason, number in new.items() if number > 0}
 
 

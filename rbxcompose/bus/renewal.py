@@ -202,7 +202,7 @@ class _Watch(_Entry):
     def _watch(self, transport: Transport) -> Closable:
         known = self._known = set()
 
-        def heard(token: str, is_there: bool) -> None:  # in a thread of the transport
+        def take(token: str, is_there: bool) -> None:  # in a thread of the transport
             if known is not self._known:
                 return  # a late update of a session that was replaced
             if is_there:
@@ -211,4 +211,4 @@ class _Watch(_Entry):
                 known.discard(token)
             self._changed(token, is_there)
 
-        return transport.watch(self._pattern, heard)
+        return transport.watch(self._pattern, take)

@@ -106,7 +106,7 @@ class Server(Generic[Q, R]):
             self._declared.append(transport.watch(clients, self._client_changed))
         self._declared.append(node.announce(endpoint))  # last: a client that sees it may send a request
         services.servers.add(self.route, self)
-        self._tell_clients()
+        self._notify_clients()
 
     def ask(self, request: ServedRequest[Q, R]) -> None:
         """Queue a request from this process; it is handled at the same instant."""
@@ -124,9 +124,9 @@ class Server(Generic[Q, R]):
         self._left.close()
         for waiting in (*self._open, *self._inbox.close()):
             waiting.fail(LOST)
-        self._tell_clients()
+        self._notify_clients()
 
-    def _tell_clients(self) -> None:
+    def _notify_clients(self) -> None:
         for client in self._services.clients.at(self.route):
             client.look_again()
 
@@ -145,7 +145,7 @@ class Server(Generic[Q, R]):
             self._open = [earlier for earlier in self._open if earlier.is_open]
             self._open.append(request)
             if self._services.witness is not None:
-                request.witness = partial(self._tell, self._services.witness, request)
+                request.witness = partial(self._report, self._services.witness, request)
             try:
                 self._handle(request)
             except Refused as refusal:
@@ -166,7 +166,7 @@ class Server(Generic[Q, R]):
                 self._process.log(self._owner, f"dropped a request to {self.route[0]}: {error}")
             return None
 
-    def _tell(self, witness: Witness, request: ServedRequest[Q, R], reply: Reply[R]) -> None:
+    def _report(self, witness: Witness, request: ServedRequest[Q, R], reply: Reply[R]) -> None:
         witness(
             WitnessedCall(
                 self._owner, self.route[0], self._service, request.client, request.sequence, True, reply.response

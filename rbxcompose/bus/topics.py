@@ -154,7 +154,7 @@ class Subscription(Generic[M]):
             self.listen()
         self._token = node.announce(endpoint)
         topics.subscriptions.add(self.route, self)
-        self._tell_publishers()
+        self._notify_publishers()
         if qos is Qos.LATCHED:
             for publisher in topics.publishers.at(self.route):
                 if publisher.kept is not None:
@@ -204,9 +204,9 @@ class Subscription(Generic[M]):
         if self._remote is not None:
             self._remote.close()
         self._inbox.close()
-        self._tell_publishers()
+        self._notify_publishers()
 
-    def _tell_publishers(self) -> None:
+    def _notify_publishers(self) -> None:
         for publisher in self._topics.publishers.at(self.route):
             publisher.look_again()
 
@@ -300,7 +300,7 @@ class OrderPublisher(Publisher[M]):
 
     def look_again(self) -> None:
         """React to a change of the subscriptions in this process."""
-        self._inbox.put(self._tell, self._process.scheduler.post)
+        self._inbox.put(self._notify, self._process.scheduler.post)
 
     def close(self) -> None:
         """Withdraw the publisher and stop watching."""
@@ -320,8 +320,8 @@ class OrderPublisher(Publisher[M]):
             self._elsewhere[key] = gid(key)
         else:
             self._elsewhere.pop(key, None)
-        self._tell()
+        self._notify()
 
-    def _tell(self) -> None:
+    def _notify(self) -> None:
         for watcher in self._watchers:
             watcher()

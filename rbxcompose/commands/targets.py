@@ -6,6 +6,7 @@ import argparse
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TypedDict
 
@@ -14,9 +15,11 @@ from rbxcompose.base.findings import Finding, Severity, Span, kind
 from rbxcompose.commands.console import NotDoneError, refuse
 from rbxcompose.commands.options import kind_of
 from rbxcompose.compiler.compile import Compilation, compile_robot
+from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.manifest.files import PREFIX, ROBOT_FILE, find, project_of, shown_name
 from rbxcompose.manifest.section import SYSTEM, TEST
 from rbxcompose.runtime.folder import ChosenLayers
+from rbxcompose.sdk.capabilities import NeedsExtra
 
 UNUSED = kind("RBX9007", Severity.WARNING)
 _USE = "name it in a robot ('missions:', 'include:')"
@@ -191,3 +194,15 @@ def chosen_layers(arguments: argparse.Namespace) -> ChosenLayers:
 def compiled(robot: str, arguments: argparse.Namespace) -> Compilation:
     """Compile a robot with all layers that a command puts over its file."""
     return compile_robot(robot, **layers_of(arguments))
+
+
+NO_EXTRA = kind("RBX2253")
+
+
+def missing_extras(robot: Robot) -> Iterator[Finding]:
+    """Yield a finding for each component whose extra is not installed."""
+    for component, needed in robot.declared(NeedsExtra):
+        if find_spec(needed.module.value) is None:
+            message = f"'{component.name}' needs the package '{needed.module.value}', which is not installed"
+            help_text = f"pip install 'rbxcompose[{needed.extra.value}]'"
+            yield NO_EXTRA.at(robot.component_span(component.name), message, help=help_text)

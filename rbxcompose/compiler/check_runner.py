@@ -88,13 +88,13 @@ def run_checks(robot: Robot, report: Report) -> None:
     for turn in range(_TURNS):
         doubts = doubts_of(robot.manifest, report)
 
-        def tells(rule: Rule[Any], turn: int = turn, doubts: Doubts = doubts) -> bool:
+        def reports(rule: Rule[Any], turn: int = turn, doubts: Doubts = doubts) -> bool:
             return _turn(rule) == turn and not doubts.bar(rule.relies_on)
 
         found: list[tuple[Rule[Any], Finding]] = []
         for mission in missions:
-            found += rule_findings(mission, tells)
-        found += [(one, finding) for one in checks if tells(one) for finding in _found(one, robot)]
+            found += rule_findings(mission, reports)
+        found += [(one, finding) for one in checks if reports(one) for finding in _found(one, robot)]
         report.extend(finding for rule, finding in found if not doubts.touch(finding, rule.relies_on))
     report.extend(broken_checks())
 

@@ -77,7 +77,7 @@ def compile_robot(
             manifest, environment=environment, report=out.report, sources=out.sources, outside=outside
         )
         run_checks(out.robot, out.report)
-        out.report.findings = manifest.inclusions.told(out.report.findings)
+        out.report.findings = manifest.inclusions.located(out.report.findings)
         return out
 
     out = compiled(profiles)
@@ -89,7 +89,7 @@ def compile_robot(
                 message = f"the profiles from '{name}' on were not tried: it would take too long for this robot"
                 out.report.add(NOT_TRIED.at(span, message, help=f"rbxcompose check --profile {name}"))
                 break
-            _tell_profile(span, compiled([name]), out, {SET, *out.robot.manifest.overlays})
+            _report_profile(span, compiled([name]), out, {SET, *out.robot.manifest.overlays})
     if out.robot is not None and not out.report.has_errors:
         out.plan = build_plan(out.robot)
     return out
@@ -137,7 +137,7 @@ def _steps_to_read(sources: Mapping[str, str]) -> int:
     return max(sum(map(len, sources.values())) // STEP_BYTES, values // STEP_VALUES)
 
 
-def _tell_profile(profile: Span, tried: Compilation, out: Compilation, above: Set[str]) -> None:
+def _report_profile(profile: Span, tried: Compilation, out: Compilation, above: Set[str]) -> None:
     """Add the findings that only a profile causes, in its own text or in the robot's files.
 
     `above` names the layers that override profiles: their values were chosen without this profile.

@@ -246,7 +246,7 @@ def decided_at(root: TreeNode, path: KeyPath, otherwise: Span) -> Span:
     return next(iter(given.values())) if len(given) == 1 else otherwise
 
 
-def told_where_given(finding: Finding) -> Finding:
+def at_its_argument(finding: Finding) -> Finding:
     """Return a finding with plain places; if it is about a given value, it also shows where that value is used."""
     related = [one for other in finding.related for one in _plain(other)]
     if not isinstance(finding.span, GivenSpan):

@@ -35,7 +35,7 @@ class ManifestHeader(Config):
     """What it is for, in a sentence."""
 
 
-def meant_keys(root: MappingNode, keys: Collection[str]) -> dict[str, str]:
+def misspelt_keys(root: MappingNode, keys: Collection[str]) -> dict[str, str]:
     """Return the misspelt keys of a map, each with the one of `keys` that it was surely meant to be."""
     found: dict[str, str] = {}
     for name in root.entries.keys() - {*keys}:
@@ -76,9 +76,9 @@ class Documents:
             return None
         if finding := _trouble(root, wanted):
             if span and finding.span and file.name == ROBOT_FILE:  # another file was meant
-                told = (Related(finding.span, f"what kind '{plain(shown)}' is"), *finding.related)
+                because = (Related(finding.span, f"what kind '{plain(shown)}' is"), *finding.related)
                 message = f"this must name a file of kind {wanted}"
-                self.report.add(changed(finding, span=span, message=message, help="", related=told))
+                self.report.add(changed(finding, span=span, message=message, help="", related=because))
             else:
                 related = (Related(span, f"this needs a {wanted}"),) if span else ()
                 self.report.add(changed(finding, related=(*finding.related, *related)))
@@ -95,7 +95,7 @@ class Documents:
 
     def meant(self, model: type[ManifestHeader], root: MappingNode) -> MappingNode:
         """Return a file with its misspelt keys corrected, after a finding for each."""
-        meant = meant_keys(root, model.model_fields)
+        meant = misspelt_keys(root, model.model_fields)
         for name, ours in meant.items():
             span, message = root.entries[name].key.span, f"unknown key '{plain(name, 60)}' in {where(())}"
             if name in FOREIGN:  # a word of another tool, not one that is spelt like ours

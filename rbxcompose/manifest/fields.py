@@ -10,13 +10,13 @@ from rbxcompose.base.config import COMPONENT, FILE, LINK, PORT, TOPIC, Angle, Co
 from rbxcompose.base.geometry import Transform3, quaternion_from_rpy
 
 TopicPattern = StringConstraints(pattern=r"^/?[a-z][a-z0-9_]*(/[a-z][a-z0-9_]*)*$", max_length=255)
-TopicName = Annotated[str, TopicPattern, Refers(TOPIC, is_told=True)]
+TopicName = Annotated[str, TopicPattern, Refers(TOPIC, is_reported=True)]
 InterfaceName = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]*(/(msg|srv|action))?/[A-Z][A-Za-z0-9]*$")]
 DottedName = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)?$", max_length=121)]
 FieldPath = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)*$", max_length=255)]
-PortName = Annotated[DottedName, Refers(PORT, is_told=True)]
-ComponentName = Annotated[Name, Refers(COMPONENT, is_told=True)]
-FileName = Annotated[str, Refers(FILE, is_told=True)]
+PortName = Annotated[DottedName, Refers(PORT, is_reported=True)]
+ComponentName = Annotated[Name, Refers(COMPONENT, is_reported=True)]
+FileName = Annotated[str, Refers(FILE, is_reported=True)]
 
 
 class FramePose(Config):
@@ -43,7 +43,7 @@ class FramePose(Config):
 class PieceAttachment(Config):
     """The link that carries a piece, and where on it the piece begins."""
 
-    to: Annotated[str, Refers(LINK, is_told=True)]
+    to: Annotated[str, Refers(LINK, is_reported=True)]
     """A link of the robot: of another piece, with its prefix, or of the robot's own body."""
     at: FramePose = FramePose()
     """Pose of the piece's root link in that link."""

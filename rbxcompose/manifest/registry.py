@@ -9,15 +9,17 @@ from dataclasses import fields
 from functools import cache
 from typing import Any, ParamSpec, TypeVar
 
+from pydantic import Field, create_model
+
 from rbxcompose.base.findings import Finding
 from rbxcompose.base.plugins import LEFT_OUT, BrokenPluginError, Plugins
-from rbxcompose.manifest.section import Declaration, Reading, Section
+from rbxcompose.manifest.documents import ManifestHeader
+from rbxcompose.manifest.section import OVERLAY, PART, ROBOT, Declaration, Reading, Section
 from rbxcompose.manifest.validate import ENTRY_WORDS
 
 M = TypeVar("M")
 R = TypeVar("R")
 P = ParamSpec("P")
-
 PLUGINS = Plugins("section", "sections")
 _EXAMPLE = "Example:"
 _SECTIONS: dict[str, Section[Any, Any]] = {}
@@ -88,13 +90,13 @@ def naming(kind: str) -> Iterator[Section[Any, Any]]:
 
 def broken_sections() -> list[Finding]:
     """Return a finding for each section of another package that is left out."""
-    return [LEFT_OUT.at(None, told) for told in _problems()]
+    return [LEFT_OUT.at(None, problem) for problem in _problems()]
 
 
 @cache
 def _problems() -> tuple[str, ...]:
     """Import all sections; return why some of other packages are left out."""
-    return tuple(told for name in PLUGINS.names() if (told := _problem(name)))
+    return tuple(problem for name in PLUGINS.names() if (problem := _problem(name)))
 
 
 def _problem(name: str) -> str:
@@ -103,3 +105,26 @@ def _problem(name: str) -> str:
     except BrokenPluginError as error:
         return str(error)
     return PLUGINS.overshadowed(name)
+
+
+FILES = {
+    ROBOT: "A robot: its components and how they are connected.",
+    PART: "A part of robots: sections of a robot with arguments of their own.",
+    OVERLAY: "Changes to a robot, given by `-f FILE`.",
+}
+
+
+def file_model(kind: str) -> type[ManifestHeader]:
+    """Return the model of a robot's, part's or overlay's file: its keys, with anything allowed in each section."""
+    return _file_model(kind, tuple((section.name, section.doc) for section in sections(kind)))
+
+
+@cache
+def _file_model(kind: str, sections: tuple[tuple[str, str], ...]) -> type[ManifestHeader]:
+    fields: dict[str, Any] = {name: (Any, Field(None, description=doc)) for name, doc in sections}
+    return create_model(f"{kind}File", __base__=ManifestHeader, __doc__=FILES[kind], **fields)
+
+
+def robot_keys() -> list[str]:
+    """Return the keys of a robot's file, its header's first."""
+    return [*ManifestHeader.model_fields, *(section.name for section in sections(ROBOT))]

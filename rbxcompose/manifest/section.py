@@ -111,7 +111,7 @@ class Short:
 @cache
 def short_type_of(model: Any, key: str) -> Any:
     """Return the type of the word in place of an entry."""
-    return Annotated[(str, *(Refers(kind, is_told=True) for kind in kinds_of(next(below(model, key)))))]
+    return Annotated[(str, *(Refers(kind, is_reported=True) for kind in kinds_of(next(below(model, key)))))]
 
 
 @cache  # each type is compiled once
@@ -202,7 +202,7 @@ class ComponentOptions(Config):
     """Whether and when it restarts after a failure: a word, or a map with `when`, `max`, `within` and `backoff`."""
     log: Literal["info", "warn", "error"] = "info"
     """The lowest level that it logs."""
-    connect: dict[Annotated[Name, Refers(OWN_PORT, is_told=True)], TopicName] = {}
+    connect: dict[Annotated[Name, Refers(OWN_PORT, is_reported=True)], TopicName] = {}
     """Topics by port, where they differ from the port's name."""
 
 
@@ -305,6 +305,9 @@ class Declaration(Generic[M]):
     """Tells of what two parts bring under a path in the section: what it is, and what helps."""
     models: Callable[[TreeNode], Iterable[Any]] | None = None
     """Returns the models of one entry, if they depend on its content."""
+    types: Callable[[], Mapping[str, Any]] | None = None
+    """Returns the classes that an entry may name as its `type`, by name: each has a `config_type()`, which is the model
+    of such an entry."""
     repeats: bool = True
     """Whether a name in a part gets the instance's name as a prefix even if that ends with it: without, the entry `arm`
     of the part `right_arm` is `right_arm`."""

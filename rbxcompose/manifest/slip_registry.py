@@ -130,5 +130,5 @@ class RefusedValue(NamedTuple):
     keys: Sequence[str] = ()
 
 
-text_slip: Slips[Callable[[Trouble], Finding | None]] = Slips(__name__)
-value_slip: Slips[Callable[[RefusedValue, TreeNode], Repair[TreeNode] | None]] = Slips(__name__)
+text_slip: Slips[Callable[[Trouble], Finding | None]] = Slips("rbxcompose.manifest.slips")
+value_slip: Slips[Callable[[RefusedValue, TreeNode], Repair[TreeNode] | None]] = Slips("rbxcompose.manifest.slips")

@@ -6,8 +6,8 @@ from typing import Any
 
 import yaml
 
-from rbxcompose.base.findings import Finding, Span, kind
-from rbxcompose.manifest.tree import DEPTH, NODES
+from rbxcompose.base.findings import Finding, Report, Span, kind
+from rbxcompose.manifest.tree import DATA_NODES, DEPTH, NODES, MappingNode, TreeNode, is_larger
 from rbxcompose.manifest.yaml_errors import explain
 
 TOO_LARGE = kind("RBX1103")
@@ -59,3 +59,13 @@ def compose(text: str, file: str) -> tuple[yaml.Node | None, Finding | None]:
         return None, explain(error, text, file)
     finally:
         loader.dispose()
+
+
+def is_moderate(section: TreeNode | None, what: str, report: Report) -> bool:
+    """Return whether every entry of a section is small enough for a mission, after a finding for each that is not."""
+    entries = section.entries.values() if isinstance(section, MappingNode) else ()
+    large = [entry for entry in entries if is_larger(entry.value, DATA_NODES)]
+    for entry in large:
+        message = f"the {what} '{entry.key.text}' holds more than {DATA_NODES:,} values"
+        report.add(TOO_LARGE.at(entry.key.span, message, help="a mission reads, checks and copies all of them at once"))
+    return not large

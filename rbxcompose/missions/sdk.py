@@ -36,7 +36,6 @@ from rbxcompose.missions.language.fields import (
     watched,
     word,
 )
-from rbxcompose.missions.modifiers.families import Plain, Skipping
 from rbxcompose.missions.modifiers.registry import Decorator, modifier
 from rbxcompose.missions.program.answers import (
     Advice,
@@ -49,8 +48,19 @@ from rbxcompose.missions.program.answers import (
     started,
 )
 from rbxcompose.missions.program.families import Choosing, Deed, GroupStep, LeafStep, Loop, Straight, ends
-from rbxcompose.missions.program.modifier import Modifier
-from rbxcompose.missions.program.outcomes import ALWAYS_FAILS, ALWAYS_SUCCEEDS, ANY, NEVER, Outcomes, either
+from rbxcompose.missions.program.modifier import Modifier, Plain, Skipping
+from rbxcompose.missions.program.outcomes import (
+    ALWAYS_FAILS,
+    ALWAYS_SUCCEEDS,
+    ANY,
+    FAILURE,
+    NEVER,
+    RUNNING,
+    SKIPPED,
+    SUCCESS,
+    NodeFailed,
+    Outcomes,
+    either,
+)
 from rbxcompose.missions.program.program import Endings, MissionNode, RobotNames, Step
 from rbxcompose.missions.program.registry import kind
-from rbxcompose.missions.program.statuses import FAILURE, RUNNING, SKIPPED, SUCCESS, NodeFailed

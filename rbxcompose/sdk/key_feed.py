@@ -30,12 +30,12 @@ class KeyFeed:
 
     def __init__(self, window: UpdateSink) -> None:
         self._window = window
-        self._told: KeyedParts | None = None  # None while nobody watched
+        self._sent: KeyedParts | None = None  # None while nobody watched
 
-    def tell(self, parts: KeyedParts) -> None:
+    def update(self, parts: KeyedParts) -> None:
         """Send what differs from what was told last."""
-        before, self._told = self._told, dict(parts) if self._window.is_watched else None
-        if self._told is None or self._told == before:
+        before, self._sent = self._sent, dict(parts) if self._window.is_watched else None
+        if self._sent is None or self._sent == before:
             return
         self._window.put(whole(parts) if before is None else _difference(before, parts))
 

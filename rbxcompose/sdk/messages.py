@@ -26,8 +26,8 @@ def _known(name: str) -> str:
         alike = tuple(text for text in known if near and text.rpartition("/")[-1] == near[0])
         if alike and short == name:
             full = " or ".join(f"'{item}'" for item in alike)
-            told = {"name": name, "help": f"write it with its package: {full}"}
-            raise PydanticCustomError("message", "there is no message type '{name}'", told) from None
+            details = {"name": name, "help": f"write it with its package: {full}"}
+            raise PydanticCustomError("message", "there is no message type '{name}'", details) from None
         context = {"name": name, "valid": alike or known, "what": "message types"}
         raise PydanticCustomError("message", "there is no message type '{name}'", context) from None
 

@@ -276,7 +276,7 @@ class ParameterField:
         return format_quantity(bound, self.dimension) if self.dimension else f"{bound:g}"
 
 
-def told_dimension(description: str) -> Dimension | None:
+def dimension_in(description: str) -> Dimension | None:
     """Return the dimension that a description tells by the unit at its end; None if it tells none."""
     _, bracket, unit = description.removesuffix("]").rpartition("[")
     if not bracket or not description.endswith("]"):
@@ -403,8 +403,8 @@ def _require_within(name: str, value: object, dimension: Dimension | None, bound
     for bound in bounds:
         for words, limit, sign in (("at least", bound.least, 1), ("at most", bound.most, -1)):
             if limit is not None and isinstance(value, int | float) and (value - limit) * sign < 0:
-                told = format_quantity(limit, dimension) if dimension else format_number(limit)
-                raise UnsettableError(f"'{name}' must be {words} {told}: {bound.by} says so")
+                limit_text = format_quantity(limit, dimension) if dimension else format_number(limit)
+                raise UnsettableError(f"'{name}' must be {words} {limit_text}: {bound.by} says so")
 
 
 def _wanted(known: Mapping[str, ParameterField], parameter: Parameter) -> object:

@@ -19,7 +19,7 @@ from rbxcompose.base.plugins import BrokenPluginError, Plugins
 from rbxcompose.base.units import NUMBER
 
 PLUGINS = Plugins("skill", "skills")
-Told = bool | str | Mapping[str, object]  # how a skill ended: success or not, an outcome, or success with results
+Returned = bool | str | Mapping[str, object]  # how a skill ended: success or not, an outcome, or success with results
 
 F = TypeVar("F", bound=Callable[..., Any])
 _SKILLS: dict[str, SkillType] = {}
@@ -36,7 +36,7 @@ class Activity:
 
     rate: ClassVar[float] = 20.0  # [Hz] of `step`
 
-    def step(self, now: float) -> Told | None:
+    def step(self, now: float) -> Returned | None:
         """Continue; return None until the skill ends."""
         raise NotImplementedError
 

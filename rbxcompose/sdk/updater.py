@@ -111,8 +111,12 @@ class CompositeTask:
         """Return them merged."""
         found = [task(now) for task in self._tasks]
         level = max((item.level for item in found), default=Level.OK)
-        told = [item.message for item in found if item.message and (level is Level.OK or item.level is not Level.OK)]
-        return TaskStatus(level, "; ".join(told), {key: value for item in found for key, value in item.values.items()})
+        messages = [
+            item.message for item in found if item.message and (level is Level.OK or item.level is not Level.OK)
+        ]
+        return TaskStatus(
+            level, "; ".join(messages), {key: value for item in found for key, value in item.values.items()}
+        )
 
 
 def heartbeat(now: float) -> TaskStatus:

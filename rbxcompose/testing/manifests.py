@@ -19,8 +19,8 @@ from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.events import MissionEvent
 from rbxcompose.missions.engine.story import MissionStory
 from rbxcompose.missions.language.reader import read_program
+from rbxcompose.missions.program.outcomes import NAMES, Result
 from rbxcompose.missions.program.program import Program, RobotNames
-from rbxcompose.missions.program.statuses import NAMES, Result
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,5 +194,5 @@ class SteppedMission:
 
     def say(self, event: MissionEvent, /) -> None:
         """Keep what it tells."""
-        if text := self._story.tell(event)[1]:
+        if text := self._story.line(event)[1]:
             self.told.append(text)

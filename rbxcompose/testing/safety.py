@@ -153,7 +153,7 @@ def unwarranted_motion(base: Base, story: ObservedStory, slack: float) -> Iterat
     """Yield the times at which a base moved faster than it could have if it had braked in time."""
     force = base.timeout + 2 * base.cycle + slack  # how long it may follow a command
     deadline = commanded = -math.inf  # until when it may follow a command; when the last one was sent
-    is_stopped, told = False, math.inf  # when it last reported its motion
+    is_stopped, reported = False, math.inf  # when it last reported its motion
     fastest: PlanarVelocity = (0.0, 0.0)
     for event in story:
         match event:
@@ -168,8 +168,8 @@ def unwarranted_motion(base: Base, story: ObservedStory, slack: float) -> Iterat
                 deadline = deadline if is_stopped else time + force
             case SentVelocity(time, topic, velocity) if topic == base.motion:
                 if is_stopped:  # a simulated base whose process hung while braking stood still in time
-                    deadline += min(slack, max(0.0, time - told - 2 * base.cycle))
-                told = time
+                    deadline += min(slack, max(0.0, time - reported - 2 * base.cycle))
+                reported = time
                 fastest = (max(fastest[0], abs(velocity[0])), max(fastest[1], abs(velocity[1])))
                 late = max(0.0, time - deadline)
                 allowed = [max(0.0, most - rate * late) for most, rate in zip(fastest, base.deceleration, strict=True)]
@@ -307,13 +307,13 @@ def laws_of(plan: Plan, *, slack: float = 0.0, is_lossless: bool = False, longes
     )
 
 
-def events_of(laws: Laws, told: Iterable[Recorded | Ordered], start: int = 0) -> Iterator[ObservedEvent]:
+def events_of(laws: Laws, reported: Iterable[Recorded | Ordered], start: int = 0) -> Iterator[ObservedEvent]:
     """Yield the events of messages in order, merged with orders. `start`: robot time 0 on the messages' clock [ns]."""
     commands = {base.command for base in laws.bases} | {switch.output for switch in laws.switches}
     commands |= {topic for switch in laws.switches for topic in switch.inputs}
     motions = {base.motion for base in laws.bases}
     goals = {ActionNames.of(name).status: name for name in laws.claims}
-    for message in told:
+    for message in reported:
         if isinstance(message, Ordered):
             yield message
             continue

@@ -28,8 +28,8 @@ from rbxcompose.missions.engine.inputs import bind_texts
 from rbxcompose.missions.engine.log_replay import OtherMissionError, ReplayBudget, ReplayError, replay
 from rbxcompose.missions.engine.logbook import INPUTS, LogRecord
 from rbxcompose.missions.execution.requests import ListMissions, LookAtAll, settings
+from rbxcompose.missions.program.outcomes import IDLE, NAMES
 from rbxcompose.missions.program.program import Skill
-from rbxcompose.missions.program.statuses import IDLE, NAMES
 from rbxcompose.missions.sources import SkillSource, SkillWay
 from rbxcompose.missions.view.picture import MissionPicture, picture_from_data, picture_of
 from rbxcompose.missions.view.replica import joined, status_list

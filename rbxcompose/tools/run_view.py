@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Iterator, Mapping
-from importlib.util import find_spec
+from collections.abc import Iterable, Mapping
 
-from rbxcompose.base.findings import Finding, Report, kind
+from rbxcompose.base.findings import Report
 from rbxcompose.base.levels import Level
 from rbxcompose.commands.console import emit, good, has_colour, refuse, write_report
 from rbxcompose.commands.lookup import ALREADY_UP, UNSAFE
 from rbxcompose.commands.story import StoryWriter, summary
+from rbxcompose.commands.targets import missing_extras
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.plan.model import Plan, extent
 from rbxcompose.domains.devices.openable import look_at, port_findings
@@ -19,7 +19,6 @@ from rbxcompose.runtime.folder import RobotFolder, RunOptions
 from rbxcompose.runtime.log import NAME, Follower, Record
 from rbxcompose.runtime.supervision import launch
 from rbxcompose.runtime.supervision.conductor import ROBOT_FAILED
-from rbxcompose.sdk.capabilities import NeedsExtra
 from rbxcompose.tools.live_rules import LiveRules
 from rbxcompose.tools.robot_changes import LiveReload
 
@@ -108,20 +107,8 @@ class _Watch:
                 return exit_code
 
 
-NO_EXTRA = kind("RBX2253")
-
-
 def is_fit(robot: Robot, sources: Mapping[str, str]) -> bool:
     """Tell what is wrong with this machine for a robot, and return whether it may start."""
     report = Report([*missing_extras(robot), *port_findings(robot, serial_ports(), look_at)])
     write_report(report, sources)
     return not report.has_errors
-
-
-def missing_extras(robot: Robot) -> Iterator[Finding]:
-    """Yield a finding for each component whose extra is not installed."""
-    for component, needed in robot.declared(NeedsExtra):
-        if find_spec(needed.module.value) is None:
-            message = f"'{component.name}' needs the package '{needed.module.value}', which is not installed"
-            help_text = f"pip install 'rbxcompose[{needed.extra.value}]'"
-            yield NO_EXTRA.at(robot.component_span(component.name), message, help=help_text)

@@ -18,7 +18,7 @@ from rbxcompose.bus.window import SCHEMA
 from rbxcompose.commands.guest import LONGEST_QUEUE, Guest, HeardMessage
 from rbxcompose.commands.guest import NAME as VISITOR
 from rbxcompose.commands.lookup import known_state
-from rbxcompose.missions.program.statuses import IDLE, NAMES
+from rbxcompose.missions.program.outcomes import IDLE, NAMES
 from rbxcompose.missions.view.picture import picture_from_data
 from rbxcompose.missions.view.replica import ACTIVE, Replica, status_list
 from rbxcompose.msgs import registry
@@ -270,7 +270,7 @@ class MissionsSeen:
         if (message := _read(payload)) is None:
             return
         name = message["value"]["mission"]
-        if self._replicas.setdefault(name, Replica()).heard(message):
+        if self._replicas.setdefault(name, Replica()).apply(message):
             self._ask(f"{_PATH}/{name}")
 
 

@@ -20,8 +20,8 @@ def reach(clock: ExternalClock) -> float:
 def going(outside: int = EPOCH) -> ExternalClock:
     """Return a clock that goes, at robot time 0.1 s and real time 0.1 s."""
     clock = ExternalClock()
-    clock.hear(outside, real=0.0)
-    assert clock.hear(outside + NANOSECONDS // 10, real=0.1) is Turn.GOES
+    clock.receive(outside, real=0.0)
+    assert clock.receive(outside + NANOSECONDS // 10, real=0.1) is Turn.GOES
     reach(clock)
     return clock
 
@@ -37,8 +37,8 @@ def test_stamps_are_those_of_the_outside() -> None:
 
 def test_one_message_is_no_going_time() -> None:
     clock = ExternalClock()
-    assert clock.hear(EPOCH, real=0.1) is None
-    assert clock.hear(EPOCH, real=0.2) is None
+    assert clock.receive(EPOCH, real=0.1) is None
+    assert clock.receive(EPOCH, real=0.2) is None
     assert (clock.is_standing, reach(clock)) == (True, 0.0)
 
 
@@ -53,7 +53,7 @@ def test_a_silent_outside_stands_still_and_that_is_told_once() -> None:
 def test_a_paused_outside_that_repeats_its_time_stands_still() -> None:
     clock = going()
     for real in (0.2, 0.4, 0.6):
-        clock.hear(EPOCH + NANOSECONDS // 10, real=real)
+        clock.receive(EPOCH + NANOSECONDS // 10, real=real)
     assert clock.look(real=0.61) is Turn.STANDS
 
 
@@ -65,7 +65,7 @@ def test_nobody_who_tells_time_is_told_too() -> None:
 def test_it_goes_on_where_it_stood() -> None:
     clock = going()
     clock.look(real=60.0)
-    assert clock.hear(EPOCH + NANOSECONDS // 5, real=60.0) is Turn.GOES
+    assert clock.receive(EPOCH + NANOSECONDS // 5, real=60.0) is Turn.GOES
     assert reach(clock) == pytest.approx(0.2)
     assert clock.look(real=60.0 + PATIENCE) is Turn.STANDS
 
@@ -74,16 +74,16 @@ def test_it_goes_on_where_it_stood() -> None:
 def test_after_a_jump_it_goes_on_from_where_it_was(jump: int) -> None:
     clock = going()
     there = EPOCH + jump
-    assert clock.hear(there, real=0.2) is Turn.JUMPED
+    assert clock.receive(there, real=0.2) is Turn.JUMPED
     assert [reach(clock), clock.stamp() - there] == pytest.approx([0.1, 0])
-    assert clock.hear(there + NANOSECONDS, real=0.3) is None
+    assert clock.receive(there + NANOSECONDS, real=0.3) is None
     assert [reach(clock), clock.stamp() - there] == pytest.approx([1.1, NANOSECONDS])
 
 
 def test_a_jump_ends_a_standstill() -> None:
     clock = going()
     clock.look(real=5.0)
-    assert clock.hear(0, real=5.0) is Turn.JUMPED
+    assert clock.receive(0, real=5.0) is Turn.JUMPED
     assert not clock.is_standing
 
 
@@ -93,7 +93,7 @@ def told_by_two(clock: ExternalClock, ahead: float, real: float, seconds: float 
     for step in range(round(seconds * 50)):
         now = real + 0.02 * step
         for shift in (0.0, ahead):
-            turns.append(clock.hear(EPOCH + round((now + shift) * NANOSECONDS), real=now))
+            turns.append(clock.receive(EPOCH + round((now + shift) * NANOSECONDS), real=now))
             turns.append(clock.look(real=now))
             reach(clock)
     return [turn for turn in turns if turn is not None]
@@ -117,7 +117,7 @@ def test_when_one_source_is_left_time_goes_on_after_a_while() -> None:
     turns = []
     for step in range(200):
         real = 3.2 + 0.02 * step
-        if turn := clock.hear(EPOCH + round(real * NANOSECONDS), real=real):
+        if turn := clock.receive(EPOCH + round(real * NANOSECONDS), real=real):
             turns.append((real, turn))
     last_jump = 3.2
     assert [turn for _, turn in turns] == [Turn.GOES]
@@ -129,27 +129,27 @@ def test_a_silence_ends_a_dispute() -> None:
     clock = going()
     told_by_two(clock, -1000.0, real=0.2)
     assert clock.look(real=9.0) is Turn.STANDS
-    assert clock.hear(EPOCH, real=9.1) is Turn.JUMPED
+    assert clock.receive(EPOCH, real=9.1) is Turn.JUMPED
 
 
 def test_jumps_with_time_between_them_are_told_each() -> None:
     clock = going()
     for number in range(1, 5):
-        assert clock.hear(EPOCH - number * NANOSECONDS, real=number * DISPUTE) is Turn.JUMPED
+        assert clock.receive(EPOCH - number * NANOSECONDS, real=number * DISPUTE) is Turn.JUMPED
 
 
 def test_what_was_told_before_a_jump_and_was_not_reached_is_left_out() -> None:
     clock = going()
-    clock.hear(EPOCH + NANOSECONDS, real=0.2)
-    clock.hear(EPOCH, real=0.3)
+    clock.receive(EPOCH + NANOSECONDS, real=0.2)
+    clock.receive(EPOCH, real=0.3)
     assert reach(clock) == pytest.approx(0.1)
 
 
 def test_a_process_that_comes_later_joins_the_time_of_the_others() -> None:
     clock = ExternalClock()
     clock.join(42.0)
-    clock.hear(EPOCH, real=0.0)
-    clock.hear(EPOCH + NANOSECONDS, real=0.1)
+    clock.receive(EPOCH, real=0.0)
+    clock.receive(EPOCH + NANOSECONDS, real=0.1)
     assert (reach(clock), clock.stamp()) == (43.0, EPOCH + NANOSECONDS)
 
 
@@ -158,6 +158,6 @@ def test_robot_time_never_goes_back_nor_leaps_whatever_is_told(told: list[int]) 
     clock = ExternalClock()
     for number, outside in enumerate(told):
         before = clock.now()
-        clock.hear(outside, real=float(number))
+        clock.receive(outside, real=float(number))
         assert before <= reach(clock) <= before + LEAP + 1e-6
         assert clock.stamp() == pytest.approx(outside, abs=2000)

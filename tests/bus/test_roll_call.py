@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.bus.liveness import CALLS, MOST_CALLS, RollCall, roll_key
+from rbxcompose.bus.liveness import CALLS, MOST_CALLS, PeerCheck, roll_key
 
 NAMES = ("mission", "robot", "router", "world")
 Reaches = Callable[[str, str, int], bool]
@@ -17,7 +17,7 @@ Reaches = Callable[[str, str, int], bool]
 
 def rounds(reaches: Reaches, count: int, names: tuple[str, ...] = NAMES) -> dict[str, list[int]]:
     """Return by process at which calls its session is opened again; `reaches(one, other, call)` says who hears whom."""
-    rolls, opened = {name: RollCall(name) for name in names}, {name: list[int]() for name in names}
+    rolls, opened = {name: PeerCheck(name) for name in names}, {name: list[int]() for name in names}
     for call in range(count):
         for name in names:
             heard = [rolls[other].answer for other in names if other == name or reaches(name, other, call)]
@@ -61,13 +61,13 @@ def test_what_does_not_help_is_tried_ever_more_seldom() -> None:
 
 @given(st.binary(max_size=40))
 def test_answers_of_other_versions_do_not_count(answer: bytes) -> None:
-    roll = RollCall("robot")
+    roll = PeerCheck("robot")
     assert not any(roll.judge([answer, roll.answer]) for _ in range(2 * CALLS))
 
 
 @pytest.mark.parametrize("answer", [b'["world", 1]', b'["world", [1, {}]]', b"[]", b"[" * 100_000, b""])
 def test_nor_do_malformed_ones(answer: bytes) -> None:
-    assert not any(RollCall("robot").judge([answer]) for _ in range(2 * CALLS))
+    assert not any(PeerCheck("robot").judge([answer]) for _ in range(2 * CALLS))
 
 
 def test_hosts_call_the_roll_apart() -> None:

@@ -27,7 +27,7 @@ def token(
 
 def told(key: str, reader: TopicReader = READER, now: float = 2 * SILENCE, started: float = 0.0) -> str:
     writers = Writers(HERE)
-    writers.heard(key, 1.0, is_there=True)
+    writers.apply(key, 1.0, is_there=True)
     return writers.trouble(reader, now, started)
 
 
@@ -71,11 +71,11 @@ def test_silence_counts_from_when_both_are_there_and_the_robot_has_started() -> 
 
 def test_a_publisher_that_comes_back_must_be_heard_again() -> None:
     writers, spoken = Writers(HERE), TopicReader("charger", READER.route, Float32.HASH, 2.0, expects_speech=True)
-    writers.heard(token(), 1.0, is_there=True)
+    writers.apply(token(), 1.0, is_there=True)
     assert writers.trouble(spoken, 50.0, 0.0) == ""
-    writers.heard(token(), 50.0, is_there=False)
+    writers.apply(token(), 50.0, is_there=False)
     assert writers.trouble(spoken, 60.0, 0.0) == ""
-    writers.heard(token(), 60.0, is_there=True)
+    writers.apply(token(), 60.0, is_there=True)
     assert writers.trouble(spoken, 61.0 + SILENCE, 0.0)
 
 
@@ -83,13 +83,13 @@ def test_the_only_message_of_a_latched_topic_may_come_while_the_robot_starts() -
     for arrived, is_told in ((0.9, False), (-math.inf, True), (-10.0, True)):
         writers = Writers(HERE)
         reader = TopicReader("charger", READER.route, Float32.HASH, arrived, expects_speech=True, is_latched=True)
-        writers.heard(token(), 1.0, is_there=True)
+        writers.apply(token(), 1.0, is_there=True)
         assert bool(writers.trouble(reader, 60.0, 3.0)) is is_told
 
 
 @given(st.text() | st.sampled_from([token(), "@ros2_lv/0/b2/1/2/MP/%/%/x/%level/a/b/c"]), st.booleans())
 def test_no_token_breaks_it(key: str, is_there: bool) -> None:
     writers = Writers(HERE)
-    writers.heard(key, 0.0, is_there=True)
-    writers.heard(key, 0.0, is_there=is_there)
+    writers.apply(key, 0.0, is_there=True)
+    writers.apply(key, 0.0, is_there=is_there)
     assert isinstance(writers.trouble(READER, 100.0, 0.0), str)

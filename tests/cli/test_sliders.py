@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.printable import columns
-from rbxcompose.domains.body.live_pose import Slider, SliderPanel, bar, is_end, sliders_of, split_keys
+from rbxcompose.domains.body.command_pose import Slider, SliderPanel, bar, is_end, sliders_of, split_keys
 from rbxcompose.domains.body.urdf import read_body
 from rbxcompose.domains.body.xml_reader import XmlElement, read_urdf
 from rbxcompose.testing.golden import Golden

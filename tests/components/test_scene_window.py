@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.compiler.plan.model import Plan
+from rbxcompose.domains.arms.command_watch import WindowViews, line_of
 from rbxcompose.domains.arms.scene_view import goal_words
-from rbxcompose.domains.arms.scene_watch import WindowViews, line_of
 from rbxcompose.msgs.moveit_msgs import CollisionObject
 from rbxcompose.msgs.rbxcompose_msgs import MoveArm
 from rbxcompose.msgs.shape_msgs import SolidPrimitive
@@ -49,7 +49,7 @@ def test_changes_add_up_to_what_is_there_whenever_a_viewer_came(steps: list[tupl
         if is_watched and not viewer.is_watched:
             viewer.known = added({}, whole(now))  # its query
         viewer.is_watched = is_watched
-        feed.tell(parts)
+        feed.update(parts)
         now = parts
         if is_watched:
             assert viewer.known == parts
@@ -59,9 +59,9 @@ def test_what_has_not_changed_is_not_told_again() -> None:
     viewer = Viewer()
     viewer.is_watched = True
     feed = KeyFeed(viewer)
-    feed.tell({"a": 1, "b": 2})
-    feed.tell({"a": 1, "b": 2})
-    feed.tell({"a": 1, "b": 3})
+    feed.update({"a": 1, "b": 2})
+    feed.update({"a": 1, "b": 2})
+    feed.update({"a": 1, "b": 3})
     assert viewer.sizes == [2, 1]
 
 

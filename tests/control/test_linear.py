@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.domains.servos.lift import LinearMove, LinearPolicy
+from rbxcompose.domains.servos.controllers.linear import LinearMove, LinearPolicy
 
 POLICY = LinearPolicy(0.05, 0.01)
 PLACES = st.floats(0.0, 0.4)

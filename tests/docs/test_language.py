@@ -11,8 +11,7 @@ from rbxcompose.base.config import Config
 from rbxcompose.base.expressions.functions import FUNCTIONS
 from rbxcompose.base.expressions.types import TYPES
 from rbxcompose.base.units import UNITS
-from rbxcompose.manifest.file_models import FILES, file_model
-from rbxcompose.manifest.registry import sections
+from rbxcompose.manifest.registry import FILES, file_model, sections
 from rbxcompose.manifest.section import ComponentOptions
 from rbxcompose.missions.language.header import INPUT_KEYS
 from rbxcompose.missions.language.reader import INTERRUPT_KEYS, KEYS

@@ -189,11 +189,11 @@ def test_a_service_manager_hears_that_all_is_up_and_that_the_supervisor_lives(tm
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener:
         listener.bind(path)
         manager = ServiceManager({"NOTIFY_SOCKET": path, "WATCHDOG_USEC": "10000000"})
-        manager.tell(READY)
-        manager.tell(ALIVE)
+        manager.notify(READY)
+        manager.notify(ALIVE)
         assert [listener.recv(100), listener.recv(100)] == [READY, ALIVE]
-        ServiceManager({"NOTIFY_SOCKET": path}).tell(ALIVE)
-        ServiceManager({}).tell(READY)
+        ServiceManager({"NOTIFY_SOCKET": path}).notify(ALIVE)
+        ServiceManager({}).notify(READY)
         listener.setblocking(False)
         with pytest.raises(BlockingIOError):
             listener.recv(100)

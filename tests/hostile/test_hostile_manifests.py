@@ -29,10 +29,10 @@ DEADLINE = 6.0  # [s] of processor time: three times what it may take, since mac
 CHILD = """
 import json, resource, sys, time
 from pathlib import Path
-from rbxcompose.findings import Report
-from rbxcompose.composition.robot_file import load_robot
-from rbxcompose.rendering.text import render_text
-import rbxcompose.components.go_to, rbxcompose.components.battery_sim
+from rbxcompose.base.findings import Report
+from rbxcompose.compiler.composition.robot_file import load_robot
+from rbxcompose.commands.formats.text import render_text
+import rbxcompose.domains.bases.components.go_to, rbxcompose.domains.power.components.battery_sim
 pages = int(Path("/proc/self/statm").read_text().split()[0])
 limit = pages * resource.getpagesize() + int(sys.argv[2])
 resource.setrlimit(resource.RLIMIT_AS, (limit, limit))

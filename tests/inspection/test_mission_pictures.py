@@ -8,8 +8,8 @@ from html.parser import HTMLParser
 import pytest
 
 from rbxcompose.commands.layout import NotDrawnError
+from rbxcompose.missions.program.outcomes import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS
 from rbxcompose.missions.program.program import RobotNames
-from rbxcompose.missions.program.statuses import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS
 from rbxcompose.missions.view.picture import MissionPicture, picture_from_data, picture_of, picture_to_data
 from rbxcompose.testing.golden import Golden
 from rbxcompose.tools.inspection.mission_html import mission_html

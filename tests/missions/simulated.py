@@ -16,8 +16,8 @@ from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.events import MissionEnded, MissionEvent
 from rbxcompose.missions.engine.story import MissionStory
 from rbxcompose.missions.engine.world import PLAIN, Settings
+from rbxcompose.missions.program.outcomes import IDLE, NAMES, RUNNING, Result
 from rbxcompose.missions.program.program import Program, RobotNames, Skill
-from rbxcompose.missions.program.statuses import IDLE, NAMES, RUNNING, Result
 from rbxcompose.testing import compile_mission
 
 PLACES = {name: Place(name, float(x), 0.0, 0.0) for x, name in enumerate(("dock", "kitchen", "corner_1", "corner_2"))}
@@ -146,7 +146,7 @@ class Simulated:
     def say(self, event: MissionEvent, /) -> None:
         """Write an event down."""
         self.events.append((self.now, event))
-        self.told.append(f"{self.now:g} {self.story.tell(event)[1]}")
+        self.told.append(f"{self.now:g} {self.story.line(event)[1]}")
 
     def finish(self, leaf: int) -> None:
         """Tell the engine how a skill ended."""

@@ -6,7 +6,7 @@ import pytest
 
 from rbxcompose.base.expressions.values import Value
 from rbxcompose.missions.engine.instant_actions import _removed
-from rbxcompose.missions.program.statuses import NodeFailed
+from rbxcompose.missions.program.outcomes import NodeFailed
 
 LISTS: Value = [["a", "b"], ["c"]]
 

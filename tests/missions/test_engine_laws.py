@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from rbxcompose.missions.engine.events import SkillEnded, SkillStarted
 from rbxcompose.missions.engine.snapshot import restore, save
 from rbxcompose.missions.engine.world import Settings
-from rbxcompose.missions.program.statuses import IDLE, RUNNING
+from rbxcompose.missions.program.outcomes import IDLE, RUNNING
 from tests.missions.random_missions import CASES, FAILING, NODES, Case, Node, schedule
 from tests.missions.simulated import Simulated, simulate
 from tests.missions.test_composites import skills

@@ -59,7 +59,7 @@ def test_it_ends_up_with_what_is_there(steps: list[tuple[str, int, int]]) -> Non
             sender.data["last"] = number
         elif what == "lose":
             sender.news()
-        elif what == "ask" or (what == "hear" and replica.heard(sender.news())):
+        elif what == "ask" or (what == "hear" and replica.apply(sender.news())):
             late.append(sender.whole())
         elif what == "arrive" and late:
             replica.answered(late.pop(0))
@@ -67,7 +67,7 @@ def test_it_ends_up_with_what_is_there(steps: list[tuple[str, int, int]]) -> Non
             sender.begin()
     for whole in late:
         replica.answered(whole)
-    while replica.heard(sender.news()):
+    while replica.apply(sender.news()):
         replica.answered(sender.whole())
     assert [replica.seen["statuses"][index] for index in range(4)] == sender.statuses
     assert replica.seen["data"] == sender.data
@@ -78,7 +78,7 @@ def test_news_that_overtake_the_whole_are_not_lost() -> None:
     sender, replica = Sender(), Replica()
     whole = sender.whole()
     sender.statuses[1] = 2
-    assert replica.heard(sender.news())
+    assert replica.apply(sender.news())
     assert not replica.answered(whole)
     assert replica.seen["statuses"][1] == 2
 
@@ -87,6 +87,6 @@ def test_more_news_than_it_keeps_need_another_whole() -> None:
     sender, replica = Sender(), Replica()
     whole = sender.whole()
     for _ in range(MOST_WAITING + 1):
-        replica.heard(sender.news())
+        replica.apply(sender.news())
     assert replica.answered(whole)
     assert not replica.answered(sender.whole())

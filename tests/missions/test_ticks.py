@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rbxcompose.missions.program.statuses import Result
+from rbxcompose.missions.program.outcomes import Result
 from tests.missions.simulated import simulate
 from tests.missions.test_composites import fails, skills
 

@@ -29,7 +29,7 @@ TIME = 0.3  # [s], in which helpers are asked, and answer first
 SCENES = (CONFINED, 175, 727)  # in which motions are hard to find, or are not found
 ORPHAN = """
 import os, signal
-from rbxcompose.arm_processes import PlanningProcess
+from rbxcompose.domains.arms.planning_processes import PlanningProcess
 from tests.motion.pi_hand import made
 one = PlanningProcess(made()[0], print, float)
 print(one.pid, flush=True)

@@ -44,12 +44,12 @@ class Stage:
     visitor: Visitor
 
     def __post_init__(self) -> None:
-        self.heard: list[float] = []
+        self.result: list[float] = []
         self.losses = 0
         self.robot.bus.serve("toy", "ring", Trigger, lambda request: Trigger.Response(success=True))
         self.tell = self.robot.bus.publisher("toy", "told", Float32, Qos.STATE)
         self.visitor.bus.subscribe(
-            "visitor", "told", Float32, Qos.STATE, lambda message: self.heard.append(message.data)
+            "visitor", "told", Float32, Qos.STATE, lambda message: self.result.append(message.data)
         )
         self.ring = self.visitor.bus.client("visitor", "ring", Trigger)
         self.ring.watch(self._changed)
@@ -64,7 +64,7 @@ class Stage:
 
     def arrives(self) -> float:
         """Speak until something that is said from now on is heard; return how long that took [s]."""
-        began, first = time.monotonic(), len(self.heard)
+        began, first = time.monotonic(), len(self.result)
         spoken = 0.0
 
         def heard() -> bool:
@@ -72,7 +72,7 @@ class Stage:
             if time.monotonic() - spoken > 0.02:
                 spoken = time.monotonic()
                 self.tell(Float32(data=spoken))
-            return any(value > began for value in self.heard[first:])
+            return any(value > began for value in self.result[first:])
 
         self.until(heard)
         return time.monotonic() - began
@@ -155,4 +155,4 @@ def test_a_link_that_is_half_open_is_given_up_and_replaced(stage: Stage, soak: S
         assert len(stage.robot.sessions) == sessions + 1
         for _ in range(2):  # the new session has proved itself: else the next one would wait for longer
             stage.robot.probe()
-            stage.until(lambda: stage.robot.lifeline.heard is ProbeResult.ANSWER)
+            stage.until(lambda: stage.robot.lifeline.result is ProbeResult.ANSWER)

@@ -18,12 +18,12 @@ from rbxcompose.sdk.parameters import (
     UnsettableError,
     changed,
     differences,
+    dimension_in,
     from_message,
     listed,
     settings,
     shown,
     to_message,
-    told_dimension,
     values_of,
 )
 
@@ -209,7 +209,7 @@ def test_a_bound_beside_the_field_holds_and_is_told() -> None:
 def test_values_are_shown_in_the_unit_that_their_description_tells() -> None:
     known = settings(SAMPLE)
     found = {
-        name: shown(setting.value, told_dimension(setting.descriptor.description)) for name, setting in known.items()
+        name: shown(setting.value, dimension_in(setting.descriptor.description)) for name, setting in known.items()
     }
     assert found["heading"] == "0.5 rad"
     assert (found["speed"], found["low"], found["count"], found["mode"]) == ("0.3 m/s", "20 %", "3", "calm")
@@ -218,7 +218,7 @@ def test_values_are_shown_in_the_unit_that_their_description_tells() -> None:
 
 @pytest.mark.parametrize("description", ["", "[", "]", "speed", "of [its] kind", "a list [x]"])
 def test_other_descriptions_tell_no_unit(description: str) -> None:
-    assert told_dimension(description) is None
+    assert dimension_in(description) is None
 
 
 class Shade(StrEnum):

@@ -17,17 +17,7 @@ TWO_SIDES = {  # what a component sees, as a protocol of the SDK, and the bus's 
     "ServedGoal",
     "Window",
 }
-NAMED_BY_ROS = {  # the messages have the names that ROS gave them
-    "Clock",  # ours tells the time of which this one is the message
-    "Empty",  # a message and a service
-    "PlanningScene",  # ours keeps the objects of which this one is a message
-    "Quaternion",  # ours is the plain tuple of its numbers
-    "RobotState",  # ours is what a supervisor tells of its robot
-    "Temperature",  # ours is the unit of a setting
-    "Time",  # ours is the unit of a setting
-    "Vector3",  # ours is the plain tuple of its numbers
-}
-NOUNS: set[str] = set()  # modules with a noun in `ing` as their name
+NOUNS = {"driving", "wiring"}  # modules with a noun in `ing` as their name
 
 
 def defined(path: Path) -> Iterator[tuple[str, bool]]:
@@ -51,8 +41,8 @@ def test_each_public_name_of_a_class_stands_for_nothing_else() -> None:
             classes |= {name} if is_class and not name.startswith("_") else set()
     assert "Node" not in places, "say of what"
     shared = {name: places[name] for name in classes if len(places[name]) > 1}
-    assert {name: found for name, found in shared.items() if name not in TWO_SIDES | NAMED_BY_ROS} == {}
-    assert shared.keys() == TWO_SIDES | NAMED_BY_ROS  # no exception outlives its reason
+    assert {name: found for name, found in shared.items() if name not in TWO_SIDES} == {}
+    assert shared.keys() == TWO_SIDES  # no exception outlives its reason
 
 
 def test_no_module_is_named_by_a_verb() -> None:

@@ -103,7 +103,7 @@ class Stage:
     # Processes
 
     def speak(self, process: str, message: say.ChannelWord) -> None:
-        self.conductor.heard(process, message)
+        self.conductor.receive(process, message)
 
     def exit(self, process: str, how: str = "was killed by SIGKILL") -> None:
         self.alive.discard(process)

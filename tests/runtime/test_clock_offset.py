@@ -99,8 +99,8 @@ def test_hosts_learn_how_far_their_clocks_are_apart_and_strangers_are_ignored() 
 
     desk, robot = line("desk", "robot", 0), line("robot", "desk", ahead)
     for _ in range(2):
-        desk.tell(HostReport("desk", "1", "run"))
-        robot.tell(HostReport("robot", "1", "run"))
+        desk.send(HostReport("desk", "1", "run"))
+        robot.send(HostReport("robot", "1", "run"))
     listeners[host_key("bot", "robot")][0](_Bytes(b"{}"))
     found = heard["desk"].clock, heard["robot"].clock
     for clock_offset, offset in zip(found, (0.3, -0.3), strict=True):

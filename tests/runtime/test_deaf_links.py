@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.runtime.folder import Echo
-from rbxcompose.runtime.process_group.router import FRESH, LONGEST, PATIENCE, DeafLinks
+from rbxcompose.runtime.process_group.router import FRESH, LONGEST, PATIENCE, OneWayLinks
 
 PERIOD = 0.25  # [s] of reports
 AHEAD = 3600.0  # [s] by which the clocks of the others are ahead
@@ -30,18 +30,18 @@ def run(
 
     `ways` tells when a host that is not heard would accept a connection.
     """
-    links, opened, arrived = DeafLinks(own, 0.0), [], dict[tuple[str, str], float]()
+    links, opened, arrived = OneWayLinks(own, 0.0), [], dict[tuple[str, str], float]()
     for step in range(1, round(seconds / PERIOD)):
         now = step * PERIOD
         if tells:
-            links.tell(now)
+            links.sent(now)
         for teller in hosts:
             for listener in hosts:
                 if listener != teller and hears(listener, teller, now):
                     arrived[listener, teller] = now
         for teller in hosts:
             is_heard = teller != own and hears(own, teller, now)
-            if is_heard and links.hear(teller, _stamp(now), _echoes(arrived, teller), now) is not None:
+            if is_heard and links.receive(teller, _stamp(now), _echoes(arrived, teller), now) is not None:
                 opened.append(now)
         if links.must_seek(now) and ways(now) and links.find(now):
             opened.append(now)

@@ -74,7 +74,7 @@ class Fed:
             return True
         real, outside = self._told.pop(0)
         self.real.advance_to(real)
-        self._inbox.put("", lambda: self._driver.hear(round(outside * NANOSECONDS)))
+        self._inbox.put("", lambda: self._driver.receive(round(outside * NANOSECONDS)))
         return False
 
 

@@ -19,7 +19,7 @@ from rbxcompose.msgs.geometry_msgs import Quaternion, Transform, TransformStampe
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.msgs.tf2_msgs import TFMessage
-from rbxcompose.runtime.process_group.live_ports import MOST_TOLD, Frames, Lookup
+from rbxcompose.runtime.process_group.live_ports import MOST_LOGGED, Frames, Lookup
 from rbxcompose.sdk.ports import Qos
 
 
@@ -152,4 +152,4 @@ def test_what_is_wrong_with_transforms_is_logged_once_and_not_without_end() -> N
     for number in range(100):
         world.tell(2.0 + 0.02 * number, math.nan, child=f"lamp_{number}")
         world.x()
-    assert len(world.logged) == MOST_TOLD
+    assert len(world.logged) == MOST_LOGGED

@@ -23,7 +23,7 @@ from rbxcompose.bus.zenoh_session import open_client, open_peer, open_router
 from rbxcompose.bus.zenoh_transport import ZenohTransport
 from rbxcompose.msgs.std_msgs import Float32
 from rbxcompose.msgs.std_srvs import Trigger
-from rbxcompose.runtime.process_group.connection import LIFELINE_BEATS, Lifeline, RollCaller, answer
+from rbxcompose.runtime.process_group.connection import LIFELINE_BEATS, Lifeline, PeerChecker, answer
 from rbxcompose.sdk.bound import Reply
 from rbxcompose.sdk.ports import Qos
 
@@ -147,7 +147,7 @@ class Probed:
             self.transport,
             lambda: self._open(router),
             router,
-            roll=RollCaller(self.transport, ROBOT, "", name),
+            roll=PeerChecker(self.transport, ROBOT, "", name),
             owns_router=True,
             post=self._post,
             log=self.log.append,
@@ -210,7 +210,7 @@ def test_a_session_that_is_sound_is_left_alone(port: int) -> None:
     until(lambda: robot.transport.ask(probe_key(ROBOT), b"", b"", take) and answers, robot)  # there is a link now
     for _ in range(2 * MISSES):
         robot.probe()
-        until(lambda: robot.lifeline.heard is ProbeResult.ANSWER, robot)
+        until(lambda: robot.lifeline.result is ProbeResult.ANSWER, robot)
     assert (robot.log, len(robot.sessions)) == ([], 1)
     robot.bus.close()
 
@@ -266,7 +266,7 @@ def test_two_that_have_lost_their_link_find_each_other_again(port: int) -> None:
     router = ZenohTransport(
         open_client(f"tcp/127.0.0.1:{port}"), lambda owner, callback: None
     )  # reaches all, as it does
-    roll = RollCaller(router, ROBOT, "", "router")
+    roll = PeerChecker(router, ROBOT, "", "router")
     robot, world = Probed(port, "robot"), Probed(port, "world")
     heard: list[float] = []
     robot.bus.subscribe("toy", "told", Float32, Qos.EVENT, lambda message: heard.append(message.data))
@@ -289,7 +289,7 @@ def test_two_that_have_lost_their_link_find_each_other_again(port: int) -> None:
 class Beating:
     """The parts of a robot, which beat faster than they do in a process, but so that answers still arrive in time."""
 
-    def __init__(self, roll: RollCaller, *processes: Probed) -> None:
+    def __init__(self, roll: PeerChecker, *processes: Probed) -> None:
         self._roll, self._processes, self._due = roll, processes, 0.0
 
     def turn(self) -> None:

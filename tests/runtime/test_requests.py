@@ -142,9 +142,9 @@ def test_release_opens_a_stop_and_nothing_else() -> None:
 
 def test_release_is_refused_with_the_reason_while_a_component_needs_the_robot_to_stand_still() -> None:
     desk = Desk()
-    desk.conductor.heard("mission", RobotHeld("estop", "'estop' is pressed"))
+    desk.conductor.receive("mission", RobotHeld("estop", "'estop' is pressed"))
     assert desk.ask(ReleaseRobot()) == ("the robot must stand still: 'estop' is pressed", True)
-    desk.conductor.heard("mission", RobotHeld("estop", ""))
+    desk.conductor.receive("mission", RobotHeld("estop", ""))
     assert desk.ask(ReleaseRobot())[1] is False
 
 

@@ -46,7 +46,7 @@ class Robot:
     def want(self, values: dict[str, int]) -> int:
         parts = {f"/{name}": str(value) for name, value in values.items()}
         number = next(self._numbers)
-        self.changes.heard("a", tell.AskForChange(number, WantedChange(parts, "somebody", "x")))
+        self.changes.receive("a", tell.AskForChange(number, WantedChange(parts, "somebody", "x")))
         return number
 
     def step(self, which: int) -> None:
@@ -65,16 +65,16 @@ class Robot:
                 (text,) = wanted.parts.values() or ("",)
                 if text and int(text) != REFUSED:
                     self.prepared[name] = int(text), self.values[name]
-                self.changes.heard(name, tell.ChangePrepared(number, "no" if text == str(REFUSED) else "", "", text))
+                self.changes.receive(name, tell.ChangePrepared(number, "no" if text == str(REFUSED) else "", "", text))
             case tell.CommitChange(number):
                 wanted_value, _ = self.prepared[name]
                 is_taken = wanted_value != LATE
                 if is_taken:
                     self.values[name] = wanted_value
-                self.changes.heard(name, tell.ChangeFollowed(number, "" if is_taken else "not now"))
+                self.changes.receive(name, tell.ChangeFollowed(number, "" if is_taken else "not now"))
             case tell.UndoChange(number):
                 self.values[name] = self.prepared[name][1]
-                self.changes.heard(name, tell.ChangeFollowed(number, ""))
+                self.changes.receive(name, tell.ChangeFollowed(number, ""))
             case tell.EndChange():
                 self.prepared.pop(name, None)
             case tell.ChangeDecided(number, refusal):
@@ -144,7 +144,7 @@ def test_while_another_plan_is_applied_changes_wait() -> None:
 
 def test_a_component_of_another_host_is_told() -> None:
     robot = Robot()
-    robot.changes.heard("a", tell.AskForChange(1, WantedChange({"/far": "1"}, "somebody")))
+    robot.changes.receive("a", tell.AskForChange(1, WantedChange({"/far": "1"}, "somebody")))
     ((_, answer),) = robot.orders
     assert isinstance(answer, tell.ChangeDecided)
     assert answer.refusal is not None

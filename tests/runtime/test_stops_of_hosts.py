@@ -78,13 +78,13 @@ def test_a_host_that_is_started_again_releases_nothing() -> None:
 
 def test_nobody_releases_what_a_component_of_another_host_holds() -> None:
     hosts = Hosts()
-    hosts.latches["robot"].heard(Member("robot"), RobotHeld("estop", "the button is pressed"))
+    hosts.latches["robot"].receive(Member("robot"), RobotHeld("estop", "the button is pressed"))
     hosts.exchange()
     assert hosts.latches["desk"].holds == {"estop": "the button is pressed"}
     hosts.latches["desk"].release()
     hosts.exchange()
     assert hosts.are_stopped() == {True}
-    hosts.latches["robot"].heard(Member("robot"), RobotHeld("estop", ""))
+    hosts.latches["robot"].receive(Member("robot"), RobotHeld("estop", ""))
     hosts.exchange()
     hosts.latches["desk"].release()
     hosts.exchange()

@@ -17,8 +17,8 @@ from rbxcompose.base.config import Config, Length, Time
 from rbxcompose.commands.main import main as command
 from rbxcompose.compiler.schema.documents import MAKERS, as_text, files
 from rbxcompose.compiler.schema.settle import referred
-from rbxcompose.manifest.file_models import FILES, file_model
 from rbxcompose.manifest.reader import read_text
+from rbxcompose.manifest.registry import FILES, file_model
 from rbxcompose.manifest.validate import to_plain
 from rbxcompose.missions.modifiers.registry import modifiers
 from rbxcompose.missions.program.registry import kinds

@@ -17,7 +17,7 @@ from rbxcompose.testing import Checked, check_text
 from tests.third_party.places import put
 
 SECTION = '''\
-from rbxcompose.config import Config
+from rbxcompose.base.config import Config
 from rbxcompose.manifest.registry import section
 
 

@@ -144,7 +144,7 @@ class SimulatedProcess(Turned):
             self._notify,
             is_stopped=self._is_stopped,
             is_restart=self._is_restart,
-            told=self._told,
+            on_order=self._told,
         )
         self._told("begin")
         self.host.configure()
@@ -254,7 +254,7 @@ class WholeRobot:
 
         def heard() -> None:
             if (process := self.processes.get(name)) is None or process.session == session:
-                self.conductor.heard(name, word)
+                self.conductor.receive(name, word)
 
         self.post(heard)
 

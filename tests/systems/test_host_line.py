@@ -59,7 +59,7 @@ def linked(folder: Path, *, is_open: bool) -> Iterator[tuple[Line, Line]]:
 
 def both_tell(lines: tuple[Line, Line]) -> bool:
     for one in lines:
-        one.line.tell(one.report)
+        one.line.send(one.report)
     return all(line.heard for line in lines)
 
 

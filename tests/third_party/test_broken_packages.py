@@ -32,7 +32,7 @@ class Thing(Component[Config]):
     pass
 """
 CHECK = '''\
-from rbxcompose.check_runner import check
+from rbxcompose.compiler.check_runner import check
 
 
 @check("{code}")

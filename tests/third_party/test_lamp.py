@@ -20,14 +20,14 @@ LIGHTHOUSE = Path(__file__).parent / "lighthouse"
 ROBOT = (LIGHTHOUSE / "robot.yaml").read_text(encoding="utf-8")
 COMPLETE = """\
 from pathlib import Path
-from rbxcompose.lsp.completion import complete
-from rbxcompose.lsp.document import Document
+from rbxcompose.tools.lsp.completion import complete
+from rbxcompose.tools.lsp.document import Document
 for text, line in ((Path("robot.yaml").read_text(), 5), (Path("robot.yaml").read_text().replace("period", "per"), 6)):
     print([item.label for item in complete(Document(Path("robot.yaml"), text), line, 10 if line == 5 else 7)])
 """
 IS_IMPORTED = """\
 import sys
-from rbxcompose.cli.main import main
+from rbxcompose.commands.main import main
 main(["check", "."])
 print("imported" if "rbx_lamp.lamp" in sys.modules else "left alone")
 """

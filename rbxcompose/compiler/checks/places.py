@@ -122,11 +122,11 @@ def plain_number(robot: Robot) -> Iterator[Finding]:
     for component in robot.components.values():
         speeds: list[Drives | CommandsMotion] = [*component.declared(Drives), *component.declared(CommandsMotion)]
         for speed in speeds if component.is_sound else ():
-            yield from _told(robot, component, speed.max_speed, SPEED)
-            yield from _told(robot, component, speed.max_turn_rate, ANGULAR_SPEED)
+            yield from _limits(robot, component, speed.max_speed, SPEED)
+            yield from _limits(robot, component, speed.max_turn_rate, ANGULAR_SPEED)
 
 
-def _told(
+def _limits(
     robot: Robot, component: RobotComponent, setting: Setting[float] | None, dimension: Dimension
 ) -> Iterator[Finding]:
     most, unit, likely = _MOST[dimension]

@@ -36,14 +36,14 @@ def fraction_of_percent(robot: Robot) -> Iterator[Finding]:
             sent = [*((True, one) for one in called(node)), *((False, template) for template in published(node))]
             for is_call, message in sent:
                 if taker := takers.get((is_call, resolve(message.target.text, robot.manifest.bus.namespace or ""))):
-                    yield from _told(robot, taker, message, known)
+                    yield from _limits(robot, taker, message, known)
 
 
 def _unit(end: PortEnd) -> str:
     return end.port.unit if isinstance(end.port, In | Serves) else ""
 
 
-def _told(robot: Robot, taker: PortEnd, message: MessageTemplate, known: Constants) -> Iterator[Finding]:
+def _limits(robot: Robot, taker: PortEnd, message: MessageTemplate, known: Constants) -> Iterator[Finding]:
     for value in _values(message.body):
         number = number_of(value.expression, known)
         if number is not None and 0.0 < number <= 1.0:
@@ -71,7 +71,7 @@ def limit_in_percent(robot: Robot) -> Iterator[Finding]:
         limits = [setting for setting in (warns.warn, warns.error) if setting is not None and 0 < setting.value < 1]
         for limit in limits if limits and component.is_sound else ():
             if writers := _in_percent(robot, component):
-                yield _limit_in_percent_told(robot, component, limit, writers)
+                yield _limit_in_percent(robot, component, limit, writers)
 
 
 def _in_percent(robot: Robot, component: RobotComponent) -> list[str]:
@@ -82,9 +82,7 @@ def _in_percent(robot: Robot, component: RobotComponent) -> list[str]:
     return [end.instance for end in ends] if units == {_PERCENT} else []
 
 
-def _limit_in_percent_told(
-    robot: Robot, component: RobotComponent, limit: Setting[float], writers: list[str]
-) -> Finding:
+def _limit_in_percent(robot: Robot, component: RobotComponent, limit: Setting[float], writers: list[str]) -> Finding:
     return limit_in_percent.at(
         robot.value(*component.place(limit.field)),
         f"'{limit.field}' of '{component.name}' is {limit.value:g}, but '{writers[0]}' tells percent, from 0 to 100",

@@ -44,7 +44,7 @@ SERVED_BY = {Calls: Serves, CallsAction: ServesAction, In: Out}
 def needed_port(robot: Robot) -> Iterator[Finding]:
     """A component needs something that nothing in the robot provides."""
     given = {(type(end.port), end.topic) for end in robot.ends}
-    lost = {end.type_name for ends in robot.writers.values() for end in ends if is_unheard(robot, end)}
+    lost = {end.type_name for ends in robot.writers.values() for end in ends if has_no_subscriber(robot, end)}
     for component in robot.components.values():
         if component.declared(RunsMissions):
             continue  # its values may come from outside, and its skills are those that exist
@@ -59,7 +59,7 @@ def needed_port(robot: Robot) -> Iterator[Finding]:
             yield _finding(robot, component, ends)
 
 
-def is_unheard(robot: Robot, end: PortEnd) -> bool:
+def has_no_subscriber(robot: Robot, end: PortEnd) -> bool:
     """Return whether this end publishes commands that nothing receives."""
     return isinstance(end.port, Out) and end.port.qos is Qos.COMMAND and end.topic not in robot.readers
 
@@ -169,14 +169,16 @@ def _of_instances(robot: Robot, part: IncludedPart, earlier: IncludedPart) -> Fi
 
 def _own_names(robot: Robot, end: PortEnd, other: str) -> str:
     """Return what to write below `connect` for all that both instances write or serve."""
-    theirs = {port_end.topic for port_end in robot.components[other].ends if _tells(port_end)}
+    theirs = {port_end.topic for port_end in robot.components[other].ends if _has_state(port_end)}
     both = (
-        port_end for port_end in robot.components[end.instance].ends if port_end.topic in theirs and _tells(port_end)
+        port_end
+        for port_end in robot.components[end.instance].ends
+        if port_end.topic in theirs and _has_state(port_end)
     )
     return ", ".join(f"{port_end.name}: {end.instance}/{port_end.name}" for port_end in both)
 
 
-def _tells(end: PortEnd) -> bool:
+def _has_state(end: PortEnd) -> bool:
     return isinstance(end.port, Out) or answers(end)
 
 
@@ -241,16 +243,16 @@ _MOST_SHOWN = 8  # subscribers that are pointed at
 
 
 @check("RBX3011", Severity.WARNING, closed=(WIRING, NAMES))
-def unheard_command(robot: Robot) -> Iterator[Finding]:
+def command_without_subscriber(robot: Robot) -> Iterator[Finding]:
     """Commands are published on a topic without a subscriber."""
     waiting: dict[str, list[PortEnd]] = {}  # by the type of their messages
     for port_end in (one for topic, ends in robot.readers.items() if topic not in robot.writers for one in ends):
         waiting.setdefault(port_end.type_name, []).append(port_end)
     for end in robot.ends:
-        if is_unheard(robot, end):
+        if has_no_subscriber(robot, end):
             starving = [other for other in waiting.get(end.type_name, ()) if other.instance != end.instance]
             topics = [one.topic.strip("/") for one in starving]
-            yield unheard_command.at(
+            yield command_without_subscriber.at(
                 robot.end_span(end),
                 f"nothing subscribes to the commands of '{end.instance}' on '{end.topic}'",
                 help=_unheard_command_cure(robot, end, starving)
@@ -313,13 +315,13 @@ def instance_topics(robot: Robot) -> Iterator[Finding]:
     """Two instances of a part publish on the same topic."""
     first: dict[tuple[str, str], str] = {}  # file and topic -> instance
     for part in robot.manifest.parts.values():
-        told = {
+        shared_topics = {
             end.topic: end.port.topic
             for name in part.components & robot.components.keys()
             for end in robot.components[name].ends
             if isinstance(end.port, Out) and not is_command(end)
         }
-        for topic, short in sorted(told.items()):
+        for topic, short in sorted(shared_topics.items()):
             other = robot.manifest.parts[first.setdefault((part.file, topic), part.name)]
             if other is part or short.startswith("/"):
                 continue

@@ -17,9 +17,8 @@ from rbxcompose.compiler.sections.include import Include, include
 from rbxcompose.compiler.sections.needs import needs
 from rbxcompose.compiler.sections.provides import provides
 from rbxcompose.manifest.documents import Documents, ManifestHeader
-from rbxcompose.manifest.file_models import file_model
 from rbxcompose.manifest.files import resolve, shown_name
-from rbxcompose.manifest.registry import naming, section_named, sections
+from rbxcompose.manifest.registry import file_model, naming, section_named, sections
 from rbxcompose.manifest.section import PART, Contents, RenamedTopic, Section
 from rbxcompose.manifest.tree import (
     ALL_BYTES,

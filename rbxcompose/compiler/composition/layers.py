@@ -16,10 +16,9 @@ from rbxcompose.compiler.composition.robot_manifest import ROBOT_LAYER, History,
 from rbxcompose.compiler.sections.include import include
 from rbxcompose.compiler.sections.profiles import profiles
 from rbxcompose.manifest.documents import Documents, ManifestHeader
-from rbxcompose.manifest.file_models import file_model
 from rbxcompose.manifest.files import PROFILE, find, shown_name
 from rbxcompose.manifest.reader import read_text
-from rbxcompose.manifest.registry import section_named, sections
+from rbxcompose.manifest.registry import file_model, section_named, sections
 from rbxcompose.manifest.section import OVERLAY, ROBOT, Contents, SetScope
 from rbxcompose.manifest.tree import KEYS, Entry, MappingNode, ScalarNode, TreeNode, with_children
 from rbxcompose.manifest.yaml_nodes import TOO_LARGE

@@ -168,8 +168,8 @@ class _Join(_Merge):
         other, section = self.history.layer(path), section_named(name)
         what = f"'{names[-1]}' of '{name}'" if names else f"'{name}'"
         help_text = "rename one of the two instances" if names else f"a robot has one '{name}': remove one"
-        if section and (told := section.clash(names)):
-            what, help_text = told
+        if section and (clash := section.clash(names)):
+            what, help_text = clash
         message = f"{self.overlay} and {other} both bring {what}"
         related = [Related(below.key.span, f"from {other}"), Related(entry.key.span, f"from {self.overlay}")]
         self.report.add(TWO_PARTS.at(self.span, message, label="the second", help=help_text, related=related))

@@ -17,16 +17,15 @@ from rbxcompose.compiler.composition.overlay import NOTHING_TO_CHANGE
 from rbxcompose.compiler.composition.robot_manifest import RobotManifest
 from rbxcompose.compiler.composition.scopes import fill_scopes
 from rbxcompose.manifest.documents import Documents, ManifestHeader
-from rbxcompose.manifest.file_models import file_model
 from rbxcompose.manifest.files import find, project_of, shown_name
 from rbxcompose.manifest.fill import SHOWN_SECRET, fill, names_of
-from rbxcompose.manifest.mission_data import is_moderate
-from rbxcompose.manifest.registry import broken_sections, naming, sections
+from rbxcompose.manifest.registry import broken_sections, file_model, naming, sections
 from rbxcompose.manifest.secrets import Secrets
 from rbxcompose.manifest.section import ROBOT, Contents, Section, is_empty
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode, at, children, key_span
 from rbxcompose.manifest.validate import MISSING_KEY, UNKNOWN_KEY
 from rbxcompose.manifest.walk import TWICE
+from rbxcompose.manifest.yaml_nodes import is_moderate
 
 
 def without_strayed(root: MappingNode, keys: Container[str], report: Report) -> MappingNode:
@@ -203,7 +202,7 @@ def load_robot(
     if not (report.has_errors or profiles):  # a misspelt name may be the one that is not read; a profile may replace it
         for node in (root, *composed.parts.roots):
             report.extend(unread_arguments(node))
-    report.findings = composed.parts.inclusions.told(report.findings)
+    report.findings = composed.parts.inclusions.located(report.findings)
     return manifest
 
 

@@ -18,7 +18,7 @@ from rbxcompose.compiler.sections.places import places
 from rbxcompose.compiler.sections.process import process
 from rbxcompose.compiler.sections.start import start
 from rbxcompose.compiler.sections.values import ValueModel, values
-from rbxcompose.manifest.arguments import DeclaredArgument, size_of, told_where_given
+from rbxcompose.manifest.arguments import DeclaredArgument, at_its_argument, size_of
 from rbxcompose.manifest.section import Contents
 from rbxcompose.manifest.tree import BROKEN, KeyPath, MappingNode, ScalarNode, TreeNode, at
 
@@ -50,14 +50,14 @@ class Inclusions:
         """Add one instance."""
         self.of_file.setdefault(file, []).append(inclusion)
 
-    def told(self, findings: Iterable[Finding]) -> list[Finding]:
+    def located(self, findings: Iterable[Finding]) -> list[Finding]:
         """Return the findings, with the chain of includes added to each one inside a part.
 
         A mistake in a part with several instances is reported once; one in a given value, where it was given.
         """
         said: set[tuple[str, Span]] = set()
         out = []
-        for finding in map(told_where_given, findings):
+        for finding in map(at_its_argument, findings):
             inclusions = self.of_file.get(finding.span.file, []) if finding.span else []
             if not inclusions or finding.span is None:
                 out.append(finding)

@@ -23,14 +23,14 @@ def part_of(robot: Robot, component: str) -> IncludedPart | None:
 
 def shared_names(robot: Robot, part: IncludedPart, other: IncludedPart) -> dict[str, str]:
     """Return what both instances publish or serve, by topic: its name in the part, which `connect` takes."""
-    theirs = _told(robot, other)
-    return {topic: name for topic, name in _told(robot, part).items() if topic in theirs}
+    theirs = _published(robot, other)
+    return {topic: name for topic, name in _published(robot, part).items() if topic in theirs}
 
 
-def _told(robot: Robot, part: IncludedPart) -> dict[str, str]:
+def _published(robot: Robot, part: IncludedPart) -> dict[str, str]:
     ends = [end for name in sorted(part.components & robot.components.keys()) for end in robot.components[name].ends]
-    told = [end for end in ends if answers(end) or (isinstance(end.port, Out) and end.port.qos is not Qos.COMMAND)]
-    return {end.topic: end.port.topic for end in told if not end.port.topic.startswith("/")}
+    published = [end for end in ends if answers(end) or (isinstance(end.port, Out) and end.port.qos is not Qos.COMMAND)]
+    return {end.topic: end.port.topic for end in published if not end.port.topic.startswith("/")}
 
 
 After = Mapping[str, Sequence[str]]  # name -> the names that start before it

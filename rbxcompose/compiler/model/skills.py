@@ -70,9 +70,9 @@ def _topics(components: Mapping[str, RobotComponent]) -> Iterable[SkillSource]:
         port = end.port
         if not isinstance(port, ServesTopic) or port.interface is None:
             continue
-        told = port.ends.interface if port.ends is not None else None
+        ends = port.ends.interface if port.ends is not None else None
         skill = topic_skill(
-            port.interface, end.skill, told, port.claims, port.restartable, outcomes=port.outcomes, entries=port.entries
+            port.interface, end.skill, ends, port.claims, port.restartable, outcomes=port.outcomes, entries=port.entries
         )
         yield SkillSource(skill, end.type_name, end.topic, SkillWay.TOPIC, _orders(components, end, port))
 

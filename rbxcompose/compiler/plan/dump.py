@@ -22,9 +22,8 @@ from rbxcompose.base.config import HIDDEN, Config, Dimensioned, Place, Secret
 from rbxcompose.base.findings import Report
 from rbxcompose.base.plugins import BrokenPluginError
 from rbxcompose.base.units import Dimension, Quantity
-from rbxcompose.compiler.plan.located import node_of_data, node_to_data
+from rbxcompose.compiler.plan.located import dimension_of_data, dimension_to_data, node_of_data, node_to_data
 from rbxcompose.compiler.plan.model import Instance, Plan
-from rbxcompose.compiler.plan.units import dimension_of_data, dimension_to_data
 from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.missions.language.reader import read_program
 from rbxcompose.missions.program.program import Program

@@ -12,16 +12,71 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from rbxcompose.base.config import Name, Time, field_docs
 from rbxcompose.base.files import replace_file
 from rbxcompose.compiler.schema.mission import mission_schema
 from rbxcompose.compiler.schema.overlays import renamed
-from rbxcompose.compiler.schema.robot import overlay_schema, part_schema, robot_schema
+from rbxcompose.compiler.schema.robot import document, or_empty, overlay_schema, part_schema, robot_schema
 from rbxcompose.compiler.schema.scalars import DEFINITIONS, SHARED, Schema
-from rbxcompose.compiler.schema.system import system_schema
-from rbxcompose.compiler.schema.trial import trial_schema
-from rbxcompose.manifest.section import OVERLAY, PART, ROBOT
+from rbxcompose.compiler.schema.settle import opened, schemas_of
+from rbxcompose.manifest import system_file, test_file
+from rbxcompose.manifest.section import OVERLAY, PART, ROBOT, SYSTEM, TEST
 from rbxcompose.missions.program.program import Skill
 from rbxcompose.sdk import registry
+
+STEP = "step"
+WORDS: dict[str, Any] = {"robot": str, "also": list[str], "profile": Name, "mission": Name, "with": dict[Name, Any]}
+_ABOUT = {
+    STEP: "A skill, a named node or a state; a skill may be followed by its main argument, or a map of its arguments.",
+    "ended": "How it ended: `success`, `failure`, `halted`, `skipped`, `running`, or an outcome of its own.",
+    "at": "When it started, counted from the start of the test.",
+}
+_WIDTH = 120  # of a line in a file
+
+
+def system_schema(types: Iterable[str]) -> Schema:
+    """Return the schema of a system; it is the same for all types of components."""
+    keys = {
+        name: field.annotation
+        for name, field in system_file.SystemFile.model_fields.items()
+        if name == system_file.SECURITY
+    }
+    schemas, definitions = schemas_of({**system_file.SECTIONS, **system_file.LINKS, **system_file.PROFILES, **keys})
+    about = field_docs(system_file.SystemFile)
+    sections = {
+        key: {**or_empty(opened(schema, definitions)), "description": about[key]} for key, schema in schemas.items()
+    }
+    whole = document(SYSTEM, system_file.SystemFile, sections, definitions)
+    return {**whole, "required": [*whole["required"], *system_file.SECTIONS]}
+
+
+def trial_schema(types: Iterable[str]) -> Schema:
+    """Return the schema of a test; it is the same for all types of components."""
+    schemas, definitions = schemas_of({**WORDS, **test_file.SECTIONS, "at": Time})
+    sections = {key: or_empty(opened(schemas[key], definitions)) for key in (*WORDS, *test_file.SECTIONS)}
+    steps: Schema = {"type": "array", "items": {"$ref": f"{DEFINITIONS}{STEP}"}}
+    expect = sections["expect"]
+    about = {key: expect["properties"][key]["description"] for key in ("steps", "never")}
+    described = {key: {**steps, "description": text} for key, text in about.items()}
+    sections["expect"] = {**expect, "properties": {**expect["properties"], **described}}
+    made = {name: {**sections[name], "description": _description(name)} for name in sections}
+    whole = document(TEST, test_file.TrialFile, made, {**definitions, STEP: _step(schemas["at"])})
+    return {**whole, "required": [*whole["required"], "robot", "mission", "expect"]}
+
+
+def _description(name: str) -> str:
+    fields = test_file.TrialFile.model_fields
+    return next(field_docs(test_file.TrialFile)[key] for key, field in fields.items() if name in (key, field.alias))
+
+
+def _step(time: Schema) -> Schema:
+    properties = {
+        "ended": {"type": "string", "description": _ABOUT["ended"]},
+        "at": {**time, "description": _ABOUT["at"]},
+    }
+    mapping = {"properties": properties, "minProperties": 1, "maxProperties": 1 + len(properties)}
+    return {"type": ["string", "object"], "minLength": 1, **mapping, "description": _ABOUT[STEP]}
+
 
 MAKERS: Mapping[str, Callable[[Iterable[str]], Schema]] = {
     "Robot": robot_schema,
@@ -32,8 +87,6 @@ MAKERS: Mapping[str, Callable[[Iterable[str]], Schema]] = {
     "System": system_schema,
 }
 """Makes the schema of a kind from the names of component types."""
-
-_WIDTH = 120  # of a line in a file
 
 
 @cache

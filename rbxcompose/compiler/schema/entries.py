@@ -1,4 +1,4 @@
-"""Schemas of entries that name their type, components and controllers: one per type, from its configuration."""
+"""Schemas of entries that name their type, such as components: one per type, from its configuration."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ import textwrap
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from rbxcompose.base.config import field_docs
 from rbxcompose.compiler.schema.scalars import DEFINITIONS, Schema
 from rbxcompose.compiler.schema.settle import opened, schemas_of
-from rbxcompose.domains.servos.controller import controller_names, controller_type
 from rbxcompose.manifest.reader import read_text
-from rbxcompose.manifest.section import ComponentOptions
+from rbxcompose.manifest.section import ComponentOptions, Section
 from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.manifest.validate import to_plain
 from rbxcompose.sdk.registry import component_type
 
 TYPE = "type"
-COMPONENT, CONTROLLER = "component_", "controller_"  # prefixes of the definition of a type
+COMPONENT = "component_"  # prefix of the definition of a type
 _EXAMPLE = "Example:"
 
 
@@ -43,16 +43,17 @@ def component_schemas(types: Iterable[str]) -> tuple[Schema, dict[str, Schema]]:
     return {"description": about, **_entry(COMPONENT, word, classes, options)}, definitions
 
 
-def controller_schemas() -> tuple[Schema, dict[str, Schema]]:
-    """Return the schema of one entry of `controllers`, and the definitions that it needs: one for each type."""
-    classes = {name: controller_type(name) for name in controller_names()}
+def typed_schemas(section: Section[Any, Any], classes: Mapping[str, Any]) -> tuple[Schema, dict[str, Schema]]:
+    """Return the schema of one entry of a section, and the definitions that it needs: one for each of these types."""
+    prefix, word_name = f"{section.entry}_", f"type_of_{section.entry}"
     schemas, definitions = schemas_of({name: cls.config_type() for name, cls in classes.items()})
     for name, schema in schemas.items():
-        definitions[f"{CONTROLLER}{name}"] = {**opened(schema, definitions), "description": _about(classes[name])}
-    about = "How it leads its joints: the name of a type of controllers."
-    definitions["type_of_controller"] = {"type": "string", **_word(classes)}
-    word = {"$ref": f"{DEFINITIONS}type_of_controller", "description": about}
-    return _entry(CONTROLLER, word, classes, {}), definitions
+        definitions[f"{prefix}{name}"] = {**opened(schema, definitions), "description": _about(classes[name])}
+    model: Any = section.model
+    about = f"{field_docs(model)[TYPE].removesuffix('.')}: the name of a type of {section.name}."
+    definitions[word_name] = {"type": "string", **_word(classes)}
+    word = {"$ref": f"{DEFINITIONS}{word_name}", "description": about}
+    return _entry(prefix, word, classes, {}), definitions
 
 
 def _entry(prefix: str, word: Schema, types: Iterable[str], options: Mapping[str, Any]) -> Schema:

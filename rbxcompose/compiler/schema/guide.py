@@ -31,13 +31,13 @@ class Guide:
         closed = [shape for shape in shapes if shape.get("additionalProperties") is False]
         names = dict.fromkeys(name for shape in closed or shapes for name in shape["properties"])
         # A key that is only allowed here (`true`) is described in another schema.
-        told = {
+        described = {
             name: schema
             for shape in [*shapes, *closed]
             for name, schema in shape["properties"].items()
             if schema is not True
         }
-        return {name: self._whole(told[name]) for name in names}
+        return {name: self._whole(described[name]) for name in names}
 
     def _whole(self, schema: Schema) -> Schema:
         """Return a schema merged with those it refers to; its own statements take precedence."""

@@ -146,11 +146,13 @@ def _interrupt() -> Schema:
 
 def _nodes(types: Iterable[str], skills: Mapping[str, Skill]) -> dict[str, Schema]:
     """Return the definitions of a node and of a list of nodes."""
-    told = skills_of(types)
-    told |= {name: (skill, told[name][1] if name in told else "Skill of this robot.") for name, skill in skills.items()}
+    found = skills_of(types)
+    found |= {
+        name: (skill, found[name][1] if name in found else "Skill of this robot.") for name, skill in skills.items()
+    }
     of_nodes = (schemas_of_keys(modifier) for modifier in modifiers().values() if not modifier.only_states)
     anywhere = {"name": NODE_NAME, **{key: schema for entry in of_nodes for key, schema in entry.items()}}
-    known = {name: _skill(skill, about) for name, (skill, about) in told.items()}
+    known = {name: _skill(skill, about) for name, (skill, about) in found.items()}
     closed: dict[str, Schema] = {}
     for name, kind in kinds().items():
         allowed = {**schemas_of_keys(kind), **dict.fromkeys(anywhere, True)}
@@ -227,18 +229,18 @@ def _machine() -> Schema:
         "ends": ends,
         "history": {"enum": list(HISTORIES), "default": HISTORIES[0]},
     }
-    described = {key: {**keys[key], "description": _MACHINE[key]} for key in MACHINE_KEYS}
-    return {"type": "object", "properties": described, "required": ["start", "states"], "additionalProperties": False}
+    found = {key: {**keys[key], "description": _MACHINE[key]} for key in MACHINE_KEYS}
+    return {"type": "object", "properties": found, "required": ["start", "states"], "additionalProperties": False}
 
 
 def _state(anywhere: dict[str, Schema]) -> Schema:
     """Return the schema of a state: its body, its transitions, and the keys that any node may have."""
     to = {"type": ["string", "object"], "minLength": 1, "minProperties": 1, "additionalProperties": ITEM_NAME}
     own: dict[str, Schema] = {"do": NODE, "machine": MACHINE, "next": to}
-    described = {key: {**schema, "description": _STATE[key]} for key, schema in own.items()}
+    found = {key: {**schema, "description": _STATE[key]} for key, schema in own.items()}
     hooks = schemas_of_keys(modifiers()[ON_ENTER])
     inside = {key: _key_of("node", key) for key in anywhere if key != "name"}
-    return {"type": "object", "properties": {**described, **hooks, **inside}, "additionalProperties": False}
+    return {"type": "object", "properties": {**found, **hooks, **inside}, "additionalProperties": False}
 
 
 def _skill(skill: Skill, about: str) -> Schema:

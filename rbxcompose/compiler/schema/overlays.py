@@ -141,7 +141,11 @@ def _may_be_empty(schema: Schema, definitions: Mapping[str, Schema]) -> bool:
     if "enum" in schema:
         return False
     types = schema.get("type", "null")
-    is_text = "string" in types and not schema.get("minLength") and re.search(schema.get("pattern", ""), "") is not None
+    is_text = (
+        "string" in types
+        and not schema.get("minLength")
+        and re.compile(schema.get("pattern", "")).search("") is not None
+    )
     return "null" in types or is_text
 
 

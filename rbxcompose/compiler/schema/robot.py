@@ -6,31 +6,27 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from rbxcompose.base.config import field_docs
-from rbxcompose.compiler.schema.entries import component_schemas, controller_schemas
+from rbxcompose.compiler.schema.entries import component_schemas, typed_schemas
 from rbxcompose.compiler.schema.overlays import SECTION, WHOLE, laid_over, or_removed, references
 from rbxcompose.compiler.schema.scalars import DEFINITIONS, SHARED, Schema, quantities
 from rbxcompose.compiler.schema.settle import opened, schemas_of
 from rbxcompose.compiler.sections.components import components
 from rbxcompose.compiler.sections.profiles import profiles
-from rbxcompose.domains.servos.sections.controllers import controllers
 from rbxcompose.manifest.documents import ManifestHeader
-from rbxcompose.manifest.file_models import file_model
+from rbxcompose.manifest.registry import file_model
 from rbxcompose.manifest.registry import sections as all_sections
 from rbxcompose.manifest.section import OVERLAY, PART, ROBOT
-
-MADE_OTHERWISE = (components, controllers, profiles)  # made from more than one model
 
 NAMES: Schema = {"pattern": "^[a-z][a-z0-9_]*$", "maxLength": 60}
 
 
 def definitions_of(types: Iterable[str]) -> dict[str, Schema]:
     """Return the definitions of a robot that may use these types: each section, what it needs, and changes to them."""
-    others = [section for section in all_sections() if section not in MADE_OTHERWISE]
+    made = {section.name: typed_schemas(section, section.types()) for section in all_sections() if section.types}
+    made[components.name] = component_schemas(types)
+    others = [section for section in all_sections() if section.name not in (*made, profiles.name)]
     schemas, definitions = schemas_of({other.name: other.type for other in others})
-    for name, (entry, needed) in {
-        components.name: component_schemas(types),
-        controllers.name: controller_schemas(),
-    }.items():
+    for name, (entry, needed) in made.items():
         schemas[name] = {"type": "object", "propertyNames": NAMES, "additionalProperties": entry}
         definitions |= needed
     about = {section.name: section.doc for section in all_sections()}

@@ -170,14 +170,14 @@ def _component(reading: Reading[ComponentOptions], name: str, entry: Entry) -> C
     before = len(report.findings)
     sound = validate(model, config_node, path, report, known, also=[*OPTIONS, "type"])
     if sound is None:
-        _tell_other_type(type_name, {*keys} - {*model.model_fields}, keys, report, before)
+        _report_other_type(type_name, {*keys} - {*model.model_fields}, keys, report, before)
     config = sound or salvaged(model, config_node, known)
     return ComponentEntry(
         name, type_name, options or ComponentOptions(), config, entry.key.span, is_sound=sound is not None
     )
 
 
-def _tell_other_type(
+def _report_other_type(
     type_name: str, unknown: Collection[str], keys: Collection[str], report: Report, before: int
 ) -> None:
     """Add to the last findings on unknown keys that another type takes all that is written, if only one does."""
@@ -188,8 +188,8 @@ def _tell_other_type(
     for index, finding in enumerate(report.findings[before:], before):
         is_meant = finding.code == UNKNOWN_KEY.code and not finding.help.startswith(DID_YOU_MEAN)
         if is_meant and any(finding.message.startswith(f"unknown key '{key}' in") for key in unknown):
-            told = f"the type '{fitting[0]}' takes this key; {finding.help}".removesuffix("; ")
-            report.findings[index] = replace(finding, help=told)
+            text = f"the type '{fitting[0]}' takes this key; {finding.help}".removesuffix("; ")
+            report.findings[index] = replace(finding, help=text)
 
 
 def _part(node: MappingNode, keys: Collection[str]) -> MappingNode:
@@ -218,8 +218,8 @@ def _type_name(name: str, entry: Entry, node: MappingNode, report: Report) -> st
         return None
     if is_broken(written):
         return None
-    if told := registry.PLUGINS.overshadowed(written.text):
-        report.add(LEFT_OUT.at(written.span, told))
+    if text := registry.PLUGINS.overshadowed(written.text):
+        report.add(LEFT_OUT.at(written.span, text))
     if written.text not in registry.component_names():
         report.add(_unknown_type(name, written))
         return None

@@ -22,7 +22,7 @@ class Include(Config):
 
     part: FileName
     """The part's file, relative to this one, or `rbx:parts/NAME.yaml` of the library."""
-    with_: dict[Annotated[Name, Refers(PART_ARGUMENT, is_told=True)], Any] = Field({}, alias="with")
+    with_: dict[Annotated[Name, Refers(PART_ARGUMENT, is_reported=True)], Any] = Field({}, alias="with")
     """Values of its arguments, by name."""
     connect: dict[TopicName, TopicName] = {}
     """Other names for its topics: those of its ports, of its muxes, and `MUX/INPUT` of a mux's inputs."""

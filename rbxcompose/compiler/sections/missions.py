@@ -14,11 +14,11 @@ from rbxcompose.base.findings import Finding, Report, Span
 from rbxcompose.manifest.fields import FileName
 from rbxcompose.manifest.files import resolve
 from rbxcompose.manifest.fill import SHOWN_SECRET
-from rbxcompose.manifest.mission_data import is_moderate
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.salvage import salvaged
 from rbxcompose.manifest.section import Reading, Short
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode, children
+from rbxcompose.manifest.yaml_nodes import is_moderate
 
 INPUT = "input"
 """An input of the mission that an entry names."""
@@ -29,9 +29,9 @@ class MissionModel(Config):
 
     file: FileName
     """The mission's file, relative to this one."""
-    with_: dict[Annotated[Name, Refers(INPUT, is_told=True)], Annotated[Any, Refers(ANYTHING, is_told=True)]] = Field(
-        {}, alias="with"
-    )
+    with_: dict[
+        Annotated[Name, Refers(INPUT, is_reported=True)], Annotated[Any, Refers(ANYTHING, is_reported=True)]
+    ] = Field({}, alias="with")
     """Values of its inputs, by name."""
 
 

@@ -10,7 +10,7 @@ from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import OVERLAY, ROBOT, Reading
 from rbxcompose.manifest.validate import validate
 
-MissionName = Annotated[Name, Refers(MISSION, is_told=True)]
+MissionName = Annotated[Name, Refers(MISSION, is_reported=True)]
 
 
 @section("start", MissionName, order=110, files=(ROBOT, OVERLAY))

@@ -135,10 +135,10 @@ def every_stop(robot: PlacedRobot) -> Iterator[tuple[str, StopAfterCut | StopOfG
 
 def slow_stops(system: System, robot: PlacedRobot) -> Iterator[Finding]:
     """Yield the bases that move on for longer than the system allows."""
-    allowed, told = robot.model.stop_within, set[str]()
+    allowed, reported = robot.model.stop_within, set[str]()
     for base, one in every_stop(robot):
-        if base not in told and (one.time is None or one.time > allowed + 1e-9):
-            told.add(base)
+        if base not in reported and (one.time is None or one.time > allowed + 1e-9):
+            reported.add(base)
             written = "stop_within" in robot.model.model_fields_set
             span = robot.span(system.root, "stop_within" if written else "robot")
             message = f"after a link is cut, {one.text}; allowed is {format_quantity(allowed, TIME)}"

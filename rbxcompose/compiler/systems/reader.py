@@ -10,7 +10,7 @@ from typing import Any
 
 from rbxcompose import __version__
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.findings import Finding, Span
+from rbxcompose.base.findings import Finding, Span, kind
 from rbxcompose.compiler.compile import Compilation, compile_robot
 from rbxcompose.compiler.composition.layers import chosen_profiles
 from rbxcompose.compiler.composition.overlay import compose, settled
@@ -18,11 +18,10 @@ from rbxcompose.compiler.model.robot import NOTHING, Outside, Robot, RobotCompon
 from rbxcompose.compiler.model.robot import resolve as absolute
 from rbxcompose.compiler.model.skills import served_skills
 from rbxcompose.compiler.plan.model import Plan
-from rbxcompose.compiler.systems import codes
 from rbxcompose.compiler.systems.certificates import NO_SECURITY
 from rbxcompose.compiler.systems.exchange import shared_name
 from rbxcompose.compiler.systems.model import HostOffer, PlacedRobot, System, Wishes, hosts_called, place
-from rbxcompose.compiler.systems.rules import system_findings
+from rbxcompose.compiler.systems.rules import UNKNOWN_HOST, system_findings
 from rbxcompose.manifest.documents import Documents
 from rbxcompose.manifest.files import PREFIX, PROFILE, find, resolve, shown_name
 from rbxcompose.manifest.fill import fill, names_of
@@ -33,6 +32,10 @@ from rbxcompose.manifest.validate import MISSING_KEY, WRONG_TYPE, label_of, vali
 from rbxcompose.missions.sources import SkillWay
 from rbxcompose.sdk.capabilities import ConnectedBy
 from rbxcompose.sdk.ports import Serves
+
+NOTHING_TO_PLACE = kind("RBX6101", is_fixable=True)
+SAME_NAME = kind("RBX6131")
+BROKEN_ROBOT = kind("RBX6102")
 
 
 def served_outside(components: Mapping[str, RobotComponent], robot: str, names: Mapping[str, str]) -> Outside:
@@ -102,7 +105,7 @@ def compile_system(
         if (other := seen.setdefault(member.name, member)) is not member:
             span = key_span(out.root, ("robots", max(member.entry, other.entry, key=len)))
             message = f"'{other.entry}' and '{member.entry}' both make a robot '{member.name}'"
-            out.report.add(codes.SAME_NAME.at(span, message, help="give one of them another name"))
+            out.report.add(SAME_NAME.at(span, message, help="give one of them another name"))
     compiling = _Compiling(out, environment, real)
     compiling.outside = joined(compiling.given(one) for one in members)
     for member in members:
@@ -222,7 +225,7 @@ class _Compiling:
         compilation = self.done[shown, model.profile]
         if compilation.plan is None:
             message = f"the robot '{shown}' has errors, so the system cannot run it"
-            out.report.add(codes.BROKEN_ROBOT.at(span, message, help="see the findings of the robot"))
+            out.report.add(BROKEN_ROBOT.at(span, message, help="see the findings of the robot"))
         return compilation
 
     def _compiled(self, shown: str, profile: str | None, at_profile: Span) -> Compilation:
@@ -230,13 +233,10 @@ class _Compiling:
         self.out.sources.update(compilation.sources)
         known = {(one.code, one.span, one.message) for one in self.out.report}
         for finding in compilation.report:
-            told = (
-                replace(finding, span=at_profile)
-                if finding.span is not None and finding.span.file == PROFILE
-                else finding
-            )
-            if (told.code, told.span, told.message) not in known:
-                self.out.report.add(told)
+            if finding.span is not None and finding.span.file == PROFILE:
+                finding = replace(finding, span=at_profile)
+            if (finding.code, finding.span, finding.message) not in known:
+                self.out.report.add(finding)
         return compilation
 
 
@@ -275,12 +275,12 @@ def _wrong_wishes(name: str, model: SystemRobotModel, out: System, known: Iterab
         if not hosts_called(called, facts):
             span = value_span(out.root, ("robots", name, *keys))
             message = f"'{called}' is neither a host of this system nor a label of one"
-            yield codes.UNKNOWN_HOST.misspelt(span, message, called, [*out.hosts, *sorted(labels)], "hosts")
+            yield UNKNOWN_HOST.misspelt(span, message, called, [*out.hosts, *sorted(labels)], "hosts")
     for key in model.place:
         if key not in known:
             span = key_span(out.root, ("robots", name, "place", key))
             message = f"the robot '{name}' has neither a component nor a part '{key}'"
-            yield codes.NOTHING_TO_PLACE.misspelt(span, message, key, sorted(known), "its components and parts")
+            yield NOTHING_TO_PLACE.misspelt(span, message, key, sorted(known), "its components and parts")
 
 
 def _link_port(model: SystemRobotModel, plan: Plan, out: System) -> int:

@@ -8,7 +8,6 @@ from rbxcompose.base.findings import Finding, Related, Severity, Span, kind
 from rbxcompose.base.units import BIT_RATE, FREQUENCY, TIME, format_quantity
 from rbxcompose.compiler.model.robot import resolve
 from rbxcompose.compiler.systems.certificates import MUTUAL, NO_SECURITY
-from rbxcompose.compiler.systems.codes import UNKNOWN_HOST
 from rbxcompose.compiler.systems.cut_link import slow_stops
 from rbxcompose.compiler.systems.exchange import (
     TAKEN_BY,
@@ -28,6 +27,7 @@ from rbxcompose.manifest.tree import key_span, value_span
 from rbxcompose.sdk.capabilities import ConnectedBy, Drives
 from rbxcompose.sdk.ports import In, Out, Qos
 
+UNKNOWN_HOST = kind("RBX6100", is_fixable=True)
 NOT_PUBLISHED = kind("RBX6123", is_fixable=True)
 NOT_SHARED = kind("RBX6124", Severity.WARNING)
 TAKEN_NAME = kind("RBX6125")

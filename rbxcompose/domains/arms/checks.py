@@ -15,10 +15,10 @@ from rbxcompose.base.units import LENGTH, format_quantity
 from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.model.mission_facts import constants
 from rbxcompose.compiler.model.robot import Robot
-from rbxcompose.domains.arms.manifest_model import SpotModel
 from rbxcompose.domains.arms.mission_goals import WrittenReach, first_joint_in, length_of, word_of, written_reaches
 from rbxcompose.domains.arms.motion.grasps import grasps_of, least_width, reach_of, solid_of
 from rbxcompose.domains.arms.motion.scene import PlacedObject, settled
+from rbxcompose.domains.arms.section_models import SpotModel
 from rbxcompose.domains.arms.sections.arms import ArmOfRobot, arms, hand_in
 from rbxcompose.domains.arms.sections.heads import heads
 from rbxcompose.domains.arms.sections.scene import scene
@@ -36,17 +36,17 @@ from rbxcompose.sdk.ports import Out
 
 @check("RBX2379", Severity.WARNING, closed=(WIRING, NAMES, "scene"))
 def frame_of_object(robot: Robot) -> Iterator[Finding]:
-    """A thing of the scene stands in a frame outside of a body that nobody places there."""
+    """A thing of the scene is in a frame without a transform to the body."""
     description, written = robot.manifest.contents.of(body), robot.declared(WritesFrame)
     if description is None or robot.declared(Drives):
         return  # RBX2286
     shape, placed = description.body, {frame.child.value for _, frame in written}
     known = placed | {frame.parent.value for _, frame in written}
-    for placed_object in robot.manifest.contents.of(scene).objects if shape.root not in placed else ():
-        if placed_object.link not in shape.links and placed_object.link in known:  # RBX2019 reports the others
+    for thing in robot.manifest.contents.of(scene).objects if shape.root not in placed else ():
+        if thing.link not in shape.links and thing.link in known:  # RBX2019 reports the others
             yield frame_of_object.at(
-                robot.value("scene", "objects", placed_object.name, "frame"),
-                f"nobody tells where '{shape.root}' is in '{placed_object.link}'",
+                robot.value("scene", "objects", thing.name, "frame"),
+                f"nobody tells where '{shape.root}' is in '{thing.link}'",
                 help="leave 'frame' out: what stands beside the robot counts from its root",
                 related=[Related(shape.links[shape.root].span, "the root of the body")],
             )
@@ -86,7 +86,7 @@ def hand_without_gripper(robot: Robot) -> Iterator[Finding]:
 
 @check("RBX2376", Severity.WARNING, closed=(WIRING, MISSIONS, "scene"))
 def idle_grasps(robot: Robot) -> Iterator[Finding]:
-    """Grasps are those of an object that there is not."""
+    """Grasps are given for an object that does not exist."""
     contents = robot.manifest.contents
     objects = [object_.name for object_ in contents.of(scene).objects]
     if not objects or any(isinstance(end.port, Out) and end.port.interface is CollisionObject for end in robot.ends):
@@ -562,15 +562,11 @@ def _word(node: MissionNode) -> str:
     return "" if "$" in text else text
 
 
-def _radius(placed_object: PlacedObject) -> float:
+def _radius(thing: PlacedObject) -> float:
     """Return how far a thing reaches from its origin at most [m]; infinite if that is unknown."""
     axes: tuple[Vector3, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), _UP)
     sides = [
-        (
-            reach_of(placed_object, placed_object.pose.rotation, axis),
-            reach_of(placed_object, placed_object.pose.rotation, _back(axis)),
-        )
-        for axis in axes
+        (reach_of(thing, thing.pose.rotation, axis), reach_of(thing, thing.pose.rotation, _back(axis))) for axis in axes
     ]
     far = [max(ahead, back) if ahead is not None and back is not None else math.inf for ahead, back in sides]
     return math.hypot(*far)
@@ -627,19 +623,19 @@ def too_wide(robot: Robot) -> Iterator[Finding]:
 
 
 def _width(
-    body: Body, placed_object: PlacedObject, given: list[float], opening: tuple[float, float]
+    body: Body, thing: PlacedObject, given: list[float], opening: tuple[float, float]
 ) -> tuple[float | None, float]:
     """Return the width of a thing where it can be held [m], None if it fits or is unknown, and the opening [m]."""
     widest = opening[1]
     if given:
         return (min(given) if min(given) >= widest else None), widest
-    if (solid := solid_of(placed_object)) is None:
+    if (solid := solid_of(thing)) is None:
         return None, widest
     if least_width(solid.shape) >= widest:
         return least_width(solid.shape), widest
-    if placed_object.link != body.root:
+    if thing.link != body.root:
         return None, widest  # nobody knows how it will be turned
-    at = placed_object.pose.compose(solid.pose)
+    at = thing.pose.compose(solid.pose)
 
     def held(limit: float) -> list[float]:
         turns = (math.tau * index / _BEARINGS for index in range(_BEARINGS))
@@ -704,21 +700,17 @@ def object_in_robot(robot: Robot) -> Iterator[Finding]:
             yield from _in_still_link(robot, shape, one)
 
 
-def _in_still_link(robot: Robot, body: Body, placed_object: PlacedObject) -> Iterator[Finding]:
+def _in_still_link(robot: Robot, body: Body, thing: PlacedObject) -> Iterator[Finding]:
     """Yield the finding about a thing that reaches into a link that nothing moves."""
     still = body.still
-    box = (
-        box_within(placed_object.shape, still[placed_object.link].compose(placed_object.pose))
-        if placed_object.link in still
-        else None
-    )
+    box = box_within(thing.shape, still[thing.link].compose(thing.pose)) if thing.link in still else None
     for link in still if box else ():
-        for shape in body.links[link].collisions if link not in placed_object.touches else ():
+        for shape in body.links[link].collisions if link not in thing.touches else ():
             other = box_within(shape.geometry, still[link].compose(shape.origin))
             if box and other and penetration(box, other) > _INTO:
                 yield object_in_robot.at(
-                    robot.key("scene", "objects", placed_object.name),
-                    f"'{placed_object.name}' reaches into '{link}', which nothing moves out of it",
+                    robot.key("scene", "objects", thing.name),
+                    f"'{thing.name}' reaches into '{link}', which nothing moves out of it",
                     help=_FARTHER,
                     related=[Related(body.links[link].span, "the link")],
                 )

@@ -10,9 +10,9 @@ from rbxcompose.base.geometry import Quaternion, Transform3, quaternion_from_rpy
 from rbxcompose.base.units import ANGLE, LENGTH, RATIO, SPEED
 from rbxcompose.domains.arms.motion.arm_task import ArmGoal, ArmTask
 from rbxcompose.domains.arms.motion.inverse_kinematics import SOLVER, PoseTarget, SolverSettings
-from rbxcompose.domains.arms.motion.kept import ANGLE as SIGHT_ANGLE
-from rbxcompose.domains.arms.motion.kept import RADIUS, Keep, KeptSight
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory
+from rbxcompose.domains.arms.motion.path_constraints import ANGLE as SIGHT_ANGLE
+from rbxcompose.domains.arms.motion.path_constraints import RADIUS, Keep, KeptSight
 from rbxcompose.domains.arms.motion.trace_planner import ANY_SPEED, TraceWish, WayPoint
 from rbxcompose.msgs.control_msgs import FollowJointTrajectory
 from rbxcompose.msgs.fields import Measures
@@ -93,11 +93,7 @@ def goal_of(message: ArmMessage, solver: SolverSettings = SOLVER) -> ArmGoal:
         )
         return ArmGoal(trace=wish, frame=message.frame, acceleration=acceleration)
     ask = partial(
-        ArmGoal,
-        speed=message.speed or 1.0,
-        acceleration=acceleration,
-        keep=_keep(message.keep),
-        replans=message.replan,
+        ArmGoal, speed=message.speed or 1.0, acceleration=acceleration, keep=_keep(message.keep), replans=message.replan
     )
     if isinstance(message, MoveArm.Goal):
         positions = dict(zip(message.joints, message.positions.tolist(), strict=False))

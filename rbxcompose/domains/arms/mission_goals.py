@@ -11,7 +11,7 @@ from rbxcompose.base.geometry import Vector3
 from rbxcompose.compiler.model.robot import Robot, RobotMission
 from rbxcompose.domains.arms.sections.arms import ArmOfRobot, arms
 from rbxcompose.domains.body.model import Body
-from rbxcompose.domains.servos.led_joints import limits_in
+from rbxcompose.domains.servos.sections.joints import limits_in
 from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.language.asked import WrittenArgument
 from rbxcompose.missions.program.answers import NodeFlow

@@ -157,10 +157,10 @@ _SMALL = 20  # fields of a goal that are told
 
 def scene_parts(objects: Iterable[PlacedObject], problem: str) -> dict[str, Any]:
     """Return the parts of a scene: each object, and why it is not known as a whole, if so."""
-    return {"problem": problem, **{f"object {placed_object.name}": _object(placed_object) for placed_object in objects}}
+    return {"problem": problem, **{f"object {thing.name}": _object(thing) for thing in objects}}
 
 
-def _object(placed_object: PlacedObject) -> dict[str, Any]:
+def _object(thing: PlacedObject) -> dict[str, Any]:
     shapes = [
         {
             "kind": piece.shape.kind,
@@ -169,13 +169,9 @@ def _object(placed_object: PlacedObject) -> dict[str, Any]:
             "position": list(piece.pose.translation),
             "rotation": list(piece.pose.rotation),
         }
-        for piece in placed_object.all_pieces
+        for piece in thing.all_pieces
     ]
-    return {
-        "link": placed_object.link,
-        "shapes": shapes,
-        "colour": list(placed_object.colour) if placed_object.colour else None,
-    }
+    return {"link": thing.link, "shapes": shapes, "colour": list(thing.colour) if thing.colour else None}
 
 
 def goal_words(message: Message) -> str:

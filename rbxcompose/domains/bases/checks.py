@@ -194,7 +194,7 @@ def _limit(robot: Robot, wheel: BodyWheel) -> float:
 
 @check("RBX2281", Severity.WARNING, closed=(WIRING,))
 def wheels_of_body(robot: Robot) -> Iterator[Finding]:
-    """The wheels of a base are others than those of its body."""
+    """The wheels of a base differ from those of its body."""
     for base in rolling_bases(robot):
         rolls, left = base.rolls, base.left
         lengths = [("wheels are %s apart", rolls.wheel_distance, abs(base.wheel_distance))]
@@ -233,7 +233,7 @@ def _moves(robot: Robot, end: PortEnd) -> bool:
 
 @check("RBX2286", Severity.WARNING, closed=(WIRING, NAMES))
 def unplaced_base(robot: Robot) -> Iterator[Finding]:
-    """A component looks up where the robot is, and no component publishes that transform."""
+    """A component looks up where the robot is, and nothing publishes it."""
     description, bases = robot.manifest.contents.of(body), robot.declared(Drives)
     if description is None or not description.body.links or not bases:
         return
@@ -257,7 +257,7 @@ def unplaced_base(robot: Robot) -> Iterator[Finding]:
 
 @check("RBX2352", Severity.WARNING, closed=(WIRING, NAMES))
 def frame_without_publisher(robot: Robot) -> Iterator[Finding]:
-    """No component publishes the transform from the frame of the virtual joint to the root of the body."""
+    """No component publishes the transform of a virtual joint."""
     description = robot.manifest.contents.of(body)
     if description is None or description.virtual is None or description.virtual.kind == "fixed":
         return

@@ -74,7 +74,7 @@ DEFAULT_TIMEOUT = 5.0  # [s]
 OTHER = "Other"  # the group of statuses that no analyzer matches
 SHOWN = ("generic", "group", "other")  # types of analyzers that have a header in the tree
 
-Pattern = Annotated[str, Refers(RUNNING, is_told=True)]
+Pattern = Annotated[str, Refers(RUNNING, is_reported=True)]
 
 
 _GLOB = re.compile(r"\*+([\w /-]+)\**")  # of a shell: `*camera*`
@@ -179,7 +179,7 @@ class AnalyzerModel(Config):
     """How long another level must last before the group has it: a time, or `up` and `down`."""
     latch: bool = False
     """Whether the worst level stays until `rbxcompose diag ack`."""
-    suppressed_by: Annotated[str, Refers(ANALYZER, is_told=True)] | None = None
+    suppressed_by: Annotated[str, Refers(ANALYZER, is_reported=True)] | None = None
     """The group of whose failure all here is only a consequence: while it is ERROR or STALE, this one is OK. It is one
     beside this group, or beside one above it."""
     analyzers: dict[Name, AnalyzerModel] = {}

@@ -409,7 +409,7 @@ def long_timeout(robot: Robot) -> Iterator[Finding]:
 
 @check("RBX3141", Severity.WARNING)
 def no_take_over(robot: Robot) -> Iterator[Finding]:
-    """Nobody can take over from a component that drives."""
+    """No input can take over from a component that drives."""
     for mux, entry in robot.manifest.contents.of(muxes).items():
         ranks = entry.ranks if entry.profile == "default" else {}
         driving = {name: rank for name, rank in ranks.items() if entry.inputs[name].source}

@@ -6,8 +6,18 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Protocol
 
 from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.findings import Severity, kind
 from rbxcompose.base.plugins import Plugins
 from rbxcompose.domains.servos.models import ServoModel, find_model, model_of_number
+
+NOT_INSTALLED = kind("RBX2207")
+SILENT = kind("RBX2208")
+ID_TAKEN = kind("RBX2209")
+NO_ITEM = kind("RBX2210")
+REFUSED = kind("RBX2211")
+UNKNOWN_MODEL = kind("RBX2212")
+OTHER_RATE = kind("RBX2250", Severity.WARNING)
+
 
 FAST = ("present_position", "present_speed", "present_load")
 """Of all servos."""

@@ -165,35 +165,33 @@ _TICK = 1.01  # ticks that a limit may lie outside: that of 150 deg is one beyon
 @check("RBX2225", Severity.WARNING, closed=(WIRING,))
 def out_of_reach(robot: Robot) -> Iterator[Finding]:
     """A joint may go where its servo cannot."""
-    for driven_joint in driven_joints(robot):
-        if driven_joint.joint.mode == "position":
-            yield from _told(driven_joint)
+    for driven in driven_joints(robot):
+        if driven.joint.mode == "position":
+            yield from _told(driven)
 
 
-def _told(driven_joint: DrivenJoint) -> Iterator[Finding]:
-    joint, limits = driven_joint.joint, driven_joint.joint.limits
+def _told(driven: DrivenJoint) -> Iterator[Finding]:
+    joint, limits = driven.joint, driven.joint.limits
     (first, last), slack = joint.reach, _TICK * joint.per_tick
     is_below = limits.least < first - slack and (limits.lower is not None or joint.is_continuous)
     is_above = limits.greatest > last + slack and (limits.upper is not None or joint.is_continuous)
     if not (is_below or is_above):
         return
     is_free = limits.lower is None and limits.upper is None
-    bounds = f"{driven_joint.position(limits.least)} to {driven_joint.position(limits.greatest)}"
+    bounds = f"{driven.position(limits.least)} to {driven.position(limits.greatest)}"
     wanted = "turns without end" if is_free else f"may go from {bounds}"
     servo = "its servo reaches" if len(joint.servos) == 1 else "its servos reach"
-    body = driven_joint.body.limits if driven_joint.body else None
-    message = (
-        f"'{driven_joint.name}' {wanted}, but {servo} {driven_joint.position(first)} to {driven_joint.position(last)}"
-    )
-    if body and not driven_joint.slides and body.may_be_degrees:
+    body = driven.body.limits if driven.body else None
+    message = f"'{driven.name}' {wanted}, but {servo} {driven.position(first)} to {driven.position(last)}"
+    if body and not driven.slides and body.may_be_degrees:
         return  # told as RBX2021
-    if body and not is_free and (meant := _in_degrees(driven_joint)):
+    if body and not is_free and (meant := _in_degrees(driven)):
         yield out_of_reach.at(body.span, message, help=f"limits in a URDF are in radians: for degrees, write {meant}")
         return
     yield out_of_reach.at(
-        _place(driven_joint, is_shifted=limits.least > last or limits.greatest < first),
+        _place(driven, is_shifted=limits.least > last or limits.greatest < first),
         message,
-        help=_remedy(driven_joint, max(first, limits.least), min(last, limits.greatest)),
+        help=_remedy(driven, max(first, limits.least), min(last, limits.greatest)),
         related=[Related(body.span, "its limits in the body")] if body else [],
     )
 
@@ -225,8 +223,8 @@ def _remedy(joint: DrivenJoint, least: float, greatest: float) -> str:
     return f"limit it: 'position: [{lower} {unit}, {upper} {unit}]' below its 'limits'"
 
 
-def _beyond_the_ticks(driven_joint: DrivenJoint) -> str:
-    for servo in driven_joint.joint.servos:
+def _beyond_the_ticks(driven: DrivenJoint) -> str:
+    for servo in driven.joint.servos:
         first, last = servo.ends
         if not first <= servo.neutral <= last:
             middle = f"the middle, 'neutral: {servo.model.family.centre}', is the default"
@@ -270,16 +268,12 @@ def _wider_limit_told(joint: DrivenJoint, name: str) -> Iterator[Finding]:
 @check("RBX2229", Severity.WARNING, closed=(WIRING,))
 def no_speed_limit(robot: Robot) -> Iterator[Finding]:
     """A joint has no limit of its speed."""
-    for driven_joint in driven_joints(robot):
-        if (
-            driven_joint.joint.mode == "position"
-            and driven_joint.joint.limits.velocity is None
-            and not driven_joint.mimics
-        ):
+    for driven in driven_joints(robot):
+        if driven.joint.mode == "position" and driven.joint.limits.velocity is None and not driven.mimics:
             yield no_speed_limit.at(
-                driven_joint.key(),
-                f"'{driven_joint.name}' has no limit of its speed: it moves as fast as its servo can",
-                help=f"add one in {'m/s' if driven_joint.slides else 'deg/s'}: 'limits: {{velocity: ...}}'",
+                driven.key(),
+                f"'{driven.name}' has no limit of its speed: it moves as fast as its servo can",
+                help=f"add one in {'m/s' if driven.slides else 'deg/s'}: 'limits: {{velocity: ...}}'",
             )
 
 
@@ -465,7 +459,7 @@ def goal_beyond_limits(robot: Robot) -> Iterator[Finding]:
 def _bounded(robot: Robot) -> dict[str, dict[str, GoalRange]]:
     """Return the ranges of the arguments of each skill."""
     declared = robot.declared(BoundsGoals)
-    joints = {driven_joint.name: driven_joint for driven_joint in driven_joints(robot)} if declared else {}
+    joints = {driven.name: driven for driven in driven_joints(robot)} if declared else {}
     found: dict[str, dict[str, GoalRange]] = {}
     for component, bounds in declared:
         skill = next((name for name in robot.skills if is_served(robot, name, component, bounds.goals)), "")

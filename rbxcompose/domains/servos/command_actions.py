@@ -16,11 +16,10 @@ from rbxcompose.base.printable import plain
 from rbxcompose.commands.console import FINDINGS, NotDoneError, refuse, table, tell, tell_report
 from rbxcompose.commands.new_files import AnswerError, read_name, taken, write_new
 from rbxcompose.domains.devices.serial_ports import port_path, serial_ports, slow_adapter
-from rbxcompose.domains.servos.bus import FoundServo
+from rbxcompose.domains.servos.bus import ID_TAKEN, NO_ITEM, OTHER_RATE, REFUSED, SILENT, UNKNOWN_MODEL, FoundServo
 from rbxcompose.domains.servos.dynamixel_bus import DynamixelBus, change_id
 from rbxcompose.domains.servos.models import ServoModel, hardware_errors
 from rbxcompose.domains.servos.new_robot import NewServo, ServoRobotAnswers, servo_robot_files, servo_robot_paths
-from rbxcompose.domains.servos.servo_findings import ID_TAKEN, NO_ITEM, OTHER_RATE, REFUSED, SILENT, UNKNOWN_MODEL
 from rbxcompose.manifest.files import shown_name
 
 

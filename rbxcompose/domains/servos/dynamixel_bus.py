@@ -13,6 +13,7 @@ from dynamixel_sdk import COMM_SUCCESS
 from rbxcompose.base.findings import Finding
 from rbxcompose.domains.devices.serial_ports import LostPortError, latency_of, port_path
 from rbxcompose.domains.servos import bus as servo_bus
+from rbxcompose.domains.servos.bus import ID_TAKEN, REFUSED, SILENT, UNKNOWN_MODEL
 from rbxcompose.domains.servos.dynamixel_port import (
     Answer,
     BlockingPort,
@@ -22,7 +23,6 @@ from rbxcompose.domains.servos.dynamixel_port import (
     packets_by_protocol,
 )
 from rbxcompose.domains.servos.models import ServoModel
-from rbxcompose.domains.servos.servo_findings import ID_TAKEN, REFUSED, SILENT, UNKNOWN_MODEL
 from rbxcompose.domains.servos.transfers import ReadPlan, Stretch, WritePlan, read_plan, write_plans
 
 

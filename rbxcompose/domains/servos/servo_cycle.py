@@ -281,12 +281,7 @@ class ServoCycle:
         self._mimic()
         if self.shares_heat:
             warmest = max(
-                (
-                    joint_drive.temperature
-                    for joint_drive in self.drives.values()
-                    if joint_drive.temperature is not None
-                ),
-                default=None,
+                (each.temperature for each in self.drives.values() if each.temperature is not None), default=None
             )
             for drive in self.drives.values():
                 drive.warmest = warmest

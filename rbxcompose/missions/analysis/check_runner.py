@@ -60,11 +60,11 @@ def check_program(program: Program, robot: RobotNames) -> list[Finding]:
 
 
 def rule_findings(
-    mission: Examined, tells: Callable[[MissionCheck], bool] = lambda rule: True
+    mission: Examined, reports: Callable[[MissionCheck], bool] = lambda rule: True
 ) -> Iterator[tuple[MissionCheck, Finding]]:
     """Yield the findings of some rules about a mission, each with its rule."""
     for check in mission_checks():
-        if tells(check):
+        if reports(check):
             yield from ((check, finding) for finding in check(mission))
 
 

@@ -95,8 +95,8 @@ def unknown_channel(mission: Examined) -> Iterator[Finding]:
             yield from _nowhere(message, "topic", mission.robot.topics)
         for message in called(node):
             if (name := message.target.text) in mission.robot.skills and name not in mission.robot.services:
-                told = f"'{name}' is a skill, and no service"
-                yield unknown_channel.at(message.target.span, told, help=f"write it as a step of its own: '- {name}'")
+                text = f"'{name}' is a skill, and no service"
+                yield unknown_channel.at(message.target.span, text, help=f"write it as a step of its own: '- {name}'")
                 continue
             yield from _nowhere(message, "service", mission.robot.services)
 
@@ -104,8 +104,8 @@ def unknown_channel(mission: Examined) -> Iterator[Finding]:
 def _nowhere(message: MessageTemplate, what: str, known: Mapping[str, str]) -> Iterator[Finding]:
     name = message.target.text
     if name and name not in known:
-        told = f"the robot has no {what} '{name}'"
-        yield unknown_channel.misspelt(message.target.span, told, name, known, f"{what}s of this robot")
+        text = f"the robot has no {what} '{name}'"
+        yield unknown_channel.misspelt(message.target.span, text, name, known, f"{what}s of this robot")
 
 
 @mission_check("RBX4144", is_fixable=True)

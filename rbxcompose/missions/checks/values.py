@@ -175,9 +175,9 @@ def _check_body(view: View, message: MessageTemplate, ros: type[Message]) -> Ite
     elif len(ros.FIELDS) == 1:
         yield from _check_value(view, body, next(iter(ros.FIELDS.values())), message.target.span)
     else:
-        told = f"{ros.TYPE} has several fields: name them"
+        text = f"{ros.TYPE} has several fields: name them"
         help_text = f"they are {', '.join(ros.FIELDS)}" if ros.FIELDS else "it has no fields at all"
-        yield wrong_field.at(_span_of(body) or message.target.span, told, help=help_text)
+        yield wrong_field.at(_span_of(body) or message.target.span, text, help=help_text)
 
 
 def _check_fields(
@@ -191,8 +191,8 @@ def _check_fields(
     for name, shape in body.items():
         span = keys[(*path, name)]
         if name not in ros.FIELDS:
-            told = f"{ros.TYPE} has no field '{name}'"
-            yield wrong_field.misspelt(span, told, name, ros.FIELDS, "its fields", taken=body)
+            text = f"{ros.TYPE} has no field '{name}'"
+            yield wrong_field.misspelt(span, text, name, ros.FIELDS, "its fields", taken=body)
         elif isinstance(shape, Mapping) and "/" in parse_type(ros.FIELDS[name]).base:
             inner = registry.message(parse_type(ros.FIELDS[name]).base)
             below = measure_of(ros.TYPE, name) or measured
@@ -395,6 +395,6 @@ def _with_results(finding: Finding, asked: Asked, ends: Mapping[str, Outcomes]) 
         branch, word = compared_with_word(part) or ("", None)
         if word and branch in ends and finding.span == inner_span(asked.scalar, word.start, word.end):
             results = ends[branch].words
-            told = f"it ends with {' or '.join(results)}" if results else "it never ends"
-            return replace(finding, message=f"the branch '{branch}' never ends with '{word.name}'", help=told)
+            text = f"it ends with {' or '.join(results)}" if results else "it never ends"
+            return replace(finding, message=f"the branch '{branch}' never ends with '{word.name}'", help=text)
     return finding

@@ -36,8 +36,8 @@ from rbxcompose.missions.execution.requests import (
 )
 from rbxcompose.missions.execution.topic_skills import Desks
 from rbxcompose.missions.execution.world import Arrivals, RobotWorld
+from rbxcompose.missions.program.outcomes import IDLE, Result
 from rbxcompose.missions.program.program import Program, RobotNames
-from rbxcompose.missions.program.statuses import IDLE, Result
 from rbxcompose.missions.sources import SkillSource, TopicSource, ValueSource, events_of
 from rbxcompose.msgs.std_msgs import String
 from rbxcompose.sdk import Capability, Component, Config, Level, Place, Port, Refused, RunsMissions, answers, component
@@ -174,12 +174,12 @@ class Mission(Component[MissionConfig]):
     def hold_back(self, run: MissionRun) -> None:
         """Let a mission begin only at the resume."""
         run.is_paused = True
-        self.tell(f"mission {run.name} is held until it is resumed")
+        self.announce(f"mission {run.name} is held until it is resumed")
 
     def received(self, port: str, message: Any) -> None:
         """Take a value and wake the missions that read it; or take the outcome of an order."""
         if port.startswith(ENDS):
-            self.desks.told(port, message)
+            self.desks.ended(port, message)
             return
         name = port.removeprefix(VALUE)
         wrong = self.arrivals.take(name, message, self.now)
@@ -202,7 +202,7 @@ class Mission(Component[MissionConfig]):
             wakes += self.turn(mission)
         if wakes:
             self.plan(min(wakes))
-        self.broadcast.tell(self.missions)
+        self.broadcast.publish(self.missions)
 
     def turn(self, run: MissionRun) -> list[float]:
         """Do what is due in a mission; return its next wake [s], if any."""
@@ -270,7 +270,7 @@ class Mission(Component[MissionConfig]):
         self.is_held = self.is_held or any(run.is_paused for run in self.missions)
         for mission in self.missions:
             mission.abort(self.now)
-        self.broadcast.tell(self.missions)
+        self.broadcast.publish(self.missions)
 
     # Commands from people
 
@@ -288,7 +288,7 @@ class Mission(Component[MissionConfig]):
         run.abort(self.now)
         if run.end is not None:
             self.finish(run.name, run.end)
-        self.broadcast.tell(self.missions)
+        self.broadcast.publish(self.missions)
         return f"mission {run.name} cancelled"
 
     @answers(PauseMission)
@@ -309,7 +309,7 @@ class Mission(Component[MissionConfig]):
             raise Refused(f"mission {run.name} is not paused")
         run.resume(self.now)
         self.look_soon()
-        return self.tell(f"mission {run.name} resumed")
+        return self.announce(f"mission {run.name} resumed")
 
     @answers(ListMissions)
     def listed(self, request: ListMissions) -> tuple[ListedMission, ...]:
@@ -339,8 +339,8 @@ class Mission(Component[MissionConfig]):
     def hold_running(self, run: MissionRun, why: str) -> str:
         """Hold a mission and return the report of it."""
         run.pause(self.now)
-        self.broadcast.tell(self.missions)
-        return self.tell(f"mission {run.name} {why}")
+        self.broadcast.publish(self.missions)
+        return self.announce(f"mission {run.name} {why}")
 
     def keep(self, begun: RunMission | None = None) -> None:
         """Let the supervisor repeat, after a crash, the requests by which people began missions that still run."""
@@ -366,7 +366,7 @@ class Mission(Component[MissionConfig]):
         """Return the running missions in words."""
         return f"running {', '.join(self.missions.names)}"
 
-    def tell(self, text: str) -> str:
+    def announce(self, text: str) -> str:
         """Log a text and make it the status."""
         self.info(text)
         self.show(Level.OK, text)
@@ -381,6 +381,6 @@ class Mission(Component[MissionConfig]):
     def summary(self) -> dict[str, str]:
         """Return the states of the missions and what they did."""
         runs = list(self.missions.runs.values())
-        told = "; ".join(f"{run.name}: {run.end.result if run.end else run.state}" for run in runs)
+        states = "; ".join(f"{run.name}: {run.end.result if run.end else run.state}" for run in runs)
         skills = "; ".join(text for run in runs if (text := run.story.skills()))
-        return {name: text for name, text in (("mission", told), ("skills", skills)) if text}
+        return {name: text for name, text in (("mission", states), ("skills", skills)) if text}

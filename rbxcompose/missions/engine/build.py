@@ -14,9 +14,9 @@ from rbxcompose.missions.engine.world import Observer
 from rbxcompose.missions.modifiers.registry import Decorator, decorator_of
 from rbxcompose.missions.program.answers import Form
 from rbxcompose.missions.program.in_turn import WithHistory
+from rbxcompose.missions.program.outcomes import IDLE, NAMES, RUNNING
 from rbxcompose.missions.program.program import MissionNode, Program, RobotNames
 from rbxcompose.missions.program.registry import task_of
-from rbxcompose.missions.program.statuses import IDLE, NAMES, RUNNING
 
 
 class Since(Decorator):

@@ -6,8 +6,8 @@ from rbxcompose.base.expressions.evaluate import holds
 from rbxcompose.missions.engine.scopes import SinceScope
 from rbxcompose.missions.engine.task import Task
 from rbxcompose.missions.engine.world import Watched
+from rbxcompose.missions.program.outcomes import RUNNING, SUCCESS
 from rbxcompose.missions.program.program import Interrupt, Target
-from rbxcompose.missions.program.statuses import RUNNING, SUCCESS
 
 
 class Course:

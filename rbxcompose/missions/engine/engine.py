@@ -12,8 +12,8 @@ from rbxcompose.missions.engine.events import MissionEnded, Reported
 from rbxcompose.missions.engine.task import Task
 from rbxcompose.missions.engine.world import PLAIN, Settings, World
 from rbxcompose.missions.program.linker import link
+from rbxcompose.missions.program.outcomes import FAILURE, IDLE, NAMES, RUNNING, SUCCESS, Result
 from rbxcompose.missions.program.program import Program, RobotNames
-from rbxcompose.missions.program.statuses import FAILURE, IDLE, NAMES, RUNNING, SUCCESS, Result
 
 TICKS_AT_ONCE = 100  # at one instant; then the mission is slowed down to its rate
 
@@ -158,11 +158,11 @@ class Engine(EngineBase):
                 break
             number = failed[-1]
         path, reason = self.program.nodes[number].path, self.reasons.get(number)
-        told = f"{path}: {reason}" if reason else f"{path} failed"
+        trouble = f"{path}: {reason}" if reason else f"{path} failed"
         if isinstance(course, Reaction):
-            return f"the reaction of '{course.name}' failed: {told}"
+            return f"the reaction of '{course.name}' failed: {trouble}"
         says_it_all = self.outcome and not reason and number == self.program.main
-        return "" if says_it_all else told
+        return "" if says_it_all else trouble
 
     def _deciding(self, number: int) -> tuple[int, ...]:
         """Return the children whose failure can make a node fail."""

@@ -15,8 +15,8 @@ from rbxcompose.missions.engine.events import MissionEvent
 from rbxcompose.missions.engine.resume_points import ResumableTask, ResumePoints
 from rbxcompose.missions.engine.scopes import MissionScope, RunScope
 from rbxcompose.missions.engine.world import Settings, Watched, World
+from rbxcompose.missions.program.outcomes import IDLE, Result
 from rbxcompose.missions.program.program import Program, RobotNames, Target
-from rbxcompose.missions.program.statuses import IDLE, Result
 
 ROUNDING = 1e-6  # [s] tolerance with which a deadline counts as reached
 

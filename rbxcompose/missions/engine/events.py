@@ -128,8 +128,8 @@ class MissionEnded:
     @property
     def words(self) -> str:
         """Return its end's own name, if it has one, why it ended, and what to doubt; empty if nothing is to be said."""
-        is_told = self.outcome in ("", self.result) or self.message.endswith(self.outcome)
-        own = "" if is_told else f"ended in {self.outcome}"
+        is_known = self.outcome in ("", self.result) or self.message.endswith(self.outcome)
+        own = "" if is_known else f"ended in {self.outcome}"
         return ": ".join(text for text in (own, self.message, self.doubt) if text)
 
 

@@ -13,7 +13,7 @@ from rbxcompose.missions.engine.task import Task
 from rbxcompose.missions.language.asked import Assignment
 from rbxcompose.missions.program.answers import Deeds, Moments
 from rbxcompose.missions.program.machines import MessageTemplate, TemplateShape
-from rbxcompose.missions.program.statuses import NodeFailed
+from rbxcompose.missions.program.outcomes import NodeFailed
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.definitions import parse_type
 from rbxcompose.msgs.types import Message

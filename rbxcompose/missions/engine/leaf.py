@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from rbxcompose.base.expressions.values import Value
 from rbxcompose.missions.engine.task import Site, Task
-from rbxcompose.missions.program.statuses import FAILURE, IDLE, RUNNING, SUCCESS, Result
+from rbxcompose.missions.program.outcomes import FAILURE, IDLE, RUNNING, SUCCESS, Result
 
 STOPPED = "it was stopped, and may not be started again"
 

@@ -13,8 +13,8 @@ from rbxcompose.missions.engine.events import MissionEvent
 from rbxcompose.missions.engine.logbook import BEGIN, INPUTS, LogRecord, record_of
 from rbxcompose.missions.engine.snapshot import NoValue, from_plain
 from rbxcompose.missions.engine.world import PLAIN, Settings
+from rbxcompose.missions.program.outcomes import Result
 from rbxcompose.missions.program.program import Program, RobotNames
-from rbxcompose.missions.program.statuses import Result
 
 MOST_WORK = 600_000  # nodes that are started or continued, in all runs of a log: enough for all that a robot keeps
 _WORK_TO_BUILD = 5  # for one node

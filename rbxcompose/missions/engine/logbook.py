@@ -16,7 +16,7 @@ from rbxcompose.base.expressions.values import NotArrived, Value
 from rbxcompose.missions.engine.events import MissionEvent
 from rbxcompose.missions.engine.snapshot import to_plain
 from rbxcompose.missions.engine.world import Settings, World
-from rbxcompose.missions.program.statuses import Result
+from rbxcompose.missions.program.outcomes import Result
 
 BEGIN, TICK, PAUSE, RESUME, ABORT = "begin", "tick", "pause", "resume", "abort"
 INPUTS = frozenset({BEGIN, TICK, PAUSE, RESUME, ABORT})

@@ -14,8 +14,8 @@ from rbxcompose.missions.engine.resume_points import DEEP
 from rbxcompose.missions.engine.scopes import MissionScope, SinceScope
 from rbxcompose.missions.language.asked import Asked
 from rbxcompose.missions.program.in_turn import WithHistory
+from rbxcompose.missions.program.outcomes import FAILURE, RUNNING, SUCCESS, words
 from rbxcompose.missions.program.program import CONTINUE, END, Program, RobotNames, Target
-from rbxcompose.missions.program.statuses import FAILURE, RUNNING, SUCCESS, words
 
 
 def since_scope(outer: MissionScope, asked: Sequence[Asked], robot: RobotNames, program: Program) -> SinceScope:

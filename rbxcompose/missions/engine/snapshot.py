@@ -20,7 +20,7 @@ from rbxcompose.missions.engine.course import Course
 from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.run import Run
 from rbxcompose.missions.engine.task import Task
-from rbxcompose.missions.program.statuses import Result
+from rbxcompose.missions.program.outcomes import Result
 
 VERSION = 2
 _CLASSES: Mapping[str, type[Any]] = {cls.__name__: cls for cls in (Place, Pose2, HeldNode, Result)}

@@ -40,7 +40,7 @@ class MissionStory:
         self._labels: dict[int, str] = {}  # what each leaf did last: `go_to corner_1`
         self._results: dict[str, Counter[str]] = {}
 
-    def tell(self, event: MissionEvent) -> tuple[Level, str]:
+    def line(self, event: MissionEvent) -> tuple[Level, str]:
         """Return how bad an event is, and its line, which is empty if other events say the same."""
         match event:
             case SkillStarted(leaf=leaf, skill=skill, arguments=arguments):

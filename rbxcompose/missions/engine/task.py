@@ -12,8 +12,8 @@ from rbxcompose.base.expressions.values import Value
 from rbxcompose.missions.engine.engine_base import EngineBase, RunBase
 from rbxcompose.missions.engine.events import Reported
 from rbxcompose.missions.engine.scopes import ItemScope, MissionScope
+from rbxcompose.missions.program.outcomes import FAILURE, IDLE, RUNNING, NodeFailed, words
 from rbxcompose.missions.program.program import MissionNode, Target
-from rbxcompose.missions.program.statuses import FAILURE, IDLE, RUNNING, NodeFailed, words
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,7 @@ class Task(ABC):
     saved: ClassVar[tuple[str, ...]] = ()
     times: ClassVar[tuple[str, ...]] = ()  # those of `saved` that are times [s]
     fresh: ClassVar[tuple[str, ...]] = ()  # those without a meaning until the next start computes them
-    told: ClassVar[tuple[str, ...]] = ()  # those that affect only what is reported
+    reported: ClassVar[tuple[str, ...]] = ()  # those that affect only what is reported
 
     def __init__(self, site: Site) -> None:
         self.engine = site.engine

@@ -7,8 +7,8 @@ from typing import Any, ClassVar, Protocol
 
 from rbxcompose.base.expressions.values import Value
 from rbxcompose.missions.program.goals import SUCCESS, values_of
+from rbxcompose.missions.program.outcomes import Result
 from rbxcompose.missions.program.program import Program, RobotNames, Skill
-from rbxcompose.missions.program.statuses import Result
 from rbxcompose.missions.sources import OUTCOME, SkillSource, TopicSource, ValueSource
 from rbxcompose.msgs.std_srvs import SetBool
 from rbxcompose.sdk.bound import Ended, Outcome, Reply, SentGoal
@@ -171,12 +171,12 @@ class Waiting(Errand):
         if not self.send():
             self.wait(f"{self.nobody} {self.name}", f"{self.nobody} {self.name}")
 
-    def wait(self, told: str, why: str) -> None:
+    def wait(self, text: str, why: str) -> None:
         """Wait for a server; at the timeout, fail with this reason."""
         now = self._shell.now
         self.is_sent, self.why = False, why
         self.earliest, self.until = now + LOOK_AGAIN, now + BACK_WITHIN
-        self._shell.warn(f"{told}; waiting for up to {BACK_WITHIN:.0f} s")
+        self._shell.warn(f"{text}; waiting for up to {BACK_WITHIN:.0f} s")
 
     def next_look(self) -> float | None:
         """Return when to poll it next [s]; None while a server works on it."""
@@ -281,15 +281,15 @@ def _result(skill: Skill, ended: Ended[Any]) -> Result:
     """Return the result of a goal; the fields `outcome` and `message` give its outcome and reason."""
     values = values_of(ended.result)
     is_good = ended.outcome is Outcome.SUCCEEDED
-    told = values.get(OUTCOME) if skill.outcomes else ""
+    text = values.get(OUTCOME) if skill.outcomes else ""
     reason = ended.message or text_in(values) or ("" if is_good else str(ended.outcome))
-    return Result(is_good, reason, told if isinstance(told, str) else "", values)
+    return Result(is_good, reason, text if isinstance(text, str) else "", values)
 
 
 def text_in(values: Mapping[str, Value]) -> str:
     """Return the reason in the fields of a result, a response or an end; empty if there is none."""
-    told = values.get(MESSAGE, "")
-    return told if isinstance(told, str) else ""
+    text = values.get(MESSAGE, "")
+    return text if isinstance(text, str) else ""
 
 
 class CallErrand(Waiting):

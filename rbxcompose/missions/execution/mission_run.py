@@ -17,8 +17,8 @@ from rbxcompose.missions.engine.logbook import LoggedWorld, LogRecord
 from rbxcompose.missions.engine.story import MissionStory
 from rbxcompose.missions.engine.world import PLAIN, POSE, Settings, World
 from rbxcompose.missions.execution.world import RobotWorld
+from rbxcompose.missions.program.outcomes import IDLE, NAMES, RUNNING, Result
 from rbxcompose.missions.program.program import Program, RobotNames, Skill
-from rbxcompose.missions.program.statuses import IDLE, NAMES, RUNNING, Result
 from rbxcompose.missions.view.replica import Mirror
 
 BLOCK = 200  # records that are packed together, into about a tenth of their memory
@@ -58,11 +58,11 @@ ROUNDING = 1e-6  # [s]
 LAST = 20  # transitions that viewers get
 
 MakeWorld = Callable[[Callable[[int, Result], None], Callable[[MissionEvent], None]], tuple[World, RobotWorld]]
-Tell = Callable[[Level, str], None]
+OnLine = Callable[[Level, str], None]
 
 
 class MissionRun:
-    """Runs a mission, with time as an argument; `tell` takes the lines of its story, `write` the records of its log."""
+    """Runs a mission, with time as an argument; `on_line` takes the lines of its story, `write` its log's records."""
 
     def __init__(
         self,
@@ -70,7 +70,7 @@ class MissionRun:
         names: RobotNames,
         inputs: Mapping[str, Value],
         make: MakeWorld,
-        tell: Tell,
+        on_line: OnLine,
         write: logbook.Write,
         *,
         name: str,
@@ -83,7 +83,7 @@ class MissionRun:
         self.patient_until: float | None = None  # [s] of the next warning while it waits for its first values
         self.story = MissionStory(name, names.skills)
         self.transitions: deque[dict[str, Any]] = deque(maxlen=LAST)
-        self._tell, self._now = tell, 0.0
+        self._on_line, self._now = on_line, 0.0
         world, self.robot = make(self._ended, self._said)
         self.log = LoggedWorld(world, lambda record: write({"time": self._now, "mission": name, **record}))
         self.engine = Engine(program, names, inputs, self.log, settings)
@@ -179,7 +179,7 @@ class MissionRun:
         self.engine.ended(leaf, result)
 
     def _said(self, event: MissionEvent) -> None:
-        level, text = self.story.tell(event)
+        level, text = self.story.line(event)
         if isinstance(event, MissionEnded):
             self.end = event
         if isinstance(event, Transition):
@@ -193,7 +193,7 @@ class MissionRun:
                 }
             )
         if text:
-            self._tell(level, text)
+            self._on_line(level, text)
 
 
 def claims_of(program: Program, skills: Mapping[str, Skill]) -> frozenset[str]:

@@ -16,19 +16,21 @@ from rbxcompose.missions.execution.errands import Equipment
 from rbxcompose.missions.execution.mission_run import LogStore, MakeWorld, MissionRun, claims_of
 from rbxcompose.missions.execution.requests import ListedMission, ListMissions, LogPart, LookAtAll, PictureData, Seen
 from rbxcompose.missions.program.linker import link
+from rbxcompose.missions.program.outcomes import IDLE, NAMES
 from rbxcompose.missions.program.program import Program
-from rbxcompose.missions.program.statuses import IDLE, NAMES
 from rbxcompose.missions.view.picture import picture_of, picture_to_data
 from rbxcompose.sdk.bound import Window
 
-Told = Callable[[str, Level, str], None]  # mission, level, line of its story
+OnLine = Callable[[str, Level, str], None]  # mission, level, line of its story
 
 
 class RunningMissions:
     """The running missions, in the order in which they began, and ended ones until they run again."""
 
-    def __init__(self, equipment: Equipment, make: MakeWorld, tell: Told, publish: Callable[[LogRecord], None]) -> None:
-        self._equipment, self.make, self._tell, self._publish = equipment, make, tell, publish
+    def __init__(
+        self, equipment: Equipment, make: MakeWorld, on_line: OnLine, publish: Callable[[LogRecord], None]
+    ) -> None:
+        self._equipment, self.make, self._on_line, self._publish = equipment, make, on_line, publish
         self.observer: Observer | None = None  # of all that begin from now on
         self.runs: dict[str, MissionRun] = {}
         self._log = LogStore()
@@ -68,7 +70,7 @@ class RunningMissions:
             self._equipment.names,
             inputs,
             self.make,
-            lambda level, text: self._tell(name, level, text),
+            lambda level, text: self._on_line(name, level, text),
             lambda record: self._write({**record, "run": number}),
             name=name,
             settings=settings,
@@ -173,10 +175,10 @@ class Broadcast:
         self._list = open_window(PATH, ListMissions())
         self._feeds = {name: MissionFeed(open_window(f"{PATH}/{name}", LookAtAll(name))) for name in names}
 
-    def tell(self, missions: RunningMissions) -> None:
+    def publish(self, missions: RunningMissions) -> None:
         """Publish what has changed; nothing is prepared without a viewer."""
         for name, run in missions.runs.items():
-            self._feeds[name].tell(run)
+            self._feeds[name].publish(run)
 
 
 class MissionFeed:
@@ -185,18 +187,18 @@ class MissionFeed:
     def __init__(self, window: Window) -> None:
         self._window = window
         self._run: MissionRun | None = None
-        self._told: dict[str, Any] = {}
+        self._published: dict[str, Any] = {}
 
-    def tell(self, run: MissionRun) -> None:
+    def publish(self, run: MissionRun) -> None:
         """Send what is new, if there is a subscriber and something new."""
         if not self._window.is_watched:
             return
         if run is not self._run:
-            self._run, self._told = run, {}
-        seen = run.seen(self._told.get("version", 0))
-        fresh = {key: value for key, value in seen.items() if key in _ALWAYS or self._told.get(key) != value}
+            self._run, self._published = run, {}
+        seen = run.seen(self._published.get("version", 0))
+        fresh = {key: value for key, value in seen.items() if key in _ALWAYS or self._published.get(key) != value}
         fresh |= {"statuses": seen["statuses"], "data": seen["data"]}
-        if all(self._told.get(key) == seen[key] for key in ("version", "state", "transitions", "began")):
+        if all(self._published.get(key) == seen[key] for key in ("version", "state", "transitions", "began")):
             return
-        self._told = seen
+        self._published = seen
         self._window.put(fresh)

@@ -7,8 +7,8 @@ from typing import Any, TypeVar
 
 from rbxcompose.base.expressions.values import Value
 from rbxcompose.missions.execution.errands import Errand, Shell, WhenDone
-from rbxcompose.missions.program.statuses import Result
-from rbxcompose.sdk.skills import Activity, SkillType, Told
+from rbxcompose.missions.program.outcomes import Result
+from rbxcompose.sdk.skills import Activity, Returned, SkillType
 
 LONGEST = 0.005  # [s] in one call, during which all missions wait
 WORDS = ("success", "failure")
@@ -31,8 +31,8 @@ class PythonErrand(Errand):
     def begin(self) -> None:
         """Call the function, or start the activity; an exception is a failure of the leaf."""
         if not self._declared.is_activity:
-            told = self._timed(lambda: self._declared.make(**self._arguments))
-            self.end(result_of(True if told is None else told))
+            returned = self._timed(lambda: self._declared.make(**self._arguments))
+            self.end(result_of(True if returned is None else returned))
             return
         made: Any = self._timed(self._declared.make)
         self._timed(lambda: made.start(**self._arguments))
@@ -69,8 +69,8 @@ class PythonErrand(Errand):
             return
         self._due = now + 1.0 / activity.rate
         try:
-            told = self._timed(lambda: activity.step(now))
-            result = None if told is None else result_of(told)
+            returned = self._timed(lambda: activity.step(now))
+            result = None if returned is None else result_of(returned)
         except Exception as error:  # whatever a plug-in raises is its own failure, and reported as such
             result = _raised(error)
         if result is not None:
@@ -96,20 +96,20 @@ class PythonErrand(Errand):
         return result
 
 
-def result_of(told: Told) -> Result:
+def result_of(returned: Returned) -> Result:
     """Return the result that a skill gives as True, False, a word or a map.
 
     Raises:
         TypeError: if it is something else.
     """
-    match told:
+    match returned:
         case bool():
-            return Result(told)
+            return Result(returned)
         case str():
-            return Result(told == WORDS[0], outcome="" if told in WORDS else told)
+            return Result(returned == WORDS[0], outcome="" if returned in WORDS else returned)
         case Mapping():
-            return Result(True, values=dict(told))
-    raise TypeError(f"a skill returns True, False, an outcome or a map, and not {told!r}")
+            return Result(True, values=dict(returned))
+    raise TypeError(f"a skill returns True, False, an outcome or a map, and not {returned!r}")
 
 
 def _raised(error: Exception) -> Result:

@@ -7,7 +7,7 @@ from typing import Any
 
 from rbxcompose.missions.execution.errands import ENDS, GONE, HALTS, SKILL, Shell, Waiting, WhenDone, port_name, text_in
 from rbxcompose.missions.program.goals import SUCCESS, values_of
-from rbxcompose.missions.program.statuses import Result
+from rbxcompose.missions.program.outcomes import Result
 from rbxcompose.missions.sources import OUTCOME, SkillSource
 from rbxcompose.msgs import registry
 from rbxcompose.sdk.bound import OrderSender
@@ -38,11 +38,11 @@ class Desk:
         if self.current is errand:
             self.current = None
 
-    def told(self, message: Any) -> None:
+    def ended(self, message: Any) -> None:
         """Handle an end. One that arrives while no order is under way belongs to an abandoned order."""
         current = self.current
         if current is not None and current.is_sent:
-            current.told(message)
+            current.ended(message)
             return
         self.closed_until = -math.inf
         if current is not None:
@@ -71,10 +71,10 @@ class Desks:
             self._shell.bound[asked].watch(desk.changed)
         return desk
 
-    def told(self, port: str, message: Any) -> None:
+    def ended(self, port: str, message: Any) -> None:
         """Handle the end of an order; ignore it if nothing waits for it."""
         if port in self._desks:
-            self._desks[port].told(message)
+            self._desks[port].ended(message)
 
 
 class TopicErrand(Waiting):
@@ -117,12 +117,13 @@ class TopicErrand(Waiting):
         self._give_up()
         self.end(Result(False, REPLACED))
 
-    def told(self, message: Any) -> None:
+    def ended(self, message: Any) -> None:
         """Handle its end."""
         values = values_of(message)
-        told = values.get(OUTCOME) if self._source.skill.outcomes else ""
-        outcome = told if isinstance(told, str) else ""
-        self.end(Result(values.get(SUCCESS) is True, text_in(values), outcome, values))
+        outcome = values.get(OUTCOME) if self._source.skill.outcomes else ""
+        self.end(
+            Result(values.get(SUCCESS) is True, text_in(values), outcome if isinstance(outcome, str) else "", values)
+        )
 
     def changed(self) -> None:
         """Check whether any of the subscribers that it was sent to is left."""

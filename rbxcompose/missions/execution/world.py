@@ -24,7 +24,7 @@ from rbxcompose.missions.execution.errands import (
 from rbxcompose.missions.execution.python_skills import PythonErrand
 from rbxcompose.missions.execution.topic_skills import Desks, TopicErrand
 from rbxcompose.missions.program.goals import filled, goal_of, message_of
-from rbxcompose.missions.program.statuses import Result
+from rbxcompose.missions.program.outcomes import Result
 from rbxcompose.missions.sources import SkillWay, ValueSource
 from rbxcompose.msgs import registry
 from rbxcompose.sdk.skills import skill_type
@@ -91,7 +91,7 @@ class RobotWorld:
         ended: Callable[[int, Result], None],
         say: Callable[[MissionEvent], None],
     ) -> None:
-        self._shell, self._arrivals, self._desks, self._told, self._say = shell, arrivals, desks, ended, say
+        self._shell, self._arrivals, self._desks, self._on_end, self._say = shell, arrivals, desks, ended, say
         self._errands: dict[int, Errand] = {}
 
     # Values
@@ -188,4 +188,4 @@ class RobotWorld:
 
     def _ended(self, leaf: int, result: Result) -> None:
         self._errands.pop(leaf, None)
-        self._told(leaf, result)
+        self._on_end(leaf, result)

@@ -10,10 +10,9 @@ from rbxcompose.missions.language.fields import contents, message
 from rbxcompose.missions.program.answers import NodeEffects
 from rbxcompose.missions.program.families import LeafStep, ends
 from rbxcompose.missions.program.machines import MessageTemplate
-from rbxcompose.missions.program.outcomes import ANY
+from rbxcompose.missions.program.outcomes import ANY, RUNNING
 from rbxcompose.missions.program.program import MissionNode
 from rbxcompose.missions.program.registry import kind
-from rbxcompose.missions.program.statuses import RUNNING
 from rbxcompose.msgs import registry
 
 

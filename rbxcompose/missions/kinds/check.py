@@ -8,9 +8,8 @@ from rbxcompose.base.expressions.tree import Expression
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.fields import condition
 from rbxcompose.missions.program.families import LeafStep, ends
-from rbxcompose.missions.program.outcomes import ANY
+from rbxcompose.missions.program.outcomes import ANY, FAILURE, SUCCESS
 from rbxcompose.missions.program.registry import kind
-from rbxcompose.missions.program.statuses import FAILURE, SUCCESS
 
 
 class CheckTask(Task):

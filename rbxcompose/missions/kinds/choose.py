@@ -11,10 +11,9 @@ from rbxcompose.missions.language.asked import Asked
 from rbxcompose.missions.language.fields import cases, child, value
 from rbxcompose.missions.program.branches import BranchChoice
 from rbxcompose.missions.program.families import Choosing
-from rbxcompose.missions.program.outcomes import ALWAYS_FAILS, ALWAYS_SUCCEEDS, Outcomes, either
+from rbxcompose.missions.program.outcomes import ALWAYS_FAILS, ALWAYS_SUCCEEDS, SKIPPED, Outcomes, either
 from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.registry import kind
-from rbxcompose.missions.program.statuses import SKIPPED
 
 
 class ChooseTask(Task):

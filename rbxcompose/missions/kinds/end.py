@@ -7,9 +7,8 @@ from rbxcompose.base.expressions.text import Template
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.fields import choice, text
 from rbxcompose.missions.program.families import Deed, ends
-from rbxcompose.missions.program.outcomes import FAILS, NEVER, SUCCEEDS
+from rbxcompose.missions.program.outcomes import FAILS, FAILURE, NEVER, RUNNING, SUCCEEDS, SUCCESS
 from rbxcompose.missions.program.registry import kind
-from rbxcompose.missions.program.statuses import FAILURE, RUNNING, SUCCESS
 
 
 class EndTask(Task):

@@ -6,10 +6,9 @@ from collections.abc import Iterator
 
 from rbxcompose.missions.program.answers import NodeFlow, NodeLook, Possibility, started
 from rbxcompose.missions.program.in_turn import RANDOM, InTurn, InTurnTask
-from rbxcompose.missions.program.outcomes import FAILS, SUCCEEDS
+from rbxcompose.missions.program.outcomes import FAILS, SUCCEEDS, SUCCESS
 from rbxcompose.missions.program.program import MissionNode, RobotNames
 from rbxcompose.missions.program.registry import kind
-from rbxcompose.missions.program.statuses import SUCCESS
 
 
 class FallbackTask(InTurnTask):

@@ -19,10 +19,9 @@ from rbxcompose.missions.language.fields import child, choice, flag, item_name, 
 from rbxcompose.missions.program.answers import NO_EFFECTS, NodeEffects, NodeFlow, NodeLook
 from rbxcompose.missions.program.families import Loop
 from rbxcompose.missions.program.outcomes import ANY as ANYHOW
-from rbxcompose.missions.program.outcomes import Outcomes
+from rbxcompose.missions.program.outcomes import FAILURE, RUNNING, SKIPPED, SUCCESS, NodeFailed, Outcomes
 from rbxcompose.missions.program.program import NOTHING, Endings, MissionNode, Target
 from rbxcompose.missions.program.registry import kind
-from rbxcompose.missions.program.statuses import FAILURE, RUNNING, SKIPPED, SUCCESS, NodeFailed
 
 WRITTEN, RANDOM, NEAREST = "written", "random", "nearest"
 STOP, NEXT = "stop", "next"

@@ -9,10 +9,9 @@ from rbxcompose.missions.analysis.facts import is_simple
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.fields import child, condition
 from rbxcompose.missions.program.families import Choosing
-from rbxcompose.missions.program.outcomes import ALWAYS_FAILS, ALWAYS_SUCCEEDS, Outcomes, either
+from rbxcompose.missions.program.outcomes import ALWAYS_FAILS, ALWAYS_SUCCEEDS, SKIPPED, Outcomes, either
 from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.registry import kind
-from rbxcompose.missions.program.statuses import SKIPPED
 
 
 class IfTask(Task):

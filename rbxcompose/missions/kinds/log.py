@@ -10,10 +10,9 @@ from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.fields import choice, text
 from rbxcompose.missions.program.answers import LEVELS
 from rbxcompose.missions.program.families import Deed
-from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, ANY, Outcomes
+from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, ANY, SUCCESS, Outcomes
 from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.registry import kind
-from rbxcompose.missions.program.statuses import SUCCESS
 
 
 class LogTask(Task):

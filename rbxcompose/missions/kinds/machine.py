@@ -18,10 +18,9 @@ from rbxcompose.missions.program.answers import Advice, Form, NodeFlow, NodeLook
 from rbxcompose.missions.program.families import Loop, Straight
 from rbxcompose.missions.program.in_turn import WithHistory
 from rbxcompose.missions.program.machines import ENDS, FAILED, FINISHED, STATE, MachineStates, Next
-from rbxcompose.missions.program.outcomes import ANY, Outcomes
+from rbxcompose.missions.program.outcomes import ANY, FAILURE, NAMES, RUNNING, SKIPPED, SUCCESS, NodeFailed, Outcomes
 from rbxcompose.missions.program.program import Endings, MissionNode, RobotNames
 from rbxcompose.missions.program.registry import kind
-from rbxcompose.missions.program.statuses import FAILURE, NAMES, RUNNING, SKIPPED, SUCCESS, NodeFailed
 
 
 class MachineTask(WithHistory):

@@ -20,10 +20,20 @@ from rbxcompose.missions.program.branches import (
     read_outcomes,
 )
 from rbxcompose.missions.program.families import Straight
-from rbxcompose.missions.program.outcomes import FAILS, SUCCEEDS, Outcomes, either
+from rbxcompose.missions.program.outcomes import (
+    FAILS,
+    FAILURE,
+    IDLE,
+    RUNNING,
+    SKIPPED,
+    SUCCEEDS,
+    SUCCESS,
+    NodeFailed,
+    Outcomes,
+    either,
+)
 from rbxcompose.missions.program.program import Endings, MissionNode, Target
 from rbxcompose.missions.program.registry import kind
-from rbxcompose.missions.program.statuses import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, NodeFailed
 
 PLAIN = {SUCCEEDS: SUCCEEDS, FAILS: FAILS}
 

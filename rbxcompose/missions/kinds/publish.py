@@ -9,10 +9,9 @@ from rbxcompose.missions.language.fields import contents, message
 from rbxcompose.missions.program.answers import NodeEffects
 from rbxcompose.missions.program.families import Deed, ends
 from rbxcompose.missions.program.machines import MessageTemplate
-from rbxcompose.missions.program.outcomes import ANY
+from rbxcompose.missions.program.outcomes import ANY, SUCCESS
 from rbxcompose.missions.program.program import MissionNode
 from rbxcompose.missions.program.registry import kind
-from rbxcompose.missions.program.statuses import SUCCESS
 
 
 class PublishTask(Task):

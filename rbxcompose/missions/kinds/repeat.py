@@ -12,10 +12,9 @@ from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.fields import child, count_or_forever, duration, watched
 from rbxcompose.missions.program.answers import Advice, NodeFlow, NodeLook
 from rbxcompose.missions.program.families import Loop
-from rbxcompose.missions.program.outcomes import ANY, Outcomes
+from rbxcompose.missions.program.outcomes import ANY, FAILURE, RUNNING, SKIPPED, SUCCESS, Outcomes
 from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.registry import kind
-from rbxcompose.missions.program.statuses import FAILURE, RUNNING, SKIPPED, SUCCESS
 
 
 class RepeatTask(Task):

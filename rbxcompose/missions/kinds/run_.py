@@ -10,10 +10,9 @@ from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.fields import value
 from rbxcompose.missions.program.answers import PLAIN, NodeFlow, Skipped
 from rbxcompose.missions.program.families import Straight
-from rbxcompose.missions.program.outcomes import ALWAYS_FAILS, ANY, Outcomes, either
+from rbxcompose.missions.program.outcomes import ALWAYS_FAILS, ANY, NodeFailed, Outcomes, either
 from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.registry import kind
-from rbxcompose.missions.program.statuses import NodeFailed
 
 
 class RunTask(Task):

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from rbxcompose.missions.program.answers import NodeFlow, NodeLook
 from rbxcompose.missions.program.in_turn import RANDOM, InTurn, InTurnTask
-from rbxcompose.missions.program.outcomes import FAILS, SUCCEEDS
+from rbxcompose.missions.program.outcomes import FAILS, FAILURE, SUCCEEDS
 from rbxcompose.missions.program.registry import kind
-from rbxcompose.missions.program.statuses import FAILURE
 
 
 class SequenceTask(InTurnTask):

@@ -10,10 +10,9 @@ from rbxcompose.missions.language.asked import Assignment
 from rbxcompose.missions.language.fields import assignments
 from rbxcompose.missions.program.answers import NodeEffects
 from rbxcompose.missions.program.families import Deed
-from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, ANY, Outcomes
+from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, ANY, SUCCESS, Outcomes
 from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.registry import kind
-from rbxcompose.missions.program.statuses import SUCCESS
 
 
 class SetTask(Task):

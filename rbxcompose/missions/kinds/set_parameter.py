@@ -13,10 +13,9 @@ from rbxcompose.missions.language.fields import new_name, record, value, word
 from rbxcompose.missions.language.written import getter
 from rbxcompose.missions.program.answers import NodeEffects, WrittenSetting
 from rbxcompose.missions.program.families import LeafStep, ends
-from rbxcompose.missions.program.outcomes import ANY
+from rbxcompose.missions.program.outcomes import ANY, RUNNING
 from rbxcompose.missions.program.program import MissionNode
 from rbxcompose.missions.program.registry import kind
-from rbxcompose.missions.program.statuses import RUNNING
 
 _ENCODED = {  # the number of `rcl_interfaces/ParameterType` and the field of the value, by the type of a setting
     TypeKind.FLAG: (1, "bool_value"),

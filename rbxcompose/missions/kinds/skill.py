@@ -17,10 +17,19 @@ from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.language.written import Getter, getter
 from rbxcompose.missions.program.answers import Possibility, ended
 from rbxcompose.missions.program.families import LeafStep
-from rbxcompose.missions.program.outcomes import ANY, FAILS, SUCCEEDS, Outcomes
+from rbxcompose.missions.program.outcomes import (
+    ANY,
+    FAILS,
+    FAILURE,
+    NAMES,
+    RUNNING,
+    SUCCEEDS,
+    SUCCESS,
+    Outcomes,
+    Result,
+)
 from rbxcompose.missions.program.program import Endings, MissionNode, RobotNames
 from rbxcompose.missions.program.registry import SKILL, kind
-from rbxcompose.missions.program.statuses import FAILURE, NAMES, RUNNING, SUCCESS, Result
 
 
 class SkillTask(Leaf):
@@ -29,7 +38,7 @@ class SkillTask(Leaf):
     __slots__ = ("arguments", "claims", "getters", "is_restartable", "skill", "started")
     saved = (*Leaf.saved, "arguments", "started")
     fresh = ("arguments",)
-    told = ("started",)
+    reported = ("started",)
 
     def __init__(self, site: Site, step: SkillStep) -> None:
         super().__init__(site)

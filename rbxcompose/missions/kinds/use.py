@@ -14,10 +14,9 @@ from rbxcompose.missions.language.written import PLACED, getter, place
 from rbxcompose.missions.program.answers import NodeFlow, NodeLook, Skipped
 from rbxcompose.missions.program.families import Straight
 from rbxcompose.missions.program.in_turn import WithHistory
-from rbxcompose.missions.program.outcomes import Outcomes
+from rbxcompose.missions.program.outcomes import FAILURE, RUNNING, Outcomes
 from rbxcompose.missions.program.program import Endings, MissionNode, Target
 from rbxcompose.missions.program.registry import kind
-from rbxcompose.missions.program.statuses import FAILURE, RUNNING
 
 
 class UseTask(WithHistory):

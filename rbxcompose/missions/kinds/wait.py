@@ -7,10 +7,9 @@ from rbxcompose.base.expressions.tree import Expression, Number
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.fields import duration
 from rbxcompose.missions.program.families import LeafStep
-from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, ANY, Outcomes
+from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, ANY, RUNNING, SUCCESS, Outcomes
 from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.registry import kind
-from rbxcompose.missions.program.statuses import RUNNING, SUCCESS
 
 
 class WaitTask(Task):

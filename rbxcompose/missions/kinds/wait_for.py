@@ -10,10 +10,9 @@ from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.engine.world import Watched
 from rbxcompose.missions.language.fields import watched
 from rbxcompose.missions.program.families import LeafStep
-from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, ANY, Outcomes
+from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, ANY, IDLE, RUNNING, SUCCESS, Outcomes
 from rbxcompose.missions.program.program import Endings, MissionNode
 from rbxcompose.missions.program.registry import kind
-from rbxcompose.missions.program.statuses import IDLE, RUNNING, SUCCESS
 
 
 class WaitForTask(Task):

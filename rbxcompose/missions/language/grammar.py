@@ -131,7 +131,7 @@ def is_empty(node: TreeNode) -> bool:
     return isinstance(node, ScalarNode) and node.plain and not node.text
 
 
-def told(span: Span) -> ScalarNode:
+def placeholder(span: Span) -> ScalarNode:
     """Return a placeholder for a value that needs no further finding."""
     return ScalarNode("", span, filled=BROKEN)
 
@@ -139,10 +139,10 @@ def told(span: Span) -> ScalarNode:
 def without_word(step: MappingNode, words: Words) -> MappingNode:
     """Return a step reduced to its modifiers; its word needs no further finding."""
     left = {key: entry for key, entry in step.entries.items() if key in words.modifiers}
-    return MappingNode({"": Entry(told(step.span), told(step.span)), **left}, step.span)
+    return MappingNode({"": Entry(placeholder(step.span), placeholder(step.span)), **left}, step.span)
 
 
-def is_told(node: TreeNode | None) -> bool:
+def is_reported(node: TreeNode | None) -> bool:
     """Return whether a value, or the word of a step, needs no further finding."""
     if isinstance(node, MappingNode) and "" in node:
         node = node.entries[""].key

@@ -11,7 +11,7 @@ from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNod
 from rbxcompose.missions import codes
 from rbxcompose.missions.engine.value_text import show
 from rbxcompose.missions.language.literals import WrongValue, literal, typed
-from rbxcompose.missions.language.names import NAME, no_name
+from rbxcompose.missions.language.value_reader import NAME, no_name
 from rbxcompose.missions.program.machines import Datum, Input
 from rbxcompose.missions.program.program import RATE
 from rbxcompose.missions.program.registry import kinds

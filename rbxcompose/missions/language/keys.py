@@ -7,7 +7,7 @@ from functools import cache
 
 from rbxcompose.manifest.tree import MappingNode, ScalarNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.grammar import BELOW, Takes, is_told
+from rbxcompose.missions.language.grammar import BELOW, Takes, is_reported
 from rbxcompose.missions.language.value_reader import Nodes
 from rbxcompose.missions.modifiers.registry import modifier_keys
 from rbxcompose.missions.program.registry import StepType, kinds
@@ -64,7 +64,7 @@ def _cure(step: MappingNode) -> str:
 
 def find_key(step: MappingNode, nodes: Nodes) -> tuple[str, StepType | None]:
     """Return the key of a step and its kind, None for a skill; if there is neither, an empty key, with a finding."""
-    if is_told(step):
+    if is_reported(step):
         return "", None
     own = [key for key in step.entries if key not in anywhere()]
     key = next((key for key in own if key in kinds()), own[0] if own else "")

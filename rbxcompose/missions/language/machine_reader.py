@@ -8,11 +8,11 @@ from rbxcompose.base.findings import Span
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode
 from rbxcompose.missions import codes
 from rbxcompose.missions.engine.resume_points import HISTORIES
-from rbxcompose.missions.language.grammar import is_told
+from rbxcompose.missions.language.grammar import is_reported
 from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.language.value_reader import WORDS
 from rbxcompose.missions.program.machines import ENDS, MACHINE_KEYS, MachineStates, Next
-from rbxcompose.missions.program.statuses import FAILURE, NAMES, SUCCESS
+from rbxcompose.missions.program.outcomes import FAILURE, NAMES, SUCCESS
 
 BODIES = ("do", "machine")
 STATE_KEYS = (*BODIES, "on_enter", "on_exit", "next")
@@ -91,7 +91,7 @@ def _next(reader: NodeReader) -> Next | None:
     value = reader.mapping.get("next")
     if value is None:
         return None
-    if is_told(value):
+    if is_reported(value):
         return Next(dict(zip(RESULTS, ENDS, strict=True)))  # so that there are no further findings on its transitions
     if isinstance(value, ScalarNode) and value.text:
         return Next({"": value.text}, {"": value.span})

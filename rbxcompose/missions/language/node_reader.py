@@ -12,7 +12,7 @@ from rbxcompose.base.findings import Span
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions import codes
 from rbxcompose.missions.language.asked import Asked, Assignment, WrittenArgument, expression_of
-from rbxcompose.missions.language.grammar import is_told
+from rbxcompose.missions.language.grammar import is_reported
 from rbxcompose.missions.language.value_reader import Nodes, ValueReader, read_expression
 from rbxcompose.missions.program.answers import DEEDS, LEVELS, OPTIONS, Deeds, Moments
 from rbxcompose.missions.program.machines import MessageTemplate, TemplateShape, WrittenValue
@@ -32,7 +32,7 @@ class NodeReader(ValueReader):
         value = self.mapping.get(key)
         if isinstance(value, MappingNode) and value.entries:
             return value
-        if not is_told(value):
+        if not is_reported(value):
             self.add(codes.WRONG_SHAPE.at(self.key_span(key), f"'{key}' needs {what}"))
         return None
 
@@ -157,7 +157,7 @@ class NodeReader(ValueReader):
         items = value.items if isinstance(value, SequenceNode) else ()
         for index, item in enumerate(items):
             self.child_node(item, str(index))
-        if value and not items and not is_told(value):
+        if value and not items and not is_reported(value):
             self.add(codes.MISSING.at(value.span, f"'{self.key}' needs at least one step"))
 
     def item_name(self, key: str) -> str:
@@ -185,7 +185,7 @@ class NodeReader(ValueReader):
     def assignments(self, key: str) -> tuple[Assignment, ...]:
         """Read a map from names of data to expressions."""
         value = self.mapping.get(key)
-        if is_told(value):
+        if is_reported(value):
             return ()
         if not isinstance(value, MappingNode) or not value.entries:
             message = f"'{key}' needs names and their values"

@@ -9,7 +9,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions.tree import Expression
 from rbxcompose.base.expressions.types import UNKNOWN
 from rbxcompose.base.findings import Finding, Related, Report, Span
-from rbxcompose.manifest.documents import meant_keys, with_keys
+from rbxcompose.manifest.documents import misspelt_keys, with_keys
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode, children, count
 from rbxcompose.missions import codes
 from rbxcompose.missions.analysis.held_nodes import ITEM, PathPattern, matching, pattern_of, with_held
@@ -19,9 +19,9 @@ from rbxcompose.missions.language.grammar import LEVELS, long_form
 from rbxcompose.missions.language.header import read_data, read_inputs, read_rate
 from rbxcompose.missions.language.keys import find_key
 from rbxcompose.missions.language.machine_reader import STATE_KEYS, as_state
-from rbxcompose.missions.language.names import NAME, NAME_HELP, no_name
 from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.language.repair import Repairs
+from rbxcompose.missions.language.value_reader import NAME, NAME_HELP, no_name
 from rbxcompose.missions.modifiers.registry import modifier_keys, modifiers
 from rbxcompose.missions.program import program
 from rbxcompose.missions.program.machines import STATE
@@ -100,7 +100,7 @@ def read_program(
                 codes.UNKNOWN_KEY.misspelt(entry.key.span, message, name, KEYS, "keys of a mission", taken=root.entries)
             )
     is_open = _is_open(root)
-    root = with_keys(root, meant_keys(root, KEYS))
+    root = with_keys(root, misspelt_keys(root, KEYS))
     inputs, data = read_inputs(root.get("inputs"), report), read_data(root.get("data"), report)
     reader = _Reader(report, root, repairs, budget)
     body = _body(root, report)
@@ -130,7 +130,7 @@ def _is_open(root: MappingNode) -> bool:
     """Return whether a mission may have names that could not be read."""
     named = (root.get(key) for key in ("inputs", "data"))
     unread = any(isinstance(node, SequenceNode) or (isinstance(node, ScalarNode) and node.text) for node in named)
-    meant = meant_keys(root, KEYS)
+    meant = misspelt_keys(root, KEYS)
     others = (entry.value for name, entry in root.entries.items() if name not in KEYS and name not in meant)
     return unread or any(isinstance(node, MappingNode) for node in others)
 

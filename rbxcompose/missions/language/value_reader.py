@@ -10,19 +10,35 @@ from rbxcompose.base.expressions.check import quotes_needed
 from rbxcompose.base.expressions.text import Template, TextSlot, parse_template, refuse_foreign
 from rbxcompose.base.expressions.tree import Expression, ExpressionError, Number
 from rbxcompose.base.expressions.types import COUNT, FLAG, TEXT, UNKNOWN, Type, quantity_of
-from rbxcompose.base.findings import Finding, Span, surely_meant
+from rbxcompose.base.findings import Finding, Fix, Span, surely_meant
 from rbxcompose.base.units import NUMBER, TIME
 from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions import codes
 from rbxcompose.missions.language.asked import Asked, expression_of, inner_span
-from rbxcompose.missions.language.grammar import is_told
-from rbxcompose.missions.language.names import NAME, no_name
+from rbxcompose.missions.language.grammar import is_reported
+
+NAME = re.compile(r"[a-z][a-z0-9_]{0,59}")
+NAME_HELP = "names start with a lower-case letter; lower-case letters, digits and underscores follow"
+_BETWEEN = re.compile(r"[\s-]+")
+
+
+def cure(text: str) -> str:
+    """Return the name that a text was meant to be, `go_home` for `Go home`; empty if that is not clear."""
+    meant = _BETWEEN.sub("_", text.strip()).lower()
+    return meant if NAME.fullmatch(meant) else ""
+
+
+def no_name(scalar: ScalarNode, fix: Fix | None = None) -> Finding:
+    """Return the finding on a text that is not a valid name."""
+    meant = cure(scalar.text)
+    help_text = f"write '{meant}': names have lower-case letters, digits and underscores" if meant else NAME_HELP
+    return codes.WRONG_SHAPE.at(scalar.span, f"'{scalar.text}' is not a valid name", help=help_text, fix=fix)
+
 
 FOREVER = "forever"
 WORDS = "it can be"
 _WORDS = re.compile(r"[^\W\d][\w'-]*+(?: (?!(?:and|or|not|in|is)\b)[^\W\d][\w'-]*+[.!?]?)+")  # several words of a text
-
 # Replaces an expression that could not be read, so that the rest can be read nevertheless.
 UNREADABLE = Expression("", Number(0, 0, 0.0, NUMBER))
 
@@ -90,7 +106,7 @@ class ValueReader:
     def scalar(self, key: str, what: str) -> ScalarNode | None:
         """Return an option that must be one word, number or text; None, with a finding, if it is not."""
         value = self.mapping.get(key)
-        if is_told(value):
+        if is_reported(value):
             return None
         if isinstance(value, ScalarNode) and (value.text or not value.plain):
             return value

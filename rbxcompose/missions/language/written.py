@@ -14,7 +14,7 @@ from rbxcompose.manifest.tree import Key, ScalarNode, SequenceNode, TreeNode, ch
 from rbxcompose.missions.engine.task import Task
 from rbxcompose.missions.language.asked import expression_of
 from rbxcompose.missions.language.literals import literal
-from rbxcompose.missions.program.statuses import NodeFailed
+from rbxcompose.missions.program.outcomes import NodeFailed
 
 Getter = Callable[[Task], Value]
 PLACED = (TypeKind.PLACE, TypeKind.POSE)
@@ -72,8 +72,8 @@ def help_with_place(nodes: Mapping[str, TreeNode]) -> str:
     frame = next((frame for frame in _frames(nodes) if frame != MAP), "")
     shown = ", ".join(f"{name}: {found[name]}" for name in _ORDER if name in found)
     place = f"'NAME: {{{shown}}}'" if {"x", "y"} <= found.keys() else "a place"
-    told = f"there are no poses in '{plain(frame, 60)}', all are in '{MAP}': " if frame else ""
-    return f"{told}declare {place} under 'places' of the robot, and write its name"
+    reason = f"there are no poses in '{plain(frame, 60)}', all are in '{MAP}': " if frame else ""
+    return f"{reason}declare {place} under 'places' of the robot, and write its name"
 
 
 def nodes_of(node: TreeNode) -> Mapping[str, TreeNode]:

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from rbxcompose.missions.engine.instant_actions import act, act_safely
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.fields import hook
-from rbxcompose.missions.modifiers.families import Acting
 from rbxcompose.missions.modifiers.registry import Decorator, modifier
-from rbxcompose.missions.program.statuses import FAILURE, SUCCESS
+from rbxcompose.missions.program.modifier import Acting
+from rbxcompose.missions.program.outcomes import FAILURE, SUCCESS
 
 ON_START, ON_SUCCESS, ON_FAILURE, ON_HALT = "on_start", "on_success", "on_failure", "on_halt"
 _ON: Mapping[int, str] = {SUCCESS: ON_SUCCESS, FAILURE: ON_FAILURE}

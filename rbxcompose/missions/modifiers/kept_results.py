@@ -6,9 +6,9 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.fields import new_name
-from rbxcompose.missions.modifiers.families import Plain
 from rbxcompose.missions.modifiers.registry import Decorator, modifier
-from rbxcompose.missions.program.statuses import RUNNING
+from rbxcompose.missions.program.modifier import Plain
+from rbxcompose.missions.program.outcomes import RUNNING
 
 
 class SaveTask(Decorator):

@@ -18,8 +18,7 @@ from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.modifiers.registry import Decorator, modifier
 from rbxcompose.missions.program.answers import Advice, ModifierScope
 from rbxcompose.missions.program.modifier import Modifier
-from rbxcompose.missions.program.outcomes import ALWAYS_FAILS, SUCCEEDS, Outcomes
-from rbxcompose.missions.program.statuses import FAILURE, RUNNING
+from rbxcompose.missions.program.outcomes import ALWAYS_FAILS, FAILURE, RUNNING, SUCCEEDS, Outcomes
 
 SHORTEST = 1e-6  # [s] of a meaningful timeout
 

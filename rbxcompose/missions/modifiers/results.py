@@ -10,8 +10,7 @@ from rbxcompose.missions.language.fields import flag
 from rbxcompose.missions.modifiers.registry import Decorator, modifier
 from rbxcompose.missions.program.answers import ModifierScope
 from rbxcompose.missions.program.modifier import Modifier
-from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, FAILS, SUCCEEDS, Outcomes
-from rbxcompose.missions.program.statuses import FAILURE, SUCCESS
+from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, FAILS, FAILURE, SUCCEEDS, SUCCESS, Outcomes
 
 
 class TurningTask(Decorator):
@@ -51,7 +50,7 @@ class OptionalTask(TurningTask):
     """Keeps in mind whether its node failed, and whether it ever succeeded."""
 
     __slots__ = ("failed", "succeeded")
-    saved = told = ("failed", "succeeded")
+    saved = reported = ("failed", "succeeded")
 
     def __init__(self, site: Site, options: Optional, inner: Task) -> None:
         super().__init__(site, options, inner)

@@ -9,10 +9,10 @@ from rbxcompose.base.expressions.evaluate import holds
 from rbxcompose.base.expressions.tree import Expression
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.fields import condition, duration, flag
-from rbxcompose.missions.modifiers.families import Skipping
 from rbxcompose.missions.modifiers.registry import Decorator, modifier
 from rbxcompose.missions.program.answers import ModifierScope
-from rbxcompose.missions.program.statuses import RUNNING, SKIPPED
+from rbxcompose.missions.program.modifier import Skipping
+from rbxcompose.missions.program.outcomes import RUNNING, SKIPPED
 
 
 class ConditionalTask(Decorator):

@@ -5,9 +5,9 @@ from __future__ import annotations
 from rbxcompose.missions.engine.instant_actions import act, act_safely
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.language.fields import hook
-from rbxcompose.missions.modifiers.families import Acting
 from rbxcompose.missions.modifiers.registry import Decorator, modifier
-from rbxcompose.missions.program.statuses import RUNNING
+from rbxcompose.missions.program.modifier import Acting
+from rbxcompose.missions.program.outcomes import RUNNING
 
 ON_ENTER, ON_EXIT = "on_enter", "on_exit"
 

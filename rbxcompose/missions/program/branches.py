@@ -13,7 +13,7 @@ from rbxcompose.missions import codes
 from rbxcompose.missions.engine.scopes import Inner, MissionScope
 from rbxcompose.missions.language.asked import Asked
 from rbxcompose.missions.language.node_reader import NodeReader
-from rbxcompose.missions.program.statuses import FAILURE, NAMES, SKIPPED, SUCCESS
+from rbxcompose.missions.program.outcomes import FAILURE, NAMES, SKIPPED, SUCCESS
 
 ALL, ANY = "all", "any"
 OTHERWISE, HALTED = "otherwise", "halted"

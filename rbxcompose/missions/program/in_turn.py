@@ -11,9 +11,18 @@ from rbxcompose.missions.engine.world import Watched
 from rbxcompose.missions.language.fields import children, choice, flag, history
 from rbxcompose.missions.program.answers import Skipped
 from rbxcompose.missions.program.families import Straight
-from rbxcompose.missions.program.outcomes import ALWAYS_FAILS, ALWAYS_SUCCEEDS, FAILS, NEVER, Outcomes
+from rbxcompose.missions.program.outcomes import (
+    ALWAYS_FAILS,
+    ALWAYS_SUCCEEDS,
+    FAILS,
+    FAILURE,
+    IDLE,
+    NEVER,
+    RUNNING,
+    SKIPPED,
+    Outcomes,
+)
 from rbxcompose.missions.program.program import Endings, MissionNode
-from rbxcompose.missions.program.statuses import FAILURE, IDLE, RUNNING, SKIPPED
 
 
 class WithHistory(Task):

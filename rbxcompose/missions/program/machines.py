@@ -14,7 +14,7 @@ from rbxcompose.base.expressions.values import Value
 from rbxcompose.base.findings import Span
 from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.engine.resume_points import NO_HISTORY
-from rbxcompose.missions.program.statuses import FAILURE, NAMES, SUCCESS
+from rbxcompose.missions.program.outcomes import FAILURE, NAMES, SUCCESS
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import ClassVar
+from dataclasses import field
+from typing import ClassVar, Self
 
+from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions.tree import Expression
 from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.language.fields import Declared
+from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.program.answers import Advice, ModifierScope, Moments
-from rbxcompose.missions.program.outcomes import Outcomes
+from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, Outcomes
 
 
 class Modifier(Declared, ABC):
@@ -76,3 +79,40 @@ class Modifier(Declared, ABC):
     def moments(self) -> Moments | None:
         """Return what its hooks do."""
         return None
+
+
+class Plain(Modifier):
+    """A modifier that changes nothing about how its node may end, and never keeps it from starting."""
+
+    __slots__ = ()
+    may_skip = False
+    serves = ModifierScope.ALL
+
+    def changed(self, inner: Outcomes) -> Outcomes:
+        """Return the outcomes of the node inside."""
+        return inner
+
+
+@dataclass(frozen=True, slots=True)
+class Acting(Plain):
+    """A modifier whose keys are hooks."""
+
+    moments: Moments = field()
+
+    value = None
+
+    @classmethod
+    def read(cls, reader: NodeReader) -> Self:
+        """Read the hooks that are present."""
+        return cls(reader.moments(cls.fields))
+
+
+class Skipping(Modifier):
+    """A modifier that may keep its node from starting: the node is then skipped, which is no failure."""
+
+    __slots__ = ()
+    may_skip = True
+
+    def changed(self, inner: Outcomes) -> Outcomes:
+        """Return that it may also be skipped."""
+        return inner.both(ALWAYS_SUCCEEDS)

@@ -8,7 +8,7 @@ from rbxcompose.base.findings import Edit, Finding, Fix, nearest
 from rbxcompose.base.slips import Repair
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.grammar import GrammarPlace, Takes, Words, told
+from rbxcompose.missions.language.grammar import GrammarPlace, Takes, Words, placeholder
 from rbxcompose.missions.program.answers import DEEDS, OPTIONS
 from rbxcompose.missions.slips import slip
 
@@ -30,13 +30,13 @@ def steps_below_a_hook(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] 
         word = node.text.partition(" ")[0] if node.plain else ""
         if not is_step(word, place.words):
             return None
-        return Repair(told(node.span), (_cannot_do(place.key.text, ScalarNode(word, node.span)),))
+        return Repair(placeholder(node.span), (_cannot_do(place.key.text, ScalarNode(word, node.span)),))
     steps = [name for name in node.entries if is_step(name, place.words)] if isinstance(node, MappingNode) else []
     if not steps or not isinstance(node, MappingNode):
         return None
     findings = tuple(_cannot_do(place.key.text, node.entries[name].key) for name in steps)
     left = {name: entry for name, entry in node.entries.items() if not is_step(name, place.words)}
-    return Repair(MappingNode(left, node.span) if left else told(node.span), findings)
+    return Repair(MappingNode(left, node.span) if left else placeholder(node.span), findings)
 
 
 def is_step(word: str, words: Words) -> bool:

@@ -11,7 +11,7 @@ from rbxcompose.base.slips import Repair
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions import codes
 from rbxcompose.missions.language.asked import inner_span
-from rbxcompose.missions.language.grammar import GrammarPlace, Takes, told
+from rbxcompose.missions.language.grammar import GrammarPlace, Takes, placeholder
 from rbxcompose.missions.slips import slip
 from rbxcompose.missions.slips.settings import foreign_keys, unknown_settings
 from rbxcompose.missions.slips.steps import misspelt_kind
@@ -69,7 +69,9 @@ def _then(node: MappingNode, value: ScalarNode, found: re.Match[str]) -> Repair[
     message = "'then' needs a line of its own"
     finding = codes.WRONG_SHAPE.at(value.span, message, help=f"write 'then: {_as_step(step)}' below 'if'{other}")
     condition = replace(value, text=written, span=inner_span(value, 0, len(written)))
-    added = {"then": Entry(ScalarNode("then", word), MappingNode({"": Entry(told(word), told(word))}, word))}
+    added = {
+        "then": Entry(ScalarNode("then", word), MappingNode({"": Entry(placeholder(word), placeholder(word))}, word))
+    }
     return Repair(_with(node, "if", condition, added), (finding,))
 
 

@@ -10,8 +10,8 @@ from rbxcompose.base.findings import Edit, Finding, Fix, nearest
 from rbxcompose.base.slips import Repair
 from rbxcompose.manifest.tree import Entry, Key, MappingNode, ScalarNode, TreeNode, children, with_children
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.grammar import GrammarPlace, Takes, told
-from rbxcompose.missions.language.names import NAME, cure, no_name
+from rbxcompose.missions.language.grammar import GrammarPlace, Takes, placeholder
+from rbxcompose.missions.language.value_reader import NAME, cure, no_name
 from rbxcompose.missions.program.machines import ENDS, MACHINE_KEYS
 from rbxcompose.missions.slips import slip
 
@@ -155,4 +155,4 @@ def asking_next(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None:
         "let a 'check' be the last step of this state, and write below 'next' where 'success' and 'failure' lead"
     )
     message = f"'next' takes no conditions: there is no '{asking[0].text}' in it"
-    return Repair(told(node.span), (codes.WRONG_SHAPE.at(asking[0].span, message, help=help_text),))
+    return Repair(placeholder(node.span), (codes.WRONG_SHAPE.at(asking[0].span, message, help=help_text),))

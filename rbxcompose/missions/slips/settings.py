@@ -155,7 +155,7 @@ def foreign_keys(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | None
         return None
     entries = {meant.get(name, name): _named(entry, meant.get(name, name)) for name, entry in node.entries.items()}
     what = f"beside '{kind}'" if kind else _WHAT.get(place.takes, "")
-    findings = tuple(_told(node.entries[theirs], ours, what) for theirs, ours in meant.items())
+    findings = tuple(_report(node.entries[theirs], ours, what) for theirs, ours in meant.items())
     return Repair(MappingNode(entries, node.span), findings)
 
 
@@ -170,7 +170,7 @@ def _named(entry: Entry, name: str) -> Entry:
     return entry if entry.key.text == name else Entry(replace(entry.key, text=name), entry.value)
 
 
-def _told(entry: Entry, ours: str, what: str) -> Finding:
+def _report(entry: Entry, ours: str, what: str) -> Finding:
     theirs = entry.key.text
     fix = replacement(entry.key.span, theirs, ours, is_safe=False)  # its value may have another form
     help_text = f"{DID_YOU_MEAN} '{ours}'?"

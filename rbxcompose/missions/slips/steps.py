@@ -9,7 +9,7 @@ from rbxcompose.base.findings import DID_YOU_MEAN, Edit, Finding, Fix, nearest, 
 from rbxcompose.base.slips import Repair
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions import codes
-from rbxcompose.missions.language.grammar import GrammarPlace, Takes, Words, told, without_word
+from rbxcompose.missions.language.grammar import GrammarPlace, Takes, Words, placeholder, without_word
 from rbxcompose.missions.language.keys import FOREIGN
 from rbxcompose.missions.slips import slip
 from rbxcompose.missions.slips.machines import keys_outside_their_machine
@@ -74,11 +74,11 @@ def words_run_together(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] 
     own = place.words.own(node) if isinstance(node, MappingNode) else []
     if not own or not isinstance(node, MappingNode):
         return None
-    finding = _told(node.entries[place.words.kind_of(node) or own[0]].key)
+    finding = _report(node.entries[place.words.kind_of(node) or own[0]].key)
     return Repair(without_word(node, place.words), (finding,)) if finding else None
 
 
-def _told(key: ScalarNode) -> Finding | None:
+def _report(key: ScalarNode) -> Finding | None:
     words = key.text.split()
     if _TIGHT_COLON.fullmatch(key.text):
         name, _, value = key.text.partition(":")
@@ -107,7 +107,7 @@ def missing_dashes(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | No
     if isinstance(node, ScalarNode) or not node.entries:
         word = node.text.split()[0] if isinstance(node, ScalarNode) and node.text.strip() else "go_to: dock"
         help_text = f"write each step on a line of its own below '{key.text}:', such as '- {word}'"
-        return Repair(told(node.span), (codes.WRONG_SHAPE.at(key.span, message, help=help_text),))
+        return Repair(placeholder(node.span), (codes.WRONG_SHAPE.at(key.span, message, help=help_text),))
     first = next(iter(node.entries.values()))
     shown = f"- {first.key.text}" + (f": {first.value.text}" if isinstance(first.value, ScalarNode) else ":")
     help_text = f"put a dash before each step: '{shown.removesuffix(': ')}'"

@@ -12,8 +12,8 @@ from rbxcompose.manifest.slips.lists import bracketed, without_brackets
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions import codes
 from rbxcompose.missions.language.asked import inner_span
-from rbxcompose.missions.language.grammar import GrammarPlace, Takes, told
-from rbxcompose.missions.language.names import NAME, no_name
+from rbxcompose.missions.language.grammar import GrammarPlace, Takes, placeholder
+from rbxcompose.missions.language.value_reader import NAME, no_name
 from rbxcompose.missions.program.program import RESTART
 from rbxcompose.missions.slips import slip
 
@@ -33,12 +33,12 @@ def assigned_in_line(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | 
     if found is None:
         message = f"'{key.text}' needs names and their values"
         help_text = f"write {_EXAMPLE} on the line below '{key.text}:', further right"
-        return Repair(told(node.span), (codes.WRONG_SHAPE.at(key.span, message, help=help_text),))
+        return Repair(placeholder(node.span), (codes.WRONG_SHAPE.at(key.span, message, help=help_text),))
     name, sign, value = found["name"], found["sign"].strip(), found["value"]
     if node.span.line != node.span.end_line:
         message = f"below '{key.text}', write each name on a line of its own, followed by a colon"
         finding = codes.WRONG_SHAPE.at(node.span, message, help=f"write {_EXAMPLE}, such as '{name}: 1'")
-        return Repair(told(node.span), (finding,))
+        return Repair(placeholder(node.span), (finding,))
     if sign in ("+=", "-="):
         value = f"${name} {sign[0]} {value}" if value.split() == [value] else f"${name} {sign[0]} ({value})"
     meant = f"{name}: {value}"
@@ -72,13 +72,13 @@ def count_in_words(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | No
         return None
     key, forever = place.key.text, ENDLESS.get(node.text, "")
     if forever in place.choices:
-        meant, told = forever, codes.NOT_A_CHOICE.at(node.span, f"'{key}' cannot be '{node.text}'")
+        meant, finding = forever, codes.NOT_A_CHOICE.at(node.span, f"'{key}' cannot be '{node.text}'")
     elif meant := _digits(node):
-        told = codes.WRONG_TYPE.at(node.span, f"'{key}' takes only a number in digits")
+        finding = codes.WRONG_TYPE.at(node.span, f"'{key}' takes only a number in digits")
     else:
         return None
     fix = replacement(node.span, node.text, meant)
-    return Repair(replace(node, text=meant), (replace(told, help=f"write '{meant}'", fix=fix),))
+    return Repair(replace(node, text=meant), (replace(finding, help=f"write '{meant}'", fix=fix),))
 
 
 def _digits(node: ScalarNode) -> str:

@@ -89,9 +89,9 @@ class Replica:
             self.seen = self._join({}, message["value"])
         waiting = [entry for entry in self._waiting if entry["source"] == self._source]
         self._waiting.clear()
-        return [entry for entry in waiting if self.heard(entry)] != []
+        return [entry for entry in waiting if self.apply(entry)] != []
 
-    def heard(self, message: Mapping[str, Any]) -> bool:
+    def apply(self, message: Mapping[str, Any]) -> bool:
         """Apply an update; return whether a full state must be queried."""
         is_known = message["source"] == self._source
         if is_known and message["sequence"] <= self._sequence:

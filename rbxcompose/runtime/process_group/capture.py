@@ -15,7 +15,7 @@ from typing import TextIO
 
 from rbxcompose.base.levels import Level
 
-Told = Callable[[Level, str, str], None]  # level, text, detail; called in the thread that printed
+OnLine = Callable[[Level, str, str], None]  # level, text, detail; called in the thread that printed
 
 _OUTPUT = Path("/proc/self/fd/1")
 
@@ -23,15 +23,15 @@ _OUTPUT = Path("/proc/self/fd/1")
 class Capture:
     """Takes standard output, standard error and all loggers of this process while it is entered."""
 
-    def __init__(self, told: Told) -> None:
-        self._told = told
-        self._is_telling = threading.local()
+    def __init__(self, on_line: OnLine) -> None:
+        self._on_line = on_line
+        self._is_passing = threading.local()
 
     def __enter__(self) -> Capture:
         self._before = sys.stdout, sys.stderr
-        sys.stdout = _Lines(sys.__stdout__, lambda line: self._tell(Level.OK, line))
-        sys.stderr = _Lines(sys.__stderr__, lambda line: self._tell(Level.WARN, line))
-        self._handler = _Handler(self._tell)
+        sys.stdout = _Lines(sys.__stdout__, lambda line: self._pass_on(Level.OK, line))
+        sys.stderr = _Lines(sys.__stderr__, lambda line: self._pass_on(Level.WARN, line))
+        self._handler = _Handler(self._pass_on)
         root = logging.getLogger()
         root.addHandler(self._handler)
         self._level = root.level
@@ -50,22 +50,22 @@ class Capture:
         logging.getLogger().removeHandler(self._handler)
         logging.getLogger().setLevel(self._level)
 
-    def _tell(self, level: Level, text: str, detail: str = "") -> None:
-        if getattr(self._is_telling, "now", False):
+    def _pass_on(self, level: Level, text: str, detail: str = "") -> None:
+        if getattr(self._is_passing, "now", False):
             os.write(2, f"{text}\n{detail}".encode(errors="backslashreplace"))  # the log itself reports something
             return
-        self._is_telling.now = True
+        self._is_passing.now = True
         try:
-            self._told(level, text, detail)
+            self._on_line(level, text, detail)
         finally:
-            self._is_telling.now = False
+            self._is_passing.now = False
 
 
 class _Lines(io.TextIOBase):
     """A stream of whole lines; the unfinished line of a thread waits for its rest."""
 
-    def __init__(self, raw: TextIO | None, told: Callable[[str], None]) -> None:
-        self._raw, self._told = raw, told
+    def __init__(self, raw: TextIO | None, on_line: Callable[[str], None]) -> None:
+        self._raw, self._on_line = raw, on_line
         self._begun: dict[int, str] = {}  # by thread
 
     def writable(self) -> bool:
@@ -92,13 +92,13 @@ class _Lines(io.TextIOBase):
 
     def _say(self, line: str) -> None:
         if line.strip():
-            self._told(line.rstrip("\r"))
+            self._on_line(line.rstrip("\r"))
 
 
 class _Handler(logging.Handler):
-    def __init__(self, told: Told) -> None:
+    def __init__(self, on_line: OnLine) -> None:
         super().__init__()
-        self._told = told
+        self._on_line = on_line
 
     def emit(self, record: logging.LogRecord) -> None:
         try:
@@ -108,7 +108,7 @@ class _Handler(logging.Handler):
         except Exception:  # arguments that do not fit their text: logging itself reports it like this
             self.handleError(record)
             return
-        self._told(_level_of(record.levelno), text, detail)
+        self._on_line(_level_of(record.levelno), text, detail)
 
 
 def _level_of(number: int) -> Level:

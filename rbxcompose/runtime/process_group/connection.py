@@ -24,7 +24,7 @@ from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus import zenoh_session as shared_memory
 from rbxcompose.bus.bus import Bus
 from rbxcompose.bus.endpoints import accepts
-from rbxcompose.bus.liveness import Probe, ProbeResult, RollCall, probe_key, roll_key
+from rbxcompose.bus.liveness import PeerCheck, Probe, ProbeResult, probe_key, roll_key
 from rbxcompose.bus.renewal import RenewableTransport
 from rbxcompose.bus.transport import Closable, Question, Transport, TransportReply
 from rbxcompose.bus.zenoh_session import open_lone, open_peer
@@ -299,13 +299,13 @@ class Driver:
         ready = self._wait(max(0.0, min(pause, until_beat)))
         self._inbox.drain(self._scheduler)
         if any(key.fileobj is self._channel for key, _ in ready):
-            self._hear(self._channel.receive())
+            self._receive(self._channel.receive())
 
     def _wait(self, longest: float) -> list[tuple[selectors.SelectorKey, int]]:
         """Wait for channel and inbox, `longest` [s] at most, and return which of them can be read."""
         return self._selector.select(longest)
 
-    def _hear(self, messages: Sequence[ChannelMessage]) -> None:
+    def _receive(self, messages: Sequence[ChannelMessage]) -> None:
         for message in messages:
             self._driven.handle(message)
             self._run_present()  # one message after the other, however they were bundled in transit
@@ -409,7 +409,7 @@ class SteppedDriver(Driver):
 
 
 class ExternalDriver(Driver):
-    """Robot time follows `hear`, event by event, so that a step runs for each instant at which it was due.
+    """Robot time follows `receive`, event by event, so that a step runs for each instant at which it was due.
 
     `turned` is called when outside time stops, runs again or has jumped.
     """
@@ -428,15 +428,15 @@ class ExternalDriver(Driver):
         self._real: Clock | None = None  # counts from `follow` on
 
     def follow(self, real: Clock) -> None:
-        """Begin to follow: from now on `hear` is called, or time stands still. `real` counts from now."""
+        """Begin to follow: from now on `receive` is called, or time stands still. `real` counts from now."""
         self._real = real
 
-    def hear(self, outside: int) -> None:
+    def receive(self, outside: int) -> None:
         """Receive outside time [ns]."""
         if self._real is not None:
-            self._tell(self._clock.hear(outside, real=self._real.now()))
+            self._follow_turn(self._clock.receive(outside, real=self._real.now()))
 
-    def _tell(self, turn: Turn | None) -> None:
+    def _follow_turn(self, turn: Turn | None) -> None:
         if turn is not None:
             self._turned(turn)
 
@@ -446,7 +446,7 @@ class ExternalDriver(Driver):
     def _advance(self) -> None:
         self._run_present()
         if self._real is not None:
-            self._tell(self._clock.look(real=self._real.now()))
+            self._follow_turn(self._clock.look(real=self._real.now()))
         until = time.monotonic() + SLICE
         while self._clock.now() < self._clock.limit and time.monotonic() < until:
             due = self._scheduler.next_due()
@@ -463,12 +463,12 @@ BEATS = 6  # of the process between two calls
 LONGEST_CALL = 2 * BEATS * BEAT  # [s] for an answer; a call is over by then
 
 
-class RollCaller:
+class PeerChecker:
     """The part of one process: calls are answered in Zenoh's threads, since they test the session."""
 
     def __init__(self, transport: Transport, robot: str, host: str, name: str) -> None:
         self._transport, self._key = transport, roll_key(robot, host)
-        self._roll = RollCall(name)
+        self._roll = PeerCheck(name)
         self._beats = 0
         self._call: Closable | None = None
         self._answers: list[bytes] = []
@@ -526,7 +526,7 @@ class Lifeline:
         reopen: Callable[[], Transport],
         router: str,
         *,
-        roll: RollCaller | None,
+        roll: PeerChecker | None,
         owns_router: bool,
         post: Post,
         log: Callable[[str], None],
@@ -559,17 +559,17 @@ class Lifeline:
         if self._beats % LIFELINE_BEATS:
             return
         if self._sent is not None:
-            heard = self._sent.close()
-            is_router_up = heard is ProbeResult.NOBODY and accepts(self._router, KNOCK)
-            if self._probe.judge(heard, is_router_up=is_router_up):
+            result = self._sent.close()
+            is_router_up = result is ProbeResult.NOBODY and accepts(self._router, KNOCK)
+            if self._probe.judge(result, is_router_up=is_router_up):
                 self._renew("no longer carries anything")
                 return
         self._sent = _Sent(self._transport, self._key, of_all=self._probe.is_in_doubt)
 
     @property
-    def heard(self) -> ProbeResult:
+    def result(self) -> ProbeResult:
         """Return the result of the current probe so far."""
-        return self._sent.heard if self._sent is not None else ProbeResult.NOTHING
+        return self._sent.result if self._sent is not None else ProbeResult.NOTHING
 
     def _renew(self, why: str) -> None:
         self._log(f"the session on the bus {why}; opening it again")
@@ -618,21 +618,21 @@ class _Sent:
     """A probe that was sent."""
 
     def __init__(self, transport: Transport, key: str, *, of_all: bool) -> None:
-        self.heard = ProbeResult.NOTHING
+        self.result = ProbeResult.NOTHING
         self._asked = transport.ask(key, b"", b"", self._answered, of_all=of_all, within=LONGEST_PROBE)
 
     def close(self) -> ProbeResult:
         """Stop waiting and return the result."""
-        heard = self.heard
+        result = self.result
         self._asked.close()
-        return heard
+        return result
 
     def _answered(self, given: TransportReply) -> None:
         # In a thread of the transport, so that a loop which is busy for a while does not miss it.
         if not given.error:
-            self.heard = ProbeResult.ANSWER
-        elif self.heard is not ProbeResult.ANSWER:  # each query ends with an error, even after its answers
-            self.heard = ProbeResult.NOBODY
+            self.result = ProbeResult.ANSWER
+        elif self.result is not ProbeResult.ANSWER:  # each query ends with an error, even after its answers
+            self.result = ProbeResult.NOBODY
 
 
 _STARVED = 1.0  # [s] of waiting for a processor, after which a router that does not answer may be late as well
@@ -684,7 +684,7 @@ def open_bus(
         transport,
         opened,
         router,
-        roll=None if is_lone else RollCaller(transport, plan.robot, plan.share.host if plan.share else "", name),
+        roll=None if is_lone else PeerChecker(transport, plan.robot, plan.share.host if plan.share else "", name),
         owns_router=plan.bus.router is None,
         post=inbox.put,
         log=lambda text: log("robot", text),

@@ -37,26 +37,26 @@ class Way:
     """From the bus where somebody gives something to the bus where somebody takes it, with its name on each."""
 
     source: Bus
-    heard: str
+    source_name: str
     sink: Bus
-    told: str
+    sink_name: str
 
 
 def carry_topic(way: Way, message: type[Message], qos: Qos) -> None:
     """Publish for others what is heard."""
-    publisher = way.sink.publisher(OWNER, way.told, message, qos)
-    way.source.subscribe(OWNER, way.heard, message, qos, publisher, may_be_silent=True)
+    publisher = way.sink.publisher(OWNER, way.sink_name, message, qos)
+    way.source.subscribe(OWNER, way.source_name, message, qos, publisher, may_be_silent=True)
 
 
 def carry_service(way: Way, service: type[Service[Any, Any]]) -> None:
     """Serve what is served elsewhere, for as long as it is."""
-    client = way.source.client(OWNER, way.heard, service)
+    client = way.source.client(OWNER, way.source_name, service)
 
     def pass_on(request: ServedRequest[Any, Any]) -> None:
         client(request.message, lambda reply: answer(request, reply), timeout=math.inf)  # its client knows how long
 
     def serve() -> Server[Any, Any]:
-        return way.sink.serve_later(OWNER, way.told, service, pass_on)
+        return way.sink.serve_later(OWNER, way.sink_name, service, pass_on)
 
     _While(client, way.sink, lambda: [serve()])
 
@@ -93,26 +93,32 @@ class CarriedAction:
     """
 
     def __init__(self, way: Way, action: type[Action[Any, Any, Any]]) -> None:
-        heard, self._told = ActionNames.of(way.heard), ActionNames.of(way.told)
+        source_names, self._sink_names = ActionNames.of(way.source_name), ActionNames.of(way.sink_name)
         self._way, self._action = way, action
         self._goals: dict[bytes, bytes] = {}  # GID of the client, by goal that may not have ended
         self._lost: list[bytes] = []  # goals whose server was lost
-        carry_topic(Way(way.source, heard.feedback, way.sink, self._told.feedback), action.FeedbackMessage, Qos.STATE)
-        carry_topic(Way(way.source, heard.status, way.sink, self._told.status), GoalStatusArray, Qos.LATCHED)
-        self._cancel = way.source.client(OWNER, heard.cancel_goal, CancelGoal)
-        self._result: Client[Any, Any] = way.source.client(OWNER, heard.get_result, action.GetResult)
-        self._send: Client[Any, Any] = way.source.client(OWNER, heard.send_goal, action.SendGoal)  # served last
+        carry_topic(
+            Way(way.source, source_names.feedback, way.sink, self._sink_names.feedback),
+            action.FeedbackMessage,
+            Qos.STATE,
+        )
+        carry_topic(
+            Way(way.source, source_names.status, way.sink, self._sink_names.status), GoalStatusArray, Qos.LATCHED
+        )
+        self._cancel = way.source.client(OWNER, source_names.cancel_goal, CancelGoal)
+        self._result: Client[Any, Any] = way.source.client(OWNER, source_names.get_result, action.GetResult)
+        self._send: Client[Any, Any] = way.source.client(OWNER, source_names.send_goal, action.SendGoal)  # served last
         _While(self._send, way.sink, self._serve)
 
     def _serve(self) -> list[Server[Any, Any]]:
         while self._lost:
             self._ask_to_cancel(self._lost.pop())
-        sink, told, action = self._way.sink, self._told, self._action
+        sink, sink_names, action = self._way.sink, self._sink_names, self._action
         return [
-            sink.serve_later(OWNER, told.cancel_goal, CancelGoal, self._on_cancel, rate=GOALS),
-            sink.serve_later(OWNER, told.get_result, action.GetResult, self._on_get_result),
+            sink.serve_later(OWNER, sink_names.cancel_goal, CancelGoal, self._on_cancel, rate=GOALS),
+            sink.serve_later(OWNER, sink_names.get_result, action.GetResult, self._on_get_result),
             sink.serve_later(
-                OWNER, told.send_goal, action.SendGoal, self._on_send, client_left=self._client_left, rate=GOALS
+                OWNER, sink_names.send_goal, action.SendGoal, self._on_send, client_left=self._client_left, rate=GOALS
             ),
         ]
 

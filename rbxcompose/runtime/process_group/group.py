@@ -334,7 +334,7 @@ class ProcessGroup:
             self._notify,
             is_stopped=self._is_stopped,
             is_restart=self._is_restart,
-            **({"told": tape.order} if tape else {}),
+            **({"on_order": tape.order} if tape else {}),
             post=self._inbox.put if isinstance(self._clock, MonotonicClock) else None,
             deciders=Deciders(rules=self._rules) if self._options.is_stepped else Deciders(self._channel.send),
         )
@@ -432,7 +432,7 @@ class ProcessGroup:
             CLOCK_TOPIC,
             ClockMessage,
             Qos.COMMAND,
-            lambda message: driver.hear(to_nanoseconds(message.clock)),
+            lambda message: driver.receive(to_nanoseconds(message.clock)),
             max_rate=math.inf,  # a limit counts in robot time, which might stand still until this message advances it
         )
         driver.follow(MonotonicClock())

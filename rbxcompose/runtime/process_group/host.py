@@ -56,7 +56,7 @@ class Deliveries:
         self._every: Callable[[], object] = lambda: scheduler.every(PERIOD, owner, lambda dt: self._look())
         self._writers = bus.watch_writers(owner)
         self._started = 0.0  # [s]
-        self._told: set[str] = set()  # names of unhealthy statuses
+        self._unhealthy: set[str] = set()  # names of unhealthy statuses
 
     def start(self) -> None:
         """Begin to check: the whole robot is active, and all publishers may publish."""
@@ -77,9 +77,9 @@ class Deliveries:
                 troubled.add(name)
                 text = sentence(gate.name, news, "request")
                 self._statuses.set(name, Level.WARN, text, {"refused": gate.refusals.total})
-        for name in self._told - troubled:
+        for name in self._unhealthy - troubled:
             self._statuses.set(name, Level.OK, "messages arrive as they should", {})
-        self._told = troubled
+        self._unhealthy = troubled
 
     def _trouble(self, subscription: Subscription[Any]) -> str:
         if news := subscription.refusals.news():
@@ -92,7 +92,7 @@ A = TypeVar("A")
 SLOW = 0.005  # [s] in one callback, after which diagnostics name it: nothing else in the process runs meanwhile
 
 Notice = States | Failed | Repeated | RobotEvent  # what a host reports to the supervisor on its own
-Told = Callable[..., None]  # takes the name of a method of the host, and its arguments
+OnOrder = Callable[..., None]  # takes the name of a method of the host, and its arguments
 
 
 def _nobody(verb: str, *words: object) -> None:
@@ -114,17 +114,17 @@ class Host:
         *,
         is_stopped: bool = False,
         is_restart: bool = False,
-        told: Told = _nobody,
+        on_order: OnOrder = _nobody,
         post: Post | None = None,
         deciders: Deciders = NOBODY_ELSE,
     ) -> None:
-        """Take `told`, which is called with each order carried out, so that a recording can be replayed.
+        """Take `on_order`, which is called with each order carried out, so that a recording can be replayed.
 
         With `post`, other threads reach the scheduler's; without it, components that may block run in the scheduler's.
         """
         self.plan, self.clock, self.bus, self.scheduler = plan, clock, bus, scheduler
         self.notify = notify
-        self._told = told
+        self._on_order = on_order
         self.is_stopped = is_stopped
         self.is_restart = is_restart
         self.has_started = False
@@ -166,7 +166,7 @@ class Host:
 
     def activate(self, names: Sequence[str]) -> None:
         """Activate components in this order."""
-        self._told("activate", *names)
+        self._on_order("activate", *names)
         for name in names:
             self._wanted.add(name)
             if self.hosted[name].state is Lifecycle.INACTIVE:
@@ -174,14 +174,14 @@ class Host:
 
     def start(self) -> None:
         """Start everything that waits for the whole robot to be active."""
-        self._told("start")
+        self._on_order("start")
         self.has_started = True
         self._deliveries.start()
         self._each_active("start")
 
     def shutdown(self) -> None:
         """Deactivate and clean up in reverse order; a component that raises does not affect the others."""
-        self._told("shutdown")
+        self._on_order("shutdown")
         self.is_braking = True
         for name in reversed(self.hosted):
             self._guarded(name, self.hosted[name].close)
@@ -190,7 +190,7 @@ class Host:
 
     def stop(self) -> None:
         """Hold everything that moves and cancel the goals that claim it."""
-        self._told("stop")
+        self._on_order("stop")
         self.is_stopped = True
         for hosted in self.hosted.values():
             hosted.cancel_claimed()
@@ -198,7 +198,7 @@ class Host:
 
     def release(self) -> None:
         """Allow motion again."""
-        self._told("release")
+        self._on_order("release")
         self.is_stopped = False
         self._each_active("release")
 
@@ -220,7 +220,7 @@ class Host:
 
     def brake(self) -> None:
         """Bring everything to rest for good: the robot goes down."""
-        self._told("brake")
+        self._on_order("brake")
         self.is_braking = True
         for hosted in self.hosted.values():
             hosted.cancel_claimed()
@@ -228,7 +228,7 @@ class Host:
 
     def lost(self, names: Sequence[str], cause: str) -> None:
         """Tell the components that those of another process are gone."""
-        self._told("lost", cause, *names)
+        self._on_order("lost", cause, *names)
         self._each_active("lost", tuple(names), cause)
 
     def request(self, instance: str, data: object) -> Request[Any]:
@@ -251,7 +251,7 @@ class Host:
             Refused: if it cannot be carried out, with the reason.
         """
         if isinstance(request, Command):
-            self._told("command", instance, as_data(request))
+            self._on_order("command", instance, as_data(request))
         return self._idle(instance).handle(request)
 
     def _is_active(self, name: str) -> bool:

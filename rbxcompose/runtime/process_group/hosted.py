@@ -182,8 +182,8 @@ class Statuses:
         for component, tasks in self._tasks.items():
             for name, task in tasks.items():
                 if self.is_active(component):
-                    told = task(now)
-                    self.set(f"{component}: {name}", told.level, told.message, told.values)
+                    status = task(now)
+                    self.set(f"{component}: {name}", status.level, status.message, status.values)
                 else:
                     self._statuses.pop(f"{component}: {name}", None)
         self.publish()

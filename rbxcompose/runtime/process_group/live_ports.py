@@ -76,7 +76,7 @@ class _Paced:
         self._sender(message)
 
 
-MOST_TOLD = 20  # things about transforms that are logged
+MOST_LOGGED = 20  # things about transforms that are logged
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +114,7 @@ class Frames:
     ) -> None:
         self.tree = TransformTree()
         self._clock, self._log = clock, log
-        self._told: set[str] = set()
+        self._logged: set[str] = set()
         self._lock = threading.Lock()  # who looks back from another thread must not see a history that changes
         self._moving = bus.subscribe(owner, "/tf", TFMessage, Qos.STATE, self._move, is_patient=is_patient)
         bus.subscribe(owner, "/tf_static", TFMessage, Qos.LATCHED, self._fix)
@@ -155,14 +155,14 @@ class Frames:
                 parent, child, pose = transform.header.frame_id, transform.child_frame_id, _transform(transform)
                 answer = self.tree.set(parent, child, pose, stamp=received, static=static, measured=time)
                 if answer.message:
-                    self._tell(answer)
+                    self._log_once(answer)
 
-    def _tell(self, answer: TransformAnswer) -> None:
+    def _log_once(self, answer: TransformAnswer) -> None:
         """Log once what is unusual about a transform; after very many such, nothing more."""
         text = plain(answer.message)
-        if text in self._told or len(self._told) == MOST_TOLD:
+        if text in self._logged or len(self._logged) == MOST_LOGGED:
             return
-        self._told.add(text)
+        self._logged.add(text)
         if answer.accepted:
             self._log(Level.OK, text)
         else:
@@ -326,7 +326,7 @@ def _answer(request: ServedRequest[Any, Any], answer: Callable[[Any], Any], send
         raise
     else:
         reply = response.then if isinstance(response, Later) else lambda then: then(response)
-        reply(lambda told: send(partial(request.reply, told)))
+        reply(lambda answer: send(partial(request.reply, answer)))
 
 
 def _at_once(call: Call) -> None:

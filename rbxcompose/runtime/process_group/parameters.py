@@ -26,7 +26,7 @@ from rbxcompose.sdk.parameters import ChangeRefusal, Configs, RobotRules, Wanted
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.sdk.registry import component_type
 
-Tell = Callable[[Hosted, Config, ChangeCause], None]  # that a component had another configuration before
+OnChange = Callable[[Hosted, Config, ChangeCause], None]  # that a component had another configuration before
 
 
 @dataclass(slots=True)
@@ -53,7 +53,7 @@ class LiveChanges:
 
     hosted: Mapping[str, Hosted]
     failed: Callable[[str, Exception], None]
-    tell: Tell
+    on_change: OnChange
     history: Callable[[str], ParameterHistory]
     _prepared: dict[int, Sequence[PreparedChange]] = field(default_factory=dict)  # by number of the change
     _done: dict[int, list[PreparedChange]] = field(default_factory=dict)
@@ -122,7 +122,7 @@ class LiveChanges:
         """Tell what was carried out, and let go of the components."""
         self._prepared.pop(number, None)
         for change in self._done.pop(number, ()):
-            self.tell(change.hosted, change.old, change.cause)
+            self.on_change(change.hosted, change.old, change.cause)
 
     def _follow(self, hosted: Hosted, config: Config) -> str:
         name = hosted.instance.name
@@ -172,9 +172,9 @@ class Parameters:
         deciders: Deciders,
     ) -> None:
         self._bus, self._clock, self._namespace, self._deciders = bus, clock, namespace, deciders
-        self._tell = bus.publisher(owner, EVENTS, rcl.ParameterEvent, Qos.EVENT)
+        self._publish_event = bus.publisher(owner, EVENTS, rcl.ParameterEvent, Qos.EVENT)
         self._histories: dict[str, ParameterHistory] = {}
-        self.changes = LiveChanges(hosted, failed, self.tell, self.history)
+        self.changes = LiveChanges(hosted, failed, self.report_change, self.history)
         self._asked: dict[int, WhenDecided] = {}
         self._numbers = count(1)
 
@@ -209,7 +209,7 @@ class Parameters:
         """
         old = hosted.config
         hosted.reconfigure(config)
-        self.tell(hosted, old, BY_APPLY)
+        self.report_change(hosted, old, BY_APPLY)
 
     def want(self, wanted: WantedChange, then: WhenDecided) -> None:
         """Change settings of components, by their nodes; `then` gets why not, now or later.
@@ -264,7 +264,7 @@ class Parameters:
             self.changes.end(OWN)
         return broken or (ChangeRefusal(reason) if reason else None)
 
-    def tell(self, hosted: Hosted, old: Config, cause: ChangeCause) -> None:
+    def report_change(self, hosted: Hosted, old: Config, cause: ChangeCause) -> None:
         """Log, keep and publish which parameters of a component have changed."""
         after = core.differences(old, hosted.config)
         if not after:
@@ -273,7 +273,7 @@ class Parameters:
         _say(hosted, after, cause)
         self.history(name).note(core.differences(hosted.config, old), after, cause, self._clock.stamp())
         stamp = to_time(self._clock.stamp())
-        self._tell(rcl.ParameterEvent(stamp=stamp, node=self.node(name), changed_parameters=tuple(after)))
+        self._publish_event(rcl.ParameterEvent(stamp=stamp, node=self.node(name), changed_parameters=tuple(after)))
 
 
 class _Served:
@@ -327,14 +327,14 @@ class _Served:
 
         def reply(refusal: ChangeRefusal | None) -> None:
             changes = self._parameters.history(self._hosted.instance.name).changes if request.tell_changes else ()
-            told = refusal or ChangeRefusal("")
+            answer = refusal or ChangeRefusal("")
             asked.reply(
                 ChangeParameters.Response(
                     success=refusal is None,
-                    message=told.reason,
-                    help=told.help,
-                    breaks_rule=told.breaks_rule,
-                    is_half_done=told.is_half_done,
+                    message=answer.reason,
+                    help=answer.help,
+                    breaks_rule=answer.breaks_rule,
+                    is_half_done=answer.is_half_done,
                     changes=tuple(changes),
                 )
             )

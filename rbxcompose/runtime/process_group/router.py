@@ -35,8 +35,8 @@ from rbxcompose.runtime.folder import Echo, OffsetFilter
 from rbxcompose.runtime.log import Record, WriteRecord
 from rbxcompose.runtime.process_group.connection import (
     CallbackInbox,
+    PeerChecker,
     RealTimeDriver,
-    RollCaller,
     Turns,
     Watchdog,
     answer,
@@ -53,40 +53,40 @@ class _Doubt:
     latest: float  # both [s]
 
 
-class DeafLinks:
+class OneWayLinks:
     """Judges the links of one host."""
 
     def __init__(self, host: str, now: float) -> None:
         self._host, self._begun = host, now
-        self._told, self._opened, self._sought = now, -LONGEST, now
+        self._sent_at, self._opened, self._sought = now, -LONGEST, now
         self._patience = PATIENCE
-        self._heard: dict[str, float] = {}  # host -> when [s]
+        self._reports: dict[str, float] = {}  # host -> when the last one arrived [s]
         self._doubts: dict[str, _Doubt] = {}
 
-    def tell(self, now: float) -> None:
+    def sent(self, now: float) -> None:
         """Take that this host reported."""
-        self._told = now
+        self._sent_at = now
 
-    def hear(self, teller: str, sent: int, heard: Mapping[str, Echo], now: float) -> str | None:
-        """Take a report, with what its host had heard until it was sent [ns, its clock].
+    def receive(self, sender: str, sent: int, echoes: Mapping[str, Echo], now: float) -> str | None:
+        """Take a report, with what its host had received until it was sent [ns, its clock].
 
         Returns the host to which the link must be opened again, if there is evidence for long enough.
         """
-        self._heard[teller] = now
-        if now - self._told > FRESH:
+        self._reports[sender] = now
+        if now - self._sent_at > FRESH:
             self._doubts.clear()  # nobody can hear this host
             return None
-        hears = {host for host, echo in heard.items() if (sent - echo.arrived) * 1e-9 < FRESH}
-        if self._host in hears:
-            self._doubts.pop(teller, None)
-        unheard = {host for host in hears - {self._host} if now - self._heard.get(host, self._begun) > FRESH}
-        for host in unheard if self._host in hears else {teller, *unheard}:
+        receiving = {host for host, echo in echoes.items() if (sent - echo.arrived) * 1e-9 < FRESH}
+        if self._host in receiving:
+            self._doubts.pop(sender, None)
+        missing = {host for host in receiving - {self._host} if now - self._reports.get(host, self._begun) > FRESH}
+        for host in missing if self._host in receiving else {sender, *missing}:
             if self._is_proven(host, now):
                 return self._give_up(host, now)
         return None
 
     def must_seek(self, now: float) -> bool:
-        """Return whether to seek a way to another host now, since none is heard any more."""
+        """Return whether to seek a way to another host now, since none reports any more."""
         if not self._is_alone(now) or now - self._sought < FRESH / 2:
             return False
         self._sought = now
@@ -100,7 +100,7 @@ class DeafLinks:
         return is_proven
 
     def _is_alone(self, now: float) -> bool:
-        return bool(self._heard) and now - max(self._heard.values()) > FRESH
+        return bool(self._reports) and now - max(self._reports.values()) > FRESH
 
     def _is_proven(self, host: str, now: float) -> bool:
         doubt = self._doubts.setdefault(host, _Doubt(now, now))
@@ -136,11 +136,11 @@ class _Sent:
 
 
 class HostLine:
-    """Sends the reports of this host; `heard` is called with those of the others, in the scheduler's thread.
+    """Sends the reports of this host; `receive` is called with those of the others, in the scheduler's thread.
 
     `passed` is called with the reason if a message of another host came through that is denied. `stamp` is wall-clock
     time [ns]; reports both ways tell how far the clocks of two hosts are apart. `judge` takes of each report its host,
-    when it was sent, and what that host had heard.
+    when it was sent, and what that host had received.
     """
 
     def __init__(
@@ -148,12 +148,12 @@ class HostLine:
         robot: str,
         share: Share,
         transport: Transport,
-        heard: Callable[[HostReport], None],
+        receive: Callable[[HostReport], None],
         passed: Callable[[str], None],
         stamp: Callable[[], int],
         judge: Callable[[str, int, Mapping[str, Echo]], None],
     ) -> None:
-        self._heard, self._passed, self._transport, self._judge = heard, passed, transport, judge
+        self._receive, self._passed, self._transport, self._judge = receive, passed, transport, judge
         self._stamp, self._host = stamp, share.host
         self._echoes: dict[str, Echo] = {}
         self._filters: dict[str, OffsetFilter] = {}
@@ -164,7 +164,7 @@ class HostLine:
         for other in share.others:
             transport.subscribe(host_key(robot, other.name), Qos.STATE, self._arrived)
 
-    def tell(self, report: HostReport) -> None:
+    def send(self, report: HostReport) -> None:
         """Send a report; nobody waits for it."""
         if self._denied is not None:
             self._denied.put(b"", b"")
@@ -181,15 +181,15 @@ class HostLine:
 
     def _read(self, data: bytes, arrived: int) -> None:
         try:
-            told: _Sent = from_data(_Sent, json.loads(data))
+            message: _Sent = from_data(_Sent, json.loads(data))
         except (UnreadableError, ValueError, RecursionError):
-            return  # another version, or a stranger: the host counts as silent, which is told
-        host = told.report.host
-        self._echoes[host] = answer = Echo(told.sent, arrived)
-        own = told.heard.get(self._host)
+            return  # another version, or a stranger: the host counts as silent, which is reported
+        host = message.report.host
+        self._echoes[host] = answer = Echo(message.sent, arrived)
+        own = message.heard.get(self._host)
         clock = self._filters.setdefault(host, OffsetFilter()).feed(own, answer) if own else None
-        self._heard(replace(told.report, clock=clock))
-        self._judge(host, told.sent, told.heard)
+        self._receive(replace(message.report, clock=clock))
+        self._judge(host, message.sent, message.heard)
 
 
 V = TypeVar("V")
@@ -214,12 +214,12 @@ class Router:
         self._watchdog = Watchdog()
         self._transport: ZenohTransport | None = None
         self._hosts: HostLine | None = None
-        self._roll: RollCaller | None = None
+        self._roll: PeerChecker | None = None
         self._exchange: Closable | None = None
         self._scheduler = Scheduler()
         self._link = _link(plan, plan.share) if plan.share else NO_LINK
         self._host = plan.share.host if plan.share else ""
-        self._deaf_links = DeafLinks(self._host, clock.now())
+        self._one_way_links = OneWayLinks(self._host, clock.now())
         self._must_reopen = False
 
     def run(self) -> None:
@@ -244,8 +244,8 @@ class Router:
             case say.Configure(endpoint):
                 self._open(endpoint)
             case say.ToHosts(report) if self._hosts is not None:
-                self._hosts.tell(report)
-                self._deaf_links.tell(self._clock.now())
+                self._hosts.send(report)
+                self._one_way_links.sent(self._clock.now())
             case say.ToHosts():
                 pass  # it is not open yet; the next report comes soon
             case say.Adopt(plan):
@@ -264,7 +264,7 @@ class Router:
         self._watchdog.feed()
         if self._roll is not None:
             self._roll.beat()  # a process that the router does not reach finds out by itself
-        if self._hosts is not None and self._deaf_links.must_seek(self._clock.now()):
+        if self._hosts is not None and self._one_way_links.must_seek(self._clock.now()):
             Thread(target=self._seek, daemon=True).start()  # a host that is not there lets whoever dials it wait
         if self._must_reopen:
             self._reopen()
@@ -287,10 +287,10 @@ class Router:
             self._endpoint = wanted
             self._transport = ZenohTransport(session, self._inbox.put)
             self._transport.serve(probe_key(self._plan.robot), answer)
-            self._roll = RollCaller(self._transport, self._plan.robot, self._host, "router")
+            self._roll = PeerChecker(self._transport, self._plan.robot, self._host, "router")
             if self._plan.share is not None:
-                told = self._heard, self._fail, self._clock.stamp, self._judge
-                self._hosts = HostLine(self._plan.robot, self._plan.share, self._transport, *told)
+                callbacks = self._receive_report, self._fail, self._clock.stamp, self._judge
+                self._hosts = HostLine(self._plan.robot, self._plan.share, self._transport, *callbacks)
             problem = self._share(self._plan.exchange, self._transport) if self._plan.exchange else ""
             self._channel.send(say.Failed("", problem) if problem else say.Configured(wanted))
             return
@@ -326,11 +326,11 @@ class Router:
         self._close()
         self._open(self._endpoint)
 
-    def _judge(self, host: str, sent: int, heard: Mapping[str, Echo]) -> None:
+    def _judge(self, host: str, sent: int, echoes: Mapping[str, Echo]) -> None:
         """Have the links opened again if another host and this one do not hear each other though there is a way."""
-        deaf = self._deaf_links.hear(host, sent, heard, self._clock.now())
-        if deaf is not None:
-            self._warn("robot", f"host '{deaf}' is there, but does not answer; the links are opened again")
+        silent = self._one_way_links.receive(host, sent, echoes, self._clock.now())
+        if silent is not None:
+            self._warn("robot", f"host '{silent}' is there, but does not answer; the links are opened again")
             self._must_reopen = True
 
     def _seek(self) -> None:
@@ -338,11 +338,11 @@ class Router:
             self._inbox.put("", self._find)
 
     def _find(self) -> None:
-        if self._deaf_links.find(self._clock.now()):
+        if self._one_way_links.find(self._clock.now()):
             self._warn("robot", "another host is there, but none answers; the links are opened again")
             self._must_reopen = True
 
-    def _heard(self, report: HostReport) -> None:
+    def _receive_report(self, report: HostReport) -> None:
         self._channel.send(say.FromHost(report))
 
     def _endpoints(self) -> Iterator[str]:

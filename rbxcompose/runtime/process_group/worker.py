@@ -191,9 +191,9 @@ class _ActionCaller(_Caller):
         self, goal: Any, then: Callable[[Any], None], feedback: Callable[[Any], None] | None = None, /
     ) -> _SentGoal:
         ended = _answering(self._worker, "the end of a goal", then)
-        told = _answering(self._worker, "feedback", feedback) if feedback is not None else None
+        last = _answering(self._worker, "feedback", feedback) if feedback is not None else None
         sent = _SentGoal(self._worker)
-        self._worker.send(lambda: sent.follow(self._end(goal, ended, told)))
+        self._worker.send(lambda: sent.follow(self._end(goal, ended, last)))
         return sent
 
 

@@ -20,7 +20,7 @@ from rbxcompose.runtime.supervision.changes import WORLD, Changes
 from rbxcompose.runtime.supervision.members import (
     BlockedComponents,
     ConductorEffects,
-    KeptWords,
+    KeptValues,
     Member,
     Phase,
     is_commanding,
@@ -55,12 +55,12 @@ class Conductor:
         self.plan, self.layers = plan, options.layers
         self.generation = 0  # of the plan: how often it was changed
         self._changing: Changing | None = None
-        self.kept = KeptWords()
+        self.kept = KeptValues()
         self._options, self._router, self._scheduler, self._effects = options, router, scheduler, effects
         self.members = {name: Member(name) for name in (*([router] if router else []), *plan.groups)}
         self.latch = StopLatch(effects, self._holding, lambda: scheduler.now if self.is_real_time else self.time)
         self._is_running = False  # everything has been active
-        self._silence = Silence(effects, self._tell_lost, scheduler.now)
+        self._silence = Silence(effects, self._report_lost, scheduler.now)
         self.hosts = OtherHosts(plan.share, effects, self._to_configured)
         self._closing: Closing | None = None  # set once the robot goes down
 
@@ -137,7 +137,7 @@ class Conductor:
 
     # What processes say
 
-    def heard(self, name: str, message: say.ChannelWord) -> None:
+    def receive(self, name: str, message: say.ChannelWord) -> None:
         """Handle a message of a process."""
         member = self.members[name]
         member.last_word = self._scheduler.now
@@ -150,7 +150,7 @@ class Conductor:
             case say.Failed(instance, text):
                 self._failed(instance, text)
             case say.Repeated() | ComponentNoted():
-                self.kept.heard(message)
+                self.kept.receive(message)
                 self._effects.states_changed()
             case MissionOver():
                 self._mission_over(message)
@@ -160,7 +160,7 @@ class Conductor:
                 self._effects.log(Level.WARN, "stop over the bus: everything that moves is held until 'release'")
                 self.stop("the command 'stop', over the bus")
             case RobotHeld():
-                self.latch.heard(member, message)
+                self.latch.receive(member, message)
             case say.AtRest():
                 member.is_at_rest = True
                 if self._closing:
@@ -173,7 +173,7 @@ class Conductor:
                 self.time = max(self.time, time)
                 self.facts.update(facts)
             case say.FromHost(report):
-                self._heard_host(report)
+                self._receive_report(report)
             case say.Retired() if self._changing:
                 self._changing.retired(name)
                 self._proceed()
@@ -188,8 +188,8 @@ class Conductor:
     def _configured(self, member: Member, endpoint: str | None) -> None:
         member.is_configured = True
         if member.is_stopped is not self.is_stopped:  # that changed after it was forked
-            self.latch.tell(member)
-        self.blocked.tell(self.plan, member)
+            self.latch.notify(member)
+        self.blocked.notify(self.plan, member)
         if member.name == self._router and self.endpoint is None:
             self.endpoint = endpoint
             for group in self.plan.groups:
@@ -228,7 +228,7 @@ class Conductor:
             self.go_down(ROBOT_FAILED, f"process '{name}' {how}, too often to continue", Level.ERROR, detail)
         else:
             self._effects.log(Level.ERROR, f"process '{name}' {how}; restarting it", detail)
-            self._tell_lost(member, how)
+            self._report_lost(member, how)
             member.restarts += 1
             self._scheduler.at(self._scheduler.now + delay, _OWNER, lambda: self._fork_again(member))
         self._went_on_without(name)
@@ -236,7 +236,7 @@ class Conductor:
     def _give_up(self, member: Member, how: str, detail: str) -> None:
         member.is_given_up = True
         self._effects.log(Level.ERROR, f"process '{member.name}' {how}; nothing in it is ever restarted", detail)
-        self._tell_lost(member, how)
+        self._report_lost(member, how)
         self._proceed()
 
     def _fork_again(self, member: Member) -> None:
@@ -264,7 +264,7 @@ class Conductor:
         new = {name for name, (state, _) in states.items() if state == "failed" and self.states[name][0] != "failed"}
         self.states.update(states)
         self._effects.states_changed()
-        self._tell_hosts()
+        self._notify_hosts()
         if self._options.is_stepped:  # there it would be received at another instant in each run
             return
         self.blocked.look(self.plan, self.states, self.hosts.failed, self.members)
@@ -276,33 +276,33 @@ class Conductor:
             self._effects.log(Level.ERROR, f"{text}: all motion is held until 'release'")
             self.stop(text)
 
-    def _tell_lost(self, member: Member, cause: str) -> None:
+    def _report_lost(self, member: Member, cause: str) -> None:
         names = [one.name for one in self.plan.of_group(member.name)]
-        if names and not member.is_told_lost:
-            member.is_told_lost = True
+        if names and not member.is_reported_lost:
+            member.is_reported_lost = True
             self._to_configured(say.Lost(names, f"process '{member.name}' {cause}"))
 
     def _look_for_silence(self) -> None:
         now = self._scheduler.now
         is_excused = self._silence.look_at_all(self.members.values(), now, is_going_down=self.is_going_down)
         self.hosts.look(now, is_excused=is_excused)
-        self._tell_hosts()
+        self._notify_hosts()
 
-    def _heard_host(self, report: HostReport) -> None:
-        if (end := self.hosts.heard(report, self._scheduler.now)) is not None:
+    def _receive_report(self, report: HostReport) -> None:
+        if (end := self.hosts.receive(report, self._scheduler.now)) is not None:
             self.go_down(end.exit_code, f"{end.reason} (host '{report.host}')")
         self.latch.heard_host(report)
         self.blocked.look(self.plan, self.states, self.hosts.failed, self.members)
         self._proceed()
 
-    def _tell_hosts(self) -> None:
+    def _notify_hosts(self) -> None:
         is_of_all = self.is_going_down and self.exit_code != INTERRUPTED  # a signal is for this host alone
         end = RobotEnd(self.exit_code, self.reason) if is_of_all else None
         self.hosts.report(self.states, self.latch.shared, end, is_going_down=self.is_going_down)
 
     def _alive(self, member: Member) -> None:
-        if member.is_told_lost and member.is_configured:
-            member.is_told_lost = False
+        if member.is_reported_lost and member.is_configured:
+            member.is_reported_lost = False
             self._effects.log(Level.WARN, f"process '{member.name}' answers again")
 
     def _look_at_duration(self) -> None:
@@ -397,7 +397,7 @@ class Conductor:
             self._changing.cut_off(f"the robot goes down: {reason}")
         if level > Level.OK:
             self._effects.log(level, f"{reason}; the robot goes down", detail)
-        self._tell_hosts()
+        self._notify_hosts()
         bound = rest_time(self.plan)
         self._after(bound, closing.close)
         self._after(bound + END_BOUND, closing.hurry)

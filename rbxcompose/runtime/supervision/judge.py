@@ -86,15 +86,15 @@ class Judge:
             in_child(lambda: _run(rules, theirs, self._title, supervisor))
         theirs.close()
         self._pid, self._channel = pid, say.Channel(ours)
-        self._selector.register(self._channel, selectors.EVENT_READ, self._hear)
+        self._selector.register(self._channel, selectors.EVENT_READ, self._receive)
         return self._channel
 
     def _watch(self, channel: say.Channel) -> None:
         """Wait for the answer, and until the judge can take the rest of a long question."""
         events = selectors.EVENT_READ | (selectors.EVENT_WRITE if channel.is_behind else 0)
-        self._selector.modify(channel, events, self._hear)
+        self._selector.modify(channel, events, self._receive)
 
-    def _hear(self) -> None:
+    def _receive(self) -> None:
         channel = self._channel
         if channel is None:
             return

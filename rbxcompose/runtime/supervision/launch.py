@@ -40,23 +40,25 @@ def end_leftovers(folder: RobotFolder) -> list[str]:
 
     The kernel has signalled them to stop; those that still respond get the time for it.
     """
-    told: list[str] = []
+    warnings: list[str] = []
     try:
         state = folder.read_state()
     except BrokenStateError as error:
-        told.append(f"the state of '{folder.path.name}' cannot be read ({error}); its processes were found by title")
+        warnings.append(
+            f"the state of '{folder.path.name}' cannot be read ({error}); its processes were found by title"
+        )
         state = None
     found = dict(state.alive()) if state else _found_by_title(folder)
-    deaf = [process for process in found.values() if process.is_stopped]
-    _kill(deaf)
+    stopped = [process for process in found.values() if process.is_stopped]
+    _kill(stopped)
     left = wait_until_ended(list(found.values()), ORDERLY)
     _kill(left)
     wait_until_ended(left, AT_ONCE)
     shared_memory.remove_orphans()
-    killed = [name for name, process in found.items() if process in (*deaf, *left)]
+    killed = [name for name, process in found.items() if process in (*stopped, *left)]
     if killed:
-        told.append(f"processes left behind were killed: {', '.join(sorted(killed))}")
-    return told
+        warnings.append(f"processes left behind were killed: {', '.join(sorted(killed))}")
+    return warnings
 
 
 def _found_by_title(folder: RobotFolder) -> dict[str, Process]:
@@ -222,7 +224,7 @@ def _supervise(
         if lock is None:
             _report(reports, AlreadyUp(_supervisor_of(folder)))
             return FINDINGS
-        told = [*_not_brought_down(folder), *end_leftovers(folder)]
+        warnings = [*_not_brought_down(folder), *end_leftovers(folder)]
         folder.sweep()
         log = start_new(folder.path)
         folder.write_state(_beginning(plan))
@@ -230,7 +232,7 @@ def _supervise(
         _report(reports, Unsafe(str(error)))
         return FINDINGS
     _report(reports, Begun())
-    for text in told:
+    for text in warnings:
         log.write(Record(0.0, Level.WARN, "robot", text))
     ended = _run(Launch(plan, options, log, folder, clock, rules), folder, lock, reports)
     shared_memory.remove_orphans(waits=True)
@@ -262,10 +264,10 @@ def _supervisor_of(folder: RobotFolder) -> int | None:
 def _run(launch: Launch, folder: RobotFolder, lock: int, reports: TextIO) -> RunEnded:
     plan, clock = launch.plan, launch.clock
 
-    def tell_up() -> None:
+    def report_up() -> None:
         _report(reports, Up(len(plan.instances), len(plan.groups), clock.now()))
 
-    supervisor = Supervisor(launch, folder, lock, tell_up)
+    supervisor = Supervisor(launch, folder, lock, report_up)
     try:
         supervisor.run()
     except Exception as error:  # our own bug: nobody reads our stderr, so it is written where people look

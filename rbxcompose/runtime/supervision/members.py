@@ -92,7 +92,7 @@ class Member:
     is_configured: bool = False
     is_started: bool = False
     is_at_rest: bool = False
-    is_told_lost: bool = False
+    is_reported_lost: bool = False
     is_closing: bool = False
     is_stopped: bool = False  # as last sent to it
     is_given_up: bool = False  # it is gone, and nothing in it is ever restarted
@@ -113,7 +113,7 @@ class Member:
     def forked(self, now: float) -> None:
         """Reset the state for a newly forked process."""
         self.is_there, self.last_word = True, now
-        self.is_configured = self.is_started = self.is_at_rest = self.is_told_lost = False
+        self.is_configured = self.is_started = self.is_at_rest = self.is_reported_lost = False
         self.moves, self.runs, self.killed_for = (), {}, ""
         self.requested.clear()
 
@@ -166,14 +166,14 @@ def blocked_text(causes: Mapping[str, str], name: str) -> str:
     return f"waits for {causes[name]}, which failed"
 
 
-class KeptWords:
+class KeptValues:
     """By component: requests that it gets again after its process was restarted, and notes for people."""
 
     def __init__(self) -> None:
         self.notes: dict[str, str] = {}
         self._requests: dict[str, list[dict[str, Any]]] = {}
 
-    def heard(self, message: Repeated | ComponentNoted) -> None:
+    def receive(self, message: Repeated | ComponentNoted) -> None:
         """Keep this instead of what the component told before."""
         if isinstance(message, Repeated):
             self._requests[message.instance] = message.requests
@@ -204,9 +204,9 @@ class BlockedComponents:
         touched = {name for name in {*before, *self.causes} if before.get(name) != self.causes.get(name)}
         for group in dict.fromkeys(instance.process for instance in plan.instances if instance.name in touched):
             if members[group].is_configured:
-                self.tell(plan, members[group], is_news=True)
+                self.notify(plan, members[group], is_news=True)
 
-    def tell(self, plan: Plan, member: Member, *, is_news: bool = False) -> None:
+    def notify(self, plan: Plan, member: Member, *, is_news: bool = False) -> None:
         """Tell a process which of its components are blocked."""
         names = [instance.name for instance in plan.of_group(member.name) if instance.name in self.causes]
         if names or is_news:

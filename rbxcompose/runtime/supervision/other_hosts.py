@@ -26,21 +26,21 @@ class _Known:
     """What is known of a host that has reported."""
 
     report: HostReport
-    heard: float  # [s]
+    last_report: float  # [s]
     is_lost: bool = False
 
 
 class OtherHosts:
     """Judges the other hosts; without a share there are none."""
 
-    def __init__(self, share: Share | None, effects: ConductorEffects, tell: Callable[[say.Lost], None]) -> None:
-        """Take `tell`, which tells all own processes."""
-        self._share, self._effects, self._tell = share, effects, tell
+    def __init__(self, share: Share | None, effects: ConductorEffects, send: Callable[[say.Lost], None]) -> None:
+        """Take `send`, which tells all own processes."""
+        self._share, self._effects, self._send = share, effects, send
         self._own = HostReport(share.host, share.version, effects.run_id) if share else None
         self._others = {other.name: other for other in share.others} if share else {}
         self._known: dict[str, _Known] = {}
         self._wrong_clocks: set[str] = set()  # hosts whose clocks are too far from ours
-        self._told_waiting = ""
+        self._reported_waiting = ""
 
     def adopt(self, share: Share | None) -> None:
         """Take what a new plan knows of the other hosts."""
@@ -58,7 +58,7 @@ class OtherHosts:
             now = replace(self._own, states=told, stop=stop, end=end, is_going_down=is_going_down)
             self._effects.to_hosts(now)
 
-    def heard(self, report: HostReport, now: float) -> RobotEnd | None:
+    def receive(self, report: HostReport, now: float) -> RobotEnd | None:
         """Take a report; return the end of the robot if it tells one."""
         host = self._others.get(report.host)
         if host is None:
@@ -107,15 +107,15 @@ class OtherHosts:
         """Look for hosts that have fallen silent; they are excused if this process did not run itself."""
         for name, known in self._known.items():
             if is_excused:
-                known.heard = now
-            elif not known.is_lost and now - known.heard > SILENT:
+                known.last_report = now
+            elif not known.is_lost and now - known.last_report > SILENT:
                 known.is_lost = True
                 self._lose(self._others[name], "does not answer")
 
     def _lose(self, host: OtherHost, how: str) -> None:
         text = f"host '{host.name}' {how}"
         self._effects.log(Level.WARN, text)
-        self._tell(say.Lost([instance.name for instance in host.instances], text))
+        self._send(say.Lost([instance.name for instance in host.instances], text))
 
     def told_lost(self) -> Iterator[say.Lost]:
         """Yield what a process must know that has missed it."""
@@ -139,9 +139,9 @@ class OtherHosts:
         """Return whether everything is active on all hosts that the robot needs; if not, log once what is awaited."""
         missing = [other for other in self._others.values() if not other.is_optional and not self._is_active(other)]
         waiting = " and ".join(f"host '{other.name}'" for other in missing)
-        if waiting and waiting != self._told_waiting:
+        if waiting and waiting != self._reported_waiting:
             self._effects.log(Level.OK, f"everything is active here; waiting for {waiting}")
-        self._told_waiting = waiting
+        self._reported_waiting = waiting
         return not missing
 
     def _is_active(self, host: OtherHost) -> bool:

@@ -187,7 +187,7 @@ class _Forking:
         os.close(descriptors[0])
         process, descriptor = Process.of(pid), os.pidfd_open(pid)  # not reaped yet: the id is still its own
         self._selector.register(descriptor, selectors.EVENT_READ, pid)
-        self._tell(Forked(order.group, process), [descriptor])
+        self._send(Forked(order.group, process), [descriptor])
 
     def _fork(self, order: Fork, channel: int) -> int:
         parent = os.getpid()
@@ -209,9 +209,9 @@ class _Forking:
     def _reap(self, descriptor: int, pid: int) -> None:
         self._selector.unregister(descriptor)
         os.close(descriptor)
-        self._tell(Exited(pid, os.waitpid(pid, 0)[1]), [])
+        self._send(Exited(pid, os.waitpid(pid, 0)[1]), [])
 
-    def _tell(self, event: Forked | Exited, descriptors: Sequence[int]) -> None:
+    def _send(self, event: Forked | Exited, descriptors: Sequence[int]) -> None:
         rights = [(socket.SOL_SOCKET, socket.SCM_RIGHTS, array.array("i", descriptors))] if descriptors else []
         try:
             self._connection.sendmsg([_EVENTS.to_line(event)], rights)

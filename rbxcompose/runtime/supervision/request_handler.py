@@ -107,7 +107,7 @@ class RequestHandler:
             raise Refused("the robot is going down")
 
     def _stop(self) -> str:
-        self._tell("stop: all motion is held until 'release'")
+        self._log("stop: all motion is held until 'release'")
         self._supervisor.conductor.stop("the command 'stop'")
         return "stopped; 'release' allows motion again"
 
@@ -116,13 +116,13 @@ class RequestHandler:
             raise Refused("the robot is not stopped")
         if reasons := self._supervisor.conductor.latch.holds.values():
             raise Refused(f"the robot must stand still: {'; '.join(reasons)}")
-        self._tell("release: motion is allowed again")
+        self._log("release: motion is allowed again")
         self._supervisor.conductor.release()
         return "released; 'mission resume' continues"
 
     def _bring_down(self) -> str:
         if not self._supervisor.conductor.is_going_down:
-            self._tell("down: the robot goes down")
+            self._log("down: the robot goes down")
         self._supervisor.conductor.go_down(FINE, "asked to go down")
         return "going down"
 
@@ -199,7 +199,7 @@ class RequestHandler:
         self._supervisor.log(Level.ERROR if is_refused else Level.OK, f"apply: {text}")
         (self._supervisor.refuse if is_refused else self._supervisor.answer)(number, text)
 
-    def _tell(self, text: str) -> None:
+    def _log(self, text: str) -> None:
         if not self._is_stepped:
             self._supervisor.log(Level.OK, text)
 

@@ -92,7 +92,7 @@ class SettingChanges:
         self._is_held = False
         self._begin()
 
-    def heard(self, process: str, message: say.ChannelWord) -> None:
+    def receive(self, process: str, message: say.ChannelWord) -> None:
         """Take a message of a process; others than those about settings are ignored."""
         match message:
             case tell.AskForChange():

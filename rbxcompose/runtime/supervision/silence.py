@@ -19,9 +19,9 @@ _OVERLOADED = "this machine has too much to do"
 class Silence:
     """Detects processes that are suspended or do not answer."""
 
-    def __init__(self, effects: ConductorEffects, tell_lost: Callable[[Member, str], None], now: float) -> None:
-        """Take `tell_lost`, which is called with a process that is no longer reliable, and why; and `now` [s]."""
-        self._effects, self._tell_lost = effects, tell_lost
+    def __init__(self, effects: ConductorEffects, report_lost: Callable[[Member, str], None], now: float) -> None:
+        """Take `report_lost`, which is called with a process that is no longer reliable, and why; and `now` [s]."""
+        self._effects, self._report_lost = effects, report_lost
         self._looked, self._own_waits = now, effects.waits(None)
         self._waits: dict[str, Mapping[str, float]] = {}  # of processes that are quiet, at first
 
@@ -47,10 +47,10 @@ class Silence:
         if not (member.is_configured or is_suspended):
             return  # getting ready may take long: meanwhile each process has a watchdog of its own
         if is_suspended:
-            self._tell_lost(member, "was suspended by a signal")
+            self._report_lost(member, "was suspended by a signal")
         elif silence > SILENT:
             waited = f"waited {starved:.1f} s for a processor: {_OVERLOADED}"
-            self._tell_lost(member, waited if starved > SILENT / 2 else "does not answer")
+            self._report_lost(member, waited if starved > SILENT / 2 else "does not answer")
         if silence - starved > DEAD:
             member.is_configured, member.last_word = False, now  # one kill is enough
             member.killed_for = f"was {_STATE[is_suspended]} for {DEAD:g} s and was killed"

@@ -50,7 +50,7 @@ class StopLatch:
         if self.shared.own is None:
             self._mark(by)
         self._latched = self._latched or (by, self._now())
-        self._tell_all(but)
+        self._notify_all(but)
 
     def _mark(self, by: str) -> None:
         self._numbers += 1
@@ -61,20 +61,20 @@ class StopLatch:
         known = [stop.own for stop in self._others.values() if stop.own is not None]
         self.shared = SharedStop(None, "", known, self._own_holds)
         self._latched = None
-        self._tell_all(None)
+        self._notify_all(None)
 
-    def _tell_all(self, but: Member | None) -> None:
+    def _notify_all(self, but: Member | None) -> None:
         for member in self._members():
             if member is not but and member.is_configured:
-                self.tell(member)
+                self.notify(member)
         self._effects.states_changed()
 
-    def tell(self, member: Member) -> None:
+    def notify(self, member: Member) -> None:
         """Tell a process how it stands."""
         member.is_stopped = self.is_stopped
         self._effects.send(member.name, say.Stop() if self.is_stopped else say.Release())
 
-    def heard(self, member: Member, held: RobotHeld) -> None:
+    def receive(self, member: Member, held: RobotHeld) -> None:
         """Stop everything for a component; its process has stopped by itself, and has logged the reason."""
         self._own_holds.pop(held.component, None)
         if held.reason:
@@ -110,10 +110,10 @@ class StopLatch:
         if holding and not self.is_stopped:
             host, stop = holding[0]
             self._latched = f"{stop.by} (host '{host}')", self._now()
-            self._tell_all(None)
+            self._notify_all(None)
         elif self.is_stopped and not holding and self.shared.own is None:
             self._latched = None
-            self._tell_all(None)
+            self._notify_all(None)
 
     def _is_released(self, mark: StopMark) -> bool:
         return mark in self.shared.released

@@ -50,7 +50,7 @@ class ServiceManager:
         self._address = f"\0{name[1:]}" if name.startswith("@") else name
         self._is_watched = "WATCHDOG_USEC" in environment
 
-    def tell(self, state: bytes) -> None:
+    def notify(self, state: bytes) -> None:
         """Send a state; if it cannot be taken now, it is not needed any more."""
         if self._address and (state is not ALIVE or self._is_watched):
             with suppress(OSError), socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sender:
@@ -215,8 +215,8 @@ class Supervisor:
         self._parent_process = self._parent.process
         self._parent_ran = self._parent_looked = self._clock.now()  # [s]
         self._scheduler.every(LOOK, _OWNER, lambda dt: self._look_around())
-        self._selector.register(self._parent, selectors.EVENT_READ, self._hear_parent)
-        self._selector.register(self._wakened, selectors.EVENT_READ, self._hear_signals)
+        self._selector.register(self._parent, selectors.EVENT_READ, self._receive_from_parent)
+        self._selector.register(self._wakened, selectors.EVENT_READ, self._on_signals)
         self._control = ControlServer(self._folder, self._selector)
         is_stepped = self._launch.options.is_stepped
         self._control.handle = RequestHandler(self, self.settings.changes, is_stepped=is_stepped).handle
@@ -251,7 +251,7 @@ class Supervisor:
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
         self._interrupts += number == signal.SIGINT  # the wake-up descriptor does the rest
 
-    def _hear_signals(self) -> None:
+    def _on_signals(self) -> None:
         self._wakened.recv(4096)
         self.conductor.go_down(INTERRUPTED, "interrupted")
         if self._interrupts > 1:
@@ -268,7 +268,7 @@ class Supervisor:
         except (BrokenPipeError, ConnectionResetError):
             return  # its end is about to be reported
         self._children[process] = _Child(channel)
-        self._selector.register(channel, selectors.EVENT_READ, lambda: self._hear(process, channel))
+        self._selector.register(channel, selectors.EVENT_READ, lambda: self._receive(process, channel))
 
     def send(self, process: str, message: say.ChannelOrder) -> None:
         """Send a message to a process."""
@@ -327,7 +327,7 @@ class Supervisor:
     def is_up(self) -> None:
         """Notify those who wait that everything is active."""
         self._write_state()
-        self._manager.tell(READY)
+        self._manager.notify(READY)
         self._on_up()
 
     def states_changed(self) -> None:
@@ -344,7 +344,7 @@ class Supervisor:
 
     # What happens
 
-    def _hear(self, name: str, channel: say.Channel) -> None:
+    def _receive(self, name: str, channel: say.Channel) -> None:
         messages = channel.receive()
         channel.flush()
         if channel.is_open:
@@ -352,10 +352,10 @@ class Supervisor:
         else:
             self._selector.unregister(channel)
         for message in messages:
-            self.conductor.heard(name, message)  # type: ignore[arg-type]
-            self.settings.changes.heard(name, message)  # type: ignore[arg-type]
+            self.conductor.receive(name, message)  # type: ignore[arg-type]
+            self.settings.changes.receive(name, message)  # type: ignore[arg-type]
 
-    def _hear_parent(self) -> None:
+    def _receive_from_parent(self) -> None:
         try:
             while self._parent is not None and (event := self._parent.receive()) is not None:
                 if isinstance(event, Forked):
@@ -379,7 +379,7 @@ class Supervisor:
     def _bury(self, name: str, how: str) -> None:
         child = self._children.pop(name)
         if child.channel.is_open:
-            self._hear(name, child.channel)  # its last words
+            self._receive(name, child.channel)  # its last words
         if child.channel.is_open:
             self._selector.unregister(child.channel)
         child.channel.close()
@@ -399,7 +399,7 @@ class Supervisor:
             return ""
 
     def _look_around(self) -> None:
-        self._manager.tell(ALIVE)
+        self._manager.notify(ALIVE)
         self._look_at_parent()
         if self._folder.has_lost(self._lock):
             self._restore_folder()
@@ -505,7 +505,7 @@ class Supervisor:
         restarts += self.conductor.members[process].restarts
         if self.is_suspended(process):
             state = SUSPENDED
-        elif child is not None and self.conductor.members[process].is_told_lost:
+        elif child is not None and self.conductor.members[process].is_reported_lost:
             state = SILENT
         note = self.conductor.kept.notes.get(name, "")
         return ComponentState(name, type_name, state, process, pid, restarts, waits_for, note)

@@ -115,7 +115,7 @@ def _chosen(arguments: argparse.Namespace) -> str:
     """Return the addressed mission: the named one, else the only one that runs, or ran last."""
     if arguments.name:
         return str(arguments.name)
-    from rbxcompose.missions.program.statuses import IDLE, NAMES
+    from rbxcompose.missions.program.outcomes import IDLE, NAMES
     from rbxcompose.missions.view.replica import ACTIVE
 
     known = [one for one in ask(arguments.robot, requests.ListMissions()) if one.state != NAMES[IDLE]]

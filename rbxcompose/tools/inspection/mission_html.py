@@ -7,7 +7,7 @@ from html import escape
 
 from rbxcompose.commands.layout import MOST_EFFORT, TOO_TANGLED, Layout, LayoutItem, NotDrawnError, effort, lay_out
 from rbxcompose.missions.program.answers import Form
-from rbxcompose.missions.program.statuses import IDLE, NAMES
+from rbxcompose.missions.program.outcomes import IDLE, NAMES
 from rbxcompose.missions.view.picture import Drawn, MissionPicture
 from rbxcompose.tools.inspection.mission_text import MARKS, status_of
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 from rbxcompose.base.printable import fitted, plain
 from rbxcompose.missions.program.answers import Form
-from rbxcompose.missions.program.statuses import FAILURE, IDLE, NAMES, RUNNING, SKIPPED, SUCCESS
+from rbxcompose.missions.program.outcomes import FAILURE, IDLE, NAMES, RUNNING, SKIPPED, SUCCESS
 from rbxcompose.missions.view.picture import Drawn, MissionPicture
 
 MARKS = {IDLE: "·", RUNNING: "▶", SUCCESS: "✓", FAILURE: "✗", SKIPPED: "-"}

@@ -10,8 +10,7 @@ from rbxcompose.compiler.composition.robot_manifest import RobotManifest
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.schema.guide import Guide
 from rbxcompose.compiler.sections.include import include
-from rbxcompose.manifest.file_models import robot_keys
-from rbxcompose.manifest.registry import naming
+from rbxcompose.manifest.registry import naming, robot_keys
 from rbxcompose.manifest.section import SetScope
 from rbxcompose.manifest.tree import KeyPath, MappingNode, SequenceNode, TreeNode, at
 

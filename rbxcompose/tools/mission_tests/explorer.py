@@ -32,8 +32,8 @@ from rbxcompose.missions.engine.story import MissionStory
 from rbxcompose.missions.engine.task import Task
 from rbxcompose.missions.engine.value_text import show_briefly
 from rbxcompose.missions.engine.world import POSE
+from rbxcompose.missions.program.outcomes import IDLE, RUNNING, Result
 from rbxcompose.missions.program.program import Program, RobotNames
-from rbxcompose.missions.program.statuses import IDLE, RUNNING, Result
 from rbxcompose.tools.mission_tests.model import FAILS, SUCCEEDS, missions_in
 
 MOST_PLACES = 3  # where the robot may be
@@ -348,7 +348,7 @@ class ExploredWorld:
 
     def say(self, event: MissionEvent, /) -> None:
         """Record faults, and the texts of calls."""
-        _, text = self.story.tell(event) if isinstance(event, SkillStarted) else (None, "")
+        _, text = self.story.line(event) if isinstance(event, SkillStarted) else (None, "")
         match event:
             case SkillStarted(leaf=leaf):
                 self.calls[leaf] = text
@@ -387,7 +387,7 @@ def _state(task: Task, state: Sequence[Any], now: float, runs: bool) -> list[Any
     counting = []
     for name, value in zip(("current", *task.saved), state, strict=True):
         is_time = name in task.times and isinstance(value, float)
-        if name not in task.told and (runs or name not in task.fresh):
+        if name not in task.reported and (runs or name not in task.fresh):
             counting.append(round(value - now, 6) if is_time else value)
     return counting
 

@@ -13,8 +13,8 @@ from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.missions.analysis.effects import sent_by
 from rbxcompose.missions.analysis.examined import Ending
 from rbxcompose.missions.engine.world import POSE
+from rbxcompose.missions.program.outcomes import FAILURE, NAMES, RUNNING, SUCCESS
 from rbxcompose.missions.program.program import Program, RobotNames, Skill
-from rbxcompose.missions.program.statuses import FAILURE, NAMES, RUNNING, SUCCESS
 from rbxcompose.msgs.types import Message
 
 SUCCEEDS, FAILS, RUNS = NAMES[SUCCESS], NAMES[FAILURE], NAMES[RUNNING]

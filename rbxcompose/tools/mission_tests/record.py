@@ -67,7 +67,7 @@ class TrialRecord:
 
     def hear(self, event: events.MissionEvent) -> None:
         """Record an event."""
-        level, text = self._story.tell(event)
+        level, text = self._story.line(event)
         if text:
             self.lines.append(TraceLine(self.now, text, level))
         match event:

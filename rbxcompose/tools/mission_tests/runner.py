@@ -20,8 +20,8 @@ from rbxcompose.missions.engine.value_text import show_briefly
 from rbxcompose.missions.engine.world import Observer, Settings, World
 from rbxcompose.missions.execution.requests import CancelMission, PauseMission, ResumeMission
 from rbxcompose.missions.execution.world import RobotWorld
+from rbxcompose.missions.program.outcomes import IDLE, RUNNING, Result
 from rbxcompose.missions.program.program import RobotNames
-from rbxcompose.missions.program.statuses import IDLE, RUNNING, Result
 from rbxcompose.sdk.capabilities import RunsMissions
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.sdk.registry import declared

@@ -16,7 +16,7 @@ from rbxcompose.msgs.rbxcompose_parameters import ChangeParameters, ParameterCha
 from rbxcompose.msgs.rcl_interfaces import ParameterEvent
 from rbxcompose.msgs.stamps import to_nanoseconds
 from rbxcompose.runtime.settings_history import MARK, ROS_TOOL, identity, in_order
-from rbxcompose.sdk.parameters import from_message, shown, told_dimension
+from rbxcompose.sdk.parameters import dimension_in, from_message, shown
 from rbxcompose.tools.parameters.nodes import ParameterNodes, described
 
 CHANGE = "change_parameters"
@@ -101,7 +101,7 @@ def _last_number(changes: Sequence[ParameterChange]) -> int:
 def _dimensions(nodes: ParameterNodes, node: str, changes: Iterable[ParameterChange]) -> Dimensions:
     names = {change.name: change.component for change in changes}
     found = described(nodes, {node: tuple(names)})
-    return {(names[item.about.name], item.about.name): told_dimension(item.about.description) for item in found}
+    return {(names[item.about.name], item.about.name): dimension_in(item.about.description) for item in found}
 
 
 def _row(change: ParameterChange, dimensions: Dimensions) -> tuple[str, ...]:

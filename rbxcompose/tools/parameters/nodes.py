@@ -17,7 +17,7 @@ from rbxcompose.msgs import rcl_interfaces as rcl
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.types import Message, Service
 from rbxcompose.sdk.bound import Reply
-from rbxcompose.sdk.parameters import TYPE_WORDS, from_message, shown, told_dimension
+from rbxcompose.sdk.parameters import TYPE_WORDS, dimension_in, from_message, shown
 
 Q = TypeVar("Q", bound=Message)
 R = TypeVar("R", bound=Message)
@@ -101,7 +101,7 @@ class ListedParameter:
     @property
     def dimension(self) -> Dimension | None:
         """Return its dimension, None if it is not a quantity or that of a foreign node."""
-        return told_dimension(self.about.description)
+        return dimension_in(self.about.description)
 
     def text(self, value: object, unit: str | None = None) -> str:
         """Return a value of it for people."""

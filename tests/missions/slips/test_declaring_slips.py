@@ -11,7 +11,7 @@ Find = Callable[[str, str], Repair[str] | None]
 
 
 def family() -> Slips[Find]:
-    return Slips("rbxcompose.rendering")  # any package whose files declare none
+    return Slips("rbxcompose.commands.formats")  # any package whose files declare none
 
 
 def replacing(old: str, new: str) -> Find:

@@ -88,7 +88,7 @@ def _objects(arguments: argparse.Namespace) -> tuple[PlacedObject, ...]:
 def _ls(arguments: argparse.Namespace) -> int:
     found = _objects(arguments)
     if arguments.json:
-        tell(json.dumps([to_data(placed_object) for placed_object in found]))
+        tell(json.dumps([to_data(thing) for thing in found]))
     elif not found:
         tell("the scene is empty")
     else:
@@ -96,11 +96,11 @@ def _ls(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _row(placed_object: PlacedObject) -> tuple[str, ...]:
-    kinds = ", ".join(piece.shape.kind for piece in placed_object.all_pieces)
-    size = "" if placed_object.shape.kind in ("plane", "mesh") else _lengths(placed_object.shape.size)
-    touches = ", ".join((*placed_object.touches, *placed_object.touches_objects))
-    return placed_object.name, kinds, size, placed_object.link, _lengths(placed_object.pose.translation), touches
+def _row(thing: PlacedObject) -> tuple[str, ...]:
+    kinds = ", ".join(piece.shape.kind for piece in thing.all_pieces)
+    size = "" if thing.shape.kind in ("plane", "mesh") else _lengths(thing.shape.size)
+    touches = ", ".join((*thing.touches, *thing.touches_objects))
+    return thing.name, kinds, size, thing.link, _lengths(thing.pose.translation), touches
 
 
 def _lengths(values: tuple[float, ...]) -> str:
@@ -147,11 +147,7 @@ def _save(arguments: argparse.Namespace) -> int:
     """Write what stands around the robot; what it holds, and octrees, are left out and told."""
     folder = find_robot(arguments.robot)
     stands = answer_of(folder, scene_view.StandingObjects())
-    kept = [
-        placed_object
-        for placed_object in stands
-        if all(piece.shape.kind != "octree" for piece in placed_object.all_pieces)
-    ]
+    kept = [thing for thing in stands if all(piece.shape.kind != "octree" for piece in thing.all_pieces)]
     names = [item.name for item in kept]
     try:
         text = written_scene(folder.path.name, [_with_triangles(item) for item in kept])
@@ -162,22 +158,22 @@ def _save(arguments: argparse.Namespace) -> int:
         return misused("scene", str(error))
     except OSError as error:
         return misused("scene", f"'{arguments.file}' cannot be written: {error.strerror}")
-    left = [placed_object.name for placed_object in _objects(arguments) if placed_object.name not in names]
+    left = [thing.name for thing in _objects(arguments) if thing.name not in names]
     words = f"wrote {arguments.file}: {len(kept)} object{'s' if len(kept) != 1 else ''}"
     told = f"{words}; left out: {', '.join(left)}" if left else words
     tell(json.dumps({"file": arguments.file, "objects": len(kept), "left_out": left}) if arguments.json else told)
     return 0
 
 
-def _with_triangles(placed_object: PlacedObject) -> PlacedObject:
+def _with_triangles(thing: PlacedObject) -> PlacedObject:
     """Return an object whose meshes are no files.
 
     Raises:
         MissingLibraryError: if a library is missing.
         ValueError: if a mesh cannot be read.
     """
-    pieces = tuple(replace(each, shape=_read(each.shape)) for each in placed_object.pieces)
-    return replace(placed_object, shape=_read(placed_object.shape), pieces=pieces)
+    pieces = tuple(replace(each, shape=_read(each.shape)) for each in thing.pieces)
+    return replace(thing, shape=_read(thing.shape), pieces=pieces)
 
 
 def _read(shape: Geometry) -> Geometry:
@@ -195,7 +191,7 @@ def _view(arguments: argparse.Namespace, *between: str) -> scene_view.ArmView:
 
 
 def _watch(arguments: argparse.Namespace) -> int:
-    from rbxcompose.domains.arms.scene_watch import watch  # a visitor on the bus, which other actions are not
+    from rbxcompose.domains.arms.command_watch import watch  # a visitor on the bus, which other actions are not
 
     return watch(find_robot(arguments.robot), as_json=arguments.json)
 
@@ -220,7 +216,7 @@ def _distance(arguments: argparse.Namespace) -> int:
         words = " and ".join(f"'{name}'" for name in arguments.pair)
         why = f"no arm watches {words}" if len(arguments.pair) > 1 else "there are too many pairs: name one or two"
         raise NotDoneError(NO_PAIR.at(None, why))
-    nearest = min(view.pairs, key=lambda pair_distance: pair_distance.distance)
+    nearest = min(view.pairs, key=lambda pair: pair.distance)
     if arguments.json:
         tell(json.dumps(to_data(nearest)))
     else:
@@ -228,12 +224,12 @@ def _distance(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _distance_row(pair_distance: PairDistance) -> tuple[str, str, str]:
-    return pair_distance.first, pair_distance.second, f"{round(pair_distance.distance * 1000, 1) + 0.0:.1f} mm"
+def _distance_row(pair: PairDistance) -> tuple[str, str, str]:
+    return pair.first, pair.second, f"{round(pair.distance * 1000, 1) + 0.0:.1f} mm"
 
 
 def _picture(arguments: argparse.Namespace) -> int:
-    from rbxcompose.domains.arms.command_pictures import write_picture  # numpy, which other actions do not need
+    from rbxcompose.domains.arms.command_line import write_picture  # numpy, which other actions do not need
     from rbxcompose.domains.arms.motion.picture import ArmPicture, draw_arm
 
     view = _view(arguments)

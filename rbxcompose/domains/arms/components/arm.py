@@ -15,7 +15,6 @@ from rbxcompose.domains.arms import scene_view
 from rbxcompose.domains.arms.arm_config import ArmConfig, ArmWorks, dimensions_of, mesh_bytes
 from rbxcompose.domains.arms.hand import PICK, PLACE, PicksAndPlaces, hand_ports, hand_task, result_of
 from rbxcompose.domains.arms.location import TellsWhereItIs, location_ports
-from rbxcompose.domains.arms.manifest_model import FAST
 from rbxcompose.domains.arms.motion.arm_task import ArmTask
 from rbxcompose.domains.arms.motion.collisions import readers_of, told
 from rbxcompose.domains.arms.motion.hand_task import HandTask
@@ -34,7 +33,8 @@ from rbxcompose.domains.arms.moveit_ports import (
 )
 from rbxcompose.domains.arms.planning_processes import compile_elsewhere, planning_processes
 from rbxcompose.domains.arms.reasons import REASONS
-from rbxcompose.domains.arms.servo_ports import PERIOD, ArmServo, servo_ports
+from rbxcompose.domains.arms.section_models import FAST
+from rbxcompose.domains.arms.teleoperation import PERIOD, ArmServo, servo_ports
 from rbxcompose.msgs.control_msgs import FollowJointTrajectory
 from rbxcompose.msgs.fields import ArrayEntries
 from rbxcompose.msgs.geometry_msgs import PoseStamped, TwistStamped
@@ -291,7 +291,7 @@ class Arm(PicksAndPlaces, TellsWhereItIs, AnswersPrograms, sdk.Component[ArmConf
             if task.difference is not None and self.scene.value is not None:
                 self.on_scene(self.scene.value)
         self.stage, self.ended = "", scene_view.ended_words(failure)
-        self.feed.tell(self.parts())
+        self.feed.update(self.parts())
         if failure is None:
             goal.succeeded(result)
         elif goal.cancel_requested:
@@ -358,7 +358,7 @@ class Arm(PicksAndPlaces, TellsWhereItIs, AnswersPrograms, sdk.Component[ArmConf
         if self.goal is not None:
             within = self.task.stage if isinstance(self.task, HandTask) else stage
             self.stage = words = stage if stage == within else f"{within}: {stage}"
-            self.feed.tell(self.parts())
+            self.feed.update(self.parts())
             self.goal.feedback(arm_goals.feedback_of(self.goal.request, words))
 
 

@@ -321,7 +321,7 @@ class Scene(Component[SceneConfig]):
             return
         self.is_told, self.published = True, self.now
         self.seen = scene_view.scene_parts(found, problem)
-        self.feed.tell(self.seen)
+        self.feed.update(self.seen)
         try:
             self.markers(markers(found))
         except ValueError as error:

@@ -86,12 +86,9 @@ class SeenObjects(sdk.Component[SeenObjectsConfig]):
         """Note what is held, which is what may touch links, and where an arm has put things."""
         known, before = self.core.objects, self.held
         self.held = frozenset(object_.name for object_ in message.objects if object_.name in known and object_.touches)
-        for placed_object in message.objects:
-            if placed_object.name in before - self.held:
-                self.core.put(
-                    placed_object.name,
-                    pose_of(placed_object.pose) if placed_object.link == self.config.stands_in else None,
-                )
+        for thing in message.objects:
+            if thing.name in before - self.held:
+                self.core.put(thing.name, pose_of(thing.pose) if thing.link == self.config.stands_in else None)
 
     def on_detections(self, message: Detection3DArray) -> None:
         """Tell the scene what is new or has moved."""
@@ -144,13 +141,13 @@ class SeenObjects(sdk.Component[SeenObjectsConfig]):
         self.newest(String(data=self.core.newest(self.held)))
 
 
-def added(seen_object: SeenObject, frame: str) -> CollisionObject:
+def added(seen: SeenObject, frame: str) -> CollisionObject:
     """Return an object as MoveIt's scene takes it."""
-    size: Vector3 = seen_object.sighting.size
+    size: Vector3 = seen.sighting.size
     return CollisionObject(
         header=Header(frame_id=frame),
-        id=seen_object.name,
-        pose=pose_message(seen_object.sighting.pose),
+        id=seen.name,
+        pose=pose_message(seen.sighting.pose),
         primitives=(SolidPrimitive(type=SolidPrimitive.BOX, dimensions=np.array(size)),),
         operation=CollisionObject.ADD,
     )

@@ -170,7 +170,7 @@ class _Drafts:
             elif (above := self.body.joint_above.get(link)) is not None:
                 found.add(above.name)
         for joint in group.joints:
-            if joint not in self.body.joints and all(outer_joint.name != joint for outer_joint in self.said.outer):
+            if joint not in self.body.joints and all(outer.name != joint for outer in self.said.outer):
                 self._tell_unknown(group, joint)
             found.add(joint)
         for other in group.groups:

@@ -171,10 +171,10 @@ class SpaceFilter:
         return found
 
     def _of_objects(self, objects: Iterable[PlacedObject]) -> Iterator[FilledSpace]:
-        for placed_object in objects:
-            for piece in placed_object.all_pieces:
+        for thing in objects:
+            for piece in thing.all_pieces:
                 if piece.shape.kind != OCTREE:
-                    yield self._space(placed_object.link, piece.shape, piece.pose)
+                    yield self._space(thing.link, piece.shape, piece.pose)
 
     def _space(self, link: str, shape: Geometry, pose: Transform3) -> FilledSpace:
         if shape.kind == PLANE:

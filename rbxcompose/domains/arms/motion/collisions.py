@@ -264,16 +264,11 @@ class MeshChecker:
                 self._add(link.name, link.name, known, shape.geometry, shape.origin)
         touching, there = set(allowed), tuple(objects)
         self._objects = {object_.name for object_ in there}
-        for placed_object in there:
-            self._moved[placed_object.name], self._paddings[placed_object.name] = (
-                self._moved[placed_object.link],
-                placed_object.padding,
-            )
-            for piece in placed_object.all_pieces:
-                self._add(placed_object.name, placed_object.link, known, piece.shape, piece.pose)
-            touching |= {
-                pair_of(placed_object.name, other) for other in (*placed_object.touches, *placed_object.touches_objects)
-            }
+        for thing in there:
+            self._moved[thing.name], self._paddings[thing.name] = (self._moved[thing.link], thing.padding)
+            for piece in thing.all_pieces:
+                self._add(thing.name, thing.link, known, piece.shape, piece.pose)
+            touching |= {pair_of(thing.name, other) for other in (*thing.touches, *thing.touches_objects)}
         self._pair(touching, is_rigid)
         self._prepare()
 

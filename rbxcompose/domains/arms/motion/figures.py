@@ -25,7 +25,7 @@ from rbxcompose.domains.arms.motion.scene import PlacedObject, ScenePiece
 from rbxcompose.domains.body.model import Geometry
 
 Array = NDArray[np.float64]
-Clock = Callable[[], float]
+Seconds = Callable[[], float]
 T = TypeVar("T")
 CALLS, TURNS = 100, 15  # of something that takes microseconds
 AGAIN = 0.005  # [rad or m] between positions that are examined once more
@@ -77,7 +77,7 @@ class Tries:
 NO_TRIES = Tries(0, 0, ())
 
 
-def call_time(job: Callable[[Array], object], inputs: Array, clock: Clock) -> float:
+def call_time(job: Callable[[Array], object], inputs: Array, clock: Seconds) -> float:
     """Return the median time of a call [s], for inputs of shape (m, n)."""
     job(inputs[0])
     found = []
@@ -90,7 +90,7 @@ def call_time(job: Callable[[Array], object], inputs: Array, clock: Clock) -> fl
 
 
 def inverse_tries(
-    kinematics: ArmKinematics, space: JointSpace, settings: SolverSettings, start: Array, goals: Array, clock: Clock
+    kinematics: ArmKinematics, space: JointSpace, settings: SolverSettings, start: Array, goals: Array, clock: Seconds
 ) -> Tries:
     """Solve for the poses of the tip at positions of shape (m, n), each from `start`; collisions are not looked at."""
     times, found = [], 0
@@ -111,7 +111,7 @@ def motion_tries(
     planner: MotionPlanner,
     pairs: Iterable[tuple[Array, Array]],
     is_free_along: Callable[[Trajectory, float], bool],
-    clock: Clock,
+    clock: Seconds,
 ) -> Tries:
     """Plan from each start to its goal, timed and examined; what comes out is examined once more."""
     total = NO_TRIES
@@ -135,7 +135,7 @@ def free_pairs(planner: MotionPlanner, count: int, seed: int) -> list[tuple[Arra
 
 
 def ended(work: Generator[object, None, T]) -> T:
-    """Return what a generator returns."""
+    """Return what a generator returns, after all that it yields."""
     while True:
         try:
             next(work)
@@ -191,9 +191,7 @@ def read_problem(scene: Path, request: Path, root: str) -> MotionProblem:
     """
     here = scene
     try:
-        objects = tuple(
-            _object(collision_object, root) for collision_object in _data(scene)["world"]["collision_objects"]
-        )
+        objects = tuple(_object(each, root) for each in _data(scene)["world"]["collision_objects"])
         here, asked = request, _data(request)
         state = asked["start_state"]["joint_state"]
         start = {str(name): float(at) for name, at in zip(state["name"], state["position"], strict=True)}

@@ -35,13 +35,9 @@ class Grasp:
     quality: float
 
 
-def solid_of(placed_object: PlacedObject) -> ScenePiece | None:
+def solid_of(thing: PlacedObject) -> ScenePiece | None:
     """Return the shape of an object and its pose in the object's frame; None unless it tells how to hold the object."""
-    return (
-        ScenePiece(placed_object.shape, placed_object.shape_pose)
-        if not placed_object.pieces and placed_object.shape.kind in SOLIDS
-        else None
-    )
+    return ScenePiece(thing.shape, thing.shape_pose) if not thing.pieces and thing.shape.kind in SOLIDS else None
 
 
 def _quality(turn: geometry.Quaternion, pitch: float) -> float:
@@ -85,9 +81,9 @@ def extent(shape: Geometry, rotation: geometry.Quaternion, direction: geometry.V
     return shape.size[0]
 
 
-def reach_of(placed_object: PlacedObject, rotation: geometry.Quaternion, direction: geometry.Vector3) -> float | None:
+def reach_of(thing: PlacedObject, rotation: geometry.Quaternion, direction: geometry.Vector3) -> float | None:
     """Return how far an object turned by `rotation` reaches from its origin along a unit vector, if that is known."""
-    if (solid := solid_of(placed_object)) is None:
+    if (solid := solid_of(thing)) is None:
         return None
     x, y, z = geometry.rotate(rotation, solid.pose.translation)
     ahead = x * direction[0] + y * direction[1] + z * direction[2]

@@ -587,27 +587,25 @@ class HandTask:
         """Return an object of the scene."""
         return next((object_ for object_ in self.site.objects or () if object_.name == name), None)
 
-    def in_root(self, placed_object: PlacedObject) -> Transform3:
+    def in_root(self, thing: PlacedObject) -> Transform3:
         """Return where an object is now in the root's frame."""
-        return self.kinematics.poses(self.here)[placed_object.link].compose(placed_object.pose)
+        return self.kinematics.poses(self.here)[thing.link].compose(thing.pose)
 
     def without(self, name: str) -> list[PlacedObject]:
         """Return all other objects."""
         return [object_ for object_ in self.site.objects or () if object_.name != name]
 
-    def carried(self, placed_object: PlacedObject, at: Transform3) -> PlacedObject:
+    def carried(self, thing: PlacedObject, at: Transform3) -> PlacedObject:
         """Return an object as it moves with the hand, `at` in the frame of the tip."""
-        return replace(placed_object, link=self.hand.links[0], pose=at, touches=self.hand.links)
+        return replace(thing, link=self.hand.links[0], pose=at, touches=self.hand.links)
 
-    def supports(self, placed_object: PlacedObject, at: Transform3) -> tuple[str, ...]:
+    def supports(self, thing: PlacedObject, at: Transform3) -> tuple[str, ...]:
         """Return what an object touches that stands `at` in the root's frame, or is just above; the hand is away."""
         x, y, z = at.translation
         lower = Transform3((x, y, z - GAP), at.rotation)
-        there = self.carried(placed_object, self.kinematics.tip_pose(self.here).inverse().compose(lower))
-        pairs = self.works.checker([*self.without(placed_object.name), there]).colliding(self.here)
-        return tuple(
-            name for pair in pairs if placed_object.name in pair for name in pair if name != placed_object.name
-        )
+        there = self.carried(thing, self.kinematics.tip_pose(self.here).inverse().compose(lower))
+        pairs = self.works.checker([*self.without(thing.name), there]).colliding(self.here)
+        return tuple(name for pair in pairs if thing.name in pair for name in pair if name != thing.name)
 
     def tolerant_near(self, held: PlacedObject, below: tuple[str, ...], tip: Transform3) -> Checker:
         """Return a checker with an object in the hand, which may touch what is `below` it near a pose of the tip."""
@@ -753,26 +751,26 @@ class PickTask(HandTask):
                 self.is_done = True
                 return None
             return self.fail(GraspReason.ALREADY_HOLDS, f"it holds '{held.name}'")
-        placed_object = self.object_named(self._goal.object)
-        if placed_object is None:
+        thing = self.object_named(self._goal.object)
+        if thing is None:
             there = ", ".join(sorted(each.name for each in self.site.objects or ())) or "none"
             return self.fail(
                 GraspReason.UNKNOWN_OBJECT, f"there is no object '{self._goal.object}' in the scene; there: {there}"
             )
-        self._one, self._at, widest = placed_object, self.in_root(placed_object), self.hand.greatest
-        self._below = self.supports(placed_object, self._at)
+        self._one, self._at, widest = thing, self.in_root(thing), self.hand.greatest
+        self._below = self.supports(thing, self._at)
         if self._goal.grasps:
             given = sorted(self._goal.grasps, key=lambda each: -each.quality)
             self._grasps = [replace(each, pose=self._at.compose(each.pose)) for each in given if each.width < widest]
             width = min(each.width for each in given)
-        elif (solid := solid_of(placed_object)) is not None:
+        elif (solid := solid_of(thing)) is not None:
             at, width = self._at.compose(solid.pose), least_width(solid.shape)
             self._grasps = grasps_of(solid.shape, at, self._bearing(), widest)
         else:
-            words = f"'{placed_object.name}' is neither a box nor a cylinder nor a sphere"
+            words = f"'{thing.name}' is neither a box nor a cylinder nor a sphere"
             return self.fail(GraspReason.NO_GRASPS, f"{words}, and the arm has no 'grasps' for it")
         if not self._grasps:
-            words = f"where '{placed_object.name}' is narrowest it is {width * 100:.1f} cm wide"
+            words = f"where '{thing.name}' is narrowest it is {width * 100:.1f} cm wide"
             return self.fail(GraspReason.TOO_WIDE, f"{words}, and the gripper opens {widest * 100:.1f} cm")
         return None
 
@@ -824,10 +822,10 @@ class PickTask(HandTask):
     @property
     def _has_moved(self) -> bool:
         """Return whether the object is gone, or elsewhere than it was when grasps of it were chosen."""
-        placed_object = self.object_named(self._one.name)
-        if placed_object is None:
+        thing = self.object_named(self._one.name)
+        if thing is None:
             return True
-        now = self.in_root(placed_object)
+        now = self.in_root(thing)
         turned = abs(sum(part * other for part, other in zip(now.rotation, self._at.rotation, strict=True)))
         away = math.dist(now.translation, self._at.translation)
         return away > MOVED or 2.0 * math.acos(min(1.0, turned)) > TURNED
@@ -915,37 +913,37 @@ class PlaceTask(HandTask):
         failure = yield from self.settle()
         if failure is not None:
             return failure
-        placed_object, goal = self.held, self._goal
+        thing, goal = self.held, self._goal
         if goal.unknown:
             return self.fail(MotionReason.UNKNOWN_GOAL, goal.unknown)
-        if placed_object is None:
+        if thing is None:
             return self.fail(GraspReason.NOTHING_HELD, "it holds nothing")
         if goal.frame and goal.frame not in self.kinematics.body.links:
             return self.fail(MotionReason.UNKNOWN_GOAL, f"there is no link '{goal.frame}'")
-        if goal.on and (self.object_named(goal.on) is None or goal.on == placed_object.name):
+        if goal.on and (self.object_named(goal.on) is None or goal.on == thing.name):
             return self.fail(GraspReason.UNKNOWN_OBJECT, f"there is nothing '{goal.on}' to put it on")
         if not all(map(math.isfinite, (*goal.at, goal.tolerance))):
             return self.fail(MotionReason.UNKNOWN_GOAL, "the place is not finite")
-        self._one = placed_object
-        self._upright = self.site.uprights.get(placed_object.name, (0.0, 0.0, 0.0, 1.0))
-        middle = self._place(placed_object)
+        self._one = thing
+        self._upright = self.site.uprights.get(thing.name, (0.0, 0.0, 0.0, 1.0))
+        middle = self._place(thing)
         if middle is None:
-            words = f"how high '{placed_object.name}' and '{goal.on}' are is known of boxes, cylinders and spheres only"
+            words = f"how high '{thing.name}' and '{goal.on}' are is known of boxes, cylinders and spheres only"
             return self.fail(GraspReason.NO_GRASPS, f"{words}: say where, with x, y and z")
         self._middle = middle
         return None
 
-    def _place(self, placed_object: PlacedObject) -> Vector3 | None:
+    def _place(self, thing: PlacedObject) -> Vector3 | None:
         """Return where the object is to be in the root's frame; None if it is not known how high it would stand."""
         goal = self._goal
         if goal.on and (base := self.object_named(goal.on)) is not None:
             under = self.in_root(base)
-            top, bottom = reach_of(base, under.rotation, UP), reach_of(placed_object, self._upright, DOWN)
+            top, bottom = reach_of(base, under.rotation, UP), reach_of(thing, self._upright, DOWN)
             if top is None or bottom is None:
                 return None
             top += bottom + ABOVE
             ahead = rotate(quaternion_from_yaw(yaw_of(under.rotation)), (goal.at[0], goal.at[1], goal.at[2] + top))
-            x, y, z = (base_at + part for base_at, part in zip(under.translation, ahead, strict=True))
+            x, y, z = (at + part for at, part in zip(under.translation, ahead, strict=True))
             return (x, y, z)
         frame = self.kinematics.poses(self.here)[goal.frame] if goal.frame else Transform3()
         return frame.apply(goal.at)
@@ -992,12 +990,8 @@ class PlaceTask(HandTask):
         return self._standing(contact.at.compose(self._one.pose))
 
     def _leaving(self) -> Checker:
-        placed_object = self.object_named(self._one.name)
-        return (
-            self._standing(self.in_root(placed_object))
-            if placed_object is not None
-            else self.works.checker(self.site.objects or ())
-        )
+        thing = self.object_named(self._one.name)
+        return self._standing(self.in_root(thing)) if thing is not None else self.works.checker(self.site.objects or ())
 
     def _standing(self, at: Transform3) -> Checker:
         stands = replace(self._one, link=self.kinematics.body.root, pose=at, touches=self.hand.links)
@@ -1021,8 +1015,8 @@ class PlaceTask(HandTask):
     def _yaw(self, point: Vector3) -> float:
         """Return by how much to turn the object so that the hand points from the arm to a place; 0 if it hangs."""
         base = self.kinematics.poses(self.here)[self.kinematics.group.base].translation
-        tip_of_object = multiply(self._upright, conjugate(self._one.pose.rotation))
-        ahead = rotate(multiply(tip_of_object, self.hand.grasp.rotation), (1.0, 0.0, 0.0))
+        turned = multiply(self._upright, conjugate(self._one.pose.rotation))
+        ahead = rotate(multiply(turned, self.hand.grasp.rotation), (1.0, 0.0, 0.0))
         if abs(ahead[2]) > STEEP:
             return 0.0
         return math.atan2(point[1] - base[1], point[0] - base[0]) - math.atan2(ahead[1], ahead[0])

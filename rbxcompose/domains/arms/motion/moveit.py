@@ -13,15 +13,14 @@ from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3, conjugate, multiply
-from rbxcompose.domains.arms.manifest_model import OMPL, PLANNERS
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.arm_task import ArmGoal, ArmSite, ArmTask, GivenTask
 from rbxcompose.domains.arms.motion.collisions import Checker, told
 from rbxcompose.domains.arms.motion.groups import JointSpace
 from rbxcompose.domains.arms.motion.inverse_kinematics import PoseSolutions, PoseTarget, SolverSettings
-from rbxcompose.domains.arms.motion.kept import Keep, KeptRange
 from rbxcompose.domains.arms.motion.octree_files import cells_of_octomap
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory
+from rbxcompose.domains.arms.motion.path_constraints import Keep, KeptRange
 from rbxcompose.domains.arms.motion.planner import MotionPlanner, PlannerSettings
 from rbxcompose.domains.arms.motion.pose_search import Posture, searched
 from rbxcompose.domains.arms.motion.scene import (
@@ -34,6 +33,7 @@ from rbxcompose.domains.arms.motion.scene import (
 )
 from rbxcompose.domains.arms.motion.scene_messages import pose_message, pose_of
 from rbxcompose.domains.arms.reasons import MotionFailure, MotionReason
+from rbxcompose.domains.arms.section_models import OMPL, PLANNERS
 from rbxcompose.domains.body.model import Body, Geometry
 from rbxcompose.msgs.geometry_msgs import Point, Pose, PoseStamped, Quaternion
 from rbxcompose.msgs.moveit_msgs import (
@@ -126,16 +126,16 @@ def _plane(message: Plane) -> Geometry:
     return Geometry("plane", tuple(message.coef.tolist()))
 
 
-def collision_object(placed_object: PlacedObject) -> CollisionObject:
+def collision_object(thing: PlacedObject) -> CollisionObject:
     """Return an object as a message; meshes in files and octrees, which it cannot hold, are left out."""
-    pieces = placed_object.own_pieces
+    pieces = thing.own_pieces
     simple = [each for each in pieces if each.shape.kind in _NUMBERS]
     meshes = [each for each in pieces if each.shape.kind == "mesh" and each.shape.points]
     planes = [each for each in pieces if each.shape.kind == "plane"]
     return CollisionObject(
-        header=Header(frame_id=placed_object.link),
-        pose=pose_message(placed_object.pose),
-        id=placed_object.name,
+        header=Header(frame_id=thing.link),
+        pose=pose_message(thing.pose),
+        id=thing.name,
         primitives=tuple(_primitive_message(each.shape) for each in simple),
         primitive_poses=tuple(pose_message(each.pose) for each in simple),
         meshes=tuple(_mesh_message(each.shape) for each in meshes),
@@ -663,8 +663,8 @@ class MoveItScene:
             ),
         )
 
-    def _is_held(self, placed_object: PlacedObject) -> bool:
-        return placed_object.link in self.scene.body.links and placed_object.link != self.scene.body.root
+    def _is_held(self, thing: PlacedObject) -> bool:
+        return thing.link in self.scene.body.links and thing.link != self.scene.body.root
 
     def _placed(self, message: CollisionObject) -> PlacedObject:
         """Return the object of a message; a link that never moves does not hold it."""
@@ -718,8 +718,8 @@ class MoveItScene:
                 self.scene.put(replace(object_, touches=links, touches_objects=others))
 
 
-def _color(placed_object: PlacedObject) -> ColorRGBA:
-    red, green, blue, alpha = placed_object.colour or (0.0, 0.0, 0.0, 0.0)
+def _color(thing: PlacedObject) -> ColorRGBA:
+    red, green, blue, alpha = thing.colour or (0.0, 0.0, 0.0, 0.0)
     return ColorRGBA(r=red, g=green, b=blue, a=alpha)
 
 

@@ -91,9 +91,9 @@ def _links(
         yield from (body_picture.placed(solid, Transform3(), tint) for solid in found.get(link, ()))
 
 
-def _solids(placed_object: PlacedObject, poses: Mapping[str, Transform3], is_red: bool) -> Iterator[Solid]:
-    for piece in placed_object.all_pieces:
-        at, colour = poses[placed_object.link].compose(piece.pose), RED if is_red else placed_object.colour or SAND
+def _solids(thing: PlacedObject, poses: Mapping[str, Transform3], is_red: bool) -> Iterator[Solid]:
+    for piece in thing.all_pieces:
+        at, colour = poses[thing.link].compose(piece.pose), RED if is_red else thing.colour or SAND
         if piece.shape.kind == "octree":
             yield body_picture.placed(_cells(piece.shape), at, colour)
         elif piece.shape.kind != "plane":
@@ -111,15 +111,15 @@ def _cells(shape: Geometry) -> Solid:
     return Solid(vertices, faces, np.tile(SAND, (len(faces), 1)))
 
 
-def _planes(placed_object: PlacedObject, poses: Mapping[str, Transform3], bounds: Array) -> Iterator[Solid]:
+def _planes(thing: PlacedObject, poses: Mapping[str, Transform3], bounds: Array) -> Iterator[Solid]:
     """Yield a thin square for each plane, below or beside all else."""
     middle, width = bounds.mean(0), float(np.linalg.norm(bounds[1] - bounds[0])) * (1 + _MARGIN)
-    for piece in placed_object.all_pieces:
+    for piece in thing.all_pieces:
         if piece.shape.kind == "plane":
-            at, normal = poses[placed_object.link].compose(piece.pose), np.array(piece.shape.size[:3])
+            at, normal = poses[thing.link].compose(piece.pose), np.array(piece.shape.size[:3])
             turned = np.array(at.compose(Transform3(_vector(normal))).translation) - at.translation
             above = float(turned @ (middle - np.array(at.translation))) + piece.shape.size[3]
-            yield _square(middle - above * turned, turned, width, placed_object.colour or FLOOR)
+            yield _square(middle - above * turned, turned, width, thing.colour or FLOOR)
 
 
 def _square(middle: Array, normal: Array, width: float, colour: tuple[float, ...]) -> Solid:

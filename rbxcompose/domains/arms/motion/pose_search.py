@@ -14,9 +14,8 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.domains.arms.motion import inverse_kinematics
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.collisions import Checker
-from rbxcompose.domains.arms.motion.damped_steps import LONGEST
 from rbxcompose.domains.arms.motion.groups import JointSpace
-from rbxcompose.domains.arms.motion.kept import Keep, KeptTip
+from rbxcompose.domains.arms.motion.path_constraints import Keep, KeptTip
 
 Array = NDArray[np.float64]
 
@@ -65,7 +64,7 @@ def slid(
         longest = share * float(np.abs(step).max())
         if longest < LEAST:
             break
-        first = np.clip(here + step * share * min(1.0, LONGEST / longest), *bounds)
+        first = np.clip(here + step * share * min(1.0, inverse_kinematics.LONGEST / longest), *bounds)
         moved = space.nearest_turns(inverse_kinematics.descended(kinematics, space, target, first)[0], values)
         left = posture.distance(space, moved)
         if left <= distance - LEAST and target.is_met(kinematics.tip_pose(moved)) and is_free(moved):
@@ -150,7 +149,11 @@ def _approached(
     size = float(error @ error)
     for _ in range(NEAREST_POSES_STEPS):
         step = _nearest_poses_step(jacobian, error, damping, values, bounds)
-        moved = np.clip(values + step * min(1.0, LONGEST / max(float(np.abs(step).max()), LONGEST)), *bounds)
+        moved = np.clip(
+            values
+            + step * min(1.0, inverse_kinematics.LONGEST / max(float(np.abs(step).max()), inverse_kinematics.LONGEST)),
+            *bounds,
+        )
         ahead, there = _weighed(kinematics, target, wanted, moved)
         left = float(ahead @ ahead)
         if left < size:

@@ -130,35 +130,31 @@ class PairDistance:
     """Whether they are nearer than they may be, with all paddings."""
 
 
-def mistake_in(placed_object: PlacedObject, body: Body, frames: Collection[str] = ()) -> str:
+def mistake_in(thing: PlacedObject, body: Body, frames: Collection[str] = ()) -> str:
     """Return why an object cannot be in the scene, nothing if it can; `frames` are those outside of the body."""
-    for piece in placed_object.own_pieces:
+    for piece in thing.own_pieces:
         if wrong := mistake_in_shape(piece.shape) or _mistake_in_pose(piece.pose):
             return wrong
-    if wrong := _mistake_in_pose(placed_object.pose):
+    if wrong := _mistake_in_pose(thing.pose):
         return wrong
-    if not 0.0 <= placed_object.padding <= MOST_PADDING:
-        return f"its padding is {placed_object.padding:g} m: from 0 to {MOST_PADDING:g} m"
-    if placed_object.colour is not None and not all(0.0 <= share <= 1.0 for share in placed_object.colour):
+    if not 0.0 <= thing.padding <= MOST_PADDING:
+        return f"its padding is {thing.padding:g} m: from 0 to {MOST_PADDING:g} m"
+    if thing.colour is not None and not all(0.0 <= share <= 1.0 for share in thing.colour):
         return "the parts of its colour are from 0 to 1"
-    if placed_object.link not in body.links and placed_object.link not in frames:
+    if thing.link not in body.links and thing.link not in frames:
         outer = f"; frames outside of the body: {', '.join(sorted(frames))}" if frames else ""
-        return f"there is no link '{placed_object.link}'{outer}"
-    if unknown := [link for link in placed_object.touches if link not in body.links]:
+        return f"there is no link '{thing.link}'{outer}"
+    if unknown := [link for link in thing.touches if link not in body.links]:
         return f"there is no link '{unknown[0]}'"
-    if (
-        not placed_object.name.isprintable()
-        or placed_object.name != placed_object.name.strip()
-        or not 0 < len(placed_object.name) <= LONGEST_NAME
-    ):
+    if not thing.name.isprintable() or thing.name != thing.name.strip() or not 0 < len(thing.name) <= LONGEST_NAME:
         return f"a name has 1 to {LONGEST_NAME} letters, in one line, and no space at its ends"
-    if placed_object.name in body.links:
-        return f"'{placed_object.name}' is a link of the body"
-    return _mistake_in_carrying(placed_object, placed_object.link, body) if placed_object.link in body.links else ""
+    if thing.name in body.links:
+        return f"'{thing.name}' is a link of the body"
+    return _mistake_in_carrying(thing, thing.link, body) if thing.link in body.links else ""
 
 
-def _mistake_in_carrying(placed_object: PlacedObject, link: str, body: Body) -> str:
-    fixed = [piece.shape.kind for piece in placed_object.all_pieces if piece.shape.kind in FIXED]
+def _mistake_in_carrying(thing: PlacedObject, link: str, body: Body) -> str:
+    fixed = [piece.shape.kind for piece in thing.all_pieces if piece.shape.kind in FIXED]
     return f"no link that moves can carry its {fixed[0]}" if fixed and link not in body.still else ""
 
 
@@ -171,10 +167,10 @@ def _mistake_in_pose(pose: Transform3) -> str:
     return f"it is {away:g} m away from its frame: at most {FARTHEST:g} m" if away > FARTHEST else ""
 
 
-def settled(placed_object: PlacedObject, body: Body) -> PlacedObject:
+def settled(thing: PlacedObject, body: Body) -> PlacedObject:
     """Return an object that is in the frame of the root if that of its link never moves."""
-    at = body.still.get(placed_object.link) if placed_object.link != body.root else None
-    return placed_object if at is None else replace(placed_object, link=body.root, pose=at.compose(placed_object.pose))
+    at = body.still.get(thing.link) if thing.link != body.root else None
+    return thing if at is None else replace(thing, link=body.root, pose=at.compose(thing.pose))
 
 
 class PlanningScene:
@@ -184,31 +180,31 @@ class PlanningScene:
         self.body, self.frames = body, frames
         self.objects: dict[str, PlacedObject] = {}
         self._stood_in: dict[str, str] = {}  # frames outside of the body in which held objects were
-        for placed_object in objects:
-            self.add(placed_object)
+        for thing in objects:
+            self.add(thing)
 
-    def add(self, placed_object: PlacedObject) -> None:
+    def add(self, thing: PlacedObject) -> None:
         """Put an object into the scene.
 
         Raises:
             SceneError: if it is there, or cannot be.
         """
-        if placed_object.name in self.objects:
-            raise SceneError(f"there is an object '{placed_object.name}' already")
-        self.put(placed_object)
+        if thing.name in self.objects:
+            raise SceneError(f"there is an object '{thing.name}' already")
+        self.put(thing)
 
-    def put(self, placed_object: PlacedObject) -> None:
+    def put(self, thing: PlacedObject) -> None:
         """Put an object into the scene, in the place of the one that has its name.
 
         Raises:
             SceneError: if it cannot be.
         """
-        if mistake := mistake_in(placed_object, self.body, self.frames):
+        if mistake := mistake_in(thing, self.body, self.frames):
             raise SceneError(mistake)
-        others = (len(each.own_pieces) for each in self.objects.values() if each.name != placed_object.name)
-        if len(placed_object.own_pieces) + sum(others) > MOST_SHAPES:
+        others = (len(each.own_pieces) for each in self.objects.values() if each.name != thing.name)
+        if len(thing.own_pieces) + sum(others) > MOST_SHAPES:
             raise SceneError(f"there would be more than {MOST_SHAPES:,} shapes")
-        self.objects[placed_object.name] = placed_object
+        self.objects[thing.name] = thing
 
     def remove(self, name: str) -> None:
         """Take an object out of the scene.
@@ -226,17 +222,17 @@ class PlanningScene:
         Raises:
             SceneError: if there is no such object or link, or if its frame has no pose.
         """
-        placed_object = self._there(name)
+        thing = self._there(name)
         unknown = [each for each in (link, *touches) if each not in self.body.links]
         if unknown:
             raise SceneError(f"there is no link '{unknown[0]}'")
-        if mistake := _mistake_in_carrying(placed_object, link, self.body):
+        if mistake := _mistake_in_carrying(thing, link, self.body):
             raise SceneError(mistake)
-        pose = links[link].inverse().compose(self._pose(placed_object, links))
-        if placed_object.link not in self.body.links:
-            self._stood_in[name] = placed_object.link
+        pose = links[link].inverse().compose(self._pose(thing, links))
+        if thing.link not in self.body.links:
+            self._stood_in[name] = thing.link
         allowed = tuple(touches) or (link, *self._carried(link))
-        self.objects[name] = replace(placed_object, link=link, pose=pose, touches=allowed)
+        self.objects[name] = replace(thing, link=link, pose=pose, touches=allowed)
 
     def detach(self, name: str, links: Mapping[str, Transform3]) -> None:
         """Let an object stay where it is, in the frame in which it stood or in the body's root; it may touch nothing.
@@ -244,13 +240,13 @@ class PlanningScene:
         Raises:
             SceneError: if there is no such object, or if its frame has no pose.
         """
-        placed_object = self._there(name)
-        frame, pose = self._stood_in.pop(name, self.body.root), self._pose(placed_object, links)
+        thing = self._there(name)
+        frame, pose = self._stood_in.pop(name, self.body.root), self._pose(thing, links)
         if frame in links and frame != self.body.root:
             pose = links[frame].inverse().compose(pose)
         else:
             frame = self.body.root
-        self.objects[name] = replace(placed_object, link=frame, pose=pose, touches=())
+        self.objects[name] = replace(thing, link=frame, pose=pose, touches=())
 
     def on_body(self, poses: Mapping[str, Transform3]) -> tuple[PlacedObject, ...]:
         """Return all objects in the frames of links that move, and those of all other frames in that of the root.
@@ -259,16 +255,16 @@ class PlanningScene:
             SceneError: if such a frame has no pose.
         """
         return tuple(
-            settled(placed_object, self.body)
-            if placed_object.link in self.body.links
-            else replace(placed_object, link=self.body.root, pose=self._pose(placed_object, poses))
-            for placed_object in self.objects.values()
+            settled(thing, self.body)
+            if thing.link in self.body.links
+            else replace(thing, link=self.body.root, pose=self._pose(thing, poses))
+            for thing in self.objects.values()
         )
 
-    def _pose(self, placed_object: PlacedObject, poses: Mapping[str, Transform3]) -> Transform3:
-        if placed_object.link not in poses:
-            raise SceneError(f"nothing tells where '{placed_object.link}' is, the frame of '{placed_object.name}'")
-        return poses[placed_object.link].compose(placed_object.pose)
+    def _pose(self, thing: PlacedObject, poses: Mapping[str, Transform3]) -> Transform3:
+        if thing.link not in poses:
+            raise SceneError(f"nothing tells where '{thing.link}' is, the frame of '{thing.name}'")
+        return poses[thing.link].compose(thing.pose)
 
     def _there(self, name: str) -> PlacedObject:
         if name not in self.objects:

@@ -166,10 +166,10 @@ class _Reader:
 def written_scene(name: str, objects: Iterable[scene.PlacedObject]) -> str:
     """Return a scene as text, in the newer variant; meshes have their triangles here, and there are no octrees."""
     lines = [name or _OLD_NAME]
-    for placed_object in objects:
-        lines += [f"* {placed_object.name}", *_pose_lines(placed_object.pose), str(len(placed_object.own_pieces))]
-        for piece in placed_object.own_pieces:
-            lines += [*_shape_lines(piece.shape), *_pose_lines(piece.pose), _row(placed_object.colour or (0, 0, 0, 0))]
+    for thing in objects:
+        lines += [f"* {thing.name}", *_pose_lines(thing.pose), str(len(thing.own_pieces))]
+        for piece in thing.own_pieces:
+            lines += [*_shape_lines(piece.shape), *_pose_lines(piece.pose), _row(thing.colour or (0, 0, 0, 0))]
         lines.append("0")
     return "\n".join([*lines, ".", ""])
 

@@ -56,11 +56,9 @@ class SecondChecker:
                 )
         owners = [model.frames[object_.parentFrame].name for object_ in self._geometry.geometryObjects]
         touching, there = set(allowed), tuple(objects)
-        for placed_object in there:
-            owners += [placed_object.name] * self._add(placed_object)
-            touching |= {
-                pair_of(placed_object.name, other) for other in (*placed_object.touches, *placed_object.touches_objects)
-            }
+        for thing in there:
+            owners += [thing.name] * self._add(thing)
+            touching |= {pair_of(thing.name, other) for other in (*thing.touches, *thing.touches_objects)}
         every = description.body.joints
         arm = {model.getJointId(name) for name, joint in every.items() if leader_of(joint, every)[0] in joints}
         moved = [arm & set(model.supports[object_.parentJoint]) for object_ in self._geometry.geometryObjects]
@@ -83,14 +81,14 @@ class SecondChecker:
         """Return whether nothing collides on the curves of a motion, every `step` [rad or m]."""
         return all(map(self.is_free, sampled(trajectory, step)))
 
-    def _add(self, placed_object: PlacedObject) -> int:
+    def _add(self, thing: PlacedObject) -> int:
         """Add an object; return how many shapes it has."""
-        pinocchio, pieces = self._pinocchio, tuple(placed_object.all_pieces)
-        frame = self._whole.model.frames[self._whole.frames[placed_object.link]]
+        pinocchio, pieces = self._pinocchio, tuple(thing.all_pieces)
+        frame = self._whole.model.frames[self._whole.frames[thing.link]]
         for number, piece in enumerate(pieces):
             pose = np.array((*piece.pose.translation, *piece.pose.rotation), dtype=float)
             placement, shape = frame.placement * pinocchio.XYZQUATToSE3(pose), coal_shape(piece.shape, {})
-            name = f"{placed_object.name}/{number}"
+            name = f"{thing.name}/{number}"
             self._geometry.addGeometryObject(pinocchio.GeometryObject(name, frame.parentJoint, placement, shape))
         return len(pieces)
 

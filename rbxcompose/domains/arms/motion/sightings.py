@@ -67,29 +67,25 @@ class Sightings:
         for name in held:
             if name in self.objects:
                 self.objects[name] = replace(self.objects[name], at=now)
-        gone = [seen_object.name for seen_object in self.objects.values() if now - seen_object.at > self._forget]
+        gone = [seen.name for seen in self.objects.values() if now - seen.at > self._forget]
         for name in gone:
             del self.objects[name]
         return gone
 
     def put(self, name: str, pose: Transform3 | None) -> None:
         """Know that somebody has put an object elsewhere; None if it is not known where, so that it is seen anew."""
-        if (seen_object := self.objects.pop(name, None)) is not None and pose is not None:
-            self.objects[name] = replace(seen_object, sighting=replace(seen_object.sighting, pose=pose))
+        if (seen := self.objects.pop(name, None)) is not None and pose is not None:
+            self.objects[name] = replace(seen, sighting=replace(seen.sighting, pose=pose))
 
     def nearest(self, point: Vector3, held: Collection[str]) -> str:
         """Return the name of the object whose middle is nearest to a point, of those seen; nothing without any."""
-        free = [seen_object for seen_object in self.objects.values() if seen_object.name not in held]
-        return (
-            min(free, key=lambda seen_object: math.dist(seen_object.sighting.pose.translation, point)).name
-            if free
-            else ""
-        )
+        free = [seen for seen in self.objects.values() if seen.name not in held]
+        return min(free, key=lambda seen: math.dist(seen.sighting.pose.translation, point)).name if free else ""
 
     def newest(self, held: Collection[str]) -> str:
         """Return the name of the object that was seen last; of several the one that is new; nothing without any."""
-        free = [seen_object for seen_object in self.objects.values() if seen_object.name not in held]
-        return max(reversed(free), key=lambda seen_object: seen_object.at).name if free else ""
+        free = [seen for seen in self.objects.values() if seen.name not in held]
+        return max(reversed(free), key=lambda seen: seen.at).name if free else ""
 
     def _nearest(self, sighting: Sighting, free: Collection[str]) -> str:
         """Return the object that a sighting without an id is of; nothing if none of them is near."""

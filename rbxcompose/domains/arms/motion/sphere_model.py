@@ -46,24 +46,18 @@ def compiled_model(checker: MeshChecker, trees: Trees) -> compiled_collisions.Co
     owners = np.array([carriers[part.link][0] for part in parts], dtype=np.int64)
     poses = [compiled_collisions.matrix_of(carriers[part.link][1].compose(part.origin)) for part in parts]
     fitted = trees.of(parts)
-    starts = np.cumsum([0, *(len(sphere_tree.radii) for sphere_tree in fitted)], dtype=np.int64)
+    starts = np.cumsum([0, *(len(each.radii) for each in fitted)], dtype=np.int64)
     solids = [_solid(part.geometry) for part in parts]
     kinds = np.array([kind for kind, _ in solids], dtype=np.int64)
-    centres = [
-        sphere_tree.centres @ pose[:, :3].T + pose[:, 3] for sphere_tree, pose in zip(fitted, poses, strict=True)
-    ]
-    corners = [
-        sphere_tree.corners @ pose[:, :3].T + pose[:, 3] for sphere_tree, pose in zip(fitted, poses, strict=True)
-    ]
+    centres = [each.centres @ pose[:, :3].T + pose[:, 3] for each, pose in zip(fitted, poses, strict=True)]
+    corners = [each.corners @ pose[:, :3].T + pose[:, 3] for each, pose in zip(fitted, poses, strict=True)]
     ends = np.cumsum([len(corner) for corner in corners], dtype=np.int64)
-    spans = [
-        sphere_tree.spans + (end - len(sphere_tree.corners)) for sphere_tree, end in zip(fitted, ends, strict=True)
-    ]
+    spans = [each.spans + (end - len(each.corners)) for each, end in zip(fitted, ends, strict=True)]
     extents = np.zeros(len(chain.parents))
     for owner, middles, tree in zip(owners, centres, fitted, strict=True):
         if tree is not NONE:
             extents[owner] = max(extents[owner], float(np.linalg.norm(middles[0]) + tree.radii[0]))
-    radii = np.array([sphere_tree.radii[0] for sphere_tree in fitted])
+    radii = np.array([each.radii[0] for each in fitted])
     firsts, seconds, margins = _ordered(checker.watched_parts, kinds, radii)
     frames = np.sort(np.stack((owners[firsts], owners[seconds]), axis=1), axis=1)
     couples, coupled = np.unique(frames, axis=0, return_inverse=True)
@@ -76,7 +70,7 @@ def compiled_model(checker: MeshChecker, trees: Trees) -> compiled_collisions.Co
         roots=starts[:-1],
         spheres=compiled_collisions.Spheres(
             np.concatenate((np.zeros((0, 3)), *centres)),
-            np.concatenate((np.zeros(0), *(sphere_tree.radii for sphere_tree in fitted))),
+            np.concatenate((np.zeros(0), *(each.radii for each in fitted))),
             _children(fitted, starts),
             np.concatenate((np.zeros((0, 2), dtype=np.int64), *spans)),
             np.concatenate((np.zeros((0, 3)), *corners)),

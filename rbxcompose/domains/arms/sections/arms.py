@@ -9,33 +9,32 @@ from pydantic import Field, model_validator
 
 from rbxcompose.base.config import ARM, CONTROLLER, Config, JointName, Length, LinkName, Name, Refers
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.findings import Finding, Related
+from rbxcompose.base.findings import Finding, Related, kind
 from rbxcompose.base.units import ANGLE, LENGTH, Quantity, format_quantity
-from rbxcompose.domains.arms import manifest_model
-from rbxcompose.domains.arms.motion.group_findings import (
-    BEYOND,
-    GRIPPER_ELSEWHERE,
-    NO_CHAIN,
-    NO_GRIPPER,
-    NO_POSE,
-    NOT_LED,
-    NOT_OF_ARM,
-)
+from rbxcompose.domains.arms import section_models
 from rbxcompose.domains.arms.motion.groups import ArmGroup, carrying, chain, group_of, moved_links, together
 from rbxcompose.domains.body.description import Description
 from rbxcompose.domains.body.link_pairs import LinkPair, PairReason
-from rbxcompose.domains.body.model import Body
+from rbxcompose.domains.body.model import Body, BodyJoint
 from rbxcompose.domains.body.sections.body import body
 from rbxcompose.domains.servos.controller import ControllerConfig, controller_type
-from rbxcompose.domains.servos.led_joints import follow_topic, joint_limits, limits_in, served_topic, stream_topic
-from rbxcompose.domains.servos.sections.controllers import controllers
-from rbxcompose.domains.servos.sections.joints import JointPosition
+from rbxcompose.domains.servos.sections.controllers import controllers, follow_topic, served_topic, stream_topic
+from rbxcompose.domains.servos.sections.joints import JointPosition, limits_in
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading, WantedComponent, Wiring
 from rbxcompose.manifest.tree import at, key_span, value_span
 from rbxcompose.manifest.validate import not_a_choice
 from rbxcompose.msgs.control_msgs import FollowJointTrajectory, GripperCommand
 from rbxcompose.sdk.capabilities import BoundsGoals
+
+NO_CHAIN = kind("RBX2301")
+NOT_LED = kind("RBX2302")
+NOT_OF_ARM = kind("RBX2303")
+BEYOND = kind("RBX2304")
+NO_GRIPPER = kind("RBX2305")
+GRIPPER_ELSEWHERE = kind("RBX2308")
+NO_POSE = kind("RBX2357")
+
 
 MOVE_GROUP = "move_group"
 """The component that passes goals of programs for MoveIt on to arms."""
@@ -45,7 +44,7 @@ _ROUNDING = 1e-6  # [rad or m]
 class ArmModel(Config):
     """Joints that move together."""
 
-    chain: manifest_model.ChainModel | None = None
+    chain: section_models.ChainModel | None = None
     """Its joints are those between these links."""
     joints: list[JointName] = []
     """Its joints, instead of a chain."""
@@ -63,17 +62,17 @@ class ArmModel(Config):
     """The frame between the fingers of the gripper: x ahead, y across; without it, the tip."""
     squeeze: Length = Field(0.0, ge=0)
     """By how much the gripper is asked to close farther than an object is wide; simulated fingers feel no objects."""
-    grasps: dict[Name, list[manifest_model.GraspModel]] = {}
+    grasps: dict[Name, list[section_models.GraspModel]] = {}
     """How objects may be held, by their names; grasps of others follow from their shapes."""
     pictures: str | None = Field(None, min_length=1)
     """A folder, relative to this file, into which each failure of picking and placing draws the scene; 20 are kept."""
-    spots: dict[Name, manifest_model.SpotModel] = {}
+    spots: dict[Name, section_models.SpotModel] = {}
     """Where the arm may put things, by name."""
     poses: dict[Name, dict[JointName, JointPosition]] = {}
     """Positions of joints by the name of the pose; a joint that a pose leaves out stays where it is."""
-    planner: manifest_model.PlannerModel = manifest_model.PlannerModel()
+    planner: section_models.PlannerModel = section_models.PlannerModel()
     """How its motions are planned."""
-    kinematics: manifest_model.SolverModel = manifest_model.SolverModel()
+    kinematics: section_models.SolverModel = section_models.SolverModel()
     """How positions of joints are searched for a pose of the tip."""
 
     @model_validator(mode="after")
@@ -123,6 +122,13 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
         yield WantedComponent(MOVE_GROUP, MOVE_GROUP, {"arms": groups}, ("arms",))
 
 
+def joint_limits(contents: Contents, joint: BodyJoint) -> dict[str, object]:
+    """Return the limits of a joint as an `ArmJointConfig` has them."""
+    limits = limits_in(contents, joint)
+    found = {name: getattr(limits, name) for name in ("lower", "upper", "velocity", "acceleration", "jerk")}
+    return {**found, "is_continuous": joint.kind == "continuous", "slides": joint.slides}
+
+
 def _pairs(description: Description, group: ArmGroup) -> dict[str, list[LinkPair]] | None:
     """Return the pairs that an arm moves relative to each other and need not watch; None if they are not known."""
     if (matrix := description.matrix) is None:
@@ -139,7 +145,7 @@ def _pairs(description: Description, group: ArmGroup) -> dict[str, list[LinkPair
     }
 
 
-def hand_in(contents: Contents, arm: ArmOfRobot) -> manifest_model.HandConfig | None:
+def hand_in(contents: Contents, arm: ArmOfRobot) -> section_models.HandConfig | None:
     """Return the gripper of an arm, if it has one."""
     model, there = arm.model, contents.of(controllers).get(arm.model.gripper or "")
     if model.gripper is None or there is None:
@@ -147,7 +153,7 @@ def hand_in(contents: Contents, arm: ArmOfRobot) -> manifest_model.HandConfig | 
     name = model.gripper
     bounds = (each for each in controller_type(there.type).capabilities(name, there) if isinstance(each, BoundsGoals))
     ranges = [pair for each in bounds if each.ranges is not None for pair in each.ranges.value.values()]
-    return manifest_model.HandConfig(
+    return section_models.HandConfig(
         controller=name,
         command=served_topic(name, there, GripperCommand),
         opening=ranges[0] if ranges else None,
@@ -212,11 +218,11 @@ def arms(reading: Reading[ArmModel]) -> dict[str, ArmOfRobot]:
     description, entries, found = reading.contents.of(body), reading.entries(), dict[str, ArmOfRobot]()
     groups: dict[str, ArmGroup | None] = {}
     for name, entry in entries.items():
-        if entry.planner.type not in manifest_model.PLANNERS:
+        if entry.planner.type not in section_models.PLANNERS:
             path = ("arms", name, "planner", "type")
             node = at(reading.contents.root, path)
             reading.report.add(
-                not_a_choice(value_span(reading.contents.root, path), "type", node, list(manifest_model.PLANNERS))
+                not_a_choice(value_span(reading.contents.root, path), "type", node, list(section_models.PLANNERS))
             )
         if description is None:
             continue  # it is missing or has a mistake, which is told
@@ -225,7 +231,7 @@ def arms(reading: Reading[ArmModel]) -> dict[str, ArmOfRobot]:
             continue
         wrong = list(_mistakes(reading, name, entry, group, description.body))
         reading.report.extend(wrong)
-        found[name] = ArmOfRobot(entry, group, not wrong and entry.planner.type in manifest_model.PLANNERS)
+        found[name] = ArmOfRobot(entry, group, not wrong and entry.planner.type in section_models.PLANNERS)
     return found
 
 

@@ -9,11 +9,10 @@ from rbxcompose.base.config import CONTROLLER, Config, LinkName, Name, Refers
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import kind
 from rbxcompose.domains.arms.motion.groups import chain
-from rbxcompose.domains.arms.sections.arms import arms
+from rbxcompose.domains.arms.sections.arms import arms, joint_limits
 from rbxcompose.domains.arms.sections.scene import scene
 from rbxcompose.domains.body.sections.body import body
-from rbxcompose.domains.servos.led_joints import follow_topic, joint_limits, stream_topic
-from rbxcompose.domains.servos.sections.controllers import controllers
+from rbxcompose.domains.servos.sections.controllers import controllers, follow_topic, stream_topic
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading, WantedComponent, Wiring
 from rbxcompose.manifest.tree import value_span
@@ -65,15 +64,7 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
 
 
 @section(
-    "heads",
-    HeadModel,
-    order=38,
-    names=HEAD,
-    runs=True,
-    wires=True,
-    entry="head",
-    repeats=False,
-    components=_components,
+    "heads", HeadModel, order=38, names=HEAD, runs=True, wires=True, entry="head", repeats=False, components=_components
 )
 def heads(reading: Reading[HeadModel]) -> dict[str, HeadOfRobot]:
     """Heads by name: a camera, and the joints that point it at things. With one head, its skill is `look_at`.

@@ -15,9 +15,9 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import read_regular
 from rbxcompose.base.findings import Finding, Span, kind
 from rbxcompose.base.printable import plain
-from rbxcompose.domains.arms.manifest_model import CloudModel
 from rbxcompose.domains.arms.motion.scene import MOST_PADDING, MOST_SHAPES, PlacedObject, mistake_in, settled
 from rbxcompose.domains.arms.motion.scene_text import LARGEST, NO_SCENE, SceneFile, read_scene
+from rbxcompose.domains.arms.section_models import CloudModel
 from rbxcompose.domains.arms.sections.arms import arms
 from rbxcompose.domains.body.files import FORMATS, mesh_problem
 from rbxcompose.domains.body.model import Body, Geometry
@@ -191,11 +191,8 @@ class SceneOfRobot:
 
     def on(self, known: Body) -> tuple[PlacedObject, ...]:
         """Return the things as seen by a robot that stands at the origin of all frames."""
-        placed = (
-            placed_object if placed_object.link in known.links else replace(placed_object, link=known.root)
-            for placed_object in self.objects
-        )
-        return tuple(settled(placed_object, known) for placed_object in placed)
+        placed = (thing if thing.link in known.links else replace(thing, link=known.root) for thing in self.objects)
+        return tuple(settled(thing, known) for thing in placed)
 
 
 def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]:
@@ -224,11 +221,11 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
         yield WantedComponent(f"{SCENE}_{name}", CLOUD_MAPPER, cloud, (scene.name, "clouds", name))
 
 
-def _config(placed_object: PlacedObject) -> dict[str, object]:
+def _config(thing: PlacedObject) -> dict[str, object]:
     return {
-        "link": placed_object.link,
-        "position": placed_object.pose.translation,
-        "rotation": placed_object.pose.rotation,
+        "link": thing.link,
+        "position": thing.pose.translation,
+        "rotation": thing.pose.rotation,
         "shapes": [
             {
                 "kind": each.shape.kind,
@@ -239,12 +236,12 @@ def _config(placed_object: PlacedObject) -> dict[str, object]:
                 "position": each.pose.translation,
                 "rotation": each.pose.rotation,
             }
-            for each in placed_object.own_pieces
+            for each in thing.own_pieces
         ],
-        "touches": placed_object.touches,
-        "touches_objects": placed_object.touches_objects,
-        "padding": placed_object.padding,
-        "colour": placed_object.colour,
+        "touches": thing.touches,
+        "touches_objects": thing.touches_objects,
+        "padding": thing.padding,
+        "colour": thing.colour,
     }
 
 
@@ -346,7 +343,7 @@ def _of_file(reading: Reading[SceneModel], read: SceneModel, known: Body, taken:
     found = [replace(object_, link=known.root) for object_ in scene_file.objects]
     wrong = [f"'{plain(item.name)}' is an object of this manifest, too" for item in found if item.name in taken]
     wrong += [f"object '{plain(item.name)}': {words}" for item in found if (words := mistake_in(item, known))]
-    if len(taken) + sum(len(placed_object.own_pieces) for placed_object in found) > MOST_SHAPES:
+    if len(taken) + sum(len(thing.own_pieces) for thing in found) > MOST_SHAPES:
         wrong.append(f"there are more than {MOST_SHAPES:,} shapes")
     reading.report.extend(NO_OBJECT.at(span, words) for words in wrong[:1])
     return [] if wrong else found

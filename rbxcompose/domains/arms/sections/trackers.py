@@ -17,7 +17,7 @@ from rbxcompose.domains.arms.sections.arms import arms
 from rbxcompose.domains.arms.sections.heads import HEAD
 from rbxcompose.domains.body.model import Body
 from rbxcompose.domains.body.sections.body import body
-from rbxcompose.domains.servos.led_joints import stream_topic
+from rbxcompose.domains.servos.sections.controllers import stream_topic
 from rbxcompose.manifest.fields import TopicName
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading, WantedComponent, Wiring

@@ -20,9 +20,9 @@ from rbxcompose.commands.formats.json_ import as_data
 from rbxcompose.commands.formats.text import render_text
 from rbxcompose.commands.layout import NotDrawnError
 from rbxcompose.commands.lookup import add_bus_options
+from rbxcompose.domains.body.command_pose import sliders_of
 from rbxcompose.domains.body.description import Description
 from rbxcompose.domains.body.files import FORMATS as MESHES
-from rbxcompose.domains.body.live_pose import sliders_of
 from rbxcompose.domains.body.meshes import LEAST_FACES, MissingLibraryError, Scale, SimplifiedMesh, simplify
 from rbxcompose.domains.body.model import Body
 from rbxcompose.domains.body.picture import draw
@@ -372,6 +372,6 @@ def _add_pose_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _pose(arguments: argparse.Namespace) -> int:
-    from rbxcompose.domains.body.live_pose import pose  # imports the bus, which no other action needs
+    from rbxcompose.domains.body.command_pose import pose  # imports the bus, which no other action needs
 
     return pose(arguments)

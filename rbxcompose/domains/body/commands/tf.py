@@ -22,7 +22,7 @@ from rbxcompose.commands.console import NotDoneError, emit, refuse
 from rbxcompose.commands.guest import NAME, NO_NAME, NOBODY, Guest, visit
 from rbxcompose.commands.lookup import BusPlace, add_bus_options, find_place
 from rbxcompose.commands.messages import shown, to_json
-from rbxcompose.domains.body.live_body import HeardFrames
+from rbxcompose.domains.body.command_body import HeardFrames
 from rbxcompose.msgs.geometry_msgs import Quaternion, Transform, TransformStamped, Vector3
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header

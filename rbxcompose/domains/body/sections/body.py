@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -124,8 +124,10 @@ def _names(read: Description | None) -> Mapping[str, Mapping[str, object]]:
     return {LINK: read.body.links, JOINT: read.body.joints} if read else {}
 
 
-def _text(read: Description | None) -> str:
-    return read.text if read else ""
+def _transforms(contents: Contents, names: Sequence[str]) -> dict[str, object]:
+    """Return the configuration of the component that publishes where links are."""
+    found = contents.of(body)
+    return {"urdf": found.text if found else ""}
 
 
 @section(
@@ -137,7 +139,7 @@ def _text(read: Description | None) -> str:
     entry="piece",
     shared=((), (PIECES,)),
     brings=(DESCRIPTION,),
-    always=AlwaysRun("transforms", lambda contents, names: {"urdf": _text(contents.of(body))}),
+    always=AlwaysRun("transforms", _transforms),
     wires=True,
     brought=_brought,
     defines=(LINK, JOINT),

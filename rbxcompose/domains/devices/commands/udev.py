@@ -300,7 +300,7 @@ def _change(path: Path, before: str | None, after: str) -> str:
 
 
 def _agreed() -> bool:
-    from rbxcompose.tools.commands.new import Asker, CancelledError  # the compiler of manifests, only to ask
+    from rbxcompose.commands.new_files import Asker, CancelledError  # with templates, only to ask
 
     try:
         return Asker(is_asking=True).ask("write it?", lambda text: text.casefold() in _YES, "no")

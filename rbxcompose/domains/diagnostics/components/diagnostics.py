@@ -18,7 +18,7 @@ from rbxcompose.sdk import Component, In, Out, Refused, answers, component
 
 PAUSE = 0.05  # [s] between two reports at least, so that flapping levels cost little
 MOST_ARRAYS, LARGEST_ARRAY = 30.0, 200_000  # [Hz], [B] of one publisher: to read more takes too much of a core
-MOST_TOLD = 100_000  # characters of an answer to people
+MOST_LOGGED = 100_000  # characters of an answer to people
 ROUNDING = 1e-9  # [s]
 PAUSE_PER_ROW = 0.0001  # [s]; a row is about 20 us of work, so reports never take more than a fifth of a core
 
@@ -186,7 +186,7 @@ def _size(line: requests.TreeLine) -> int:
 
 def _within(order: Iterable[int], sizes: Sequence[int]) -> Iterator[int]:
     """Yield the first of `order` whose sizes an answer can hold."""
-    left = MOST_TOLD
+    left = MOST_LOGGED
     for index in order:
         left -= sizes[index]
         if left < 0:

@@ -67,6 +67,10 @@ def _settings(contents: Contents, names: Sequence[str]) -> dict[str, object]:
     return {**{name: getattr(groups, name) for name in groups.model_fields_set}, "expected": names}
 
 
+def _levels(contents: Contents) -> dict[str, str]:
+    return contents.of(diagnostics).headers
+
+
 @section(
     "diagnostics",
     DiagnosticsModel,
@@ -76,7 +80,7 @@ def _settings(contents: Contents, names: Sequence[str]) -> dict[str, object]:
     shared=((), ("analyzers",)),
     rename=_rename,
     always=AlwaysRun("diagnostics", _settings),
-    levels=lambda contents: contents.of(diagnostics).headers,
+    levels=_levels,
 )
 def diagnostics(reading: Reading[DiagnosticsModel]) -> DiagnosticsModel:
     """How the states of components are grouped: each group is OK, WARN, ERROR or STALE.

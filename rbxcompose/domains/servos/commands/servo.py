@@ -13,7 +13,7 @@ from pathlib import Path
 from rbxcompose.commands import options
 from rbxcompose.commands.console import refuse
 from rbxcompose.domains.devices.serial_ports import PortError
-from rbxcompose.domains.servos.servo_findings import NOT_INSTALLED
+from rbxcompose.domains.servos.bus import NOT_INSTALLED
 
 LAST_ID = 252
 USUAL = (57_600, 1_000_000)  # [bit/s], at which servos are sold

@@ -358,10 +358,7 @@ def result_of(port: str, outcome: gripper.GripOutcome) -> Message:
     """Return how a goal at a port has ended."""
     if port == COMMAND:
         return GripperCommand.Result(
-            position=outcome.position,
-            effort=outcome.effort,
-            stalled=outcome.stalled,
-            reached_goal=outcome.reached_goal,
+            position=outcome.position, effort=outcome.effort, stalled=outcome.stalled, reached_goal=outcome.reached_goal
         )
     return Grip.Result(
         opening=outcome.position,

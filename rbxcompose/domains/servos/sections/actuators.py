@@ -75,13 +75,11 @@ def model_of(contents: Contents, actuator: ActuatorModel) -> ServoModel | None:
 
 
 def _models(reading: Reading[ActuatorModel], found: Mapping[str, ActuatorModel]) -> Iterator[Finding]:
-    for name, actuator_model in found.items():
-        if model_of(reading.contents, actuator_model) is None:
-            known = type_of(reading.contents, actuator_model.bus).models()
+    for name, actuator in found.items():
+        if model_of(reading.contents, actuator) is None:
+            known = type_of(reading.contents, actuator.bus).models()
             span = value_span(reading.contents.root, ("actuators", name, "model"))
-            yield NO_MODEL.misspelt(
-                span, f"no servo is called '{actuator_model.model}'", actuator_model.model, known, "models"
-            )
+            yield NO_MODEL.misspelt(span, f"no servo is called '{actuator.model}'", actuator.model, known, "models")
 
 
 def _ids(reading: Reading[ActuatorModel], found: Mapping[str, ActuatorModel]) -> Iterator[Finding]:

@@ -155,13 +155,8 @@ def _is_led(
     return set(config.claimed) <= joints.keys() and all(places) and bool(config.claimed or places)
 
 
-def _servo(actuator_model: ActuatorModel) -> dict[str, object]:
-    return {
-        "id": actuator_model.id,
-        "model": actuator_model.model,
-        "neutral": actuator_model.neutral,
-        "invert": actuator_model.invert,
-    }
+def _servo(actuator: ActuatorModel) -> dict[str, object]:
+    return {"id": actuator.id, "model": actuator.model, "neutral": actuator.neutral, "invert": actuator.invert}
 
 
 def _joint(joint: BodyJoint | None, driven: JointModel, servos: list[ActuatorModel]) -> dict[str, object]:

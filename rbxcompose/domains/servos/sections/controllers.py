@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from typing import Any
 
 from rbxcompose.base.config import CONTROLLER, Config
 from rbxcompose.base.findings import Finding, Related, Span, kind
@@ -17,9 +18,12 @@ from rbxcompose.domains.servos.sections.actuators import actuators, model_of
 from rbxcompose.domains.servos.sections.joints import held_limits, joints, may_be_driven
 from rbxcompose.manifest.arguments import decided_at
 from rbxcompose.manifest.registry import section
-from rbxcompose.manifest.section import Reading
+from rbxcompose.manifest.section import Contents, Reading
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode, at, key_span, value_span
 from rbxcompose.manifest.validate import MISSING_KEY, not_a_choice
+from rbxcompose.msgs.control_msgs import FollowJointTrajectory
+from rbxcompose.msgs.trajectory_msgs import JointTrajectory
+from rbxcompose.sdk.ports import In, ServesAction
 
 NOT_DRIVEN = kind("RBX2215")
 CLAIMED_TWICE = kind("RBX2220")
@@ -54,6 +58,7 @@ def _details(read: Mapping[str, ControllerConfig]) -> dict[str, str]:
     entry="controller",
     needs="type",
     models=_models,
+    types=lambda: {name: controller_type(name) for name in controller_names()},
     details=_details,
 )
 def controllers(reading: Reading[ControllerConfig]) -> dict[str, ControllerConfig]:
@@ -261,3 +266,22 @@ def _place(reading: Reading[ControllerConfig], name: str, joint: str) -> Span:
             if isinstance(item, ScalarNode) and item.text == joint and key != "type":
                 return item.span
     return value_span(reading.contents.root, ("controllers", name))
+
+
+def served_topic(name: str, config: ControllerConfig, action: type[Any]) -> str:
+    """Return the topic at which a controller serves an action; nothing if it does not."""
+    ports = controller_type(config.type).ports(name, config).values()
+    return next((port.topic for port in ports if isinstance(port, ServesAction) and port.interface is action), "")
+
+
+def follow_topic(contents: Contents, controller: str) -> str:
+    """Return the topic at which a controller takes trajectories; nothing if it takes none."""
+    there = contents.of(controllers).get(controller)
+    return served_topic(controller, there, FollowJointTrajectory) if there is not None else ""
+
+
+def stream_topic(contents: Contents, controller: str) -> str:
+    """Return the topic on which a controller takes trajectories; nothing if it takes none."""
+    there = contents.of(controllers).get(controller)
+    ports = controller_type(there.type).ports(controller, there).values() if there is not None else ()
+    return next((port.topic for port in ports if isinstance(port, In) and port.interface is JointTrajectory), "")

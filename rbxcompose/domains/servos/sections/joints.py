@@ -132,7 +132,7 @@ def joints(reading: Reading[dict[str, JointModel]]) -> dict[str, JointModel]:
         if (finding := next(mistakes, None)) is not None:
             wrong[name] = finding
     reading.report.extend(wrong.values())
-    return {name: joint_model for name, joint_model in found.items() if name not in wrong}
+    return {name: joint for name, joint in found.items() if name not in wrong}
 
 
 def _read(reading: Reading[dict[str, JointModel]]) -> dict[str, JointModel]:
@@ -280,6 +280,17 @@ def held_limits(model: JointModel, joint: BodyJoint | None) -> MotionLimits:
     return limits_of(model, joint).limits or MotionLimits()
 
 
+def limits_in(contents: Contents, joint: BodyJoint) -> MotionLimits:
+    """Return the limits of a joint: those of the body, and the tighter ones of the joint if it is driven."""
+    driven = contents.of(joints).get(joint.name)
+    if driven is not None:
+        return held_limits(driven, joint)
+    outer = joint.limits
+    if outer is None or joint.kind == "continuous":
+        return MotionLimits()
+    return MotionLimits(outer.lower, outer.upper)
+
+
 def _servos(
     reading: Reading[dict[str, JointModel]], name: str, model: JointModel, users: dict[str, str]
 ) -> Iterator[Finding]:
@@ -330,11 +341,11 @@ def table_of(model: JointModel) -> tuple[tuple[float, float], ...]:
     return tuple(sorted((point.servo, point.joint.value) for point in model.calibration))
 
 
-def effort_of(joint_model: JointModel, servos: Iterable[ActuatorModel]) -> float | None:
+def effort_of(joint: JointModel, servos: Iterable[ActuatorModel]) -> float | None:
     """Return the most that its servos exert on a joint [Nm or N], None if that is not known of one of them."""
     models = [model_named(servo.model) for servo in servos]
     known = [model for model in models if model is not None]
     if not known or len(known) < len(models):  # those of other types of buses
         return None
-    gear = math.tau / joint_model.travel if joint_model.travel else joint_model.ratio
-    return joint_effort(known, steepest(table_of(joint_model)) if joint_model.calibration else gear)
+    gear = math.tau / joint.travel if joint.travel else joint.ratio
+    return joint_effort(known, steepest(table_of(joint)) if joint.calibration else gear)

@@ -90,7 +90,7 @@ class FaultScript:
         present = [fault for fault in self._faults if fault.is_present(now)]
         if present == self._present:
             return
-        was_out, is_out = (any(twin_fault.fault == UNPLUG for twin_fault in each) for each in (self._present, present))
+        was_out, is_out = (any(item.fault == UNPLUG for item in each) for each in (self._present, present))
         for joint, servos in self._servos.items():
             before, after = _names(self._present, joint), _names(present, joint)
             for servo in servos if before != after else ():
@@ -103,4 +103,4 @@ class FaultScript:
 
 
 def _names(faults: Iterable[TwinFault], joint: str) -> list[str]:
-    return [twin_fault.fault for twin_fault in faults if twin_fault.joint in ("", joint) and twin_fault.fault != UNPLUG]
+    return [fault.fault for fault in faults if fault.joint in ("", joint) and fault.fault != UNPLUG]

@@ -20,7 +20,7 @@ from rbxcompose.bus.topics import Publisher
 from rbxcompose.commands.console import NotDoneError, emit, misused, refuse
 from rbxcompose.commands.guest import NAME, NOBODY, Guest, visit
 from rbxcompose.commands.terminal import NO_TERMINAL, LiveScreen, is_terminal
-from rbxcompose.domains.body.live_body import HeardFrames, described, described_body
+from rbxcompose.domains.body.command_body import HeardFrames, described, described_body
 from rbxcompose.domains.body.model import Body, BodyJoint
 from rbxcompose.domains.body.source import UNKNOWN
 from rbxcompose.msgs.sensor_msgs import JointState

@@ -17,11 +17,11 @@ from rbxcompose.base.findings import Finding, Report, Severity, Sources, kind
 from rbxcompose.base.printable import plain
 from rbxcompose.commands.console import FINDINGS, refuse, tell, tell_report
 from rbxcompose.commands.new_files import name_like, write_new
-from rbxcompose.commands.targets import compiled, robot_path
+from rbxcompose.commands.targets import compiled, missing_extras, robot_path
 from rbxcompose.compiler.compile import Compilation
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.domains.arms.arm_config import ArmConfig
-from rbxcompose.domains.arms.command_goals import works_of
+from rbxcompose.domains.arms.command_line import whole_number, works_of
 from rbxcompose.domains.arms.drafts import manifest_of, proposed_arms
 from rbxcompose.domains.arms.motion.collisions import MeshChecker, adjacent_pairs
 from rbxcompose.domains.arms.sections.arms import arms
@@ -35,35 +35,22 @@ from rbxcompose.manifest.tree import ScalarNode, at
 
 NO_SETUP = kind("RBX9420")
 TOUCH_AT_REST = kind("RBX9421", Severity.WARNING)
-SAMPLES, LEAST = 50_000, 100
+SAMPLES, LEAST = 50_000, 100  # with fewer, what collides at rest by chance would be left out for ever
 _BAR = 30
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `arm setup`."""
     parser.add_argument(
-        "--samples", type=_samples, default=SAMPLES, metavar="N", help=f"positions (default: {SAMPLES})"
+        "--samples", type=whole_number(LEAST), default=SAMPLES, metavar="N", help=f"positions (default: {SAMPLES})"
     )
-    parser.add_argument("--seed", type=_count, default=1, metavar="S", help="the same one gives the same file")
+    parser.add_argument("--seed", type=whole_number(0), default=1, metavar="S", help="the same one gives the same file")
     words = "the file (default: the one under 'collisions', or ROBOT.collisions.yaml; a profile has its own)"
     parser.add_argument("--out", metavar="FILE", help=words)
     words = "examine all poses on the shapes of the body instead, and tell what collides"
     parser.add_argument("--check", action="store_true", help=words)
     words = "print a robot with the arms that a .urdf file seems to have, or write it to the file of --out"
     parser.add_argument("--propose", action="store_true", help=words)
-
-
-def _count(text: str) -> int:
-    if not text.isdecimal() or len(text) > 9:
-        raise argparse.ArgumentTypeError(f"must be a whole number of at least 0, not '{text}'")
-    return int(text)
-
-
-def _samples(text: str) -> int:
-    count = _count(text)
-    if count < LEAST:  # else what collides at rest by chance would be left out for ever
-        raise argparse.ArgumentTypeError(f"must be at least {LEAST}, not {count}")
-    return count
 
 
 def run_setup(arguments: argparse.Namespace) -> int:
@@ -130,8 +117,6 @@ def _propose(path: str, arguments: argparse.Namespace) -> int:
 
 
 def _checked(robot: Robot, compilation: Compilation, *, is_json: bool) -> int:
-    from rbxcompose.tools.run_view import missing_extras  # what starts robots
-
     lacking = Report([*missing_extras(robot)])
     if lacking.has_errors:
         tell_report(lacking, compilation.sources)
@@ -198,10 +183,7 @@ def _tell(file: Path, matrix: CollisionMatrix, sources: Sources, *, is_json: boo
 
 
 COLLIDES = kind("RBX9423")
-UNWATCHED = kind(
-    "RBX9424",
-    Severity.WARNING,
-)
+UNWATCHED = kind("RBX9424", Severity.WARNING)
 
 
 def run_check(robot: Robot, compilation: Compilation, *, is_json: bool) -> int:
@@ -242,10 +224,8 @@ def _findings(robot: Robot) -> Iterator[tuple[str, str, list[tuple[str, str]], F
             if pairs := works.planner.checker.colliding(values):
                 message = f"the pose '{pose}' of '{name}' is in collision: {told_pairs(pairs)}"
                 yield name, pose, pairs, COLLIDES.at(span, message)
-            if hidden := [
-                link_pair for link_pair in every.colliding(values) if matrix.get(link_pair) in ("never", "user")
-            ]:
-                reasons = " and ".join(sorted({f"'{matrix[link_pair]}'" for link_pair in hidden}))
+            if hidden := [pair for pair in every.colliding(values) if matrix.get(pair) in ("never", "user")]:
+                reasons = " and ".join(sorted({f"'{matrix[pair]}'" for pair in hidden}))
                 message = (
                     f"links collide in the pose '{pose}' of '{name}' that are there as {reasons}: {told_pairs(hidden)}"
                 )

@@ -111,7 +111,7 @@ class WindowViews:
 
     def _heard(self, path: str, payload: bytes) -> None:
         if (message := _window_message(payload)) is not None:
-            self._follow(path, self._replicas[path].heard(message))
+            self._follow(path, self._replicas[path].apply(message))
 
     def _follow(self, path: str, is_asked: bool) -> None:
         if is_asked:
