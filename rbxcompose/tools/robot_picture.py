@@ -91,10 +91,6 @@ class RobotPicture:
         }
 
 
-def _component_data(picture: ComponentPicture) -> dict[str, Any]:
-    return {**asdict(picture), "level": None if picture.level is None else picture.level.name}
-
-
 @dataclass(frozen=True, slots=True)
 class PictureLine:
     """A line, and the colour that it has on a terminal."""

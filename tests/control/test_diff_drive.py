@@ -152,5 +152,5 @@ def test_what_cannot_be_is_refused() -> None:
         WheelGeometry.of_ticks(0.0, 0.26)
     with pytest.raises(ValueError, match="above 0"):
         BaseLimits(jerk=0.0)
-    with pytest.raises(ValueError, match="no step"):
+    with pytest.raises(ValueError, match="a step must be positive"):
         WheelDrive(GEOMETRY, LIMITS).step(0.0, 0.0)
