@@ -15,7 +15,7 @@ from rbxcompose.bus.local import Inbox
 from rbxcompose.bus.names import admin_key
 from rbxcompose.bus.transport import TransportReply
 from rbxcompose.bus.window import SCHEMA
-from rbxcompose.commands.guest import LONGEST_QUEUE, Guest, HeardMessage
+from rbxcompose.commands.guest import LONGEST_QUEUE, Guest, ReceivedMessage
 from rbxcompose.commands.guest import NAME as VISITOR
 from rbxcompose.commands.lookup import known_state
 from rbxcompose.missions.program.outcomes import IDLE, NAMES
@@ -85,7 +85,7 @@ class Sampler:
             is_wanted = topic.name == _HEALTH or topic.name in self._gauges or _is_light(topic)
             if topic.name not in self._listened and topic.givers and is_wanted:
                 self._listened.add(topic.name)
-                self._guest.listen(topic, partial(self._heard, topic.name))
+                self._guest.listen(topic, partial(self._receive, topic.name))
 
     def _trees(self, state: RobotState) -> list[Tree]:
         """Follow the missions, if the robot has any, and return the running ones while their process lives."""
@@ -98,19 +98,19 @@ class Sampler:
         active = {name: seen for name, seen in self._missions.by_name.items() if seen["state"] in ACTIVE}
         return [_tree(name, seen) for name, seen in sorted(active.items())]
 
-    def _heard(self, topic: str, heard: HeardMessage) -> None:
-        self._counts[heard.sender] += 1
+    def _receive(self, topic: str, received: ReceivedMessage) -> None:
+        self._counts[received.sender] += 1
         if topic == _HEALTH:
-            self._healthy(heard)
+            self._keep_statuses(received)
         elif gauge := self._gauges.get(topic):
-            charge = _charge(gauge, heard)
+            charge = _charge(gauge, received)
             self._charges |= {} if charge is None else {topic: charge}
 
-    def _healthy(self, heard: HeardMessage) -> None:
-        if heard.kind.type != DiagnosticArray.TYPE:
+    def _keep_statuses(self, received: ReceivedMessage) -> None:
+        if received.kind.type != DiagnosticArray.TYPE:
             return
         try:
-            array = decode(DiagnosticArray, heard.arrival.payload)
+            array = decode(DiagnosticArray, received.arrival.payload)
         except CdrError:
             return  # the next one comes within a second
         self._statuses = {status.name: status for status in array.status}
@@ -176,14 +176,14 @@ def _component(end: GraphEnd) -> str:
     return end.node.rpartition("/")[2]
 
 
-def _charge(gauge: Gauge, heard: HeardMessage) -> float | None:
+def _charge(gauge: Gauge, received: ReceivedMessage) -> float | None:
     """Return the charge that a message reports (a ratio); None if it reports none."""
     try:
-        message = decode(registry.message(heard.kind.type), heard.arrival.payload)
+        message = decode(registry.message(received.kind.type), received.arrival.payload)
     except (CdrError, KeyError):  # broken, or of a package that is not installed
         return None
     values = [getattr(message, name) for name in message.FIELDS]
-    if heard.kind.type != gauge.message or len(values) != 1 or not isinstance(values[0], int | float):
+    if received.kind.type != gauge.message or len(values) != 1 or not isinstance(values[0], int | float):
         return None
     unit = UNITS.get(gauge.unit)
     return unit.to_si(values[0]) if unit else float(values[0])
@@ -220,7 +220,7 @@ class MissionsSeen:
         self._replicas: dict[str, Replica] = {}
         self._asked: set[str] = set()  # paths with a pending answer
         self._is_listed = False
-        news: Inbox[bytes] = Inbox(VISITOR, LONGEST_QUEUE, self._heard, guest.scheduler.post)
+        news: Inbox[bytes] = Inbox(VISITOR, LONGEST_QUEUE, self._receive, guest.scheduler.post)
         transport = guest.transport
         pattern = f"{admin_key(robot, _PATH)}/*"
         transport.subscribe(pattern, Qos.STATE, lambda arrival: news.put(arrival.payload, transport.wake))
@@ -266,7 +266,7 @@ class MissionsSeen:
         if self._replicas.setdefault(name, Replica()).answered(message):
             self._ask(path)
 
-    def _heard(self, payload: bytes) -> None:
+    def _receive(self, payload: bytes) -> None:
         if (message := _read(payload)) is None:
             return
         name = message["value"]["mission"]

@@ -231,15 +231,15 @@ def port_of(wanted: UsbDevice, ports: Iterable[SerialPort]) -> SerialPort:
     """
     ports = list(ports)
     usb = [port for port in ports if port.device]
-    meant = [port for port in usb if port.device and port.device.is_meant_by(wanted)]
+    matching = [port for port in usb if port.device and port.device.matches(wanted)]
     linked = [port for port in ports if wanted.name and port.is_linked(wanted.name)]
-    if len(meant) != 1:
-        meant = [port for port in linked if port in meant or not (meant or port.device)] or meant
-    if not meant:
+    if len(matching) != 1:
+        matching = [port for port in linked if port in matching or not (matching or port.device)] or matching
+    if not matching:
         raise NoDeviceError(wanted.called, "is not connected", connected(usb, "USB serial port"))
-    if len(meant) > 1:
-        raise DeviceNotUniqueError(wanted.called, f"has {len(meant)} ports", connected(meant, "USB serial port"))
-    return meant[0]
+    if len(matching) > 1:
+        raise DeviceNotUniqueError(wanted.called, f"has {len(matching)} ports", connected(matching, "USB serial port"))
+    return matching[0]
 
 
 def connected(ports: Sequence[SerialPort], what: str) -> str:

@@ -22,7 +22,7 @@ def names_of(port: SerialPort, named: Iterable[UsbDevice]) -> list[str]:
     """Return the names that mean a port: by its device, or by a link if the kernel reports no device."""
     if port.device is None:
         return [device.name for device in named if port.is_linked(device.name)]
-    return [device.name for device in named if port.device.is_meant_by(device)]
+    return [device.name for device in named if port.device.matches(device)]
 
 
 def proposed(port: SerialPort, ports: Sequence[SerialPort]) -> Mapping[str, str]:
@@ -43,7 +43,7 @@ def proposed(port: SerialPort, ports: Sequence[SerialPort]) -> Mapping[str, str]
 
 def _alike(keys: Mapping[str, str], others: Iterable[UsbDevice]) -> list[UsbDevice]:
     wanted = UsbDevice(keys["vendor"], keys["product"], keys.get("serial", ""), keys.get("usb_port", ""))
-    return [other for other in others if other.is_meant_by(wanted)]
+    return [other for other in others if other.matches(wanted)]
 
 
 def same_serials(ports: Iterable[SerialPort]) -> list[list[SerialPort]]:

@@ -167,8 +167,8 @@ def _log(arguments: argparse.Namespace) -> int:
             news = ask(arguments.robot, requests.ReadLog(number))
             number = news.next
             for record in news.records:
-                is_meant = not arguments.name or record["mission"] == arguments.name
-                if is_meant and (arguments.all or record["event"] not in INPUTS):
+                is_wanted = not arguments.name or record["mission"] == arguments.name
+                if is_wanted and (arguments.all or record["event"] not in INPUTS):
                     emit(json.dumps(record))
             if not arguments.follow:
                 return 0

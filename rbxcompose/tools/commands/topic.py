@@ -135,7 +135,7 @@ def measure(guest: Guest, arguments: argparse.Namespace) -> int:
     """Print every second how often messages arrive."""
     topic = wanted(guest.graph().topics, arguments.topic, "topic")
     meter = PaceMeter(arguments.window)
-    guest.listen(topic, lambda heard: meter.arrived(heard.time))
+    guest.listen(topic, lambda message: meter.arrived(message.time))
     left = math.inf if arguments.duration is None else arguments.duration
     while left > 0:
         guest.run(lambda: False, min(_LINE_PERIOD, left))

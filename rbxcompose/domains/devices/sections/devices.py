@@ -127,8 +127,8 @@ def _shared(name: str, other: str, wanted: Mapping[str, UsbDevice], spans: Mappi
     if device == first:
         words = f"the devices '{other}' and '{name}' are described alike"
         yield SAME_DEVICE.at(spans[name], words, help=help_text, related=related)
-    elif device.is_meant_by(first) or first.is_meant_by(device):
-        narrow, wide = (name, other) if device.is_meant_by(first) else (other, name)
+    elif device.matches(first) or first.matches(device):
+        narrow, wide = (name, other) if device.matches(first) else (other, name)
         words = f"the device '{narrow}' is also one that '{wide}' describes"
         yield INCLUDED_DEVICE.at(spans[name], words, help=help_text, related=related)
 

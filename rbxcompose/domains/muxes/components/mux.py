@@ -78,7 +78,7 @@ class Mux(Component[MuxConfig]):
         self.wakes_at = math.inf  # [s], the first of the wakes to come
         self.refused: list[str] = []
         self.broken: set[str] = set()  # inputs whose last message had a number that is none
-        self.heard_at: dict[str, float] = {}  # when an input last sent
+        self.received_at: dict[str, float] = {}  # when an input last sent
         self.changes: deque[requests.MuxChange] = deque(maxlen=KEPT)
         self.orders = MuxOrders()
         self.listening = set(self.config.inputs)
@@ -102,7 +102,7 @@ class Mux(Component[MuxConfig]):
                 self.add_input(order)
                 self.orders.keep(order)
         self.core.take_over(old.core)
-        self.heard_at = old.heard_at
+        self.received_at = old.received_at
         self.orders.take_over(old.orders, self.core.inputs)
         self.changed()
 
@@ -127,7 +127,7 @@ class Mux(Component[MuxConfig]):
                 self.warn(f"input '{name}' sends numbers that are not finite: they are dropped")
             return
         self.broken.discard(name)
-        self.heard_at[name] = self.now
+        self.received_at[name] = self.now
         self.send(self.core.receive(name, message, self.now))
 
     def wake(self) -> None:
@@ -184,7 +184,7 @@ class Mux(Component[MuxConfig]):
             core.active,
             until if until < math.inf else None,
             core.arbiter.selected,
-            states_of(core, self.topics, self.heard_at, now, has_priorities=config.has_priorities),
+            states_of(core, self.topics, self.received_at, now, has_priorities=config.has_priorities),
             lock_states(core, {name: config.topic_of(name) for name in config.locks}, now),
         )
 
