@@ -24,8 +24,7 @@ from rbxcompose.commands.lookup import NOT_UP, add_robot_option, find_robot, pla
 from rbxcompose.commands.messages import to_json
 from rbxcompose.commands.options import EACH, add_json_option, add_system_options
 from rbxcompose.commands.terminal import LiveScreen, is_terminal
-from rbxcompose.tools.robot_picture import RobotPicture, ShareView, lines_of, system_lines
-from rbxcompose.tools.sampler import Sampler
+from rbxcompose.tools.top import RobotPicture, Sampler, ShareView, lines_of, system_lines
 
 ON_SYSTEM = EACH
 _PERIOD = 1.0  # [s] between two samples

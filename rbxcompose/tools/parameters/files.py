@@ -44,7 +44,7 @@ from rbxcompose.tools.live_rules import compiled_with
 from rbxcompose.tools.parameters.changes import PIPED, change_values, message_of, write_values
 from rbxcompose.tools.parameters.history import changes_of
 from rbxcompose.tools.parameters.nodes import ParameterNodes, listed
-from rbxcompose.tools.up_system import layers_of
+from rbxcompose.tools.system_runs import layers_of
 
 
 @dataclass(frozen=True, slots=True)
