@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import re
 from collections.abc import Callable, Iterable
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +35,11 @@ class Subcommand:
 def argument(*names: str, **options: Any) -> Declare:
     """Return what declares one argument, as `add_argument` takes it."""
     return lambda parser: parser.add_argument(*names, **options)
+
+
+def deferred(module: str, function: str) -> Callable[..., int]:
+    """Return what calls a function of a module that is imported only then, since it needs more than others do."""
+    return lambda *arguments: int(getattr(import_module(module), function)(*arguments))
 
 
 def add_actions(

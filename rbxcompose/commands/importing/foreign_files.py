@@ -98,7 +98,7 @@ def _read(path: Path, report: Report, sources: MutableMapping[str, str]) -> Fore
 
 
 def _without_objects(finding: Finding, shown: str) -> Finding:
-    """Return what to tell of a tag of Python: the object is not made, its parts are read as plain data."""
+    """Return the finding about a tag of Python: the object is not made, its parts are read as plain data."""
     if finding.code != TAG.code or _PYTHON not in finding.message:
         return finding
     words = f"'{plain(shown)}' asks for an object of Python here, which is not made"
@@ -106,7 +106,7 @@ def _without_objects(finding: Finding, shown: str) -> Finding:
 
 
 class ForeignMap:
-    """A map in a foreign file. Whoever has asked for all keys that there may be tells the others with `tell_others`.
+    """A map in a foreign file. After all known keys were read, `report_unknown_keys` reports the others.
 
     A value of the wrong type is reported and then counts as not given. `what` names the map in findings.
     """

@@ -65,7 +65,7 @@ class WheelGeometry:
     def __post_init__(self) -> None:
         for value in (self.wheel_distance, self.metres_per_unit):
             if not (math.isfinite(value) and value > 0.0):
-                raise ValueError(f"a distance or a radius of {value} is none")
+                raise ValueError(f"distances and radii must be positive and finite, not {value}")
 
     @classmethod
     def of_radius(cls, wheel_radius: float, wheel_distance: float) -> WheelGeometry:
@@ -251,7 +251,7 @@ class WheelDrive:
         A command holds up to its deadline, not to the end of the step. ValueError if `dt` is not above 0.
         """
         if not (math.isfinite(dt) and dt > 0.0):
-            raise ValueError(f"a step of {dt} s is no step")
+            raise ValueError(f"a step must be positive and finite, not {dt} s")
         driven = min(max(self._until - (now - dt), 0.0), dt)
         if driven > 0.0:
             self.limiter.step(self._target, driven)
@@ -263,7 +263,7 @@ class WheelDrive:
 
 def _refusal(velocity: Velocity2, excess: float) -> str:
     command = f"{velocity.linear:g} m/s and {velocity.angular:g} rad/s"
-    return f"{command} is {excess:.1f} times too fast" if velocity.is_finite else f"{command} is no velocity"
+    return f"{command} is {excess:.1f} times too fast" if velocity.is_finite else f"{command} is not a finite velocity"
 
 
 def _scaled(velocity: Velocity2, factor: float) -> Velocity2:

@@ -40,7 +40,7 @@ def frame_of_body(robot: Robot) -> Iterator[Finding]:
         for port in (end.port for end in component.ends):
             for name in (port.source, port.target) if isinstance(port, Looks) else ():
                 if name not in placed and name not in shape.links:
-                    message = f"'{component.name}' looks up the frame '{name}', which nobody places"
+                    message = f"'{component.name}' looks up the frame '{name}', which no component publishes"
                     help_text = suggest(name, shape.links, "its links")
                     place = robot.entry_span(component.name)
                     yield _finding(shape, place, message, help_text, (component.name, name))

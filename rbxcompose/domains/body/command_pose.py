@@ -20,7 +20,7 @@ from rbxcompose.bus.topics import Publisher
 from rbxcompose.commands.console import NotDoneError, emit, misused, refuse
 from rbxcompose.commands.guest import NAME, NOBODY, Guest, visit
 from rbxcompose.commands.terminal import NO_TERMINAL, LiveScreen, is_terminal
-from rbxcompose.domains.body.command_body import HeardFrames, described, described_body
+from rbxcompose.domains.body.command_body import ReceivedFrames, described, described_body
 from rbxcompose.domains.body.model import Body, BodyJoint
 from rbxcompose.domains.body.source import UNKNOWN
 from rbxcompose.msgs.sensor_msgs import JointState
@@ -233,8 +233,8 @@ def _posed(guest: Guest, arguments: argparse.Namespace) -> int:
 
 
 def _start(guest: Guest, body: Body) -> dict[str, float]:
-    """Return where the joints are now, as far as transforms tell: opening the sliders must not move anything."""
-    frames = HeardFrames(guest)
+    """Return where the joints are now, as far as they are published: opening the sliders moves nothing."""
+    frames = ReceivedFrames(guest)
     guest.run(lambda: all(frames.tree.parent_of(joint.child) for joint in body.moving), HEARD)
     found = ((joint, frames.tree.lookup(joint.parent, joint.child)) for joint in body.moving)
     return {joint.name: joint.position_of(pose) for joint, pose in found if pose is not None}

@@ -127,7 +127,7 @@ class BodyFile:
         found = {name: mesh for name in set(mesh_names(root)) if (mesh := self._mesh(name)) is not None}
         return {name: mesh for name, mesh in found.items() if self._is_ours(mesh)}
 
-    def meant_meshes(self, root: XmlElement) -> dict[str, str]:
+    def respelt_meshes(self, root: XmlElement) -> dict[str, str]:
         """Return, for each mesh that is not there, the name of a file that differs only in its capitals."""
         missing = set(mesh_names(root)) - self.meshes(root).keys()
         return {name: near for name in missing if (near := self._in_other_letters(name))}

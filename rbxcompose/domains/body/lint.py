@@ -212,14 +212,14 @@ _TURN = math.tau + 0.01  # [rad]
 _WITH_ORIGINS = ("link", "joint", "visual", "collision", "inertial")
 
 
-def lint(body: Body, meshes: Collection[str], meant: Mapping[str, str] = MappingProxyType({})) -> Iterator[Finding]:
+def lint(body: Body, meshes: Collection[str], respelt: Mapping[str, str] = MappingProxyType({})) -> Iterator[Finding]:
     """Yield what is wrong with a body; `meshes` are the names of the mesh files that exist.
 
-    `meant` has names of files that exist, for those that differ only in their capitals.
+    `respelt` has names of files that exist, for those that differ only in their capitals.
     """
     yield from mass_mistakes(body)
     for link in body.links.values():
-        yield from _shapes(link, meshes, meant)
+        yield from _shapes(link, meshes, respelt)
     for joint in body.joints.values():
         if (away := math.hypot(*joint.origin.translation)) > LARGEST:
             message = f"joint '{plain(joint.name, _SHOWN)}' is {away:g} m away from the link that carries it"
@@ -271,12 +271,12 @@ def _be(words: list[str]) -> str:
     return "is" if len(words) == 1 else "are"
 
 
-def _shapes(link: BodyLink, meshes: Collection[str], meant: Mapping[str, str]) -> Iterator[Finding]:
+def _shapes(link: BodyLink, meshes: Collection[str], respelt: Mapping[str, str]) -> Iterator[Finding]:
     for shape in (*link.visuals, *link.collisions):
         geometry = shape.geometry
         if geometry.kind == "mesh" and geometry.file not in meshes:
             message = f"the mesh '{plain(geometry.file)}' does not exist"
-            near = meant.get(geometry.file, "")
+            near = respelt.get(geometry.file, "")
             help_text = f"{DID_YOU_MEAN} '{near}'? Capitals count" if near else _where_meshes_are(geometry.file)
             yield NO_MESH.at(shape.size_span or shape.span, message, help=help_text)
         if largest := _extent(shape):

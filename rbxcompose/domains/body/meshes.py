@@ -70,7 +70,7 @@ def joined(solids: Sequence[Solid]) -> Solid:
 def read_mesh(path: Path, name: str, most: int = LARGEST) -> Solid:
     """Return the triangles of a file of at most `most` bytes; `name` is that in messages.
 
-    Lengths are those of the file, but in metres if it tells its unit. Its upward axis is ignored.
+    Lengths are those of the file, but in metres if it has a unit. Its upward axis is ignored.
 
     Raises:
         MissingLibraryError: if a library for this format is missing.
@@ -79,7 +79,7 @@ def read_mesh(path: Path, name: str, most: int = LARGEST) -> Solid:
     if problem := mesh_problem(path, most):
         raise ValueError(f"the mesh '{plain(name)}' {problem}")
     if (ending := path.suffix.lower()) not in FORMATS:
-        raise ValueError(f"the mesh '{plain(name)}' is none of {', '.join(FORMATS)}")
+        raise ValueError(f"the mesh '{plain(name)}' must be one of {', '.join(FORMATS)}")
     if ending == _COLLADA:
         need("Collada files", "collada")
     try:

@@ -77,7 +77,7 @@ _SHOWN = 60  # characters of a name in a message
 
 
 def missing_prefixes(files: Mapping[str, BareFile]) -> Iterator[Finding]:
-    """Yield one finding for each file with bare tags, as the fenced process tells them."""
+    """Yield one finding for each file with bare tags, as the fenced process reports them."""
     for path, found in files.items():
         file, first, count = shown_name(Path(path)), found.tags[0], len(found.tags)
         others = "" if count == 1 else f", like {count - 1} other {'tag' if count == 2 else 'tags'} of this file"

@@ -39,7 +39,7 @@ class PortError(Exception):
         self.help = help or self.help
 
     def finding(self, span: Span | None = None) -> Finding:
-        """Return what to tell a person."""
+        """Return the message for people."""
         return self.kind.at(span, f"{plain(self.path)} {plain(self.problem)}", help=self.help)
 
 
@@ -151,7 +151,7 @@ def serial_ports(root: Path = ROOT) -> list[SerialPort]:
 
 
 def _names(root: Path) -> Mapping[str, Sequence[str]]:
-    """Return the links to serial ports by the paths where they lead; those that tell the device come first."""
+    """Return the links to serial ports by the paths where they lead; those that name the device come first."""
     found: dict[str, list[str]] = {}
     for folder in _LINKS:
         for link in _entries(root / folder):
@@ -226,20 +226,20 @@ def port_path(name: str, root: Path = ROOT) -> str:
 def port_of(wanted: UsbDevice, ports: Iterable[SerialPort]) -> SerialPort:
     """Return the port of a device among those that are connected; raise as `port_path` does.
 
-    What the kernel tells of devices decides. A link with the name of the device (that of a udev rule) decides among
-    several that are meant, and where the kernel tells nothing, as in containers.
+    What the kernel reports decides. A link with the name of the device (that of a udev rule) decides among
+    several that are meant, and where the kernel reports nothing, as in containers.
     """
     ports = list(ports)
     usb = [port for port in ports if port.device]
-    meant = [port for port in usb if port.device and port.device.is_meant_by(wanted)]
+    matching = [port for port in usb if port.device and port.device.matches(wanted)]
     linked = [port for port in ports if wanted.name and port.is_linked(wanted.name)]
-    if len(meant) != 1:
-        meant = [port for port in linked if port in meant or not (meant or port.device)] or meant
-    if not meant:
+    if len(matching) != 1:
+        matching = [port for port in linked if port in matching or not (matching or port.device)] or matching
+    if not matching:
         raise NoDeviceError(wanted.called, "is not connected", connected(usb, "USB serial port"))
-    if len(meant) > 1:
-        raise DeviceNotUniqueError(wanted.called, f"has {len(meant)} ports", connected(meant, "USB serial port"))
-    return meant[0]
+    if len(matching) > 1:
+        raise DeviceNotUniqueError(wanted.called, f"has {len(matching)} ports", connected(matching, "USB serial port"))
+    return matching[0]
 
 
 def connected(ports: Sequence[SerialPort], what: str) -> str:

@@ -19,10 +19,10 @@ from rbxcompose.domains.devices.usb import UsbDevice
 
 
 def names_of(port: SerialPort, named: Iterable[UsbDevice]) -> list[str]:
-    """Return the names that mean a port: by its device, or by a link if the kernel tells no device."""
+    """Return the names that mean a port: by its device, or by a link if the kernel reports no device."""
     if port.device is None:
         return [device.name for device in named if port.is_linked(device.name)]
-    return [device.name for device in named if port.device.is_meant_by(device)]
+    return [device.name for device in named if port.device.matches(device)]
 
 
 def proposed(port: SerialPort, ports: Sequence[SerialPort]) -> Mapping[str, str]:
@@ -43,11 +43,11 @@ def proposed(port: SerialPort, ports: Sequence[SerialPort]) -> Mapping[str, str]
 
 def _alike(keys: Mapping[str, str], others: Iterable[UsbDevice]) -> list[UsbDevice]:
     wanted = UsbDevice(keys["vendor"], keys["product"], keys.get("serial", ""), keys.get("usb_port", ""))
-    return [other for other in others if other.is_meant_by(wanted)]
+    return [other for other in others if other.matches(wanted)]
 
 
 def same_serials(ports: Iterable[SerialPort]) -> list[list[SerialPort]]:
-    """Return groups of ports of different devices that tell the same serial number, as cheap copies do."""
+    """Return groups of ports of different devices that report the same serial number, as cheap copies do."""
     groups: dict[UsbDevice, dict[str, SerialPort]] = defaultdict(dict)
     for port in ports:
         if port.device is not None and port.device.serial:
@@ -163,7 +163,7 @@ def device_answers(
     for group in same_serials(ports):
         places = ", ".join(serial_port.path for serial_port in group)
         serial = group[0].device.serial if group[0].device else ""
-        words = f"{len(group)} adapters tell the same serial number '{plain(serial)}': {places}"
+        words = f"{len(group)} adapters report the same serial number '{plain(serial)}': {places}"
         yield SAME_SERIAL.at(None, words, help="name them by 'usb_port' instead of 'serial'")
     if not named:
         yield "the robot has no devices"

@@ -102,7 +102,7 @@ def _text(folder: Path, name: str) -> str:
     try:
         with (folder / name).open(encoding="utf-8", errors="replace") as file:
             return file.read(64).strip()
-    except OSError:  # Linux shows only what the battery tells, and a battery may be taken out while it is read
+    except OSError:  # Linux shows only what the battery reports, and a battery may be taken out while it is read
         return ""
 
 

@@ -415,7 +415,7 @@ def no_take_over(robot: Robot) -> Iterator[Finding]:
         driving = {name: rank for name, rank in ranks.items() if entry.inputs[name].source}
         open_ones = [name for name in ranks if name not in driving]
         if any(rank <= max(driving.values(), default=0) for rank in entry.lock_ranks.values()):
-            continue  # told as RBX3110
+            continue  # reported as RBX3110
         if open_ones and driving and max(ranks[name] for name in open_ones) < min(driving.values()):
             best = max(open_ones, key=lambda name: ranks[name])
             first = min(driving, key=lambda name: driving[name])
@@ -457,7 +457,7 @@ def past_the_mux(robot: Robot) -> Iterator[Finding]:
             if muxes and end.instance not in muxes and isinstance(end.port, In) and end.port.qos is Qos.COMMAND:
                 mux, own = robot.components[inputs[0].instance], inputs[0]
                 if own.topic in {port_end.topic for port_end in mux.ends if isinstance(port_end.port, Out)}:
-                    continue  # the mux takes what it writes itself, which is told there
+                    continue  # the mux takes what it writes itself, which is reported there
                 yield past_the_mux.at(
                     robot.end_span(end),
                     f"'{end.instance}' subscribes to '{topic}', bypassing the mux '{mux.name}'",

@@ -226,7 +226,7 @@ def empty_on_the_way(robot: Robot) -> Iterator[Finding]:
         ways, known = ways_of(robot, mission), constants(mission)
         if ways is None:
             continue
-        lost = {place.name for place in far_places(robot)}  # told as RBX3512
+        lost = {place.name for place in far_places(robot)}  # reported as RBX3512
         list(too_short(ways, known))  # consumed for its side effect: it walks the whole mission
         for call in calls(robot, mission):
             goals = (

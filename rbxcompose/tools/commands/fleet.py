@@ -23,7 +23,9 @@ from rbxcompose.missions.execution.requests import MISSION
 
 NO_LABEL = kind("RBX6130")
 _COLUMNS = ("robot", "host", "state", "mission", "battery")
-ShareFacts = tuple[str, str, dict[str, Any]]  # robot, host, and what `top` tells of the share, or its `state` alone
+ShareFacts = tuple[
+    str, str, dict[str, Any]
+]  # robot, host, and what `top` reports about the share, or its `state` alone
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -25,6 +25,7 @@ from rbxcompose.base.config import HIDDEN
 from rbxcompose.base.files import NotRegularError, open_regular
 from rbxcompose.base.findings import MOST_NAMES, Finding, Severity, suggest
 from rbxcompose.base.printable import plain
+from rbxcompose.base.requests import to_data
 from rbxcompose.bus.endpoints import tcp_endpoint
 from rbxcompose.bus.names import Attachment, data_key, dds_type, resolve
 from rbxcompose.bus.tokens import EntityKind, NodeToken, gid
@@ -424,7 +425,7 @@ def _report(arguments: argparse.Namespace, name: str, found: ReplayResult) -> in
     for text in found.errors:
         emit(plain(text))
     if arguments.json:
-        emit(json.dumps({"component": name, "equal": found.equal, "difference": _difference_fields(found.difference)}))
+        emit(json.dumps({"component": name, "equal": found.equal, "difference": to_data(found.difference)}))
     elif found.difference is None:
         emit(f"'{name}' sends the same as recorded: {found.equal:,} messages")
     else:
@@ -436,15 +437,3 @@ def _difference_text(name: str, one: RunDifference, equal: int) -> str:
     where = f", field '{plain(one.field)}'" if one.field else ""
     values = f"recorded {plain(one.recorded)}, now {plain(one.now)}"
     return f"'{name}' differs at {one.time:.3f} s on {plain(one.topic)}{where}: {values}; {equal:,} messages were equal"
-
-
-def _difference_fields(difference: RunDifference | None) -> dict[str, object] | None:
-    if difference is None:
-        return None
-    return {
-        "time": difference.time,
-        "topic": difference.topic,
-        "field": difference.field,
-        "recorded": difference.recorded,
-        "now": difference.now,
-    }

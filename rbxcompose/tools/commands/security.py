@@ -93,7 +93,7 @@ def _bring(system: System, host: str, folder: Path, arguments: argparse.Namespac
     done = subprocess.run(remote.ssh(script), input=archive_of(files, mode=0o600), capture_output=True, check=False)
     if done.returncode == 0:
         return None
-    reason = done.stderr.decode(errors="replace").strip().splitlines()[-1:] or ["no reason is told"]
+    reason = done.stderr.decode(errors="replace").strip().splitlines()[-1:] or ["no reason given"]
     return NOT_MADE.at(None, f"'{host}' cannot be given its certificate: {reason[0]}")
 
 

@@ -43,7 +43,7 @@ def _router(robot: RunningRobot, facts: HostFacts) -> Iterator[str | Finding]:
     if robot.state is None or robot.state.router is None or "router" not in robot.state.processes:
         return  # it uses a router from elsewhere, or none is known
     if not robot.state.is_supervised:
-        return  # that the robot has ended is told by `leftovers`
+        return  # `leftovers` reports that the robot has ended
     if is_private(robot.state.router):
         yield f"the bus of {robot.name} takes programs of this user only"
         return
@@ -144,7 +144,7 @@ def _wires_of(running_robot: RunningRobot, topics: list[GraphName]) -> Iterator[
         nodes = ", ".join(sorted({end.node for end in topic.takers}))
         words = f"{plain(nodes)} of '{running_robot.name}' subscribes to {plain(topic.name)}, which has no publisher"
         yield NOBODY_PUBLISHES.at(None, words, help="'rbxcompose topic ls' shows what is published")
-    unheard = [plain(topic.name) for topic in topics if topic.givers and not topic.takers]
-    more = f" and {len(unheard) - _MOST_NAMES} more" if len(unheard) > _MOST_NAMES else ""
-    heard = f"; published without a subscriber: {', '.join(unheard[:_MOST_NAMES])}{more}" if unheard else ""
-    yield f"{running_robot.name}: {len(topics) - len(alone)} topics are published or open to the outside{heard}"
+    unread = [plain(topic.name) for topic in topics if topic.givers and not topic.takers]
+    more = f" and {len(unread) - _MOST_NAMES} more" if len(unread) > _MOST_NAMES else ""
+    rest = f"; published without a subscriber: {', '.join(unread[:_MOST_NAMES])}{more}" if unread else ""
+    yield f"{running_robot.name}: {len(topics) - len(alone)} topics are published or open to the outside{rest}"

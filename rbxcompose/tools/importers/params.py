@@ -141,16 +141,16 @@ def params(files: Sequence[ForeignFile], name: str, report: Report) -> str:
 def _is_one(file: ForeignFile, report: Report) -> bool:
     words = ""
     if not isinstance(file.root, MappingNode):
-        words = "it is no map of keys"
+        words = "it is not a map of keys"
     elif {"rbx", "kind"} <= file.root.entries.keys():
         words = "it is a manifest"
     if words:
-        report.add(OTHER_PROGRAM.at(file.root.span, f"'{plain(file.name)}' is no file of parameters: {words}"))
+        report.add(OTHER_PROGRAM.at(file.root.span, f"'{plain(file.name)}' is not a file of parameters: {words}"))
     return not words
 
 
 def _add(known: GivenValues, node: NodeParameters, report: Report) -> None:
-    """Add the parameters of a node; tell those that cannot be carried over, and those that disagree."""
+    """Add the parameters of a node; report those that cannot be carried over, and those that disagree."""
     for path, entry in scalars_of(node.root):
         shown = f"'{plain(shown_name(path), 60)}' of '{plain(node.node, 60)}'"
         if path[0] in _OF_ROS and not _is_false(entry.value):

@@ -260,7 +260,7 @@ def _add_mission(robot: Robot, mission: RobotMission, key: str, found: dict[tupl
     def lead(kind: WireContent, topic: str, type_name: str) -> None:
         found.setdefault((kind, topic), _Open(kind, type_name)).sources.append(Tip(key))
 
-    def hear(topic: str, type_name: str, note: str) -> None:
+    def receive(topic: str, type_name: str, note: str) -> None:
         found.setdefault((WireContent.TOPIC, topic), _Open(WireContent.TOPIC, type_name)).targets.append(Tip(key, note))
 
     for skill in sorted({node.skill for node in mission.program.nodes} & robot.skills.keys()):
@@ -270,7 +270,7 @@ def _add_mission(robot: Robot, mission: RobotMission, key: str, found: dict[tupl
         if (halts := source.orders.halts) is not None:
             lead(WireContent.TOPIC, halts.topic, halts.message)
         if (ends := source.orders.ends) is not None:
-            hear(ends.topic, ends.message, skill)
+            receive(ends.topic, ends.message, skill)
     published, called = sent_by([mission.program])
     space = robot.manifest.bus.namespace or ""
     for name in sorted(published & robot.topics.keys()):
@@ -279,7 +279,7 @@ def _add_mission(robot: Robot, mission: RobotMission, key: str, found: dict[tupl
         lead(WireContent.SERVICE, resolve(name, space), robot.services[name])
     for name in sorted(mission.program.reads & robot.values.keys()):
         value = robot.values[name]
-        hear(value.topic, value.message, f"${name}")
+        receive(value.topic, value.message, f"${name}")
 
 
 def _add_look_ups(robot: Robot, found: dict[tuple[WireContent, str], _Open]) -> None:

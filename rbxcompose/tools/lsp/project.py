@@ -180,7 +180,7 @@ class Newest:
     """The project as last compiled, and the texts that have changed since.
 
     A thread works on a copy of the project, which replaces the project when it is done. A text that arrives meanwhile
-    makes the copy outdated: it stops at the next robot, and the work starts again with all texts. So what is `told`
+    makes the copy outdated: it stops at the next robot, and the work starts again with all texts. So what is published
     always comes from the newest texts. All methods belong to the thread of the event loop.
     """
 

@@ -523,7 +523,7 @@ class TrialReader:
         return trials[0], Report([*findings])
 
     def every(self, path: Path) -> list[WrittenTrial]:
-        """Return the contents of a file for each robot with which it runs; the names of further ones are told."""
+        """Return the contents of a file for each robot with which it runs; the names of further ones name the robot."""
         first = self.open(path)
         node = first.root.get("also") if first.root is not None else None
         if first.root is None or node is None:

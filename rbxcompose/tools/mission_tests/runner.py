@@ -159,7 +159,7 @@ class Now:
 class Watcher(Observer, Protocol):
     """An observer of the paths that a mission takes."""
 
-    def hear(self, event: MissionEvent, /) -> None:
+    def receive(self, event: MissionEvent, /) -> None:
         """Handle an event of the mission."""
         ...
 
@@ -244,8 +244,8 @@ class TrialStage:
 
     def say(self, event: MissionEvent, /) -> None:
         """Record an event."""
-        self.record.hear(event)
-        self.watcher.hear(event)
+        self.record.receive(event)
+        self.watcher.receive(event)
 
     # The run.
 
@@ -496,8 +496,8 @@ class TrialWorld:
     def say(self, event: MissionEvent, /) -> None:
         """Keep an event, and pass it on."""
         self._run.record.now = self._run.now
-        self._run.record.hear(event)
-        self._run.watcher.hear(event)
+        self._run.record.receive(event)
+        self._run.watcher.receive(event)
         self._robot.say(event)
 
 

@@ -1,4 +1,4 @@
-"""The nodes on a bus that have parameters, and what they tell: `param ls`, `get` and `describe`."""
+"""The nodes on a bus that have parameters, and their values: `param ls`, `get` and `describe`."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ _KEYS = ("node", "name", "value", "read_only", "about")
 
 @dataclass(frozen=True, slots=True)
 class ListedParameter:
-    """A parameter as its node tells it."""
+    """A parameter as its node reports it."""
 
     node: str
     value: object

@@ -111,7 +111,7 @@ def devices_of(arguments: argparse.Namespace) -> RobotDevices | None:
 
 
 def read_devices(path: str, arguments: argparse.Namespace) -> RobotDevices | None:
-    """Return the devices of a robot, and tell its findings; None if it cannot be read."""
+    """Return the devices of a robot, and report its findings; None if it cannot be read."""
     found = compiled(path, arguments)
     if found.report.has_errors:
         console.write_report(found.report, found.sources)
@@ -274,7 +274,7 @@ def _install(arguments: argparse.Namespace) -> int:
         return _done(arguments, path, written=False)
     if not arguments.yes:
         if arguments.json or not sys.stdin.isatty():
-            return console.misused("udev install", "there is nobody to ask: give '--yes'")
+            return console.misused("udev install", "there is no terminal to ask: give '--yes'")
         console.emit(_change(path, before, rules))
         if not _agreed():
             console.emit("nothing was written")

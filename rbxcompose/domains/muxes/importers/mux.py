@@ -48,14 +48,14 @@ class ForeignMux:
 
 
 def read_muxes(file: ForeignFile, report: Report) -> list[ForeignMux]:
-    """Return the muxes of a file; other nodes in it are told, and so is a file without any."""
+    """Return the muxes of a file; other nodes in it are reported, and so is a file without any."""
     found, others = parameters_with(file, lambda root: bool(_program(root)))
     if not found:
-        words = f"'{plain(file.name)}' is no file of a mux: it has neither 'topics' nor 'locks' nor 'subscribers'"
+        words = f"'{plain(file.name)}' is not a file of a mux: it has neither 'topics' nor 'locks' nor 'subscribers'"
         report.add(OTHER_PROGRAM.at(file.root.span, words))
         return []
     for node in others:
-        report.add(NOT_CARRIED_OVER.at(node.span, f"'{plain(node.node, 60)}' is not carried over: it is no mux"))
+        report.add(NOT_CARRIED_OVER.at(node.span, f"'{plain(node.node, 60)}' is not carried over: it is not a mux"))
     named = (replace(node, node="") if node.root.span == file.root.span else node for node in found)
     return [_mux(node, _program(node.root), report) for node in named]
 
