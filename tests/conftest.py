@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import atexit
+import fcntl
 import os
 import shutil
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
+from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +26,7 @@ ROOT = Path(__file__).parents[1]
 
 
 CACHES = "RBXCOMPOSE_TEST_CACHES"
+WITH_ARMS = tuple(f"tests/{folder}/" for folder in ("components", "interop", "motion", "robots", "testing"))
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -42,11 +46,31 @@ def pytest_configure(config: pytest.Config) -> None:
         atexit.register(shutil.rmtree, os.environ[CACHES], ignore_errors=True)
 
 
-def pytest_collection_finish() -> None:
-    """Compile what arms need before any test: on a busy machine, that takes longer than a test may."""
-    if "rbxcompose.domains.arms.motion.arm_kinematics" in sys.modules:
-        from tests.motion.toy_arm import fast_planner, kinematics
+def pytest_collection_finish(session: pytest.Session) -> None:
+    """Compile what arms need before any test: on a busy machine, that takes longer than a test may.
 
+    One worker does, and the others begin with tests that need none of it.
+    """
+    if not session.config.option.collectonly and "rbxcompose.domains.arms.motion.arm_kinematics" in sys.modules:
+        with suppress(BlockingIOError):
+            compile_for_arms(fcntl.LOCK_NB)
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
+    """Wait for what is compiled outside of the time that a test has."""
+    if item.nodeid.startswith(WITH_ARMS):
+        compile_for_arms()
+    return (yield)
+
+
+@cache
+def compile_for_arms(flags: int = 0) -> None:
+    """Compile what arms need, or take it from the worker that has."""
+    from tests.motion.toy_arm import fast_planner, kinematics
+
+    with open(Path(os.environ[CACHES], "compiling"), "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX | flags)
         kinematics().hasten()
         fast_planner()
 

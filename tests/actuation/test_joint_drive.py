@@ -18,6 +18,7 @@ from rbxcompose.domains.servos.models import model_named, servo_models
 from rbxcompose.domains.servos.servo_cycle import ServoCycle
 from rbxcompose.domains.servos.twins.servo_fake import FakeServo
 from rbxcompose.domains.servos.twins.servo_twin import TwinBus, pseudo_terminal
+from tests.loops import for_all
 
 PERIOD = 0.01
 LIMITS = MotionLimits(-1.0, 1.5, 2.0, 10.0)
@@ -55,7 +56,7 @@ class Driven:
             self.now += PERIOD
 
 
-@pytest.mark.parametrize("name", servo_models())
+@for_all("name", servo_models())
 @pytest.mark.parametrize("is_inverted", [False, True])
 def test_each_tick_is_the_tick_of_its_angle(name: str, is_inverted: bool) -> None:
     servo_joint = joint(name, is_inverted=is_inverted, neutral=100)
