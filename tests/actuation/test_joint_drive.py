@@ -7,7 +7,7 @@ import time
 from dataclasses import replace
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.domains.servos.dynamixel_bus import DynamixelBus
@@ -82,7 +82,6 @@ def test_a_joint_starts_without_torque_and_moves_from_where_it_is() -> None:
     assert driven.drive.measured.position == pytest.approx(start + 0.5, abs=driven.drive.per_tick)
 
 
-@settings(max_examples=60)
 @given(asked=st.lists(st.lists(requests, max_size=2), min_size=1, max_size=40), start=st.integers(320, 760))
 def test_whatever_is_asked_the_goal_keeps_to_the_limits(asked: list[list[MoveTo | Relax | Enable]], start: int) -> None:
     driven = Driven()

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.msgs.action_msgs import CancelGoal, GoalInfo
@@ -46,7 +46,6 @@ def test_a_message_of_defaults_is_written_as_rosbags_writes_it_and_read_back(mes
     assert decode(message, payload) == message()
 
 
-@settings(suppress_health_check=[HealthCheck.too_slow])  # most of the time goes into making messages
 @given(any_message())
 def test_any_message_is_written_as_rosbags_writes_it_and_read_back(message: Message) -> None:
     payload = encode(message)
