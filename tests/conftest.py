@@ -19,7 +19,7 @@ from hypothesis import HealthCheck, settings
 from xdist.scheduler import LoadScopeScheduling
 
 from rbxcompose.testing.golden import Golden
-from tests.side_by_side import REAL_TIME, scope_of
+from tests.side_by_side import REAL_TIME, scope_of, turn_of
 from tests.soak import Soak
 
 ROOT = Path(__file__).parents[1]
@@ -77,7 +77,8 @@ def compile_for_arms(flags: int = 0) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Let tests of real processes try again: a machine that stands still for a moment keeps none of their deadlines."""
+    """Begin with what takes longest; let tests of real processes try again, since a busy machine keeps no deadline."""
+    items.sort(key=lambda item: turn_of(item.nodeid))
     for item in items:
         if item.nodeid.startswith(REAL_TIME):
             item.add_marker(pytest.mark.flaky(reruns=2))
@@ -91,6 +92,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadScopeScheduling:
     """Say how tests are given to the workers of `pytest -n`."""
+    config.option.loadscopereorder = False
     scheduling = LoadScopeScheduling(config, log)
     scheduling._split_scope = scope_of
     return scheduling
