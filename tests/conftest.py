@@ -33,6 +33,7 @@ def pytest_configure(config: pytest.Config) -> None:
     """Give all workers a folder of caches that goes with the run; say how many examples to try; keep bytecode."""
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     sys.dont_write_bytecode = False
+    config.addinivalue_line("markers", "soak: takes long, and runs under --soak alone")
     many = bool(config.getoption("--soak"))
     settings.register_profile(
         "rbxcompose",
@@ -76,8 +77,12 @@ def compile_for_arms(flags: int = 0) -> None:
         fast_planner()
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Begin with what takes longest; let tests of real processes try again, since a busy machine keeps no deadline."""
+    if not config.getoption("--soak"):
+        rare = [item for item in items if item.get_closest_marker("soak")]
+        config.hook.pytest_deselected(items=rare)
+        items[:] = [item for item in items if item not in set(rare)]
     items.sort(key=lambda item: turn_of(item.nodeid))
     for item in items:
         if item.nodeid.startswith(REAL_TIME):
