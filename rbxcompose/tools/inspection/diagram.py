@@ -23,6 +23,10 @@ from rbxcompose.sdk.capabilities import Forwards
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Looks, Out, Port, Serves, ServesAction, ServesTopic
 
 Keys = tuple[tuple[str, str], ...]  # its purpose, and the key
+MISSION = "mission"  # the component that runs missions
+TRANSFORMS = ("/tf", "/tf_static")  # what a look-up subscribes to
+STATUSES = "/diagnostics"  # where every component publishes without declaring it
+_GRAPH_MERMAID_STYLES = ("classDef wire fill:none,stroke-dasharray:2 2", "classDef mux stroke-width:2px")
 
 
 def keys_of(port: Port[Any], topic: str, bus: BusPlan) -> Keys:
@@ -69,11 +73,6 @@ def does(port: Port[Any]) -> str:
         case Calls():
             return "calls"
     return "looks up"
-
-
-MISSION = "mission"  # the component that runs missions
-TRANSFORMS = ("/tf", "/tf_static")  # what a look-up subscribes to
-STATUSES = "/diagnostics"  # where every component publishes without declaring it
 
 
 class BoxShape(StrEnum):
@@ -367,7 +366,6 @@ _ARROWS = {
     WireContent.LOOK_UP: "-.-o",
 }
 _GRAPH_MERMAID_SHAPES = {BoxShape.COMPONENT: ("[", "]"), BoxShape.MUX: ("{{", "}}"), BoxShape.PROGRAM: ("([", "])")}
-_GRAPH_MERMAID_STYLES = ("classDef wire fill:none,stroke-dasharray:2 2", "classDef mux stroke-width:2px")
 
 
 def mermaid(diagram: Diagram) -> str:

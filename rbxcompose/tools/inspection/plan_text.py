@@ -27,6 +27,14 @@ from rbxcompose.sdk.registry import component_type
 from rbxcompose.tools.inspection.diagram import does, keys_of, qos_of
 
 _NUMBER = 4  # width of a position in the start order
+LONGEST = 6  # reasons shown for one component
+_TOPIC = "topic of "  # prefix of the key of a wire
+_TEXT = 200  # characters of a reason
+_OPEN_TO = {
+    "none": "open to every machine of the network",
+    "tls": "encrypted, open to every machine of the network",
+    "mtls": "for hosts of the system",
+}
 
 
 def plan_text(plan: Plan, *, with_keys: bool = False) -> str:
@@ -85,11 +93,6 @@ def _wire(wire: Wire, port: Port[Any]) -> str:
         return f"{does(port)} '{port.source}' in '{port.target}'"
     qos = f" as {qos_of(port)}" if qos_of(port) else ""
     return f"{does(port)} {wire.topic} ({wire.type}){qos}"
-
-
-LONGEST = 6  # reasons shown for one component
-_TOPIC = "topic of "  # prefix of the key of a wire
-_TEXT = 200  # characters of a reason
 
 
 def with_places(found: Mapping[str, Any], robot: Robot) -> dict[str, Any]:
@@ -165,13 +168,6 @@ def _indexed(root: TreeNode, path: KeyPath) -> KeyPath:
         is_item = isinstance(at(root, found), SequenceNode) and str(key).isdigit()
         found = (*found, int(key) if is_item else key)
     return found
-
-
-_OPEN_TO = {
-    "none": "open to every machine of the network",
-    "tls": "encrypted, open to every machine of the network",
-    "mtls": "for hosts of the system",
-}
 
 
 def system_extent(system: System) -> str:

@@ -44,6 +44,12 @@ _FILL = re.compile(r"\$\$|\$\{(?P<body>[^}]*)\}")
 _ARGUMENT = "args."
 _UNNAMED = (ANYTHING, FILE, TOPIC, INPUT, PART_ARGUMENT)  # kinds that are looked up elsewhere, or have no names
 PLACED = ("place", "pose")  # types whose values are names of places
+_NAMED = (Takes.BRANCHES, Takes.CASES, Takes.STATES, Takes.INTERRUPTS)  # maps whose keys people choose
+_PLAIN = ("message", "set", "with", "publish", "call", "inputs")  # keys whose values are no steps
+_WORDS = (TypeKind.CHOICE, TypeKind.TEXT)  # types whose bare words are no places
+TARGETS = (ITEM, STATE, NODE)  # sorts of names that an interrupt may restart
+_SORTS = {"for": ITEM, "save": VARIABLE, "name": NODE}
+_STEPS = (STATE, NODE, ITEM)
 
 
 class ManifestMentions:
@@ -227,9 +233,6 @@ def _entries(node: TreeNode | None) -> list[tuple[str, Entry]]:
 
 
 Skills = Mapping[str, Skill]
-_NAMED = (Takes.BRANCHES, Takes.CASES, Takes.STATES, Takes.INTERRUPTS)  # maps whose keys people choose
-_PLAIN = ("message", "set", "with", "publish", "call", "inputs")  # keys whose values are no steps
-_WORDS = (TypeKind.CHOICE, TypeKind.TEXT)  # types whose bare words are no places
 
 
 @dataclass(frozen=True, slots=True)
@@ -454,9 +457,6 @@ class MissionMentions:
                     yield from mentions(self.files, self.path, scalar, 0, meanings)
 
 
-TARGETS = (ITEM, STATE, NODE)  # sorts of names that an interrupt may restart
-
-
 def mission_names(files: ProjectFiles, path: Path) -> dict[str, list[Symbol]]:
     """Return the symbols that a mission's file defines, by name."""
     found: dict[str, dict[Symbol, None]] = {}
@@ -486,9 +486,6 @@ def mission_names(files: ProjectFiles, path: Path) -> dict[str, list[Symbol]]:
             add(VARIABLE, name)
     walk(root, ())
     return {name: list(symbols) for name, symbols in found.items()}
-
-
-_SORTS = {"for": ITEM, "save": VARIABLE, "name": NODE}
 
 
 def mission_files(files: ProjectFiles, robot: Path, mission: str) -> set[Path]:
@@ -525,9 +522,6 @@ def _step_words() -> frozenset[str]:
     options = (key for kind in kinds().values() for key in kind.fields)
     own = (*STATE_KEYS, *MACHINE_KEYS, *INTERRUPT_KEYS, *DEEDS, "level", "restart", "name")
     return frozenset((*options, *modifier_keys(), *own))
-
-
-_STEPS = (STATE, NODE, ITEM)
 
 
 class TrialMentions:

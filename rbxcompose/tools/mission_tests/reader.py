@@ -65,6 +65,13 @@ from rbxcompose.tools.mission_tests.model import (
 )
 from rbxcompose.tools.mission_tests.scope import agrees, check_setting, names_of, read_value, setting_of
 
+_REMOVE = "remove one of them"
+FAULT = "fault"
+STEP_HELP = "write the name of a skill, a node or a state, such as '- go_to: corner_1'"
+ENDS = {one: one for one in (SUCCEEDS, FAILS, HALTED, SKIPPED)}
+AT, SET, PUBLISH = "at", "set", "publish"
+ROBOT_FILE = "robot.yaml"
+
 
 @dataclass(frozen=True, slots=True)
 class TrialContext:
@@ -103,9 +110,6 @@ def entries_of(node: TreeNode | None) -> Iterator[tuple[str, Entry]]:
     """Yield the entries of a map; nothing for any other node, which has its finding already."""
     if isinstance(node, MappingNode):
         yield from node.entries.items()
-
-
-_REMOVE = "remove one of them"
 
 
 def contradictions(expect: Expectations) -> Iterator[Finding]:
@@ -233,9 +237,6 @@ def _values(context: TrialContext, skill: Skill, node: TreeNode | None) -> list[
     return found
 
 
-FAULT = "fault"
-
-
 def read_fault(context: TrialContext, node: TreeNode, model: trials.InjectedModel) -> EventDeed | None:
     """Return the fault as a request to the driver of a bus, None after a finding."""
     driven, report = buses_of_joints(context.robot.manifest.contents), context.report
@@ -257,10 +258,6 @@ def read_fault(context: TrialContext, node: TreeNode, model: trials.InjectedMode
         return None
     request = InjectFault(model.fault, model.joint or "", model.for_)
     return EventDeed(FAULT, request=request, component=model.bus or driven[name])
-
-
-STEP_HELP = "write the name of a skill, a node or a state, such as '- go_to: corner_1'"
-ENDS = {one: one for one in (SUCCEEDS, FAILS, HALTED, SKIPPED)}
 
 
 def read_expect(context: TrialContext, node: TreeNode | None, model: trials.ExpectModel) -> Expectations:
@@ -419,9 +416,6 @@ def _fields(context: TrialContext, topic: str, node: TreeNode | None) -> dict[st
     return written
 
 
-AT, SET, PUBLISH = "at", "set", "publish"
-
-
 def read_events(
     context: TrialContext, node: TreeNode | None, models: Sequence[trials.EventModel]
 ) -> tuple[TrialEvent, ...]:
@@ -487,9 +481,6 @@ class MessagePlaces:
     def value(self, path: KeyPath) -> Span:
         """Return the place of a field's value."""
         return value_span(self.node, (*self.below, *path))
-
-
-ROBOT_FILE = "robot.yaml"
 
 
 @dataclass(frozen=True, slots=True)
