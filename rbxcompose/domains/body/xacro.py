@@ -35,7 +35,7 @@ BINDING = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
 _SHOWN = 60  # characters of a name in a message
 DEADLINE = 12.0  # [s] of real time, on a busy machine; the processes limit their processor time themselves
 KEPT = 64  # answers
-_XACRO_ANSWERS_LARGEST = 8_000_000  # [bytes] of a file that xacro reads
+_LARGEST_READ = 8_000_000  # [bytes] of a file that xacro reads
 _RUN = "import sys; sys.path.insert(0, sys.argv[1]); from rbxcompose.domains.body.xacro_child import main; main()"
 NOT_EXPANDED = kind("RBX2007")
 _NAMESPACE = "http://www.ros.org/wiki/xacro"
@@ -169,11 +169,7 @@ def _digest(path: str) -> str:
     """Return a digest of what a file or folder contains; none for what cannot be read."""
     try:
         is_folder = os.path.isdir(path)
-        data = (
-            "\0".join(sorted(os.listdir(path))).encode()
-            if is_folder
-            else read_regular(Path(path), _XACRO_ANSWERS_LARGEST)
-        )
+        data = "\0".join(sorted(os.listdir(path))).encode() if is_folder else read_regular(Path(path), _LARGEST_READ)
         return xxh3_128_hexdigest(data)
     except OSError:
         return ""

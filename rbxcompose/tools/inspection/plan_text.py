@@ -109,10 +109,10 @@ def with_places(found: Mapping[str, Any], robot: Robot) -> dict[str, Any]:
 
 def changes_text(found: Mapping[str, Any]) -> str:
     """Return the result of `with_places` for people: component by component, with the reasons."""
-    return "\n".join(_changes_text_lines(found))
+    return "\n".join(_change_lines(found))
 
 
-def _changes_text_lines(found: Mapping[str, Any]) -> Iterator[str]:
+def _change_lines(found: Mapping[str, Any]) -> Iterator[str]:
     components = found["components"]
     fates = dict.fromkeys(entry["fate"] for entry in components)
     counts = (f"{sum(entry['fate'] == fate for entry in components)} {fate}" for fate in fates)
@@ -178,10 +178,10 @@ def system_extent(system: System) -> str:
 
 def system_text(system: System, *, with_keys: bool = False) -> str:
     """Return what `up` would run on each host, why, and what would cross between hosts."""
-    return "\n".join(_system_text_lines(system, with_keys))
+    return "\n".join(_system_lines(system, with_keys))
 
 
-def _system_text_lines(system: System, with_keys: bool) -> Iterator[str]:
+def _system_lines(system: System, with_keys: bool) -> Iterator[str]:
     yield f"{system.name}: {system_extent(system)}"
     for host, facts in system.hosts.items():
         optional = ", the others start without it" if facts.optional else ""

@@ -27,7 +27,7 @@ from rbxcompose.sdk.capabilities import Drives
 from rbxcompose.sdk.component import Component
 from rbxcompose.sdk.registry import component_names, component_type, declared
 
-ABOUT = "A simulated battery, and the group of its status."
+PART_ABOUT = "A simulated battery, and the group of its status."
 ROBOT_ABOUT = "Goes to its places, and home to charge when the battery is low."
 BASE = "diff_drive_sim"
 COMMANDS = "cmd_vel"  # the mux of the template
@@ -43,7 +43,7 @@ _INDENT = re.compile(r"(?:[ \t]*(?:#[^\n]*)?\r?\n)*( +)\S")
 _CLASSES = frozenset({"Component", "Config", "Field", "Float32", "In", "Level", "Out", "Path", "Ratio"})
 
 
-def part_files(name: str, about: str = ABOUT) -> dict[str, str]:
+def part_files(name: str, about: str = PART_ABOUT) -> dict[str, str]:
     """Return the texts of the part's file and its test, by path."""
     return {
         f"parts/{name}.yaml": render("part.yaml.j2", name=name, about=about),
