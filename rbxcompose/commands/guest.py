@@ -45,6 +45,9 @@ _EACH = zenoh.ConsolidationMode.NONE
 _PAUSE = 0.01  # [s] between two looks for the router
 NO_HASHES = "TypeHashNotSupported"  # ROS 2 Humble writes this in place of a hash
 NO_ROUTER = kind("RBX9020")
+NO_NAME = kind("RBX9022")
+NOBODY = kind("RBX9025")
+SAID_NO = kind("RBX9026")
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,9 +219,6 @@ def _complain(owner: str, text: str) -> None:
 
 
 Do = Callable[[Guest, argparse.Namespace], int]
-NO_NAME = kind("RBX9022")
-NOBODY = kind("RBX9025")
-SAID_NO = kind("RBX9026")
 
 
 def visit(arguments: argparse.Namespace, do: Callable[[Guest], int]) -> int:

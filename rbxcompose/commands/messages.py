@@ -33,6 +33,8 @@ MOST_SHOWN = 128  # values of a list that text shows; JSON shows all
 _SHOWN = "MESSAGE"  # name of the message text in findings
 M = TypeVar("M", bound=Message)
 T = TypeVar("T", bound=Interface)
+_PERIOD = 1.0  # [s] between two notices about messages left out
+_INTERRUPTED = 130
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,9 +172,6 @@ class EchoReader:
             return None
 
 
-_PERIOD = 1.0  # [s] between two notices about messages left out
-
-
 class _Echo:
     """Prints messages until there are enough."""
 
@@ -262,9 +261,6 @@ def call(guest: Guest, arguments: argparse.Namespace) -> int:
         return refuse(SAID_NO.at(None, f"'{found.name}': {replies[0].error}"))
     emit(shown(to_plain(replies[0].response), arguments.json))
     return 0
-
-
-_INTERRUPTED = 130
 
 
 def send(guest: Guest, arguments: argparse.Namespace) -> int:

@@ -19,6 +19,8 @@ EACH, BUS = "each host", "bus"
 that reaches its bus; any other word is the type of the component that answers."""
 
 Declare = Callable[[argparse.ArgumentParser], object]  # declares some arguments
+_KIND = re.compile(rb"^kind:[ \t]*['\"]?(\w+)", re.MULTILINE)
+_HEAD = 4096  # bytes at the start of a file that contain its kind
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,10 +73,6 @@ def add_system_options(parser: argparse.ArgumentParser, *, has_profile: bool = F
             "--profile", action="append", default=[], metavar="P", help="of a system: apply this profile"
         )
     parser.add_argument("--ssh-config", metavar="FILE", help="of a system: ssh's configuration, instead of the user's")
-
-
-_KIND = re.compile(rb"^kind:[ \t]*['\"]?(\w+)", re.MULTILINE)
-_HEAD = 4096  # bytes at the start of a file that contain its kind
 
 
 def kind_of(path: Path) -> str:

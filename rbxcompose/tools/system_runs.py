@@ -39,6 +39,12 @@ from rbxcompose.tools.live_rules import LiveRules
 from rbxcompose.tools.robot_changes import Proposal, carry_out, unsure
 from rbxcompose.tools.run_view import is_fit, run_plan
 
+USAGE = 2
+WHICH_HOST = kind("RBX6110")
+OTHER_MACHINE = kind("RBX6111")
+WHICH_ROBOT = kind("RBX6112")
+REFUSED_THERE = kind("RBX6128")
+
 
 def up_everywhere(path: str, system: System, arguments: argparse.Namespace) -> int:
     """Bring the files to all hosts, start all shares, and show what they write until the robots are down."""
@@ -62,12 +68,6 @@ def up_everywhere(path: str, system: System, arguments: argparse.Namespace) -> i
             words, folder=folder, has_terminal=not arguments.detach
         )
     return follow_commands(commands, [label_of(shares, *key) for key, share in shares.items() if share.model.optional])
-
-
-USAGE = 2
-WHICH_HOST = kind("RBX6110")
-OTHER_MACHINE = kind("RBX6111")
-WHICH_ROBOT = kind("RBX6112")
 
 
 def run_share(path: str, arguments: argparse.Namespace, options: RunOptions) -> int:
@@ -173,7 +173,6 @@ def _address_problem(plan: Plan, host: str) -> Finding | None:
     return None
 
 
-REFUSED_THERE = kind("RBX6128")
 Key = tuple[str, str]  # host and robot
 
 

@@ -41,6 +41,11 @@ COLOURS = {Level.OK: "", Level.WARN: YELLOW, Level.ERROR: RED, Level.STALE: _MAG
 ALARMS = {level.name: text for level, text in COLOURS.items()}
 _FAILED = frozenset({"failed", "dead", "lost"})
 _MOST_OF_NAMES = 24  # columns
+SILENT = 3.0  # [s] after which a host does not answer
+_HEALTH = "/diagnostics_agg"
+_SUPERVISOR = "supervisor"
+_WIDEST = 200  # columns per line of a mission
+_PATH = "missions"
 
 
 @dataclass(frozen=True, slots=True)
@@ -233,9 +238,6 @@ def painted(line: PictureLine, width: int, colour: bool) -> str:
     return f"{line.colour}{text}{_RESET}" if colour and line.colour and text else text
 
 
-SILENT = 3.0  # [s] after which a host does not answer
-
-
 @dataclass(frozen=True, slots=True)
 class ShareView:
     """A share: the last answer of its host, as `top --json` writes it, its age [s], and what is wrong."""
@@ -327,11 +329,6 @@ def _share_warnings(shares: Sequence[ShareView]) -> list[PictureLine]:
         for share, entry in found
     ]
     return [PictureLine(""), *lines] if lines else []
-
-
-_HEALTH = "/diagnostics_agg"
-_SUPERVISOR = "supervisor"
-_WIDEST = 200  # columns per line of a mission
 
 
 class Sampler:
@@ -505,9 +502,6 @@ def _picture_of(
         None if status is None else level_of(status.level),
         "" if status is None else status.message,
     )
-
-
-_PATH = "missions"
 
 
 class MissionsSeen:

@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import AT_REST, Pose2, Velocity2
 
+ABSURD = 2.0  # a command above this many times a limit is a fault of its sender, not a wish to go fast
+ROUNDING = 1e-12  # a smaller difference of velocities counts as none [m/s, rad/s]
+
 
 class VelocityWindow:
     """Averages a velocity over the last `duration` [s]; between two steps it is a straight line.
@@ -45,10 +48,6 @@ class VelocityWindow:
         while len(self._steps) > used:
             self._steps.popleft()
         return Velocity2(linear / self.duration, angular / self.duration)
-
-
-ABSURD = 2.0  # a command above this many times a limit is a fault of its sender, not a wish to go fast
-ROUNDING = 1e-12  # a smaller difference of velocities counts as none [m/s, rad/s]
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,6 +15,8 @@ from rbxcompose.domains.body.sections.body import body
 from rbxcompose.sdk.capabilities import Drives, Setting, WritesFrame
 from rbxcompose.sdk.ports import Looks
 
+STATIC = "_static"  # suffix of the topic of static transforms; both topics describe one tree
+
 
 @check("RBX2019", Severity.WARNING, closed=(WIRING,))
 def frame_of_body(robot: Robot) -> Iterator[Finding]:
@@ -56,9 +58,6 @@ def _finding(body: Body, place: Span, message: str, help_text: str, about: tuple
     root = body.links[body.root]
     root_is = [Related(root.span, f"the root of the body is '{root.name}'")]
     return frame_of_body.at(place, message, help=help_text, related=root_is, about=about)
-
-
-STATIC = "_static"  # suffix of the topic of static transforms; both topics describe one tree
 
 
 @check("RBX3014", Severity.WARNING, closed=(WIRING, NAMES))

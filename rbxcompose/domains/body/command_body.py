@@ -18,6 +18,7 @@ from rbxcompose.msgs.std_msgs import String
 from rbxcompose.msgs.tf2_msgs import TFMessage
 
 DESCRIPTION = "robot_description"
+_TOPICS = ("/tf", "/tf_static")
 
 
 def described(guest: Guest, wanted: str | None) -> GraphName:
@@ -66,9 +67,6 @@ def described_body(guest: Guest, topic: GraphName, timeout: float) -> Body:
     if findings:
         raise NotDoneError(findings[0])
     return body
-
-
-_TOPICS = ("/tf", "/tf_static")
 
 
 class ReceivedFrames:

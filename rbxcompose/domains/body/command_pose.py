@@ -49,6 +49,8 @@ _MOVE = {
 }
 
 Draw = Callable[[float, float], float]
+HEARD = 1.5  # [s] in which transforms of all joints should come
+_JOINTS = "joint_states"
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,10 +199,6 @@ def bar(slider: Slider, at: float, width: int) -> str:
     span = slider.upper - slider.lower
     place = round((slider.within(at) - slider.lower) / span * (inside - 1)) if span > 0 else 0
     return f"[{'-' * place}#{'-' * (inside - 1 - place)}]"
-
-
-HEARD = 1.5  # [s] in which transforms of all joints should come
-_JOINTS = "joint_states"
 
 
 def pose(arguments: argparse.Namespace) -> int:

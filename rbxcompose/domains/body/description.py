@@ -26,6 +26,8 @@ MOUNT = "mount"
 _NAMES = {"link": ("name",), "joint": ("name",), "parent": ("link",), "child": ("link",), "mimic": ("joint",),
           "material": ("name",)}  # fmt: skip
 _OTHERS = ("name", "reference", "joint", "link")  # attributes of further elements that may name a link or a joint
+_OF_SHAPE = ("origin", "geometry")  # what a visual has in common with a collision
+MISFIT = kind("RBX2249")
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,9 +151,6 @@ def _lines(element: XmlElement, indent: str) -> Iterator[str]:
     yield f"{indent}</{element.name}>"
 
 
-_OF_SHAPE = ("origin", "geometry")  # what a visual has in common with a collision
-
-
 def covering(root: XmlElement, body: Body) -> XmlElement:
     """Return the URDF of a body whose visual shapes are collision shapes, too; none that is one is there twice."""
     children = [
@@ -173,7 +172,6 @@ def _seen(element: XmlElement, link: BodyLink) -> Iterator[XmlElement]:
 
 
 VirtualKind = Literal["fixed", "planar", "floating"]
-MISFIT = kind("RBX2249")
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,6 +26,9 @@ _HEAD = 8_192  # [bytes] that are read
 _SHOWN = 200
 _TEXT = {7, 8, 9, 10, 12, 13, 27, *range(32, 256)}
 _ELEMENTS = re.compile(rb"^element\s+\w+\s+(\d{1,20})\s*$", re.MULTILINE)
+PACKAGE = "package://"
+LIBRARY = "rbxcompose"
+"""The package of the shipped library, for `$(find rbxcompose)`."""
 
 
 def mesh_mistakes(body: Body, meshes: Mapping[str, Path]) -> Iterator[Finding]:
@@ -96,11 +99,6 @@ _FORMATS: Mapping[str, Callable[[bytes, int], str]] = {
 }
 """What looks at the beginning and the size of a file, by the ending of its name."""
 FORMATS = (*_FORMATS,)
-
-
-PACKAGE = "package://"
-LIBRARY = "rbxcompose"
-"""The package of the shipped library, for `$(find rbxcompose)`."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,6 +18,24 @@ Tensor = tuple[Vector3, Vector3, Vector3]
 """A symmetric matrix [kg m^2], row by row."""
 _SWEEPS = 12  # half of them suffice: each squares what is left beside the diagonal
 _PLANES = ((0, 1, 2), (0, 2, 1), (1, 2, 0))  # two axes, and the one that they turn about
+NO_MASS = kind("RBX2009", Severity.WARNING)
+NO_INERTIA = kind("RBX2010", Severity.WARNING)
+TOO_DENSE = kind("RBX2022", Severity.WARNING)
+_DENSEST = 100_000.0  # [kg/m^3]: four times osmium, since shapes may leave something out
+_TOLERANCE = 1e-6  # relative, of moments that were rounded when they were written
+_THIN = 1e-6  # [m]: a mass that is nearer than this to an axis has no moment about it
+_SHOWN = 60
+NO_MOTION = kind("RBX2011", Severity.WARNING)
+NO_MESH = kind("RBX2012")
+MILLIMETRES = kind("RBX2013", Severity.WARNING)
+DEGREES = kind("RBX2021", Severity.WARNING)
+TURNED_IN_DEGREES = kind("RBX2023", Severity.WARNING)
+LARGEST = 20.0  # [m]
+_WRITE = "write what the motor can do"
+_UNWRITTEN = "a limit that is not written is 0; joints without limits are 'continuous', those that never move 'fixed'"
+_LACKS_UNIT = "are these millimetres, or does a size lack its unit?"
+_TURN = math.tau + 0.01  # [rad]
+_WITH_ORIGINS = ("link", "joint", "visual", "collision", "inertial")
 
 
 def principal_moments(tensor: Tensor) -> tuple[float, float, float]:
@@ -77,15 +95,6 @@ def added(tensors: list[Tensor]) -> Tensor:
 def _sum(rows: list[Vector3]) -> Vector3:
     x, y, z = map(sum, zip(*rows, strict=True))
     return x, y, z
-
-
-NO_MASS = kind("RBX2009", Severity.WARNING)
-NO_INERTIA = kind("RBX2010", Severity.WARNING)
-TOO_DENSE = kind("RBX2022", Severity.WARNING)
-_DENSEST = 100_000.0  # [kg/m^3]: four times osmium, since shapes may leave something out
-_TOLERANCE = 1e-6  # relative, of moments that were rounded when they were written
-_THIN = 1e-6  # [m]: a mass that is nearer than this to an axis has no moment about it
-_SHOWN = 60
 
 
 def mass_mistakes(body: Body) -> Iterator[Finding]:
@@ -197,19 +206,6 @@ def _together(body: Body, links: Sequence[BodyLink]) -> tuple[float, Tensor]:
     mass = sum(inertial.mass for _, inertial in places)
     x, y, z = (sum(inertial.mass * at.translation[axis] for at, inertial in places) / mass for axis in range(3))
     return mass, added([about((x, y, z), at, inertial.mass, _tensor(inertial)) for at, inertial in places])
-
-
-NO_MOTION = kind("RBX2011", Severity.WARNING)
-NO_MESH = kind("RBX2012")
-MILLIMETRES = kind("RBX2013", Severity.WARNING)
-DEGREES = kind("RBX2021", Severity.WARNING)
-TURNED_IN_DEGREES = kind("RBX2023", Severity.WARNING)
-LARGEST = 20.0  # [m]
-_WRITE = "write what the motor can do"
-_UNWRITTEN = "a limit that is not written is 0; joints without limits are 'continuous', those that never move 'fixed'"
-_LACKS_UNIT = "are these millimetres, or does a size lack its unit?"
-_TURN = math.tau + 0.01  # [rad]
-_WITH_ORIGINS = ("link", "joint", "visual", "collision", "inertial")
 
 
 def lint(body: Body, meshes: Collection[str], respelt: Mapping[str, str] = MappingProxyType({})) -> Iterator[Finding]:

@@ -25,6 +25,13 @@ LOST = kind("RBX2205")
 NO_USB_DEVICE = kind("RBX2251")
 TWO_USB_DEVICES = kind("RBX2252")
 SLOW_ADAPTER = kind("RBX2206", Severity.WARNING)
+ROOT = Path("/")
+_TTYS = ("*:*/tty/tty*", "*:*/*/tty/tty*")  # below a device: of a modem (ttyACM), of a converter (ttyUSB)
+_LONGEST = 300  # characters of a port as it is shown
+_ONBOARD = ("ttyAMA", "ttyTHS", "ttymxc")
+_LINKS = ("dev/serial/by-id", "dev/serial/by-path", "dev")
+_MOST = 4096  # entries of a folder that are looked at
+_ATTRIBUTE = 4096  # [B], the longest that the kernel shows
 
 
 class PortError(Exception):
@@ -98,15 +105,6 @@ def slow_adapter(path: str, latency: float | None, span: Span | None = None) -> 
     timer = f"/sys/bus/usb-serial/devices/{plain(Path(path).resolve().name)}/latency_timer"
     now = f"echo 1 | sudo tee {timer}"
     return SLOW_ADAPTER.at(span, words, help=f"{now}; to keep it, in /etc/udev/rules.d/99-servos.rules: {_RULE}")
-
-
-ROOT = Path("/")
-_TTYS = ("*:*/tty/tty*", "*:*/*/tty/tty*")  # below a device: of a modem (ttyACM), of a converter (ttyUSB)
-_LONGEST = 300  # characters of a port as it is shown
-_ONBOARD = ("ttyAMA", "ttyTHS", "ttymxc")
-_LINKS = ("dev/serial/by-id", "dev/serial/by-path", "dev")
-_MOST = 4096  # entries of a folder that are looked at
-_ATTRIBUTE = 4096  # [B], the longest that the kernel shows
 
 
 @dataclass(frozen=True, slots=True)

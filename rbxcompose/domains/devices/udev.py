@@ -17,6 +17,23 @@ from rbxcompose.domains.devices.openable import LookAt
 from rbxcompose.domains.devices.serial_ports import FORBIDDEN, PortError, SerialPort, port_of
 from rbxcompose.domains.devices.usb import UsbDevice
 
+RULES = Path("etc/udev/rules.d")
+"""The folder of rules, below the root."""
+GROUP, MODE = "dialout", "0660"
+RELOAD = (
+    "sudo udevadm control --reload && "
+    "sudo udevadm trigger --action=add --subsystem-match=tty --subsystem-match=usb-serial"
+)
+"""The commands by which rules take effect for what is plugged in already."""
+_FTDI = "0403"
+_SPECIAL = "*?["  # in patterns
+_UNSURE = re.compile(r'[_"\\|]|[^\x20-\x7e]')  # udev writes `_` for others; no rule can have the rest
+NO_LINK = kind("RBX9413", Severity.WARNING)
+OTHER_RULES = kind("RBX9414", Severity.WARNING)
+SAME_SERIAL = kind("RBX9415", Severity.WARNING)
+NOT_IN_GROUP = kind("RBX9416", Severity.WARNING)
+OTHER_LINK = kind("RBX9417")
+
 
 def names_of(port: SerialPort, named: Iterable[UsbDevice]) -> list[str]:
     """Return the names that mean a port: by its device, or by a link if the kernel reports no device."""
@@ -56,19 +73,6 @@ def same_serials(ports: Iterable[SerialPort]) -> list[list[SerialPort]]:
     return [list(group.values()) for group in groups.values() if len(group) > 1]
 
 
-RULES = Path("etc/udev/rules.d")
-"""The folder of rules, below the root."""
-GROUP, MODE = "dialout", "0660"
-RELOAD = (
-    "sudo udevadm control --reload && "
-    "sudo udevadm trigger --action=add --subsystem-match=tty --subsystem-match=usb-serial"
-)
-"""The commands by which rules take effect for what is plugged in already."""
-_FTDI = "0403"
-_SPECIAL = "*?["  # in patterns
-_UNSURE = re.compile(r'[_"\\|]|[^\x20-\x7e]')  # udev writes `_` for others; no rule can have the rest
-
-
 def rules_file(robot: str) -> Path:
     """Return the path of a robot's rules below the root; those of a later number overrule earlier ones."""
     return RULES / f"99-rbxcompose-{robot}.rules"
@@ -106,13 +110,6 @@ def _parent(device: UsbDevice) -> Iterator[str]:
 def _escaped(text: str) -> str:
     """Return a text as a pattern that fits it alone, with `?` for any one sign that is not sure."""
     return "".join("?" if _UNSURE.match(sign) else f"[{sign}]" if sign in _SPECIAL else sign for sign in text)
-
-
-NO_LINK = kind("RBX9413", Severity.WARNING)
-OTHER_RULES = kind("RBX9414", Severity.WARNING)
-SAME_SERIAL = kind("RBX9415", Severity.WARNING)
-NOT_IN_GROUP = kind("RBX9416", Severity.WARNING)
-OTHER_LINK = kind("RBX9417")
 
 
 @dataclass(frozen=True, slots=True)

@@ -31,6 +31,16 @@ from rbxcompose.sdk.component import Component
 from rbxcompose.sdk.ports import Out
 
 REPORTS = 1.0  # [s] between two reports of a component's status
+_OF_ITEMS = ("match", "expected", "strip_prefix", "discard_stale", "count")
+_OF_LEVELS = ("debounce", "latch", "suppressed_by")
+_WITHOUT_EFFECT = {
+    "generic": ("analyzers",),
+    "group": (*_OF_ITEMS, "timeout"),
+    "other": ("match", "expected", "strip_prefix", "discard_stale", "analyzers"),
+    "ignore": ("timeout", "discard_stale", "count", "path", "analyzers", *_OF_LEVELS),
+    "discard": ("timeout", "discard_stale", "count", "path", "analyzers", *_OF_LEVELS),
+}
+_MOST_COMPARED = 200_000  # of patterns with names
 
 
 @check("RBX5005")
@@ -111,17 +121,6 @@ def expected_rate(robot: Robot) -> Iterator[Finding]:
                 help=f"write '{format_quantity(sent, FREQUENCY)}', or change the source",
                 related=[Related(robot.component_span(writer.instance), "the source")],
             )
-
-
-_OF_ITEMS = ("match", "expected", "strip_prefix", "discard_stale", "count")
-_OF_LEVELS = ("debounce", "latch", "suppressed_by")
-_WITHOUT_EFFECT = {
-    "generic": ("analyzers",),
-    "group": (*_OF_ITEMS, "timeout"),
-    "other": ("match", "expected", "strip_prefix", "discard_stale", "analyzers"),
-    "ignore": ("timeout", "discard_stale", "count", "path", "analyzers", *_OF_LEVELS),
-    "discard": ("timeout", "discard_stale", "count", "path", "analyzers", *_OF_LEVELS),
-}
 
 
 @check("RBX5010")
@@ -278,9 +277,6 @@ def _may_watch(component: RobotComponent) -> bool:
     classes = (one for one in component.cls.__mro__ if one is not Component)
     codes = (getattr(entry, "__code__", None) for cls in classes for entry in vars(cls).values())
     return any(code is not None and "watch" in code.co_names for code in codes)
-
-
-_MOST_COMPARED = 200_000  # of patterns with names
 
 
 @check("RBX5001", is_fixable=True, closed=(NAMES,))

@@ -27,6 +27,11 @@ from rbxcompose.msgs.diagnostic_msgs import DiagnosticStatus, KeyValue
 MOST_ITEMS = 10_000
 LONGEST_NAME = 256  # characters
 MOST_TEXT = 8_192  # characters of a status; ten thousand of these are 80 MB
+OK, WARN, ERROR, STALE = Level
+FAILED = (ERROR, STALE)
+MOST_CHANGES = 1000
+_LONGEST = 200  # characters of a cause
+_FLOORS = {"warn": Level.WARN, "error": Level.ERROR}
 
 
 class Admission:
@@ -70,10 +75,6 @@ def _reason(name: str, known: int) -> str:
     if len(name) > LONGEST_NAME:
         return f"statuses whose name has more than {LONGEST_NAME} characters are left out"
     return f"there are {MOST_ITEMS:,} statuses: further names are left out" if known >= MOST_ITEMS else ""
-
-
-OK, WARN, ERROR, STALE = Level
-FAILED = (ERROR, STALE)
 
 
 class Item:
@@ -338,10 +339,6 @@ class Group:
         return DiagnosticStatus(int(self.level), self.path, self.message, values=items + groups)
 
 
-MOST_CHANGES = 1000
-_LONGEST = 200  # characters of a cause
-
-
 @dataclass(frozen=True, slots=True)
 class TreeRow:
     """A header or an item of the tree; `status.name` is its path, `depth` the number of headers above it."""
@@ -368,9 +365,6 @@ class LevelHistory:
         """Return the changes with greater numbers that are still known, oldest first; all if there never was one."""
         known = min(self.count - (number if number <= self.count else 0), len(self._changes))
         return list(self._changes)[len(self._changes) - known :] if known > 0 else []
-
-
-_FLOORS = {"warn": Level.WARN, "error": Level.ERROR}
 
 
 class GroupLayout:

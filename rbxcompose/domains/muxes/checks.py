@@ -22,6 +22,11 @@ from rbxcompose.missions.analysis.effects import published
 from rbxcompose.sdk.capabilities import Drives, Forwards, Setting
 from rbxcompose.sdk.ports import In, Looks, Out, Qos
 
+_MOST_SHOWN = 8  # inputs that are pointed at
+ENDINGS = ("on_idle", "on_lock")
+LONGEST = 60.0  # [s]: commands come many times a second
+TYPE = "message"  # the setting of those whose type is chosen
+
 
 @check("RBX3130")
 def mux_heartbeat(robot: Robot) -> Iterator[Finding]:
@@ -267,9 +272,6 @@ def mux_type(robot: Robot) -> Iterator[Finding]:
                     )
 
 
-_MOST_SHOWN = 8  # inputs that are pointed at
-
-
 @check("RBX3133", Severity.WARNING)
 def mux_unreached(robot: Robot) -> Iterator[Finding]:
     """An input of a mux never gets through."""
@@ -317,9 +319,6 @@ def _meaningless(entry: MuxModel) -> Iterator[tuple[str, ...]]:
             ("inputs", name, "priority") for name, mux_input in entry.inputs.items() if mux_input.priority is not None
         )
         yield from (("locks", name, "priority") for name, lock in entry.locks.items() if lock.priority is not None)
-
-
-ENDINGS = ("on_idle", "on_lock")
 
 
 @check("RBX3514", Severity.WARNING, closed=(WIRING,))
@@ -386,9 +385,6 @@ def lock_timeout(robot: Robot) -> Iterator[Finding]:
                         help=f"make it several times as long: '{format_quantity(10 * period, TIME)}'",
                         related=[Related(robot.component_span(writer.instance), "the source")],
                     )
-
-
-LONGEST = 60.0  # [s]: commands come many times a second
 
 
 @check("RBX3108", Severity.WARNING, closed=(WIRING, NAMES))
@@ -491,9 +487,6 @@ def taken_twice(robot: Robot) -> Iterator[Finding]:
                     help="remove one of the two",
                     related=[Related(robot.value("muxes", other[0], "inputs", other[1], "from"), "taken here")],
                 )
-
-
-TYPE = "message"  # the setting of those whose type is chosen
 
 
 @check("RBX3002", closed=(WIRING,))

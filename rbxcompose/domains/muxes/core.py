@@ -20,6 +20,9 @@ M = TypeVar("M")
 
 QUIET = 0.5  # [s] of silence after which an input without a timeout counts as come to rest
 NEVER = math.inf
+VELOCITIES = (Twist.TYPE, TwistStamped.TYPE)
+"""Types whose zero is rest by their definition. A zero position, pose or flag is a command like any other."""
+AXES = ("x", "y", "z")
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,10 +83,6 @@ class MuxEndings:
     """When its source has fallen silent and no other is live."""
     on_lock: float = 0.0
     """When its source was locked out."""
-
-
-VELOCITIES = (Twist.TYPE, TwistStamped.TYPE)
-"""Types whose zero is rest by their definition. A zero position, pose or flag is a command like any other."""
 
 
 def zeroed(message: Message) -> Message:
@@ -334,9 +333,6 @@ class ByLatest(Arbiter):
         """Continue with the same order."""
         if isinstance(old, ByLatest):
             self._order = [name for name in old._order if name in names]
-
-
-AXES = ("x", "y", "z")
 
 
 def grown(last: float, wanted: float, most: float) -> float:

@@ -23,6 +23,9 @@ from rbxcompose.missions.program.answers import NodeFlow
 from rbxcompose.missions.program.program import Interrupt, MissionNode, Program
 from rbxcompose.sdk.capabilities import Charges, Drains, Navigates, Setting, Warns
 
+_ABSURD = 1.0  # [m] of a tolerance, which is then what is wrong
+_LASTS = "how long a full battery lasts"
+
 
 @check("RBX4121")
 def charge_and_call(robot: Robot) -> Iterator[Finding]:
@@ -152,9 +155,6 @@ def _ends_of_loops(program: Program, call: ChargeInterrupt) -> Iterator[Asked]:
             yield from (asked for asked in node.asked[: node.own] if asked.is_watched)
 
 
-_ABSURD = 1.0  # [m] of a tolerance, which is then what is wrong
-
-
 @check("RBX3505", Severity.WARNING, closed=())
 def charger_reach(robot: Robot) -> Iterator[Finding]:
     """The robot may stop too far from its dock to be charged."""
@@ -214,9 +214,6 @@ def _is_dock(robot: Robot, mission: RobotMission, node: MissionNode) -> bool:
     there = goal_place(node, robot.skills[node.skill].skill.main, constants(mission), robot.manifest.places)
     docks = [charges.place.value.name for _, charges in robot.declared(Charges) if charges.place]
     return there is not None and there.name in docks
-
-
-_LASTS = "how long a full battery lasts"
 
 
 @check("RBX4124", Severity.WARNING)

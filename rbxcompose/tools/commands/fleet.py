@@ -26,6 +26,7 @@ _COLUMNS = ("robot", "host", "state", "mission", "battery")
 ShareFacts = tuple[
     str, str, dict[str, Any]
 ]  # robot, host, and what `top` reports about the share, or its `state` alone
+_UP = "up"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -130,9 +131,6 @@ class Fleet:
     def follow(self, options: Sequence[str]) -> int:
         """Show the logs of all."""
         return hosts.follow_all(self.shares, lambda robot: ["logs", robot, *options])
-
-
-_UP = "up"
 
 
 def _facts(one: hosts.Running) -> dict[str, Any]:

@@ -56,6 +56,9 @@ from rbxcompose.tools.commands.record import add_selection_options, count_table,
 
 _MATCHING = 1.0  # [s] maximum wait until subscribers have found a new publisher
 _MATCH_PAUSE = 0.01  # [s] between two checks for them
+_PAUSE = 0.05  # [s] before a recording restarts
+_PORT, _TRIES = 7447, 20  # the port at which ROS 2 looks for a router, and those behind it
+HOW = "'rbxcompose up PATH --rate max --record FILE' records everything that is needed"
 
 
 class Player:
@@ -89,9 +92,6 @@ class Player:
         """Publish a message again."""
         publisher, sender = self._publishers[message.topic]
         publisher.put(message.payload, Attachment(next(self._sequence), self._guest.clock.stamp(), sender).encode())
-
-
-_PAUSE = 0.05  # [s] before a recording restarts
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -302,9 +302,6 @@ def _rate(text: str) -> float:
     return rate
 
 
-_PORT, _TRIES = 7447, 20  # the port at which ROS 2 looks for a router, and those behind it
-
-
 @contextmanager
 def replay_bus(arguments: argparse.Namespace) -> Iterator[BusPlace]:
     """Yield the bus that the options name; with `--alone`, or if no robot is up, one with a router of its own.
@@ -335,9 +332,6 @@ def _own_router() -> Iterator[str]:
             session.close()  # type: ignore[no-untyped-call]
         return
     raise NotDoneError(NO_ROUTER.at(None, f"no port from {_PORT} to {_PORT + _TRIES - 1} is free for a router"))
-
-
-HOW = "'rbxcompose up PATH --rate max --record FILE' records everything that is needed"
 
 
 def run_again(arguments: argparse.Namespace, path: Path, reader: RecordingReader) -> int:

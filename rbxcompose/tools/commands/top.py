@@ -29,6 +29,8 @@ from rbxcompose.tools.top import RobotPicture, Sampler, ShareView, lines_of, sys
 ON_SYSTEM = EACH
 _PERIOD = 1.0  # [s] between two samples
 _WIDTH, _HEIGHT = 100, 1000  # columns and lines of a picture without a terminal
+_SYSTEM_PERIOD = 0.5  # [s] between two pictures
+_AGAIN = 3.0  # [s] after a command has ended until it is started again
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -102,10 +104,6 @@ def _sampled(sampler: Sampler) -> RobotPicture:
     if picture is None:
         raise NotDoneError(NOT_UP.at(None, "the robot is down"))
     return picture
-
-
-_SYSTEM_PERIOD = 0.5  # [s] between two pictures
-_AGAIN = 3.0  # [s] after a command has ended until it is started again
 
 
 class LiveShare:

@@ -24,6 +24,7 @@ from rbxcompose.commands.lookup import add_bus_options
 ON_SYSTEM = options.BUS
 _ENDS = ("publishers", "subscriptions")
 _WINDOW = 100  # messages
+_LINE_PERIOD = 1.0  # [s] between two lines
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -126,9 +127,6 @@ def measured(times: Sequence[float]) -> Pace | None:
     mean = (times[-1] - times[0]) / len(intervals)
     jitter = math.sqrt(sum((interval - mean) ** 2 for interval in intervals) / len(intervals))
     return Pace(1 / mean, min(intervals), max(intervals), jitter, len(times))
-
-
-_LINE_PERIOD = 1.0  # [s] between two lines
 
 
 def measure(guest: Guest, arguments: argparse.Namespace) -> int:

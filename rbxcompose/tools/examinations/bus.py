@@ -14,6 +14,15 @@ from rbxcompose.tools.doctor import HostFacts, Listener, RunningRobot, examinati
 
 PORT_TAKEN = kind("RBX9402", Severity.WARNING)
 NO_LISTENER = kind("RBX9403")
+CLASH = kind("RBX9408")
+MOST_STEP = 0.05  # [s] by which the wall clock may move against the monotonic one while we look
+MOST_AHEAD, MOST_BEHIND = 0.05, 1.0  # [s] of a sender's stamps; those behind also include the transport time
+WRONG_CLOCK = kind("RBX9404", Severity.WARNING)
+OTHER_CLOCK = kind("RBX9405", Severity.WARNING)
+HOSTS_DIFFER = kind("RBX6129", Severity.WARNING)
+_HELP = "let a time server set it: timedatectl set-ntp true"
+NOBODY_PUBLISHES = kind("RBX9407", Severity.WARNING)
+_MOST_NAMES = 8  # names
 
 
 @examination
@@ -64,9 +73,6 @@ def _who(taken: Listener) -> str:
     return "a process of another user" if taken.pid is None else f"'{plain(taken.title)}' (process {taken.pid})"
 
 
-CLASH = kind("RBX9408")
-
-
 @examination
 def clashes(facts: HostFacts) -> Iterator[str | Finding]:
     """Compare types and hashes of all ends of each name."""
@@ -78,15 +84,6 @@ def clashes(facts: HostFacts) -> Iterator[str | Finding]:
             yield CLASH.at(None, words, help=f"'rbxcompose topic show {plain(name.name)}' shows which end has which")
         if not any(name.clash for name in names):
             yield f"{robot.name}: all ends of {len(names)} names agree in their types"
-
-
-MOST_STEP = 0.05  # [s] by which the wall clock may move against the monotonic one while we look
-MOST_AHEAD, MOST_BEHIND = 0.05, 1.0  # [s] of a sender's stamps; those behind also include the transport time
-
-WRONG_CLOCK = kind("RBX9404", Severity.WARNING)
-OTHER_CLOCK = kind("RBX9405", Severity.WARNING)
-HOSTS_DIFFER = kind("RBX6129", Severity.WARNING)
-_HELP = "let a time server set it: timedatectl set-ntp true"
 
 
 @examination
@@ -122,10 +119,6 @@ def _server(is_synchronised: bool | None) -> str:
     return (
         ", set by a time server" if is_synchronised else "; no time server sets it, which matters with several machines"
     )
-
-
-NOBODY_PUBLISHES = kind("RBX9407", Severity.WARNING)
-_MOST_NAMES = 8  # names
 
 
 @examination

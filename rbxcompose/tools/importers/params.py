@@ -32,6 +32,12 @@ from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode
 from rbxcompose.sdk.registry import component_type, usable_names
 
 GUESSED_TYPE = kind("RBX2293", Severity.WARNING)
+# What programs of ROS have by themselves, and what decides here.
+_OF_ROS = {
+    "use_sim_time": "'bus: {clock: external}' makes robot time follow '/clock'",
+    "qos_overrides": "the class of a port decides",
+    "start_type_description_service": "there is no such service",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,13 +114,6 @@ def _written(value: ParameterData, dimension: Dimension | None) -> str:
 
 ParameterPath = tuple[str, ...]
 GivenValues = dict[ParameterPath, Given[ParameterData]]
-
-# What programs of ROS have by themselves, and what decides here.
-_OF_ROS = {
-    "use_sim_time": "'bus: {clock: external}' makes robot time follow '/clock'",
-    "qos_overrides": "the class of a port decides",
-    "start_type_description_service": "there is no such service",
-}
 
 
 @importer("params", "files of ROS 2 parameters, and dumps of dynamic_reconfigure")

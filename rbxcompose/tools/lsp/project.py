@@ -26,6 +26,7 @@ _MOST_ROBOTS = 200  # examined per project
 _BEGINNING = 4_000  # characters that contain the header of a manifest
 
 FoundByFile = dict[Path, list[Finding]]
+PAUSE = 0.1  # [s] without a keystroke before robots are compiled again
 
 
 class OutdatedError(Exception):
@@ -171,9 +172,6 @@ def _robot_files(path: Path) -> list[Path]:
     folder = project_of(path) / "robots"
     found = sorted(folder.rglob("*.yaml"))[:_MOST_ROBOTS] if folder.is_dir() else []
     return [robot.resolve() for robot in found]
-
-
-PAUSE = 0.1  # [s] without a keystroke before robots are compiled again
 
 
 class Newest:

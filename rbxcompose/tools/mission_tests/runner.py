@@ -33,6 +33,13 @@ from rbxcompose.tools.mission_tests.record import TrialRecord
 from rbxcompose.tools.mission_tests.scope import TrialScope, agrees
 
 ROUNDING = 1e-9  # [s]
+MOST_INSTANTS = 100_000  # instants at which something happens
+MOST_STEPS = 5000
+MOST_LINES = 50_000  # of the trace
+MOST_WORK = 600_000  # nodes that are started or continued
+OWNER = "test"
+BEGINS_WITHIN = 60.0  # [s] after the last event of the test; after that, something never comes
+_COMMANDS = {"pause": PauseMission, "resume": ResumeMission, "cancel": CancelMission}
 
 
 @dataclass(slots=True)
@@ -184,12 +191,6 @@ class Setter:
         return set(computed)
 
 
-MOST_INSTANTS = 100_000  # instants at which something happens
-MOST_STEPS = 5000
-MOST_LINES = 50_000  # of the trace
-MOST_WORK = 600_000  # nodes that are started or continued
-
-
 class TrialStage:
     """The world of a mission that runs alone."""
 
@@ -322,10 +323,7 @@ class TrialStage:
         return min((time for time in times if time is not None), default=None)
 
 
-OWNER = "test"
 WhenEnded = Callable[[int, Result], None]
-BEGINS_WITHIN = 60.0  # [s] after the last event of the test; after that, something never comes
-_COMMANDS = {"pause": PauseMission, "resume": ResumeMission, "cancel": CancelMission}
 
 
 class RobotRun:

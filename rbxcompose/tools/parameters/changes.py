@@ -29,6 +29,9 @@ from rbxcompose.tools.parameters.nodes import ParameterNodes, described, require
 NO_VALUES = kind("RBX9048")
 PIPED = "-"
 _ROS = "ros__parameters"
+HALF_DONE = kind("RBX9047")
+BREAKS_RULE = kind("RBX9030")
+_WORDS = 3  # of a single change: component, parameter, value
 
 
 def value_of(text: str) -> rcl_interfaces.ParameterValue:
@@ -87,8 +90,6 @@ def _no_map(span: Span, what: str) -> Finding:
     return NO_VALUES.at(span, f"{what} must be a map", help="'rbxcompose param dump' shows the form")
 
 
-HALF_DONE = kind("RBX9047")
-BREAKS_RULE = kind("RBX9030")
 Wanted = Mapping[str, Sequence[rcl_interfaces.Parameter]]  # by node
 
 
@@ -154,9 +155,6 @@ def _user() -> str:
         return getpass.getuser()
     except (KeyError, OSError):  # an account without a name
         return f"user {os.getuid()}"
-
-
-_WORDS = 3  # of a single change: component, parameter, value
 
 
 def param_set(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:

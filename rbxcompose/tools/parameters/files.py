@@ -46,6 +46,12 @@ from rbxcompose.tools.parameters.history import changes_of
 from rbxcompose.tools.parameters.nodes import ParameterNodes, listed
 from rbxcompose.tools.system_runs import layers_of
 
+NOT_SAVED = kind("RBX9044")
+CHANGED_SINCE = kind("RBX9045")
+_COMPARE = 10.0  # [s] for the supervisor to read a plan
+NO_FILES = kind("RBX9046")
+_LARGEST = 10_000_000  # [bytes] of a file of parameters
+
 
 @dataclass(frozen=True, slots=True)
 class LiveChange:
@@ -133,10 +139,7 @@ def nodes_of(robot: Robot) -> dict[str, str]:
     return {resolve(name, robot.manifest.bus.namespace or ""): name for name in robot.components}
 
 
-NOT_SAVED = kind("RBX9044")
-CHANGED_SINCE = kind("RBX9045")
 Compiled = Callable[[Mapping[Path, str]], Compilation]
-_COMPARE = 10.0  # [s] for the supervisor to read a plan
 
 
 @dataclass(frozen=True, slots=True)
@@ -282,9 +285,6 @@ def _keys_of(found: Difference) -> str:
     keys = [f"{name}.{change.key}" for name, each in found.changed.items() for change in each]
     keys += [change.key for change in found.plan]
     return ", ".join(f"'{key}'" for key in keys) or "the robot"
-
-
-NO_FILES = kind("RBX9046")
 
 
 def manifest_of(nodes: ParameterNodes, arguments: argparse.Namespace) -> tuple[LiveSettings, RobotFolder, RobotState]:
@@ -433,9 +433,6 @@ def _change_text(change: LiveChange) -> str:
 def _data(change: LiveChange) -> dict[str, object]:
     old, new = (json.loads(to_json(one)) for one in (change.written, change.live))
     return {"component": change.component, "name": change.name, "old": old, "new": new}
-
-
-_LARGEST = 10_000_000  # [bytes] of a file of parameters
 
 
 @dataclass(frozen=True, slots=True)

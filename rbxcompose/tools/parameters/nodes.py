@@ -22,6 +22,8 @@ from rbxcompose.sdk.parameters import TYPE_WORDS, dimension_in, from_message, sh
 Q = TypeVar("Q", bound=Message)
 R = TypeVar("R", bound=Message)
 _GET = "/get_parameters"
+_WIDEST = 40  # characters of a value in a table
+_KEYS = ("node", "name", "value", "read_only", "about")
 
 
 class ParameterNodes:
@@ -79,10 +81,6 @@ def _response(node: str, reply: Reply[R]) -> R:
     if reply.response is None:
         raise NotDoneError(SAID_NO.at(None, f"'{node}': {reply.error}"))
     return reply.response
-
-
-_WIDEST = 40  # characters of a value in a table
-_KEYS = ("node", "name", "value", "read_only", "about")
 
 
 @dataclass(frozen=True, slots=True)

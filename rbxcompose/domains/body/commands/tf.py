@@ -31,6 +31,9 @@ from rbxcompose.sdk.ports import Qos
 
 ON_SYSTEM = options.BUS
 _DIGITS = 4  # decimal places of metres and degrees
+_TOPIC = "/tf_static"
+_LONGEST = 1000  # characters of a note
+NO_PLACE = kind("RBX9043")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -169,11 +172,6 @@ def _past(text: str) -> int:
     if time > 0:
         raise argparse.ArgumentTypeError("must not be in the future: write '-0.5s'")
     return round(time * NANOSECONDS)
-
-
-_TOPIC = "/tf_static"
-_LONGEST = 1000  # characters of a note
-NO_PLACE = kind("RBX9043")
 
 
 def add_static_arguments(parser: argparse.ArgumentParser) -> None:

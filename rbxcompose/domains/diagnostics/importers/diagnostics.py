@@ -45,6 +45,7 @@ _ELSEWHERE = {
     "history_depth": "'rbxcompose record' keeps changes of levels",
     "bond_id": "analyzers are tied to no other program",
 }
+_EVERYTHING = "{regex: '.*'}"  # what an empty beginning matches
 
 
 @dataclass(slots=True)
@@ -201,8 +202,6 @@ def _is_regex(given: Given[str], entries: ForeignMap) -> bool:
 
 
 T = TypeVar("T")
-
-_EVERYTHING = "{regex: '.*'}"  # what an empty beginning matches
 
 
 @importer("diagnostics", "analyzers of diagnostic_aggregator, for ROS 1 and ROS 2")

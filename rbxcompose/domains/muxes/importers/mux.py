@@ -21,6 +21,11 @@ TWIST_MUX, YOCS = "twist_mux", "yocs"
 _INPUTS = {TWIST_MUX: "topics", YOCS: "subscribers"}
 _LOCKS = "locks"
 _MOST = 1 << 31  # of a priority
+RENAMED_TOPIC = kind("RBX2294", Severity.WARNING)
+GUESSED_OUTPUT = kind("RBX2295", Severity.WARNING)
+_TOPIC = re.compile(r"/?[a-z][a-z0-9_]*(/[a-z][a-z0-9_]*)*")
+_USUAL, _OTHERWISE = "cmd_vel", "cmd_vel_out"
+_LOCK_PORT = "lock_"
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,14 +160,6 @@ def joined(muxes: list[ForeignMux], report: Report) -> list[ForeignMux]:
                     words = f"the {what} '{plain(name, 60)}' was something else before; the first one counts"
                     report.add(DISAGREES.at(source.span, words, related=[Related(other.span, "the first one")]))
     return [one for one in found.values() if one.inputs]
-
-
-RENAMED_TOPIC = kind("RBX2294", Severity.WARNING)
-GUESSED_OUTPUT = kind("RBX2295", Severity.WARNING)
-
-_TOPIC = re.compile(r"/?[a-z][a-z0-9_]*(/[a-z][a-z0-9_]*)*")
-_USUAL, _OTHERWISE = "cmd_vel", "cmd_vel_out"
-_LOCK_PORT = "lock_"
 
 
 @importer("mux", "files of twist_mux and of yocs_cmd_vel_mux, for ROS 1 and ROS 2")
