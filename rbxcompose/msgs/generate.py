@@ -52,7 +52,7 @@ class _Module:
     def _in_order(self) -> list[str]:
         """Return the interfaces of the package in an order in which each one follows the messages inside it."""
         names = sorted(
-            name for name in self.structures if name.startswith(f"{self.package}/") and "_" not in _bare(name)
+            name for name in self.structures if name.startswith(f"{self.package}/") and "_" not in name.split("/")[2]
         )
         ordered: dict[str, None] = {}
 
@@ -207,10 +207,6 @@ class _Module:
 
     def _made_by(self, factory: str) -> str:
         return f"{self._use('field', 'dataclasses')}(default_factory={factory})"
-
-
-def _bare(name: str) -> str:
-    return name.split("/")[2]
 
 
 def _least(type_: definitions.FieldType) -> int:
