@@ -278,7 +278,7 @@ class Walk:
         sources = value.items if isinstance(value, tree.SequenceNode) else (value,)
         for source in sources:
             if not isinstance(source, tree.MappingNode):
-                related = [Related(span_of(node, self.file), "this is none")]
+                related = [Related(span_of(node, self.file), "this is no map")]
                 self.add(ALIAS.at(span, "'<<' takes a map, or a list of maps", related=related))
                 return
             self._alias_nodes += len(source.entries)

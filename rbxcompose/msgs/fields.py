@@ -154,9 +154,7 @@ def _collect(message: type[Message], prefix: str, singles: list[str], others: li
 def _test_of_many(type_: FieldType) -> Test | None:
     if type_.is_message:
         return lambda values: all(map(is_finite, values))
-    if holds_numbers(type_) and type_.base in FLOATS:
-        return _is_finite_array
-    return None
+    return _is_finite_array if holds_numbers(type_) and type_.base in FLOATS else None
 
 
 def _all_finite(values: tuple[float, ...]) -> bool:

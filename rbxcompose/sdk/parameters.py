@@ -58,9 +58,7 @@ TYPE_WORDS = {
 def to_message(value: object) -> rcl_interfaces.ParameterValue | None:
     """Return a value as a message, None if no parameter can have its type."""
     number = parameter_type(value)
-    if number is None:
-        return None
-    return _made(number, value.value if isinstance(value, Enum) else value)
+    return None if number is None else _made(number, value.value if isinstance(value, Enum) else value)
 
 
 def _made(number: int, value: object) -> rcl_interfaces.ParameterValue:

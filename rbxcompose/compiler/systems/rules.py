@@ -49,7 +49,7 @@ def share_findings(system: System) -> Iterator[Finding]:
                 message = f"no component of '{robot.name}' publishes or serves '{name}'"
                 yield NOT_PUBLISHED.misspelt(span, message, name.removeprefix("/"), valid, "what it has")
             if givers and exchange.is_called(givers[0]) and not robot.model.callers:
-                message = f"'{name}' is {_kind(givers[0])}, and nobody may call it"
+                message = f"'{name}' is {_kind(givers[0])}, which no other robot may call"
                 yield NO_CALLER.at(span, message, help="add 'callers' with the robots that may")
         yield from _unshared(system, robot)
 

@@ -130,7 +130,7 @@ def unknown_name(mission: Examined) -> Iterator[findings.Finding]:
                 message = f"only data can be set; the mission has no datum '{name}'"
                 if name in mission.program.inputs or name in mission.robot.values:
                     what = "an input" if name in mission.program.inputs else "a value of the robot"
-                    help_text = f"'{name}' is {what}, which nobody sets: declare a datum of another name under 'data'"
+                    help_text = f"'{name}' is {what}, which is never set: declare a datum of another name under 'data'"
                     yield UNKNOWN_NAME.at(assignment.span, message, help=help_text)
                     continue
                 help_text = findings.suggest(name, data, "its data") or f"write '{name}: ...' under 'data'"

@@ -200,9 +200,7 @@ def _fitted(ros_type: str, value: Any) -> Any:
         return to_plain(_POSES[base](value))
     if base == LASTING and isinstance(value, int | float):
         return to_plain(to_duration(value))
-    if base in INTEGERS and isinstance(value, float) and value.is_integer():
-        return int(value)
-    return value
+    return int(value) if base in INTEGERS and isinstance(value, float) and value.is_integer() else value
 
 
 def values_of(message: Message | None) -> dict[str, Value]:

@@ -30,9 +30,7 @@ from rbxcompose.sdk.parameters import ChangeRefusal, RobotRules
 
 PATIENCE = 10.0  # [s] for an answer; the first one after another plan compiles the robot
 _OWNER = "judge"
-UNKNOWN = ChangeRefusal(
-    "the rules of the robot cannot be checked now", "'rbxcompose check' tells whether it has errors"
-)
+UNKNOWN = ChangeRefusal("the rules of the robot cannot be checked now", "'rbxcompose check' shows its errors")
 
 
 class FiledRules(RobotRules, Protocol):
