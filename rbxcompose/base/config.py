@@ -167,7 +167,7 @@ def plural(kind: str) -> str:
 class Config(BaseModel):
     """A closed, frozen set of fields; a key that it does not declare is a finding."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
