@@ -176,7 +176,7 @@ def test_a_command_that_is_no_number_is_refused_with_a_note() -> None:
     rover.controller.received("commands", type("Nan", (), {"linear": _v(x=math.nan), "angular": _v()}))
     rover.advance(0.5)
     assert rover.torque == [0, 0]
-    assert rover.controller.note == "a command was refused: nan m/s and 0 rad/s is no velocity"
+    assert rover.controller.note == "a command was refused: nan m/s and 0 rad/s is not a finite velocity"
     rover.drive(0.6, 0.0, 1.2)
     assert rover.controller.note == "commands are cut to its limits"
     assert any("cut to its limits" in status.message for status in rover.statuses)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from rbxcompose.commands.new_files import AnswerError, read_name, read_place, read_text, read_yes
 from rbxcompose.testing import check_file
-from rbxcompose.tools.scaffold.robot import RobotAnswers, read_base, read_component_name, robot_files
+from rbxcompose.tools.scaffold import RobotAnswers, read_base, read_component_name, robot_files
 
 WRONG_NAMES = ["", "Cart", "my-cart", "1st", "_x", "a b", "../x", "a/b", "a" * 61, "ä", "a\n", "true", "null"]
 

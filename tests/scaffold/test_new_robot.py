@@ -15,7 +15,7 @@ from rbxcompose.manifest.registry import robot_keys
 from rbxcompose.missions.modifiers.registry import modifier_keys
 from rbxcompose.missions.program.registry import kinds
 from rbxcompose.testing import Checked, Golden, check_file, run_robot
-from rbxcompose.tools.scaffold.robot import DOCK, MOST_PLACES, RobotAnswers, read_places, robot_files
+from rbxcompose.tools.scaffold import DOCK, MOST_PLACES, RobotAnswers, read_places, robot_files
 
 WORDS = ["and", "or", "not", "in", "is", "lambda", "do", "then", "else", "when", "m"]
 WORDS += ["place", "battery", "pose", "base", "dock", "low"]
