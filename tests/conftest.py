@@ -26,7 +26,9 @@ ROOT = Path(__file__).parents[1]
 
 
 CACHES = "RBXCOMPOSE_TEST_CACHES"
-WITH_ARMS = tuple(f"tests/{folder}/" for folder in ("components", "interop", "motion", "robots", "testing"))
+WITH_ARMS = tuple(
+    f"tests/{start}" for start in ("cli/test_arm", "components/", "interop/", "motion/", "robots/", "testing/")
+)
 
 
 def pytest_configure(config: pytest.Config) -> None:
