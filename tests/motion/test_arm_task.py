@@ -51,7 +51,7 @@ class Site:
     def stop_following(self) -> None:
         self.stops += 1
 
-    def told(self, stage: str) -> None:
+    def report_stage(self, stage: str) -> None:
         self.stages.append(stage)
 
     def info(self, text: str) -> None:

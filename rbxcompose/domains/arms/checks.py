@@ -98,9 +98,9 @@ def idle_grasps(robot: Robot) -> Iterator[Finding]:
             continue  # what it picks is known only later
         for one in (each for each in arm.model.grasps if each not in (*objects, *picked)):
             others = [each for each in dict.fromkeys(picked) if each not in arm.model.grasps]
-            meant = f"{DID_YOU_MEAN} '{others[0]}'?" if len(others) == 1 else suggest(one, objects, "objects")
+            hint = f"{DID_YOU_MEAN} '{others[0]}'?" if len(others) == 1 else suggest(one, objects, "objects")
             yield idle_grasps.at(
-                robot.key("arms", name, "grasps", one), f"no object of the scene is named '{one}'", help=meant
+                robot.key("arms", name, "grasps", one), f"no object of the scene is named '{one}'", help=hint
             )
 
 
@@ -259,11 +259,11 @@ def optical_camera(robot: Robot) -> Iterator[Finding]:
         camera = head.model.camera
         if _OPTICAL in camera and camera in shape.joint_above:
             plain = camera.replace(_OPTICAL, "")
-            meant = plain if plain in shape.links else shape.joint_above[camera].parent
+            link = plain if plain in shape.links else shape.joint_above[camera].parent
             yield optical_camera.at(
                 robot.value("heads", name, "camera"),
                 f"'{camera}' looks along its z, and a head points the x of its camera",
-                help=f"write 'camera: {meant}'",
+                help=f"write 'camera: {link}'",
                 related=[Related(shape.links[camera].span, "the link")],
             )
 
@@ -378,7 +378,7 @@ def spot_beside(robot: Robot) -> Iterator[Finding]:
         for name, spot in one.model.spots.items():
             if spot.on in things:
                 spans = {axis: robot.value("arms", arm, "spots", name, axis) for axis in ("x", "y")}
-                yield from _told(robot, f"the spot '{name}'", things[spot.on], (spot.x, spot.y), spans)
+                yield from _beyond_edge(robot, f"the spot '{name}'", things[spot.on], (spot.x, spot.y), spans)
     for place in written_reaches(robot, "place"):
         on, _ = word_of(place, "on")
         given = {axis: place.arguments[axis] for axis in ("x", "y") if axis in place.arguments}
@@ -386,10 +386,10 @@ def spot_beside(robot: Robot) -> Iterator[Finding]:
         x, y = numbers.get("x", 0.0), numbers.get("y", 0.0)
         if on in things and x is not None and y is not None and not place.may_fail:
             spans = {axis: written.value.span for axis, written in given.items()}
-            yield from _told(robot, "this", things[on], (x, y), spans)
+            yield from _beyond_edge(robot, "this", things[on], (x, y), spans)
 
 
-def _told(
+def _beyond_edge(
     robot: Robot, what: str, on: PlacedObject, at: tuple[float, float], spans: Mapping[str, Span]
 ) -> Iterator[Finding]:
     for axis, away, edge in _beyond(on, *at):
@@ -453,7 +453,7 @@ class _Reaches:
                 if shoulder is not None and not pick.may_fail:
                     away = math.dist(shoulder, thing.pose.translation) - _radius(thing)
                     related = [Related(self.robot.key("scene", "objects", name), "the thing")]
-                    yield from self.told((pick.name, pick.arm), f"'{name}'", away, span, related)
+                    yield from self.out_of_reach((pick.name, pick.arm), f"'{name}'", away, span, related)
         for place in self.places:
             if not place.may_fail:
                 yield from self.placed(place)
@@ -504,10 +504,10 @@ class _Reaches:
         """Yield that a spot is out of reach."""
         on, length = self.things.get(spot.on or ""), length_of(self.robot, self.body, arm[1])
         if on is not None and (self.is_brought(on.name, "") or max(on.shape.size) > _TIMES * length):
-            return  # elsewhere, or a support in a wrong unit, which RBX2246 tells
+            return  # elsewhere, or a support in a wrong unit, which RBX2246 reports
         if (from_it := _from_spot(self.body, arm[1], spot, on)) is not None:
             slack = spot.tolerance + self.held(arm[0])
-            yield from self.told(arm, what, from_it, span, related, slack)
+            yield from self.out_of_reach(arm, what, from_it, span, related, slack)
 
     def held(self, arm: str) -> float:
         """Return how far from the middle of a thing the hand may be that puts it down [m]."""
@@ -519,7 +519,7 @@ class _Reaches:
                 found = max(found, own, *(math.hypot(grasp.x, grasp.y, grasp.z) for grasp in grasps))
         return found or _HELD
 
-    def told(
+    def out_of_reach(
         self,
         arm: tuple[str, ArmOfRobot],
         what: str,

@@ -47,7 +47,7 @@ class GraspReason(StrEnum):
     UNKNOWN_OBJECT = "unknown_object"  # it is not in the scene
     ALREADY_HOLDS = "already_holds"  # the arm holds an object, so that it cannot pick
     NOTHING_HELD = "nothing_held"  # the arm holds none, so that it cannot place
-    NO_GRASPS = "no_grasps"  # its shape does not tell how to hold it, and nothing else does
+    NO_GRASPS = "no_grasps"  # its shape does not show how to hold it, and nothing else does
     TOO_WIDE = "too_wide"  # the gripper does not open that far
     LINE_OUT_OF_REACH = "line_out_of_reach"  # joints cannot follow a straight line of the tip
     GRIPPER_FAILED = "gripper_failed"  # its controller failed

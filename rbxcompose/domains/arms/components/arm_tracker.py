@@ -176,7 +176,7 @@ class ArmTracker(sdk.Component[ArmTrackerConfig]):
             self.bound[POSE](PoseStamped(header=Header(frame_id=self.config.base), pose=pose))
 
     def rested(self, end: sdk.Ended[MoveArm.Result]) -> None:
-        """Know that the arm moves no more, and tell why it did not go where it rests."""
+        """Know that the arm moves no more, and log why it did not go where it rests."""
         self.is_moving, self.resting = False, None
         if end.outcome not in (sdk.Outcome.SUCCEEDED, sdk.Outcome.CANCELED):
             self.warn(f"the arm does not go to '{self.config.rest}': {end.message}")

@@ -176,7 +176,7 @@ class Head(sdk.Component[HeadConfig]):
             goal.feedback(LookAtPoint.Feedback(angle=self.past(goal.request)))
 
     def begin(self, goal: LookGoal) -> None:
-        """Send the head to where it looks at the point, or tell why it cannot."""
+        """Send the head to where it looks at the point, or report why it cannot."""
         found = self.aim(goal.request)
         if isinstance(found, Aiming) and found.angle > (most := goal.request.tolerance or CLOSE):
             words = ", ".join(f"'{name}'" for name in found.blocked) or "its joints"
