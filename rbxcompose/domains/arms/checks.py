@@ -46,7 +46,7 @@ def frame_of_object(robot: Robot) -> Iterator[Finding]:
         if thing.link not in shape.links and thing.link in known:  # RBX2019 reports the others
             yield frame_of_object.at(
                 robot.value("scene", "objects", thing.name, "frame"),
-                f"nobody tells where '{shape.root}' is in '{thing.link}'",
+                f"no component publishes the transform from '{thing.link}' to '{shape.root}'",
                 help="leave 'frame' out: what stands beside the robot counts from its root",
                 related=[Related(shape.links[shape.root].span, "the root of the body")],
             )
@@ -277,7 +277,7 @@ def placeless_goal(robot: Robot) -> Iterator[Finding]:
     for reach in written_reaches(robot):
         any_position = "any_position" in reach.arguments and word_of(reach, "any_position")[0] != "false"
         if not any_position and not reach.arguments.keys() & set(_AXES):
-            message = f"'{reach.node.skill}' is not told where the tip should be"
+            message = f"'{reach.node.skill}' has no position for the tip"
             help_text = "give 'x', 'y' and 'z', or 'any_position: true' if only the orientation counts"
             yield placeless_goal.at(reach.node.span, message, help=help_text)
 

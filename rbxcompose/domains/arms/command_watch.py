@@ -28,7 +28,7 @@ _LONGEST = 300  # letters of a goal or a reason
 def watch(folder: RobotFolder, *, as_json: bool) -> int:
     """Print a line for each change until Ctrl-C; as JSON all that is known then, with its `window`."""
     if (state := known_state(folder)) is None:
-        raise NotDoneError(NO_ANSWER.at(None, "the robot does not tell which arms it has"))
+        raise NotDoneError(NO_ANSWER.at(None, "the robot does not report its arms"))
     arms = [component.name for component in state.components if component.type == ARM]
 
     def changed(path: str, seen: Mapping[str, Any]) -> None:

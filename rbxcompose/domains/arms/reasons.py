@@ -12,7 +12,7 @@ class MotionReason(StrEnum):
 
     UNKNOWN_GOAL = "unknown_goal"  # no such pose or joint, or numbers that are none
     UNKNOWN_START = "unknown_start"  # not all joints have reported where they are
-    UNKNOWN_SCENE = "unknown_scene"  # nothing has told what is around the robot
+    UNKNOWN_SCENE = "unknown_scene"  # no planning scene has been received
     START_OUTSIDE_LIMITS = "start_outside_limits"
     START_IN_COLLISION = "start_in_collision"
     GOAL_OUTSIDE_LIMITS = "goal_outside_limits"

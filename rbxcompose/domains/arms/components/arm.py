@@ -138,7 +138,7 @@ class Arm(PicksAndPlaces, LocationService, KinematicsServices, sdk.Component[Arm
         if self.works.always:
             words = pairs_shown(self.works.always, len(self.works.always))
             self.info(f"links that always collide are not watched: {words}")
-        self.problem = "nothing has told what is around the robot"  # with the scene, or nothing
+        self.problem = "no planning scene has been received"  # with the scene, or nothing
         self.way: tuple[Vector3, ...] = ()  # of the tip, as last planned [m]
         self.measured: dict[str, tuple[float, float]] = {}  # position and velocity of all joints of the body
         self.uprights, self.remembered = {}, {}
@@ -211,7 +211,7 @@ class Arm(PicksAndPlaces, LocationService, KinematicsServices, sdk.Component[Arm
         unknown = [name for name in self.works.space.names if name not in self.measured]
         if unknown:
             return f"nothing has reported where '{unknown[0]}' is"
-        return "" if self.is_ready else "nothing has told what is around the robot"
+        return "" if self.is_ready else "no planning scene has been received"
 
     def wake(self) -> None:
         """Go on with what is commanded now."""

@@ -151,7 +151,7 @@ class ArmTracker(sdk.Component[ArmTrackerConfig]):
             goal.canceled()
         elif self.core.is_lost(self.now, patience):
             self.end()
-            text = self.problem or f"nothing has told on '{self.config.target}' where the point is for {patience:g} s"
+            text = self.problem or f"no point has come on '{self.config.target}' for {patience:g} s"
             goal.aborted(f"{LOST}: {text}", FollowPoint.Result(outcome=LOST, message=text))
         else:
             self.lead()

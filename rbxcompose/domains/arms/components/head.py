@@ -232,7 +232,7 @@ class Head(sdk.Component[HeadConfig]):
         if not request.object:
             return (request.x, request.y, request.z), request.frame
         if self.objects is None:
-            why = "nothing has told what is around the robot" if self.config.sees_scene else "this robot has no scene"
+            why = "no planning scene has been received" if self.config.sees_scene else "this robot has no scene"
             return NoAim(MotionReason.UNKNOWN_SCENE, why)
         if request.object not in self.objects:
             there = ", ".join(sorted(self.objects)) or "none"

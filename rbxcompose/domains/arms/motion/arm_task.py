@@ -59,7 +59,7 @@ class ArmGoal:
         """Return what is wrong with it for an arm that has poses of these names, or nothing."""
         for word, share in (("speed", self.speed), ("acceleration", self.acceleration)):
             if not (math.isfinite(share) and 0.0 < share <= 1.0):
-                return f"a {word} of {share:.0%} is none"
+                return f"the {word} must be above 0 % and at most 100 %, not {share:.0%}"
         if problem := self.keep.mistake(kinematics):
             return problem
         aim = self.trace or self.target

@@ -563,7 +563,7 @@ class HandTask:
         while not self.site.is_ready or any(name not in self.site.measured for name in self.space.names):
             if self.site.now - began >= SETTLING:
                 if not self.site.is_ready:
-                    return self.fail(MotionReason.UNKNOWN_SCENE, "nothing has told what is around the robot")
+                    return self.fail(MotionReason.UNKNOWN_SCENE, "no planning scene has been received")
                 return self.fail(MotionReason.UNKNOWN_START, "nothing has reported where all joints of the arm are")
             yield
         self.place_body()
@@ -698,7 +698,7 @@ class HandTask:
         began = self.site.now
         while not answers or not (answers[0] or is_done()):
             if self.site.now - began >= SETTLING:
-                return self.fail(GraspReason.NOT_ATTACHED, "the scene has not told of it")
+                return self.fail(GraspReason.NOT_ATTACHED, "the scene has not confirmed it")
             yield
         return self.fail(GraspReason.NOT_ATTACHED, answers[0]) if answers[0] else None
 

@@ -310,7 +310,9 @@ class ServoBusDriver(Component[ServoBusConfig]):
         """Set how fast a joint moves by single commands, within its limits."""
         drive = self.cycle.drives[name]
         if not (math.isfinite(request.speed) and request.speed > 0.0):
-            return SetSpeed.Response(success=False, message=f"a speed of {request.speed} is none")
+            return SetSpeed.Response(
+                success=False, message=f"the speed must be positive and finite, not {request.speed}"
+            )
         if isinstance(drive, PositionDrive):
             drive.speed = request.speed
         fastest = drive.joint.limits.speed

@@ -208,7 +208,9 @@ def _blind(reading: Reading[ControllerConfig], name: str, config: ControllerConf
         model = model_of(reading.contents, servos[servo])
         if model is not None and model.family.span < math.tau - model.per_tick:
             degrees = round(math.degrees(model.family.span))
-            message = f"'{name}' needs to know how far '{servo}' turns, and an {model.name} tells {degrees} of 360 deg"
+            message = (
+                f"'{name}' needs to know how far '{servo}' turns, and an {model.name} measures {degrees} of 360 deg"
+            )
             span = value_span(reading.contents.root, ("actuators", servo, "model"))
             help_text = "take a model that sees the whole turn, such as XL430-W250 or MX-28"
             here = Related(key_span(reading.contents.root, ("controllers", name)), "the controller")
