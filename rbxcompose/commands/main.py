@@ -69,7 +69,7 @@ def _run(name: str, words: Sequence[str]) -> int:
 
 
 def _leave_out_plugins_of_pydantic() -> None:
-    """Have pydantic not search all packages for plugins, nor import what would: that takes longer than Python's start."""
+    """Have pydantic not search all packages for plugins, nor import what would: it takes longer than Python's start."""
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     loader: Any = ModuleType("pydantic.plugin._loader")
     loader.get_plugins = tuple
