@@ -11,11 +11,10 @@ from rbxcompose.base.plugins import LEFT_OUT, BrokenPluginError, Plugins
 from rbxcompose.base.printable import plain
 from rbxcompose.base.rooms import domain_of
 from rbxcompose.base.rules import OUR_CODES, Rule, declared
-from rbxcompose.compiler.model.doubts import Doubts, doubts_of
+from rbxcompose.compiler.doubts import Doubts, doubts_of, half_read
 from rbxcompose.compiler.model.robot import NOTHING, Robot
 from rbxcompose.manifest.registry import PLUGINS as SECTIONS
 from rbxcompose.manifest.registry import section_named
-from rbxcompose.manifest.walk import TWICE
 from rbxcompose.missions.analysis.check_runner import rule_findings
 from rbxcompose.missions.analysis.examined import Examined
 
@@ -104,7 +103,7 @@ def run_checks(robot: Robot, report: Report) -> None:
     in doubt may only follow from an error, so it is left out. A mission with a key that is written twice is not
     checked: half of something in it was not read.
     """
-    halves = {finding.span.file for finding in report if finding.code == TWICE.code and finding.span}
+    halves = half_read(report)
     programs = (mission.program for mission in robot.missions.values())
     missions = [Examined(program, robot.names) for program in programs if program.file not in halves]
     checks = checks_of(robot)

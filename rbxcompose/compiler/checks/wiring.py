@@ -78,6 +78,7 @@ def _finding(robot: Robot, component: RobotComponent, ends: list[PortEnd]) -> Fi
         f"'{component.name}' needs {names}, which nothing in the robot provides",
         help=f"connect it: {fix}" if fix else f"add the component that provides it{_such_as(ends)}",
         related=[Related(robot.end_span(other), f"'{other.topic}' is of this type") for _, other in near],
+        about=(component.name, *(end.topic for end in ends)),
     )
 
 
@@ -108,7 +109,7 @@ def two_publishers(robot: Robot) -> Iterator[Finding]:
             own = f"{other.name}: {other.instance}/{other.name}"
             yield two_publishers.at(
                 robot.component_span(other.instance),
-                f"'{other.instance}' and '{first}' both write on '{topic}', and nobody can tell whose it is",
+                f"'{other.instance}' and '{first}' both publish '{topic}', and its messages do not name their source",
                 help=f"give one of them another topic: 'connect: {{{own}}}'",
                 related=[Related(robot.component_span(first), "and this one")],
             )
@@ -260,6 +261,7 @@ def command_without_subscriber(robot: Robot) -> Iterator[Finding]:
                 or suggest(end.topic.strip("/"), topics, WAITING)
                 or _unheard_command_such_as(end),
                 related=[Related(robot.end_span(one), f"listens to '{one.topic}'") for one in starving[:_MOST_SHOWN]],
+                about=(end.instance, end.topic),
             )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,10 +12,10 @@ from rbxcompose.base.config import COMPONENT, Secret
 from rbxcompose.base.findings import Finding, Related, Report, Severity, Span, kind
 from rbxcompose.base.garbage_collection import paused_collection
 from rbxcompose.compiler.composition.includes import included_parts
-from rbxcompose.compiler.composition.layers import INCLUDE, Chosen, Composed, compose_robot, profile_spans
-from rbxcompose.compiler.composition.overlay import NOTHING_TO_CHANGE
+from rbxcompose.compiler.composition.layers import Chosen, Composed, compose_robot, profile_spans
 from rbxcompose.compiler.composition.robot_manifest import RobotManifest
 from rbxcompose.compiler.composition.scopes import fill_scopes
+from rbxcompose.compiler.doubts import has_a_section_twice, without_half_entries
 from rbxcompose.manifest.documents import Documents, ManifestHeader
 from rbxcompose.manifest.files import find, project_of, shown_name
 from rbxcompose.manifest.fill import SHOWN_SECRET, fill, names_of
@@ -29,9 +29,8 @@ from rbxcompose.manifest.registry import (
 )
 from rbxcompose.manifest.secrets import Secrets
 from rbxcompose.manifest.section import ROBOT, Contents, Section, is_empty
-from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode, at, children, key_span
-from rbxcompose.manifest.validate import MISSING_KEY, UNKNOWN_KEY
-from rbxcompose.manifest.walk import TWICE
+from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode, at, children, key_span
+from rbxcompose.manifest.validate import UNKNOWN_KEY
 from rbxcompose.manifest.yaml_nodes import is_moderate
 
 
@@ -226,11 +225,12 @@ def _manifest(
     documents.check(keys, without_strayed(composed.root, keys.model_fields, documents.report))
     names = names_of(_name(composed.root), sim, environment, Secrets(project_of(file), environment))
     filled = fill_scopes(composed, names)
-    read_so_far = len(documents.report.findings)
-    is_whole = composed.parts.is_complete and not _has_a_section_twice(documents.report, composed.root)
+    report = documents.report
+    read_so_far = len(report.findings)
+    is_whole = composed.parts.is_complete and not has_a_section_twice(report, composed.root)
     manifest = read_sections(filled.root, file, sim, documents, is_whole=is_whole)
     if not is_whole:
-        _drop_what_may_be_there(documents.report, filled.root, filled.include, read_so_far)
+        report.findings = without_half_entries(report.findings, read_so_far, filled.root, filled.include)
     return replace(
         manifest,
         parts=included_parts(composed.instances),
@@ -240,48 +240,6 @@ def _manifest(
         files=documents.files,
         inclusions=composed.parts.inclusions,
     )
-
-
-def _has_a_section_twice(report: Report, root: MappingNode) -> bool:
-    """Return whether a file has a section with names twice, so that what stands in the second one is not read."""
-    words = {entry.key.span for entry in root.entries.values() if isinstance(entry.value, ScalarNode)}
-    twice = (
-        finding
-        for finding in report.findings
-        if finding.code == TWICE.code and finding.span is not None and finding.span.column == 1
-    )
-    return any(words.isdisjoint(other.span for other in finding.related) for finding in twice)
-
-
-def _drop_what_may_be_there(report: Report, root: MappingNode, given: MappingNode, start: int) -> None:
-    """Remove the findings about entries that may only change what could not be read: what a part brings, for example.
-
-    `start` is the number of findings from before the sections were read.
-    """
-    prefixes = tuple(f"{name}_" for name, _ in _entries(given, INCLUDE))
-    changing = [
-        entry
-        for section in sections_in_use(ROBOT)
-        for name, entry in _entries(root, section.name)
-        if section.has_topics or name.startswith(prefixes) or not prefixes
-    ]
-    spans = [span for entry in changing for span in (entry.key.span, entry.value.span)]
-
-    def stays(finding: Finding) -> bool:
-        return finding.code != MISSING_KEY.code or not any(
-            finding.span and span.contains(finding.span) for span in spans
-        )
-
-    before, after = report.findings[:start], report.findings[start:]
-    report.findings = [
-        *(finding for finding in before if finding.code != NOTHING_TO_CHANGE.code),
-        *filter(stays, after),
-    ]
-
-
-def _entries(root: MappingNode, section: str) -> Iterable[tuple[str, Entry]]:
-    there = root.get(section)
-    return there.entries.items() if isinstance(there, MappingNode) else ()
 
 
 @paused_collection()

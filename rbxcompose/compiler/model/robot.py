@@ -14,7 +14,7 @@ from rbxcompose.base.findings import Span
 from rbxcompose.base.levels import Level
 from rbxcompose.base.rules import NAMES, WIRING
 from rbxcompose.compiler.composition.robot_manifest import RobotManifest
-from rbxcompose.compiler.model.doubts import doubts_of
+from rbxcompose.compiler.doubts import doubts_of
 from rbxcompose.compiler.sections.places import unknown_place
 from rbxcompose.compiler.sections.values import values
 from rbxcompose.manifest.fill import OpenNames

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import field, replace
+from dataclasses import asdict, field, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -227,15 +227,7 @@ def _config(thing: PlacedObject) -> dict[str, object]:
         "position": thing.pose.translation,
         "rotation": thing.pose.rotation,
         "shapes": [
-            {
-                "kind": each.shape.kind,
-                "size": each.shape.size,
-                "file": each.shape.file,
-                "points": each.shape.points,
-                "triangles": each.shape.triangles,
-                "position": each.pose.translation,
-                "rotation": each.pose.rotation,
-            }
+            {**asdict(each.shape), "position": each.pose.translation, "rotation": each.pose.rotation}
             for each in thing.own_pieces
         ],
         "touches": thing.touches,
