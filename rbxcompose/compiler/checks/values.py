@@ -85,9 +85,9 @@ def _in_percent(robot: Robot, component: RobotComponent) -> list[str]:
 def _limit_in_percent(robot: Robot, component: RobotComponent, limit: Setting[float], writers: list[str]) -> Finding:
     return limit_in_percent.at(
         robot.value(*component.place(limit.field)),
-        f"'{limit.field}' of '{component.name}' is {limit.value:g}, but '{writers[0]}' tells percent, from 0 to 100",
+        f"'{limit.field}' of '{component.name}' is {limit.value:g}, but '{writers[0]}' reports percent, from 0 to 100",
         help=f"write '{limit.field}: {100 * limit.value:g}'",
-        related=[Related(robot.component_span(writer), "tells percent") for writer in writers],
+        related=[Related(robot.component_span(writer), "reports percent") for writer in writers],
     )
 
 
@@ -168,7 +168,8 @@ def value_source(robot: Robot) -> Iterator[Finding]:
         if entry.port is not None and (wrong := _missing(robot, name, entry.port)):
             span = robot.value("values", name, "port")
             fix = correction(wrong.name, wrong.valid, span, within=entry.port)
-            yield value_source.at(span, f"value '{name}' {wrong.message}", help=wrong.help, fix=fix)
+            message = f"value '{name}' {wrong.message}"
+            yield value_source.at(span, message, help=wrong.help, fix=fix, about=[name, wrong.name])
 
 
 def _missing(robot: Robot, name: str, source: str) -> Wrong | None:

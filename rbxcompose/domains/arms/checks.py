@@ -49,6 +49,7 @@ def frame_of_object(robot: Robot) -> Iterator[Finding]:
                 f"no component publishes the transform from '{thing.link}' to '{shape.root}'",
                 help="leave 'frame' out: what stands beside the robot counts from its root",
                 related=[Related(shape.links[shape.root].span, "the root of the body")],
+                about=(shape.root, thing.link),
             )
 
 

@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--host", metavar="NAME", help="of a system: only what this host runs, which is this machine")
     parser.add_argument("--robot", metavar="NAME", help="of a system: only this robot")
     parser.add_argument("--partial", action="store_true", help="of a system: change the hosts that can, without others")
-    undo = "take back the last change, or that of this generation, as --json tells it"
+    undo = "take back the last change, or that of this generation, as --json shows it"
     parser.add_argument("--undo", nargs="?", type=int, const=_LAST, metavar="N", help=undo)
     parser.add_argument("-y", "--yes", action="store_true", help="do not ask")
     parser.add_argument("--dry-run", action="store_true", help="show the difference and what prevents it")
@@ -41,7 +41,7 @@ def run(arguments: argparse.Namespace) -> int:
     if path is None:
         return FINDINGS
     if is_system(path):
-        from rbxcompose.tools.apply_system import apply_system  # only needed for systems
+        from rbxcompose.tools.system_runs import apply_system  # only needed for systems
 
         return apply_system(path, arguments)
     if arguments.undo is not None:

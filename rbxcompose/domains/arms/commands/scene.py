@@ -55,8 +55,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     stays = "It stays where it is, and may touch the link and all that this carries, or the links of --touch."
     save = "write the objects around the robot into a file, in the frame of the body's root"
     watch = "print the goals and plans of arms, and the scene, as they change, until Ctrl-C"
-    check = "print what collides now: links and objects that are nearer than they may be"
-    distance = "print which two links or objects are the nearest to each other, or those of A [and B]"
+    check = "report what collides now: links and objects that are nearer than they may be"
+    distance = "report which two links or objects are the nearest to each other, or those of A [and B]"
     picture = "draw the robot as it stands now, with what is around it, and the way that is planned"
     table: tuple[tuple[str, str, Do, tuple[Declare, ...]], ...] = (
         ("ls", "list the objects", _ls, (ask,)),

@@ -110,7 +110,7 @@ class ObjectModel(Config):
     @field_validator("touches", mode="before")
     @classmethod
     def _are_links(cls, names: object, info: ValidationInfo) -> object:
-        known = info.context or {}
+        known = {} if info.context is None else info.context
         for name in names if isinstance(names, list) else ():
             if isinstance(name, str) and name in known.get(OBJECT, ()) and name not in known.get(LINK, ()):
                 context = {"name": name, "help": f"write 'touches_objects: [{name}]'"}

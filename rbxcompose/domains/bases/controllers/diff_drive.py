@@ -37,15 +37,15 @@ from rbxcompose.sdk import (
     WritesFrame,
 )
 
-AVERAGED = 0.1  # [s], over which velocities are told
+AVERAGED = 0.1  # [s], over which velocities are averaged
 JUMP = 2.0  # times the largest speed of a wheel: a servo that has started again counts from elsewhere
 STALE = 3.0  # cycles after which nobody knows where a wheel is
-UNKNOWN = 1e6  # variance of what wheels cannot tell: height, roll, pitch
+UNKNOWN = 1e6  # variance of what wheels cannot measure: height, roll, pitch
 PLANAR = (0, 1, 5)  # x, y, and the turn about z, of the six that a covariance has
 
 
 class OdometryConfig(Config):
-    """What is told of the way of the base."""
+    """The odometry of the base."""
 
     topic: TopicName = "odom"
     """Where poses and velocities are published."""
@@ -91,7 +91,7 @@ class DiffDriveConfig(ControllerConfig):
     turn_jerk: AngularJerk | None = Field(None, gt=0)
     """Largest change of the acceleration of a turn."""
     odometry: OdometryConfig = OdometryConfig()
-    """What is told of its way."""
+    """Its odometry."""
 
     @property
     def claimed(self) -> tuple[str, ...]:
@@ -101,7 +101,7 @@ class DiffDriveConfig(ControllerConfig):
 
 @controller("diff_drive")
 class DiffDriveController(Controller[DiffDriveConfig]):
-    """Drives a base on two wheels by `cmd_vel`, and tells its way by `odom` and among the frames.
+    """Drives a base on two wheels by `cmd_vel`, and publishes its odometry as `odom` and as a transform.
 
     What is too fast is slowed down as a whole, so that the curvature is kept. Without commands, at a stop, or when a
     wheel fails, the base brakes within its limits. Its wheels have no torque before the first command.
@@ -116,7 +116,7 @@ class DiffDriveController(Controller[DiffDriveConfig]):
 
     @classmethod
     def ports(cls, name: str, config: DiffDriveConfig) -> dict[str, Port[Any]]:
-        """Return its commands, and what it tells."""
+        """Return its commands, and what it publishes."""
         odometry = config.odometry
         ports: dict[str, Port[Any]] = {
             "commands": In(geometry.Twist, config.commands, qos="command"),
@@ -203,7 +203,7 @@ class DiffDriveController(Controller[DiffDriveConfig]):
 
     @property
     def note(self) -> str:
-        """Return why it does not do as it is told."""
+        """Return why it does not follow its commands."""
         return self.trouble or self.refused
 
     def received(self, port: str, message: geometry.Twist) -> None:
@@ -243,7 +243,7 @@ class DiffDriveController(Controller[DiffDriveConfig]):
             if wheel.blocked:
                 return f"wheel '{name}': {wheel.blocked}"
             if now - wheel.measured_at > STALE * dt:
-                return f"wheel '{name}' does not tell where it is"
+                return f"wheel '{name}' does not report its position"
             if not self.drive.at_rest and not wheel.has_torque:
                 return f"wheel '{name}' was relaxed"
         return ""

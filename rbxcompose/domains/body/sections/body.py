@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, StringConstraints, model_validator
+from pydantic_core import PydanticCustomError
 
 from rbxcompose.base.config import JOINT, LINK, Config, Name
 from rbxcompose.base.findings import Finding, Report, Severity, Span, kind, replacement
@@ -51,7 +52,7 @@ class BodyFileModel(Config):
         if self.with_ and self.xacro is None:
             raise ValueError("'with' is for a xacro: a URDF has no arguments")
         if self.urdf is None and self.xacro is None and (missing := self.lacks_file()):
-            raise ValueError(missing)
+            raise PydanticCustomError("no_file", "{missing}", {"missing": missing, "about": ("urdf", "xacro")})
         return self
 
     def lacks_file(self) -> str:
@@ -109,7 +110,7 @@ def _brought(instance: str, own: TreeNode | None, entry: TreeNode) -> TreeNode |
     """Return the body of a part as a piece of the body of the file that includes it."""
     attach = entry.entries.get("attach") if isinstance(entry, MappingNode) else None
     if own is None and attach is not None:
-        own = MappingNode({}, attach.key.span)  # a piece without a file, which is told there
+        own = MappingNode({}, attach.key.span)  # a piece without a file, which is reported there
     if not isinstance(own, MappingNode):
         return own
     piece = {key: one for key, one in own.entries.items() if key != PIECES} | ({"attach": attach} if attach else {})
@@ -160,7 +161,7 @@ def body(reading: Reading[BodyModel]) -> Description | None:
     if read is None or reading.node is None:
         return None
     if any(value is BROKEN for one in (read, *read.pieces.values()) for value in one.with_.values()):
-        return None  # what is wrong with an argument is told where it was given
+        return None  # what is wrong with an argument is reported where it was given
     parts = [_part(reading, reading.node, (), "", read, None)] if read.urdf or read.xacro else []
     for name, piece in read.pieces.items():
         parts.append(_part(reading, reading.node, (PIECES, name), name, piece, piece.attach))
