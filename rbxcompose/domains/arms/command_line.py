@@ -225,8 +225,7 @@ def read_joints(written: str, dimensions: Mapping[str, Dimension]) -> dict[str, 
             raise NotDoneError(NO_MOTION.at(None, message))
         if position.dimension != dimensions[name]:
             word = "slides" if dimensions[name] == LENGTH else "turns"
-            message = f"'{name}' {word}, and this is {position.dimension.phrase}"
-            raise NotDoneError(NO_MOTION.at(None, message))
+            raise NotDoneError(NO_MOTION.at(None, f"'{name}' {word}, and this is {position.dimension.phrase}"))
     return {name: position.value for name, position in read.items()}
 
 

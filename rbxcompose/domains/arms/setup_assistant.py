@@ -47,7 +47,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=whole_number(0), default=1, metavar="S", help="the same one gives the same file")
     words = "the file (default: the one under 'collisions', or ROBOT.collisions.yaml; a profile has its own)"
     parser.add_argument("--out", metavar="FILE", help=words)
-    words = "examine all poses on the shapes of the body instead, and tell what collides"
+    words = "examine all poses on the shapes of the body instead, and report what collides"
     parser.add_argument("--check", action="store_true", help=words)
     words = "print a robot with the arms that a .urdf file seems to have, or write it to the file of --out"
     parser.add_argument("--propose", action="store_true", help=words)

@@ -101,10 +101,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     shared = (add_path_argument, add_layer_options, json_)
     of_arm = (add_path_argument, arm, add_layer_options, json_)
     ik = "print positions of joints that bring the tip to a pose (inverse kinematics)"
-    trace = "plan a way of the tip along lines and arcs, or tell how far it gets"
+    trace = "plan a way of the tip along lines and arcs, or print how far it gets"
     setup = "find pairs of links that need not be watched, and write their file"
     bench = "measure kinematics, and motions, also those of published problems"
-    plan = "plan a motion and tell how long it takes, or why there is none"
+    plan = "plan a motion and print how long it takes, or why there is none"
     actions = (
         Subcommand("ls", "list the arms of a robot with their joints and poses", _ls, shared),
         Subcommand("fk", "print where the tip is (forward kinematics)", _fk, (goal, fk_picture, *of_arm)),

@@ -14,7 +14,7 @@ from rbxcompose.domains.arms import goals as arm_goals
 from rbxcompose.domains.arms import scene_view
 from rbxcompose.domains.arms.arm_config import ArmConfig, ArmWorks, dimensions_of, mesh_bytes
 from rbxcompose.domains.arms.hand import PICK, PLACE, PicksAndPlaces, hand_ports, hand_task, result_of
-from rbxcompose.domains.arms.location import TellsWhereItIs, location_ports
+from rbxcompose.domains.arms.location import LocationService, location_ports
 from rbxcompose.domains.arms.motion.arm_task import ArmTask
 from rbxcompose.domains.arms.motion.collisions import readers_of, told
 from rbxcompose.domains.arms.motion.hand_task import HandTask
@@ -25,7 +25,7 @@ from rbxcompose.domains.arms.motion.scene_messages import path_of, placed_object
 from rbxcompose.domains.arms.moveit_ports import (
     GIVEN,
     MOTION,
-    AnswersPrograms,
+    KinematicsServices,
     around,
     is_turned_away,
     moveit_ports,
@@ -53,7 +53,7 @@ AnyTask = ArmTask | HandTask | MoveItTask
 
 
 @sdk.component("arm")
-class Arm(PicksAndPlaces, TellsWhereItIs, AnswersPrograms, sdk.Component[ArmConfig]):
+class Arm(PicksAndPlaces, LocationService, KinematicsServices, sdk.Component[ArmConfig]):
     """Moves an arm to poses by name, to positions of its joints, or its tip to a pose, on ways without collisions.
 
     The actions are `NAME/move`, `NAME/reach` and `NAME/trace`, with a gripper also `NAME/pick` and `NAME/place`; the

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import field, replace
+from dataclasses import asdict, field, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -110,7 +110,7 @@ class ObjectModel(Config):
     @field_validator("touches", mode="before")
     @classmethod
     def _are_links(cls, names: object, info: ValidationInfo) -> object:
-        known = info.context or {}
+        known = {} if info.context is None else info.context
         for name in names if isinstance(names, list) else ():
             if isinstance(name, str) and name in known.get(OBJECT, ()) and name not in known.get(LINK, ()):
                 context = {"name": name, "help": f"write 'touches_objects: [{name}]'"}
@@ -227,15 +227,7 @@ def _config(thing: PlacedObject) -> dict[str, object]:
         "position": thing.pose.translation,
         "rotation": thing.pose.rotation,
         "shapes": [
-            {
-                "kind": each.shape.kind,
-                "size": each.shape.size,
-                "file": each.shape.file,
-                "points": each.shape.points,
-                "triangles": each.shape.triangles,
-                "position": each.pose.translation,
-                "rotation": each.pose.rotation,
-            }
+            {**asdict(each.shape), "position": each.pose.translation, "rotation": each.pose.rotation}
             for each in thing.own_pieces
         ],
         "touches": thing.touches,

@@ -57,7 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ("generate", "print the rules of udev for the devices of a robot", _generate, (group,)),
         (
             "check",
-            "report whether the devices of a robot are plugged in, named and open to this user",
+            "report whether the devices of a robot are plugged in, named and open to you",
             _check,
             (group,),
         ),
