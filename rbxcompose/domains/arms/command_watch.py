@@ -13,7 +13,7 @@ from rbxcompose.bus.local import Inbox
 from rbxcompose.bus.names import admin_key
 from rbxcompose.bus.transport import Arrival, Transport, TransportReply
 from rbxcompose.bus.window import SCHEMA
-from rbxcompose.commands.console import NotDoneError, tell
+from rbxcompose.commands.console import NotDoneError, emit
 from rbxcompose.commands.guest import Guest
 from rbxcompose.commands.lookup import NO_ANSWER, known_state, place_of
 from rbxcompose.domains.arms.scene_view import ARM, ARM_WINDOW, SCENE_WINDOW
@@ -32,7 +32,7 @@ def watch(folder: RobotFolder, *, as_json: bool) -> int:
     arms = [component.name for component in state.components if component.type == ARM]
 
     def changed(path: str, seen: Mapping[str, Any]) -> None:
-        tell(json.dumps({"window": path, **seen}) if as_json else line_of(seen))
+        emit(json.dumps({"window": path, **seen}) if as_json else line_of(seen))
 
     with Guest(place_of(folder)) as guest, guest.interruptible():
         paths = (SCENE_WINDOW, *(f"{ARM_WINDOW}/{name}" for name in arms))

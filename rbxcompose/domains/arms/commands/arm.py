@@ -26,7 +26,7 @@ from rbxcompose.base.config import Config, Length, Time
 from rbxcompose.base.findings import suggest
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.base.units import ANGLE, LENGTH
-from rbxcompose.commands.console import NotDoneError, misused, table, tell
+from rbxcompose.commands.console import NotDoneError, emit, misused, table
 from rbxcompose.commands.guest import Guest, visit, wanted
 from rbxcompose.commands.lookup import add_bus_options
 from rbxcompose.commands.options import (
@@ -130,15 +130,15 @@ def _ls(arguments: argparse.Namespace) -> int:
         return 1
     found = robot.manifest.contents.of(arms)
     if arguments.json:
-        tell(json.dumps([{"name": name, **_described(arm)} for name, arm in found.items()]))
+        emit(json.dumps([{"name": name, **_described(arm)} for name, arm in found.items()]))
     elif not found:
-        tell("this robot has no arms")
+        emit("this robot has no arms")
     else:
         rows = [
             (name, arm.group.base, arm.group.tip, ", ".join(arm.group.joints), ", ".join(arm.model.poses))
             for name, arm in found.items()
         ]
-        tell(table([("name", "base", "tip", "joints", "poses"), *rows]))
+        emit(table([("name", "base", "tip", "joints", "poses"), *rows]))
     return 0
 
 
@@ -163,11 +163,11 @@ def _fk(arguments: argparse.Namespace) -> int:
     pose = works.kinematics.tip_pose(values)
     root = works.kinematics.body.root
     if arguments.json:
-        tell(json.dumps({"frame": root, "position": pose.translation, "rotation": pose.rotation}))
+        emit(json.dumps({"frame": root, "position": pose.translation, "rotation": pose.rotation}))
     else:
         x, y, z = (f"{value * 100:.2f} cm" for value in pose.translation)
         turn = ", ".join(f"{value:.4f}" for value in pose.rotation)
-        tell(f"'{robot.group.tip}' in '{root}': x {x}, y {y}, z {z}; rotation (x, y, z, w) {turn}")
+        emit(f"'{robot.group.tip}' in '{root}': x {x}, y {y}, z {z}; rotation (x, y, z, w) {turn}")
     return 0
 
 
@@ -242,7 +242,7 @@ def _tell_plan(
     if arguments.json:
         data = {"duration": duration, "waypoints": points, "attempts": found.attempts, "examined": found.examined}
         origin = {"found_by": found.found_by, "fast_failed": found.fast_failed}
-        tell(json.dumps(data | {"planning_time": took, "fraction": found.share} | origin))
+        emit(json.dumps(data | {"planning_time": took, "fraction": found.share} | origin))
         return 0
     by = f"found by {found.found_by}, " if found.found_by else ""
     words = f"{by}{found.examined} positions examined, attempt {found.attempts}"
@@ -250,9 +250,9 @@ def _tell_plan(
         words += f"; fast: {found.fast_failed}"
     if found.share < 1.0:
         words = f"only {found.share:.1%} of the way; {words}"
-    tell(f"a motion of {duration:.2f} s over {len(points)} points, planned in {took * 1000:.0f} ms ({words})")
+    emit(f"a motion of {duration:.2f} s over {len(points)} points, planned in {took * 1000:.0f} ms ({words})")
     for point in points:
-        tell(f"  {shown(works, point)}")
+        emit(f"  {shown(works, point)}")
     return 0
 
 
@@ -287,11 +287,11 @@ def run_inverse(arguments: argparse.Namespace) -> int:
     if arguments.json:
         data = {"solutions": each, "colliding": len(found.colliding), "attempts": found.attempts}
         errors = [{"away": away, "angle": angle} for away, angle in missed]
-        tell(json.dumps(data | {"approximate": found.is_approximate, "errors": errors}))
+        emit(json.dumps(data | {"approximate": found.is_approximate, "errors": errors}))
         return 0 if each else 1
     for number, (solution, off) in enumerate(zip(each, missed, strict=True), 1):
         words = f" (approximate, {_far(*off)} from it)" if found.is_approximate else ""
-        tell(f"solution {number}{words}: {shown(works, solution)}")
+        emit(f"solution {number}{words}: {shown(works, solution)}")
     if each:
         return 0
     words = f"goal_out_of_reach: the tip got within {_far(*found.nearest)} of it"
@@ -428,15 +428,15 @@ def run_bench(arguments: argparse.Namespace, works: ArmWorks) -> int:
     is_fast = kinematics.compiled is not None
     if arguments.json:
         data = {name: _data(entry) for name, entry in tries.items()}
-        tell(json.dumps({"compiled": is_fast, "calls": calls, "tries": data}))
+        emit(json.dumps({"compiled": is_fast, "calls": calls, "tries": data}))
     else:
         how = "compiled by numba" if is_fast else "not compiled: pip install 'rbxcompose[fast]' makes it faster"
-        tell(f"{len(works.space.joints)} joints, inverse kinematics {how}; times are those of the processor")
+        emit(f"{len(works.space.joints)} joints, inverse kinematics {how}; times are those of the processor")
         rows = [(name, "", f"{1e6 * took:.1f} us", "", "", "") for name, took in calls.items()]
-        tell(table([HEAD, *rows, *(_row(name, entry) for name, entry in tries.items())]))
+        emit(table([HEAD, *rows, *(_row(name, entry) for name, entry in tries.items())]))
         for name, one in tries.items():
             for reason, count in Counter(one.failures).most_common(SHOWN):
-                tell(
+                emit(
                     f"not solved in {name}, {count} times: {reason}" if count > 1 else f"not solved in {name}: {reason}"
                 )
     return 1 if any(entry.colliding for entry in tries.values()) else 0
@@ -571,10 +571,10 @@ def run_reach(arguments: argparse.Namespace, works: ArmWorks, start: NDArray[np.
             for cell, found_cell in sorted(found.cells.items())
         ]
         data = {"side": found.side, "of": DIRECTIONS, "samples": found.tried, "seed": arguments.seed, "cells": told}
-        tell(json.dumps({**data, "colliding": found.colliding, "joints": list(works.space.names)}))
+        emit(json.dumps({**data, "colliding": found.colliding, "joints": list(works.space.names)}))
         return 0
-    tell(text)
-    tell(f"wrote {arguments.out}")
+    emit(text)
+    emit(f"wrote {arguments.out}")
     return 0
 
 
