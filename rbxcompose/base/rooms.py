@@ -10,6 +10,8 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from functools import cache
+from importlib import import_module
+from types import ModuleType
 
 _PACKAGE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 _NAME, _DOMAINS, _RULES = "rbxcompose", "domains", "checks"
@@ -24,6 +26,17 @@ def modules_of(folder: str) -> dict[str, str]:
 def file_of(module: str) -> str:
     """Return the file of one of these modules."""
     return os.path.join(_PACKAGE, *module.split(".")[1:]) + ".py"
+
+
+def domain_of(module: str) -> str:
+    """Return the domain of a module, by its name; empty for modules of other rooms and of other packages."""
+    package, _, below = module.partition(f".{_DOMAINS}.")
+    return below.partition(".")[0] if package == _NAME else ""
+
+
+def package_of(domain: str) -> ModuleType:
+    """Return the package of a domain."""
+    return import_module(f"{_NAME}.{_DOMAINS}.{domain}")
 
 
 def _found(folder: str) -> Iterator[tuple[str, str]]:

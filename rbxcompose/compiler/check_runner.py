@@ -9,10 +9,12 @@ from typing import Any
 from rbxcompose.base.findings import Finding, Report, Severity
 from rbxcompose.base.plugins import LEFT_OUT, BrokenPluginError, Plugins
 from rbxcompose.base.printable import plain
+from rbxcompose.base.rooms import domain_of
 from rbxcompose.base.rules import OUR_CODES, Rule, declared
-from rbxcompose.compiler.model.doubts import Doubts, doubts_of
-from rbxcompose.compiler.model.robot import Robot
-from rbxcompose.manifest.walk import TWICE
+from rbxcompose.compiler.doubts import Doubts, doubts_of, half_read
+from rbxcompose.compiler.model.robot import NOTHING, Robot
+from rbxcompose.manifest.registry import PLUGINS as SECTIONS
+from rbxcompose.manifest.registry import section_named
 from rbxcompose.missions.analysis.check_runner import rule_findings
 from rbxcompose.missions.analysis.examined import Examined
 
@@ -57,6 +59,26 @@ def all_checks() -> list[Check]:
     return [CHECKS[code] for code in sorted(CHECKS)]
 
 
+def checks_of(robot: Robot) -> list[Check]:
+    """Return `all_checks` without those that can find nothing: of domains of which the robot has nothing.
+
+    A domain's rules are about its sections and components. They are about other components, too, if they have what only
+    components of this domain have otherwise: components of other packages may, and other robots' skills.
+    """
+    types = [component.cls for component in robot.components.values()]
+    if robot.outside is not NOTHING or any(map(_is_foreign, types)):
+        return all_checks()
+    sections = filter(None, map(section_named, robot.manifest.root.entries))
+    used = {domain_of(part.__module__) for part in (*types, *(section.read for section in sections))}
+    left_out = {domain_of(module) for module in SECTIONS.shipped.values()} - used
+    for name, module in PLUGINS.shipped.items():
+        if domain_of(module) not in left_out:
+            PLUGINS.load(name)
+    for name in PLUGINS.third_party:
+        _problem(name)
+    return [CHECKS[code] for code in sorted(CHECKS)]
+
+
 def broken_checks() -> list[Finding]:
     """Return a finding for each check of another package that is left out."""
     return [LEFT_OUT.at(None, problem) for name in sorted(PLUGINS.third_party) if (problem := _problem(name))]
@@ -81,10 +103,10 @@ def run_checks(robot: Robot, report: Report) -> None:
     in doubt may only follow from an error, so it is left out. A mission with a key that is written twice is not
     checked: half of something in it was not read.
     """
-    halves = {finding.span.file for finding in report if finding.code == TWICE.code and finding.span}
+    halves = half_read(report)
     programs = (mission.program for mission in robot.missions.values())
     missions = [Examined(program, robot.names) for program in programs if program.file not in halves]
-    checks = all_checks()
+    checks = checks_of(robot)
     for turn in range(_TURNS):
         doubts = doubts_of(robot.manifest, report)
 
@@ -118,9 +140,9 @@ def _found(one: Check, robot: Robot) -> list[Finding]:
         return [LEFT_OUT.at(None, f"the check {one.code} of '{_package(one.find)}' has failed: {reason}")]
 
 
-def _is_foreign(find: Find) -> bool:
-    return _package(find) != _package(declared)
+def _is_foreign(part: Callable[..., Any]) -> bool:
+    return _package(part) != _package(declared)
 
 
-def _package(find: Callable[..., Any]) -> str:
-    return find.__module__.partition(".")[0]
+def _package(part: Callable[..., Any]) -> str:
+    return part.__module__.partition(".")[0]

@@ -13,8 +13,8 @@ from rbxcompose.base.findings import Related, Report, Severity, Span, kind, one_
 from rbxcompose.compiler.check_runner import run_checks
 from rbxcompose.compiler.composition.overlay import SET
 from rbxcompose.compiler.composition.robot_file import load_robot
+from rbxcompose.compiler.doubts import with_removals
 from rbxcompose.compiler.model.build import build_robot, with_missions
-from rbxcompose.compiler.model.removals import blamed
 from rbxcompose.compiler.model.robot import NOTHING, Outside, Robot
 from rbxcompose.compiler.plan.build import build_plan
 from rbxcompose.compiler.plan.model import Plan
@@ -144,10 +144,12 @@ def _report_profile(profile: Span, tried: Compilation, out: Compilation, above: 
     """
     known = {(finding.code, finding.span) for finding in out.report}
     new = [one for one in tried.report if (one.code, one.span) not in known]
-    found = blamed(new, out.robot, tried.robot, profile) if out.robot and tried.robot else new
+    if out.robot and tried.robot:
+        ends = ((name, end.instance) for end in out.robot.ends for name in (end.skill, end.topic) if name)
+        new = list(with_removals(new, tried.robot.manifest.history, profile, ends))
     more = tried.sources.keys() - out.sources.keys() - {PROFILE, SET}  # a mission that only this profile has
     out.sources.update({file: tried.sources[file] for file in sorted(more)})
-    for finding in found:
+    for finding in new:
         span = finding.span
         if span is None or span.file not in out.sources or span.file in above:
             continue

@@ -13,8 +13,10 @@ from pydantic import Field, create_model
 
 from rbxcompose.base.findings import Finding
 from rbxcompose.base.plugins import LEFT_OUT, BrokenPluginError, Plugins
+from rbxcompose.base.rooms import domain_of, package_of
 from rbxcompose.manifest.documents import ManifestHeader
 from rbxcompose.manifest.section import OVERLAY, PART, ROBOT, Declaration, Reading, Section
+from rbxcompose.manifest.tree import MappingNode
 from rbxcompose.manifest.validate import ENTRY_WORDS
 
 M = TypeVar("M")
@@ -72,20 +74,58 @@ def register(made: Section[Any, Any]) -> None:
 
 
 def sections(kind: str = "") -> list[Section[Any, Any]]:
-    """Return all sections in their order, or those that a kind of manifest may have."""
+    """Import all sections and return them in their order, or those that a kind of manifest may have."""
     _problems()
+    PLUGINS.load_shipped()
+    return _of_kind(kind)
+
+
+def sections_in_use(kind: str = "") -> list[Section[Any, Any]]:
+    """Return those of `sections` that count for the files read so far: none of a domain of which they have no section.
+
+    A domain's sections are imported together, when `section_named` is first asked for one of them: as it is for each
+    key of a file. Those of a domain that says `IN_EVERY_ROBOT` always count.
+    """
+    _problems()
+    _load_common()
+    return _of_kind(kind)
+
+
+def _of_kind(kind: str) -> list[Section[Any, Any]]:
     return [one for one in _SECTIONS.values() if not kind or kind in one.files]
 
 
 def section_named(name: object) -> Section[Any, Any] | None:
     """Return the section of this name, or None."""
     _problems()
+    if name in PLUGINS.shipped:
+        _load_domain(domain_of(PLUGINS.shipped[str(name)]))
     return _SECTIONS.get(str(name))
+
+
+@cache
+def _load_common() -> None:
+    for domain in dict.fromkeys(map(domain_of, PLUGINS.shipped.values())):
+        if not domain or getattr(package_of(domain), "IN_EVERY_ROBOT", False):
+            _load_domain(domain)
+
+
+@cache
+def _load_domain(domain: str) -> None:
+    """Import the sections of a domain, or those that belong to none."""
+    for name, module in PLUGINS.shipped.items():
+        if domain_of(module) == domain:
+            PLUGINS.load(name)
 
 
 def naming(kind: str) -> Iterator[Section[Any, Any]]:
     """Yield the sections whose keys are names of a kind."""
     return (one for one in sections() if one.has_names_of(kind))
+
+
+def naming_in_use(kind: str) -> list[Section[Any, Any]]:
+    """Return those of `naming` that are in use."""
+    return [one for one in sections_in_use() if one.has_names_of(kind)]
 
 
 def broken_sections() -> list[Finding]:
@@ -95,8 +135,8 @@ def broken_sections() -> list[Finding]:
 
 @cache
 def _problems() -> tuple[str, ...]:
-    """Import all sections; return why some of other packages are left out."""
-    return tuple(problem for name in PLUGINS.names() if (problem := _problem(name)))
+    """Import the sections of other packages; return why some are left out."""
+    return tuple(problem for name in sorted(PLUGINS.third_party) if (problem := _problem(name)))
 
 
 def _problem(name: str) -> str:
@@ -117,6 +157,14 @@ FILES = {
 def file_model(kind: str) -> type[ManifestHeader]:
     """Return the model of a robot's, part's or overlay's file: its keys, with anything allowed in each section."""
     return _file_model(kind, tuple((section.name, section.doc) for section in sections(kind)))
+
+
+def model_for(kind: str, root: MappingNode) -> type[ManifestHeader]:
+    """Return a model that judges a file as `file_model` does; sections that it lacks count only if a key is unknown."""
+    found = [section_named(name) for name in root.entries if name not in ManifestHeader.model_fields]
+    if all(section is not None and kind in section.files for section in found):
+        return _file_model(kind, tuple((section.name, section.doc) for section in sections_in_use(kind)))
+    return file_model(kind)
 
 
 @cache

@@ -28,12 +28,12 @@ def salvaged(model: type[T], node: TreeNode, context: Mapping[str, object] | Non
 
     What is unknown or wrong is left out, so that it has its default; what must be there gets a stand-in, some value
     that the model accepts. Nothing is reported: that was done by `validate`. Nobody may conclude anything from a
-    value that is in doubt; see `rbxcompose/compiler/model/doubts.py`.
+    value that is in doubt; see `rbxcompose/compiler/doubts.py`.
     """
     data, tried = to_plain(node), Counter[KeyPath]()
     for _ in range(_ROUNDS):
         try:
-            return cast(T, adapter(cast(Any, model)).validate_python(data, strict=True, context=dict(context or {})))
+            return cast(T, adapter(cast(Any, model)).validate_python(data, strict=True, context=context))
         except ValidationError as error:
             errors = error.errors(include_url=False)
         for details in errors:

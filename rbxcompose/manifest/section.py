@@ -438,13 +438,16 @@ class Contents:
         documents: Documents,
         sections: Iterable[Section[Any, Any]] = (),
         *,
+        others: Callable[[], Iterable[Section[Any, Any]]] = tuple,
+        named: Callable[[str], Section[Any, Any] | None] = lambda name: None,
         is_simulated: bool = True,
         is_whole: bool = True,
     ) -> None:
         self.root, self.file, self.documents, self.is_simulated = root, file, documents, is_simulated
         self.is_whole = is_whole
         """Whether all files that the tree was composed of could be read."""
-        self._sections = list(sections)
+        self._sections = list(sections if is_whole else others())
+        self._others, self._named = others, named
         self._read: dict[str, object] = {}
 
     def of(self, section: Section[Any, R]) -> R:
@@ -478,21 +481,47 @@ class Contents:
 
     def is_misplaced(self, section: Section[Any, Any], entry: Entry) -> bool:
         """Return whether an entry of a section is another section of the file, indented too far."""
-        other = next((one for one in self._sections if one.name == entry.key.text), None)
+        other = self._named(entry.key.text)
         if other is None:
             return False
         keys = () if other.is_map else keys_at(other.model, ())
         return is_misplaced(entry.value, keys, section.keys_of(entry))
 
     @cached_property
-    def known(self) -> dict[str, Mapping[str, object]]:
+    def known(self) -> Mapping[str, Mapping[str, object]]:
         """Return the names of each kind, including entries with mistakes: references to them are not wrong."""
-        naming = [section for section in self._sections if section.names]
+        return _Kinds(self._known_from(self._sections), lambda: self._others_known)
+
+    @cached_property
+    def _others_known(self) -> Mapping[str, Mapping[str, object]]:
+        return self._known_from(self._others())
+
+    def _known_from(self, sections: Iterable[Section[Any, Any]]) -> dict[str, Mapping[str, object]]:
+        all_ = list(sections)
+        naming = [section for section in all_ if section.names]
         kinds = {COMPONENT, *(section.names for section in naming)}
         found: dict[str, Mapping[str, object]] = {
             kind: _Names(self, kind, [section for section in naming if section.has_names_of(kind)]) for kind in kinds
         }
-        return found | {kind: _Defined(self, section, kind) for section in self._sections for kind in section.defines}
+        return found | {kind: _Defined(self, section, kind) for section in all_ for kind in section.defines}
+
+
+class _Kinds(Mapping[str, Mapping[str, object]]):
+    """The names of each kind; sections that are not in use are asked only for a kind that those in use do not have."""
+
+    def __init__(
+        self, used: Mapping[str, Mapping[str, object]], others: Callable[[], Mapping[str, Mapping[str, object]]]
+    ) -> None:
+        self._used, self._others = used, others
+
+    def __getitem__(self, kind: str) -> Mapping[str, object]:
+        return self._used[kind] if kind in self._used else self._others()[kind]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter({**self._used, **self._others()})
+
+    def __len__(self) -> int:
+        return len({**self._used, **self._others()})
 
 
 class _Names(Mapping[str, object]):

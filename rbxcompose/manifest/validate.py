@@ -273,7 +273,7 @@ def validate(
     data = to_plain(node)
     for _ in range(_ROUNDS):
         try:
-            return cast(T, adapter(cast(Any, model)).validate_python(data, strict=True, context=dict(context or {})))
+            return cast(T, adapter(cast(Any, model)).validate_python(data, strict=True, context=context))
         except ValidationError as error:
             errors = error.errors(include_url=False)
         before = data
@@ -382,8 +382,11 @@ def _finding(model: Any, node: tree.TreeNode, path: tree.KeyPath, loc: tree.KeyP
     if "valid" in context:  # a validator of ours that supplies the valid names
         message = error["msg"] if is_key else f"'{name}': {error['msg']}"
         return NOT_A_CHOICE.misspelt(place, message, context["name"], context["valid"], context["what"])
+    if "about" in context:  # or the names that it lacks
+        return WRONG_TYPE.at(span, f"'{name}': {error['msg']}", about=context["about"])
     if "help" in context:  # or its own help
-        return NOT_A_CHOICE.at(span, f"'{name}': {error['msg']}", help=str(context["help"]))
+        named = [str(context.get("name", ""))]
+        return NOT_A_CHOICE.at(span, f"'{name}': {error['msg']}", help=str(context["help"]), about=named)
     return WRONG_TYPE.at(span, f"'{name}': {error['msg'][:1].lower()}{error['msg'][1:]}", label=label_of(value))
 
 

@@ -23,4 +23,5 @@ TOO_DEEP = kind("RBX4115")
 
 def removed_place(span: Span, name: str, remover: Span) -> Finding:
     """Return the finding for a place that the robot had until a layer removed it."""
-    return UNKNOWN_PLACE.at(span, f"there is no place '{name}' any more", related=[Related(remover, "removed here")])
+    related = [Related(remover, "removed here")]
+    return UNKNOWN_PLACE.at(span, f"there is no place '{name}' any more", related=related, about=[name])

@@ -186,7 +186,7 @@ class SendsOrders(Out[M]):
 
 
 class Serves(Port[None]):
-    """Serves requests: the method `on_<port>` takes a request and returns the response, or a `Later` that tells it.
+    """Serves requests: the method `on_<port>` takes a request and returns the response, or a `Later` that brings it.
 
     It is a skill of missions if the response has a flag `success`; `skill` is as in `ServesAction`. `unit` says what a
     bare number in the request means (`%`).

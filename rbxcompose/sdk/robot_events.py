@@ -35,7 +35,7 @@ class RobotHeld:
 
 @dataclass(frozen=True, slots=True)
 class ComponentNoted:
-    """A component tells what people should see of it in `ps`; an empty text ends it."""
+    """What people should see of a component in `ps`; an empty text ends it."""
 
     component: str
     text: str

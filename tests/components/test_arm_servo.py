@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.domains.arms.servo_ports import STATUS, STREAM, TIMEOUT, ArmServo
+from rbxcompose.domains.arms.teleoperation import STATUS, STREAM, TIMEOUT, ArmServo
 from rbxcompose.msgs.geometry_msgs import Point, Pose, PoseStamped, Quaternion, Twist, TwistStamped, Vector3
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header

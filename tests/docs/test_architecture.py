@@ -21,9 +21,9 @@ THERE = {path.name for path in (PACKAGE / "domains").iterdir() if (path / "__ini
 def calls_of(file: str, function: str) -> list[str]:
     """Return the names that a function calls, in the order of the text."""
     [found] = [node for node in functions(file) if node.name == function]
-    calls = [node for node in ast.walk(found) if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)]
-    ordered = sorted(calls, key=lambda call: (call.lineno, call.col_offset))
-    return [call.func.id for call in ordered if isinstance(call.func, ast.Name)]
+    calls = [node for node in ast.walk(found) if isinstance(node, ast.Call)]
+    ordered = [call.func for call in sorted(calls, key=lambda call: (call.lineno, call.col_offset))]
+    return [call.attr if isinstance(call, ast.Attribute) else getattr(call, "id", "") for call in ordered]
 
 
 def functions(file: str) -> list[ast.FunctionDef]:

@@ -9,14 +9,22 @@ from pathlib import Path
 
 import pytest
 
-from tests.docs.examples import PATROL, ROBOT, ROOT, blocks_of, with_sections
+from tests.docs.examples import ROOT, blocks_of
 
 pytestmark = pytest.mark.timeout(300)  # mypy without its cache
 PAGE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 BLOCKS = [block for block in blocks_of(PAGE, "CONTRIBUTING.md") if block.language == "python"]
 FILES = {block.words[1]: block.text for block in BLOCKS}
 DOMAIN = "rbxcompose/domains/sirens"
-SIRENS = "sirens:\n  front: base\n  back: {driver: base, after: [front]}\n"
+SITE = """rbx: 1
+kind: Robot
+name: site
+components:
+  base: {type: diff_drive_sim}
+sirens:
+  front: base
+  back: {driver: base, after: [front]}
+"""
 
 
 def run(*words: str, cwd: Path, path: Path) -> str:
@@ -91,12 +99,12 @@ def test_its_tests_pass(copy: Path) -> None:
 
 
 def test_its_domain_has_a_section_a_component_a_check_and_a_command(copy: Path) -> None:
-    robot = with_sections(ROBOT, SIRENS).replace("../../missions/", "")
-    site = written(copy / "sounding", {"robot.yaml": robot, "patrol.yaml": PATROL})
+    site = written(copy / "site", {"robot.yaml": SITE})
     assert "List the sirens of a robot" in run("rbxcompose", "--help", cwd=site, path=copy)
     assert run("rbxcompose", "siren", cwd=site, path=copy).splitlines()[-2:] == ["front  base", "back   base"]
     assert "'front' needs '/alarm', which nothing in the robot provides" in run(
         "rbxcompose", "check", cwd=site, path=copy
     )
-    written(site, {"robot.yaml": robot.replace("[front]", "[back]")})
+    assert "site is up" in (said := run("rbxcompose", "up", "--rate", "max", "--for", "1s", cwd=site, path=copy)), said
+    written(site, {"robot.yaml": SITE.replace("[front]", "[back]")})
     assert "siren 'back' waits for itself" in run("rbxcompose", "check", cwd=site, path=copy)

@@ -13,8 +13,8 @@ from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.arms.motion.arm_task import SETTLING, ArmGoal, ArmTask
 from rbxcompose.domains.arms.motion.collisions import MeshChecker, adjacent_pairs
 from rbxcompose.domains.arms.motion.inverse_kinematics import PoseTarget, SolverSettings
-from rbxcompose.domains.arms.motion.kept import Keep
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory
+from rbxcompose.domains.arms.motion.path_constraints import Keep
 from rbxcompose.domains.arms.motion.scene import PlacedObject
 from rbxcompose.domains.arms.motion.trace_planner import TraceWish, WayPoint
 from rbxcompose.domains.arms.reasons import MotionReason

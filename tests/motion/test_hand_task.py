@@ -10,11 +10,11 @@ from typing import Any
 import pytest
 
 from rbxcompose.base.geometry import Transform3, quaternion_from_rpy
-from rbxcompose.domains.arms.manifest_model import GraspModel
 from rbxcompose.domains.arms.motion import hand_task as contacts
 from rbxcompose.domains.arms.motion.collisions import MeshChecker
 from rbxcompose.domains.arms.motion.hand_task import HandTask, LineEnd, line_steps
 from rbxcompose.domains.arms.motion.scene import PlacedObject
+from rbxcompose.domains.arms.section_models import GraspModel
 from rbxcompose.domains.body.model import Geometry
 from rbxcompose.msgs.rbxcompose_msgs import MoveArm, PickObject, PlaceObject
 from tests.motion.pi_hand import HandBench

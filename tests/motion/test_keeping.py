@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.arms.motion.inverse_kinematics import PoseSolutions, PoseTarget
-from rbxcompose.domains.arms.motion.kept import Keep, KeptTip
+from rbxcompose.domains.arms.motion.path_constraints import Keep, KeptTip
 from rbxcompose.domains.arms.motion.planner import MotionPlan, MotionPlanner, MotionRequest, PlannerSettings
 from rbxcompose.domains.arms.motion.pose_search import Posture, kept_solutions
 from rbxcompose.domains.arms.reasons import MotionFailure, MotionReason

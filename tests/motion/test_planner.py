@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.domains.arms.manifest_model import OMPL
 from rbxcompose.domains.arms.motion.collisions import TOUCH
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory
 from rbxcompose.domains.arms.motion.planner import MotionPlan, MotionRequest
 from rbxcompose.domains.arms.motion.search import searched
 from rbxcompose.domains.arms.reasons import MotionFailure, MotionReason
+from rbxcompose.domains.arms.section_models import OMPL
 from rbxcompose.domains.servos.curves import cubic
 from tests.body.kinematics import description_of
 from tests.motion.toy_arm import FENCE, Array, ended, gap, planner, urdf

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.arms.motion.collisions import MeshChecker, adjacent_pairs
-from rbxcompose.domains.arms.motion.kept import Keep, KeptSight, KeptTip, SightLine
+from rbxcompose.domains.arms.motion.path_constraints import Keep, KeptSight, KeptTip, SightLine
 from rbxcompose.domains.arms.motion.planner import MotionPlan, MotionPlanner, MotionRequest, PlannerSettings
 from rbxcompose.domains.arms.motion.scene import PlacedObject
 from rbxcompose.domains.arms.reasons import MotionFailure, MotionReason

@@ -11,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbxcompose.base.geometry import Transform3
-from rbxcompose.domains.arms.manifest_model import FAST
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.collisions import TOUCH, MeshChecker, adjacent_pairs
 from rbxcompose.domains.arms.motion.groups import ArmGroup, ArmJoint, JointSpace, interpolated
@@ -20,6 +19,7 @@ from rbxcompose.domains.arms.motion.scene import PlacedObject
 from rbxcompose.domains.arms.motion.sphere_checker import SphereChecker
 from rbxcompose.domains.arms.motion.sphere_model import Trees
 from rbxcompose.domains.arms.reasons import MotionFailure, MotionReason
+from rbxcompose.domains.arms.section_models import FAST
 from rbxcompose.domains.body.model import Geometry
 from rbxcompose.domains.servos.limits import MotionLimits
 from tests.body.kinematics import description_of

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.arms.arm_config import ArmConfig, ArmWorks
-from rbxcompose.domains.arms.manifest_model import FAST
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.collisions import MeshChecker
 from rbxcompose.domains.arms.motion.figures import ended
@@ -24,6 +23,7 @@ from rbxcompose.domains.arms.motion.planner import MotionPlan, MotionRequest
 from rbxcompose.domains.arms.motion.scene import PlacedObject
 from rbxcompose.domains.arms.motion.second_checker import sampled
 from rbxcompose.domains.arms.motion.sphere_model import Trees, compiled_model
+from rbxcompose.domains.arms.section_models import FAST
 from rbxcompose.domains.body.description import covering, to_xml
 from rbxcompose.domains.body.model import Geometry, Shape
 from rbxcompose.domains.body.urdf import read_body

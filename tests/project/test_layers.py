@@ -26,9 +26,9 @@ ROOMS = (
 """Each imports only from itself and from those before it; what stands behind it, it loads by name."""
 DOMAINS = {"arms": "body servos", "bases": "body servos", "servos": "body devices"}
 """Which other domains a domain may import; one that is not named here imports none."""
-PURE = re.compile(r"rbxcompose\.(bus|runtime|commands|tools|testing)\b")
-"""What the core of a domain does not import: all of it but its folders of plug-ins."""
-PLUG_INS = ("components", "sections", "commands", "controllers", "importers", "bus_types", "checks")
+IMPURE = ("bus", "runtime", "testing", "tools")
+"""What the core of a domain does not import: all of it but its plug-ins, and what belongs to its commands."""
+PLUG_IN = re.compile(r"components|sections|commands|command_\w+|controllers|importers|bus_types|checks")
 
 
 def imports(path: Path) -> set[str]:
@@ -40,7 +40,7 @@ def imports(path: Path) -> set[str]:
         elif isinstance(node, ast.ImportFrom) and node.module:
             names = {f"{node.module}.{alias.name}" for alias in node.names}
             found |= names if node.module in ("rbxcompose", "rbxcompose.domains") else {node.module}
-    return {name for name in found if name.startswith("rbxcompose.")}
+    return {name for name in found if name.startswith("rbxcompose.") and name != "rbxcompose.__version__"}
 
 
 FILES = {path: imports(path) for path in sorted(PACKAGE.rglob("*.py"))}
@@ -86,3 +86,15 @@ def test_a_domain_imports_only_those_domains_that_its_row_names() -> None:
     ]
     assert wrong == []
     TopologicalSorter({name: row.split() for name, row in DOMAINS.items()}).prepare()
+
+
+def test_the_core_of_a_domain_needs_no_bus_and_nothing_that_runs() -> None:
+    wrong = [
+        f"{module} imports {name}"
+        for path, names in FILES.items()
+        if (module := module_of(path)).startswith("rbxcompose.domains.")
+        and not any(map(PLUG_IN.fullmatch, module.split(".")[3:4]))
+        for name in sorted(names)
+        if room_of(name) in IMPURE
+    ]
+    assert wrong == []

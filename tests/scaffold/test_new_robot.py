@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from rbxcompose.base.expressions.functions import FUNCTIONS
 from rbxcompose.commands.new_files import AnswerError
-from rbxcompose.compiler.composition.robot_file import reserved_names
+from rbxcompose.compiler.composition.robot_file import RESERVED
+from rbxcompose.manifest.registry import robot_keys
 from rbxcompose.missions.modifiers.registry import modifier_keys
 from rbxcompose.missions.program.registry import kinds
 from rbxcompose.testing import Checked, Golden, check_file, run_robot
@@ -43,7 +44,7 @@ def test_it_is_written_as_people_would_write_it(golden: Golden) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", sorted({*WORDS, *reserved_names(), *FUNCTIONS, *modifier_keys(), *kinds(), "go_to", "recharge"})
+    "name", sorted({*WORDS, *RESERVED, *robot_keys(), *FUNCTIONS, *modifier_keys(), *kinds(), "go_to", "recharge"})
 )
 def test_a_place_with_an_odd_name_is_refused_or_fine(name: str, tmp_path: Path) -> None:
     assert findings(tmp_path, f"{name}=1,1") in ("", "RBX9102")

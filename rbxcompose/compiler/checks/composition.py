@@ -71,6 +71,7 @@ def part_needs(robot: Robot) -> Iterator[Finding]:
                 f"part '{part.name}' needs '{need.name}' ({short(need.type)}) from outside, and nothing has it",
                 help=f"include a part with '{need.name}', or connect it to the right topic with 'connect:'",
                 related=[Related(need.span, "needed here")],
+                about=(part.name, need.name),
             )
 
 
@@ -152,13 +153,15 @@ def part_provides(robot: Robot) -> Iterator[Finding]:
         for claim in part.claims:
             if claim.about is not About.NEED and (what := _lacking(robot, claim, ends)):
                 message = f"part '{part.name}' does not have {what}, which it says it provides"
+                about = (part.name, claim.name)
                 is_own = part.components <= robot.components.keys() and not claim.span.file.startswith(PREFIX)
                 if not is_own:  # something of it was removed or changed
-                    yield part_provides.at(part.span, message, related=[Related(claim.span, "promised here")])
+                    related = [Related(claim.span, "promised here")]
+                    yield part_provides.at(part.span, message, related=related, about=about)
                     continue
                 known = [end.skill for end in ends if _serves(end, end.skill)] if claim.about is About.SKILL else []
                 help_text = suggest(claim.name, known, "its skills")
-                yield part_provides.at(claim.span, message, help=help_text)
+                yield part_provides.at(claim.span, message, help=help_text, about=about)
 
 
 def _serves(end: PortEnd, skill: str) -> bool:

@@ -126,6 +126,7 @@ def place_in_data(robot: Robot) -> Iterator[Finding]:
                     f"there is no place '{text}', which '{node.skill}' gets from '${name}'",
                     help=suggest(text, places, "places of this robot"),
                     related=[Related(node.span, "used here")],
+                    about=(text, node.skill),
                 )
 
 
@@ -292,7 +293,7 @@ def start_mission(robot: Robot) -> Iterator[Finding]:
     message = f"the robot has no mission '{start}' to start"
     if files := _files((place, robot.value("name")), start):
         help_text = f"add '{start}: {files[0]}' below 'missions:'"
-        yield start_mission.at(place, message, help=help_text)
+        yield start_mission.at(place, message, help=help_text, about=[start])
         return
     yield start_mission.misspelt(place, message, start, robot.manifest.missions, "missions of this robot")
 

@@ -13,7 +13,7 @@ from rbxcompose.base.expressions.types import Type, TypeKind
 from rbxcompose.base.expressions.values import EvaluationError, Value
 from rbxcompose.base.findings import Finding, Related, Severity
 from rbxcompose.base.rules import NAMES, OUR_CODES
-from rbxcompose.compiler.check_runner import all_checks, check
+from rbxcompose.compiler.check_runner import check, checks_of
 from rbxcompose.compiler.model.mission_facts import constants
 from rbxcompose.compiler.model.robot import Robot, RobotComponent
 from rbxcompose.manifest.tree import ScalarNode
@@ -201,7 +201,7 @@ def _with(robot: Robot, change: _Change) -> Robot:
 
 def _found(robot: Robot) -> Iterator[Finding]:
     """Yield what our other rules about the robot find."""
-    for one in all_checks():
+    for one in checks_of(robot):
         if one.code.startswith(OUR_CODES) and one.code != setting_breaks_rule.code:
             yield from one(robot)
 

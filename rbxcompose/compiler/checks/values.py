@@ -168,7 +168,8 @@ def value_source(robot: Robot) -> Iterator[Finding]:
         if entry.port is not None and (wrong := _missing(robot, name, entry.port)):
             span = robot.value("values", name, "port")
             fix = correction(wrong.name, wrong.valid, span, within=entry.port)
-            yield value_source.at(span, f"value '{name}' {wrong.message}", help=wrong.help, fix=fix)
+            message = f"value '{name}' {wrong.message}"
+            yield value_source.at(span, message, help=wrong.help, fix=fix, about=[name, wrong.name])
 
 
 def _missing(robot: Robot, name: str, source: str) -> Wrong | None:

@@ -9,11 +9,12 @@ from rbxcompose.base.rules import NAMES, WIRING
 from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.composition.robot_manifest import IncludedPart
 from rbxcompose.compiler.model.build import MISSION
+from rbxcompose.compiler.model.flow import setting_span
 from rbxcompose.compiler.model.instances import answers, cycle_of, part_of, shared_names
 from rbxcompose.compiler.model.robot import PortEnd, Robot, RobotComponent
 from rbxcompose.manifest.tree import at
 from rbxcompose.msgs.definitions import parse_type
-from rbxcompose.sdk.capabilities import Drives, Forwards, RunsMissions
+from rbxcompose.sdk.capabilities import ConnectedBy, Drives, Forwards, RunsMissions
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Looks, Out, Qos, Serves, ServesAction, ServesTopic
 from rbxcompose.sdk.registry import types_with
 
@@ -77,6 +78,7 @@ def _finding(robot: Robot, component: RobotComponent, ends: list[PortEnd]) -> Fi
         f"'{component.name}' needs {names}, which nothing in the robot provides",
         help=f"connect it: {fix}" if fix else f"add the component that provides it{_such_as(ends)}",
         related=[Related(robot.end_span(other), f"'{other.topic}' is of this type") for _, other in near],
+        about=(component.name, *(end.topic for end in ends)),
     )
 
 
@@ -259,6 +261,7 @@ def command_without_subscriber(robot: Robot) -> Iterator[Finding]:
                 or suggest(end.topic.strip("/"), topics, WAITING)
                 or _unheard_command_such_as(end),
                 related=[Related(robot.end_span(one), f"listens to '{one.topic}'") for one in starving[:_MOST_SHOWN]],
+                about=(end.instance, end.topic),
             )
 
 
@@ -333,3 +336,19 @@ def instance_topics(robot: Robot) -> Iterator[Finding]:
                     help=f"give one of them another topic: 'connect: {{{short}: {part.name}/{short}}}'",
                     related=[Related(other.span, f"the instance '{other.name}'")],
                 )
+
+
+@check("RBX2247", closed=())
+def shared_port(robot: Robot) -> Iterator[Finding]:
+    """Two components use the same serial port."""
+    first: dict[str, tuple[str, str]] = {}
+    for component, connected in robot.declared(ConnectedBy):
+        port, field = connected.port.value, connected.port.field
+        other, place = first.setdefault(port, (component.name, field))
+        if other != component.name:
+            yield shared_port.at(
+                setting_span(robot, (component, field)),
+                f"'{component.name}' and '{other}' use the same port, {port}",
+                help="give each its own port, or put what is on one cable into one of them",
+                related=[Related(setting_span(robot, (robot.components[other], place)), f"'{other}'")],
+            )

@@ -16,7 +16,7 @@ from rbxcompose.base.units import UNITS, Dimension, Quantity, UnitError, format_
 from rbxcompose.compiler.composition.robot_manifest import RobotManifest
 from rbxcompose.compiler.sections.args import args
 from rbxcompose.manifest.files import PREFIX, library_root, project_of, resolve
-from rbxcompose.manifest.registry import sections
+from rbxcompose.manifest.registry import sections_in_use
 from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.section import ROBOT
 from rbxcompose.manifest.tree import BROKEN, Entry, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode
@@ -55,7 +55,7 @@ def _in_one_file(manifest: RobotManifest) -> MappingNode:
 
     entries = dict(manifest.root.entries)
     entries.pop(args.name, None)  # their values have been filled in: nothing reads them any more
-    for section in sections(ROBOT):
+    for section in sections_in_use(ROBOT):
         if section.name in entries:
             key, value = entries[section.name].key, entries[section.name].value
             entries[section.name] = Entry(key, section.with_references(value, named))

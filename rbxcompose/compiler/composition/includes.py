@@ -19,7 +19,7 @@ from rbxcompose.compiler.sections.provides import provides
 from rbxcompose.manifest import tree
 from rbxcompose.manifest.documents import Documents, ManifestHeader
 from rbxcompose.manifest.files import resolve, shown_name
-from rbxcompose.manifest.registry import file_model, naming, section_named, sections
+from rbxcompose.manifest.registry import model_for, naming_in_use, section_named, sections_in_use
 from rbxcompose.manifest.section import PART, Contents, RenamedTopic, Section
 from rbxcompose.manifest.validate import WRONG_TYPE
 from rbxcompose.manifest.yaml_nodes import TOO_LARGE
@@ -41,17 +41,17 @@ class Renaming:
     def of(cls, prefix: str, connect: dict[str, RenamedTopic], roots: Iterable[tree.MappingNode]) -> Renaming:
         """Return the renaming for `roots`: the file of a part and all that it includes."""
         trees = list(roots)
-        named = [section for section in sections() if section.names and section.is_composed]
+        named = [section for section in sections_in_use() if section.names and section.is_composed]
         own = {section.name: frozenset(name for root in trees for name in section.names_in(root)) for section in named}
         defines = frozenset(
-            kind for section in sections() for kind in section.defines if any(section.name in it for it in trees)
+            kind for section in sections_in_use() for kind in section.defines if any(section.name in it for it in trees)
         )
         return cls(prefix, connect, own, defines)
 
     @property
     def running(self) -> frozenset[str]:
         """Return the names of all that the part runs."""
-        return frozenset(name for one in naming(COMPONENT) for name in self.own[one.name])
+        return frozenset(name for one in naming_in_use(COMPONENT) for name in self.own[one.name])
 
     def root(self, root: tree.MappingNode) -> tree.MappingNode:
         """Return the sections of a part under their new names."""
@@ -91,14 +91,14 @@ class Renaming:
         if kind in self.defines:
             return f"{self.prefix}{name}"
         head, dot, rest = name.partition(".") if kind in (PORT, COMPONENT) else (name, "", "")
-        for section in naming(COMPONENT if kind == PORT else kind):
+        for section in naming_in_use(COMPONENT if kind == PORT else kind):
             if head in self.own.get(section.name, ()):
                 return f"{self._new(section, head)}{dot}{rest}"
         return name
 
     def any_name(self, name: str) -> str:
         """Return the new form of a word that may name anything in the part: a value given by `with:`."""
-        kinds = (section.names for section in sections() if section.is_map and section.is_composed)
+        kinds = (section.names for section in sections_in_use() if section.is_map and section.is_composed)
         changed = (self.name(kind, name) for kind in (COMPONENT, *kinds, *PREFIXED))
         return next((text for text in changed if text != name), name)
 
@@ -136,7 +136,7 @@ class Renaming:
         return replace(node, entries=entries)
 
     def _is_own_topic(self, topic: str) -> bool:
-        return any(section.has_topics and topic in self.own.get(section.name, ()) for section in sections())
+        return any(section.has_topics and topic in self.own.get(section.name, ()) for section in sections_in_use())
 
     def _new(self, section: Section[Any, Any], name: str) -> str:
         if section.has_topics:
@@ -171,7 +171,7 @@ def topics_of(roots: Iterable[tree.MappingNode]) -> set[str]:
     return {
         topic
         for root in roots
-        for section in sections()
+        for section in sections_in_use()
         for name in section.names_in(root)
         if (node := tree.at(root, (section.name, *section.at, name))) is not None
         for topic in section.topics(name, node)
@@ -319,8 +319,8 @@ class Parts:
         if path not in self._files:
             root = self.documents.read(path, PART, span)
             if root is not None:
-                root = self.documents.meant(file_model(PART), root)
-                self.documents.check(file_model(PART), root)
+                root = self.documents.meant(model_for(PART, root), root)
+                self.documents.check(model_for(PART, root), root)
             self._files[path] = _File(root, tuple(claims_of(Contents(root, path, self.documents)))) if root else None
         self._size += len(self.documents.sources.get(shown_name(path), ""))
         self.is_complete &= self._files[path] is not None
@@ -358,7 +358,7 @@ def _brought(name: str, root: tree.MappingNode, entry: tree.TreeNode | None) -> 
     if entry is None:
         return root
     entries = dict(root.entries)
-    for section in sections(PART):
+    for section in sections_in_use(PART):
         there = entries.get(section.name)
         if (node := section.brought(name, there.value if there else None, entry)) is not None:
             entries[section.name] = tree.Entry(there.key if there else tree.ScalarNode(section.name, node.span), node)
@@ -368,7 +368,10 @@ def _brought(name: str, root: tree.MappingNode, entry: tree.TreeNode | None) -> 
 def _instance(name: str, file: _File, opened: _Open, entry: tree.Entry) -> PartInstance:
     """Return an instance with the names of its own file."""
     scoped = in_scope(file.root, name)
-    own = {*ManifestHeader.model_fields, *(section.name for section in sections(PART) if not section.is_composed)}
+    own = {
+        *ManifestHeader.model_fields,
+        *(section.name for section in sections_in_use(PART) if not section.is_composed),
+    }
     given = tree.at(entry.value, ("with",))
     return PartInstance(
         name=name,
@@ -414,10 +417,10 @@ def included_parts(instances: Sequence[PartInstance]) -> dict[str, IncludedPart]
     for instance in instances:
         own = [other for other in instances if f"{other.name}.".startswith(f"{instance.name}.")]
         roots = [other.root for other in own]
-        running = list(naming(COMPONENT))
+        running = list(naming_in_use(COMPONENT))
         components = _names(roots, (declaration for declaration in running if not declaration.has_topics))
         muxes = _names(roots, (declaration for declaration in running if declaration.has_topics))
-        values = _names(roots, naming(VALUE))
+        values = _names(roots, naming_in_use(VALUE))
         found[instance.name] = IncludedPart(
             instance.name, instance.file, instance.span, components, muxes, values, instance.claims
         )

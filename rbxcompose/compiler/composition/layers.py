@@ -18,7 +18,7 @@ from rbxcompose.compiler.sections.profiles import profiles
 from rbxcompose.manifest.documents import Documents, ManifestHeader
 from rbxcompose.manifest.files import PROFILE, find, shown_name
 from rbxcompose.manifest.reader import read_text
-from rbxcompose.manifest.registry import file_model, section_named, sections
+from rbxcompose.manifest.registry import model_for, section_named, sections
 from rbxcompose.manifest.section import OVERLAY, ROBOT, Contents, SetScope
 from rbxcompose.manifest.tree import KEYS, Entry, MappingNode, ScalarNode, TreeNode, with_children
 from rbxcompose.manifest.yaml_nodes import TOO_LARGE
@@ -243,7 +243,7 @@ def _overlays(chosen: Sequence[str], documents: Documents) -> Iterator[tuple[Map
         if isinstance(file, Finding):
             documents.report.add(file)
         elif (root := documents.read(file, OVERLAY)) is not None:
-            root = documents.meant(file_model(OVERLAY), root)
-            documents.check(file_model(OVERLAY), root)
+            root = documents.meant(model_for(OVERLAY, root), root)
+            documents.check(model_for(OVERLAY, root), root)
             sections = {name: entry for name, entry in root.entries.items() if name not in ManifestHeader.model_fields}
             yield replace(root, entries=sections), f"overlay '{shown_name(file)}'"

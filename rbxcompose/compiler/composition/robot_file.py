@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,19 +12,25 @@ from rbxcompose.base.config import COMPONENT, Secret
 from rbxcompose.base.findings import Finding, Related, Report, Severity, Span, kind
 from rbxcompose.base.garbage_collection import paused_collection
 from rbxcompose.compiler.composition.includes import included_parts
-from rbxcompose.compiler.composition.layers import INCLUDE, Chosen, Composed, compose_robot, profile_spans
-from rbxcompose.compiler.composition.overlay import NOTHING_TO_CHANGE
+from rbxcompose.compiler.composition.layers import Chosen, Composed, compose_robot, profile_spans
 from rbxcompose.compiler.composition.robot_manifest import RobotManifest
 from rbxcompose.compiler.composition.scopes import fill_scopes
+from rbxcompose.compiler.doubts import has_a_section_twice, without_half_entries
 from rbxcompose.manifest.documents import Documents, ManifestHeader
 from rbxcompose.manifest.files import find, project_of, shown_name
 from rbxcompose.manifest.fill import SHOWN_SECRET, fill, names_of
-from rbxcompose.manifest.registry import broken_sections, file_model, naming, sections
+from rbxcompose.manifest.registry import (
+    broken_sections,
+    model_for,
+    naming_in_use,
+    section_named,
+    sections,
+    sections_in_use,
+)
 from rbxcompose.manifest.secrets import Secrets
 from rbxcompose.manifest.section import ROBOT, Contents, Section, is_empty
-from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode, at, children, key_span
-from rbxcompose.manifest.validate import MISSING_KEY, UNKNOWN_KEY
-from rbxcompose.manifest.walk import TWICE
+from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode, at, children, key_span
+from rbxcompose.manifest.validate import UNKNOWN_KEY
 from rbxcompose.manifest.yaml_nodes import is_moderate
 
 
@@ -32,13 +38,15 @@ def without_strayed(root: MappingNode, keys: Container[str], report: Report) -> 
     """Return a tree without keys that are the names of entries of its sections, after a finding for each."""
     left = dict(root.entries)
     empty = [
-        section for section in sections(ROBOT) if section.names and (node := root.get(section.name)) and is_empty(node)
+        section
+        for section in sections_in_use(ROBOT)
+        if section.names and (node := root.get(section.name)) and is_empty(node)
     ]
     for name, entry in root.entries.items():
         home = (
             None
             if name in keys
-            else next((section for section in sections(ROBOT) if name in section.names_in(root)), None)
+            else next((section for section in sections_in_use(ROBOT) if name in section.names_in(root)), None)
         )
         if name not in keys and home is None and len(empty) == 1 and isinstance(entry.value, MappingNode):
             home = empty[0]
@@ -93,19 +101,23 @@ def read_sections(
     The tree is not whole if one of the robot's parts could not be read.
     """
     documents.report.extend([*broken_sections(), *_shown_secrets(root)])
-    contents = Contents(root, file, documents, sections(), is_simulated=sim, is_whole=is_whole)
+    contents = Contents(
+        root,
+        file,
+        documents,
+        sections_in_use(),
+        others=sections,
+        named=section_named,
+        is_simulated=sim,
+        is_whole=is_whole,
+    )
     documents.report.extend(_taken_names(contents))
-    for section in sections(ROBOT):
+    for section in sections_in_use(ROBOT):
         if section.is_composed:
             contents.of(section)
     return RobotManifest(
         name=_text(root, "name"), about=_text(root, "about"), path=file, root=root, is_simulated=sim, contents=contents
     )
-
-
-def reserved_names() -> frozenset[str]:
-    """Return the names of present and future sections of a robot's file."""
-    return frozenset((*RESERVED, *(section.name for section in sections(ROBOT))))
 
 
 def _text(root: MappingNode, key: str) -> str:
@@ -124,7 +136,7 @@ def _shown_secrets(root: MappingNode) -> Iterator[Finding]:
 def _taken_names(contents: Contents) -> Iterator[Finding]:
     """Yield a finding for each name of something that runs that is already taken."""
     root = contents.root
-    running = list(naming(COMPONENT))
+    running = list(naming_in_use(COMPONENT))
     for index, section in enumerate(running):
         for name in () if section.has_topics else _placed_names(contents, section):
             span = key_span(root, (section.name, *section.at, name))
@@ -145,7 +157,7 @@ def _placed_names(contents: Contents, section: Section[Any, Any]) -> Iterator[st
 
 def _own_name(name: str, section: Section[Any, Any]) -> str:
     """Return why a user must not use a name, or nothing."""
-    if name in reserved_names():
+    if name in RESERVED or ((other := section_named(name)) is not None and ROBOT in other.files):
         return f"a {section.entry} cannot be named like the section '{name}'"
     return f"every robot already runs a component '{name}'" if name in ALWAYS_THERE else ""
 
@@ -154,7 +166,7 @@ def _other_owner(
     root: MappingNode, name: str, section: Section[Any, Any], others: list[Section[Any, Any]]
 ) -> tuple[str, str, tuple[str, ...]] | None:
     """Return the other owner of a name: a message, a label, and its path."""
-    for one in sections(ROBOT):
+    for one in sections_in_use(ROBOT):
         if name in one.brings and one.name in root:
             return f"the {one.name} already brings a component '{name}'", f"the {one.name}", (one.name,)
     for other in others:
@@ -192,7 +204,7 @@ def load_robot(
     root = documents.read(file, ROBOT)
     if root is None:
         return None
-    root = documents.meant(file_model(ROBOT), root)
+    root = documents.meant(model_for(ROBOT, root), root)
     composed = compose_robot(root, file, Chosen(profiles, overlays, sets), documents)
     manifest = _manifest(composed, file, sim, environment or {}, documents)
     if manifest is not None:
@@ -209,15 +221,16 @@ def load_robot(
 def _manifest(
     composed: Composed, file: Path, sim: bool, environment: Mapping[str, str], documents: Documents
 ) -> RobotManifest | None:
-    keys = file_model(ROBOT)
+    keys = model_for(ROBOT, composed.root)
     documents.check(keys, without_strayed(composed.root, keys.model_fields, documents.report))
     names = names_of(_name(composed.root), sim, environment, Secrets(project_of(file), environment))
     filled = fill_scopes(composed, names)
-    read_so_far = len(documents.report.findings)
-    is_whole = composed.parts.is_complete and not _has_a_section_twice(documents.report, composed.root)
+    report = documents.report
+    read_so_far = len(report.findings)
+    is_whole = composed.parts.is_complete and not has_a_section_twice(report, composed.root)
     manifest = read_sections(filled.root, file, sim, documents, is_whole=is_whole)
     if not is_whole:
-        _drop_what_may_be_there(documents.report, filled.root, filled.include, read_so_far)
+        report.findings = without_half_entries(report.findings, read_so_far, filled.root, filled.include)
     return replace(
         manifest,
         parts=included_parts(composed.instances),
@@ -227,48 +240,6 @@ def _manifest(
         files=documents.files,
         inclusions=composed.parts.inclusions,
     )
-
-
-def _has_a_section_twice(report: Report, root: MappingNode) -> bool:
-    """Return whether a file has a section with names twice, so that what stands in the second one is not read."""
-    words = {entry.key.span for entry in root.entries.values() if isinstance(entry.value, ScalarNode)}
-    twice = (
-        finding
-        for finding in report.findings
-        if finding.code == TWICE.code and finding.span is not None and finding.span.column == 1
-    )
-    return any(words.isdisjoint(other.span for other in finding.related) for finding in twice)
-
-
-def _drop_what_may_be_there(report: Report, root: MappingNode, given: MappingNode, start: int) -> None:
-    """Remove the findings about entries that may only change what could not be read: what a part brings, for example.
-
-    `start` is the number of findings from before the sections were read.
-    """
-    prefixes = tuple(f"{name}_" for name, _ in _entries(given, INCLUDE))
-    changing = [
-        entry
-        for section in sections(ROBOT)
-        for name, entry in _entries(root, section.name)
-        if section.has_topics or name.startswith(prefixes) or not prefixes
-    ]
-    spans = [span for entry in changing for span in (entry.key.span, entry.value.span)]
-
-    def stays(finding: Finding) -> bool:
-        return finding.code != MISSING_KEY.code or not any(
-            finding.span and span.contains(finding.span) for span in spans
-        )
-
-    before, after = report.findings[:start], report.findings[start:]
-    report.findings = [
-        *(finding for finding in before if finding.code != NOTHING_TO_CHANGE.code),
-        *filter(stays, after),
-    ]
-
-
-def _entries(root: MappingNode, section: str) -> Iterable[tuple[str, Entry]]:
-    there = root.get(section)
-    return there.entries.items() if isinstance(there, MappingNode) else ()
 
 
 @paused_collection()

@@ -15,7 +15,7 @@ from rbxcompose.compiler.composition.robot_manifest import ROBOT_LAYER, History,
 from rbxcompose.compiler.sections.args import args
 from rbxcompose.manifest.arguments import DeclaredArgument
 from rbxcompose.manifest.fill import Names, Typed, fill, with_arguments
-from rbxcompose.manifest.registry import sections
+from rbxcompose.manifest.registry import sections_in_use
 from rbxcompose.manifest.section import ROBOT, Contents
 from rbxcompose.manifest.tree import BROKEN, MappingNode
 from rbxcompose.manifest.validate import UNKNOWN_KEY
@@ -47,7 +47,7 @@ def fill_scopes(composed: Composed, names: Names) -> FilledScopes:
     declared = Contents(arguments, parts.robot, parts.documents).of(args)
     values = {name: _own_value(name, argument, composed.history, report) for name, argument in declared.items()}
     bounds = {"": {name: own_bounds(name, one, "the robot") for name, (one, _) in declared.items()}}
-    whole = Contents(root, parts.robot, parts.documents, sections(ROBOT))
+    whole = Contents(root, parts.robot, parts.documents, sections_in_use(ROBOT))
     may_have = (lambda name: whole.may_have(ARGUMENT, name)) if whole.stray or args.is_unreadable(root) else None
     names = with_arguments(names, values, "", may_have)
     include = fill(composed.include, names, report)

@@ -25,7 +25,7 @@ from rbxcompose.compiler.model.robot import (
 from rbxcompose.compiler.model.skills import names_of_skills, services_of, skills_of, topics_of
 from rbxcompose.compiler.model.values import value_of
 from rbxcompose.compiler.sections.missions import missions
-from rbxcompose.manifest.registry import sections
+from rbxcompose.manifest.registry import sections_in_use
 from rbxcompose.manifest.section import ROBOT, Contents, WantedComponent
 from rbxcompose.manifest.tree import at
 from rbxcompose.missions.analysis.effects import sent_by, settings_of
@@ -127,7 +127,7 @@ def written_components(manifest: RobotManifest) -> dict[str, RobotComponent]:
     """Return the wired components that the sections request: first those named by users, then those of sections."""
     wires = _Wires(manifest.bus.namespace or "")
     given = _given_topics(manifest.contents)
-    for section in sorted(sections(ROBOT), key=lambda one: not one.names):
+    for section in sorted(sections_in_use(ROBOT), key=lambda one: not one.names):
         for wanted in section.components(manifest.contents, wires):
             wires.add(_component(manifest, wanted, given.get(wanted.name, {})))
     return wires.components
@@ -136,7 +136,7 @@ def written_components(manifest: RobotManifest) -> dict[str, RobotComponent]:
 def _given_topics(contents: Contents) -> dict[str, dict[str, str]]:
     """Return the topics that sections give to ports of components: component -> port -> topic."""
     found: dict[str, dict[str, str]] = {}
-    for section in sections(ROBOT):
+    for section in sections_in_use(ROBOT):
         for component, topics in section.connects(contents).items():
             found.setdefault(component, {}).update(topics)
     return found
@@ -182,7 +182,7 @@ class _Wires:
 
 def own_components(manifest: RobotManifest, written: Mapping[str, RobotComponent]) -> dict[str, RobotComponent]:
     """Return the components that every robot runs, except the one that runs missions."""
-    always = [section.always for section in sections(ROBOT) if section.always]
+    always = [section.always for section in sections_in_use(ROBOT) if section.always]
     names = [*written, *(own.type_name for own in always), *([MISSION] if manifest.missions else [])]
     return {own.type_name: _own(manifest, own.type_name, own.config(manifest.contents, names)) for own in always}
 
@@ -249,7 +249,7 @@ def values_of(manifest: RobotManifest, components: Mapping[str, RobotComponent])
     namespace = manifest.bus.namespace or ""
     levels = {
         f"{section.name}.{name}": status
-        for section in sections(ROBOT)
+        for section in sections_in_use(ROBOT)
         for name, status in section.levels(manifest.contents).items()
     }
     entries = {  # not those whose type is a mistake, which is told

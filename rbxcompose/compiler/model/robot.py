@@ -14,11 +14,11 @@ from rbxcompose.base.findings import Span
 from rbxcompose.base.levels import Level
 from rbxcompose.base.rules import NAMES, WIRING
 from rbxcompose.compiler.composition.robot_manifest import RobotManifest
-from rbxcompose.compiler.model.doubts import doubts_of
+from rbxcompose.compiler.doubts import doubts_of
 from rbxcompose.compiler.sections.places import unknown_place
 from rbxcompose.compiler.sections.values import values
 from rbxcompose.manifest.fill import OpenNames
-from rbxcompose.manifest.registry import naming, sections
+from rbxcompose.manifest.registry import naming_in_use, sections_in_use
 from rbxcompose.manifest.tree import KeyPath, at, key_span, value_span
 from rbxcompose.missions.analysis.effects import settings_of
 from rbxcompose.missions.program.program import Program, RobotNames
@@ -190,13 +190,15 @@ class Robot:
     @cached_property
     def written(self) -> frozenset[str]:
         """Return the names of all components that sections of the manifest request, including those with mistakes."""
-        return frozenset(name for declaration in naming(COMPONENT) for name in declaration.names_in(self.manifest.root))
+        return frozenset(
+            name for declaration in naming_in_use(COMPONENT) for name in declaration.names_in(self.manifest.root)
+        )
 
     @cached_property
     def brought(self) -> frozenset[str]:
         """Return the names of components that sections bring because they are there, including those with mistakes."""
         return frozenset(
-            name for section in sections() if section.name in self.manifest.root for name in section.brings
+            name for section in sections_in_use() if section.name in self.manifest.root for name in section.brings
         )
 
     @cached_property

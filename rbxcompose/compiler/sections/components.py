@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Set
 from dataclasses import replace
 from difflib import get_close_matches
 from typing import Any
@@ -177,9 +177,7 @@ def _component(reading: Reading[ComponentOptions], name: str, entry: Entry) -> C
     )
 
 
-def _report_other_type(
-    type_name: str, unknown: Collection[str], keys: Collection[str], report: Report, before: int
-) -> None:
+def _report_other_type(type_name: str, unknown: Set[str], keys: Collection[str], report: Report, before: int) -> None:
     """Add to the last findings on unknown keys that another type takes all that is written, if only one does."""
     types = [type_ for type_ in _types() if type_ not in registry.PLUGINS.third_party and type_ != type_name]
     fitting = [type_ for type_ in types if {*keys} <= registry.component_type(type_).config_type().model_fields.keys()]
@@ -187,7 +185,7 @@ def _report_other_type(
         return
     for index, finding in enumerate(report.findings[before:], before):
         is_meant = finding.code == UNKNOWN_KEY.code and not finding.help.startswith(DID_YOU_MEAN)
-        if is_meant and any(finding.message.startswith(f"unknown key '{key}' in") for key in unknown):
+        if is_meant and not unknown.isdisjoint(finding.about):
             text = f"the type '{fitting[0]}' takes this key; {finding.help}".removesuffix("; ")
             report.findings[index] = replace(finding, help=text)
 

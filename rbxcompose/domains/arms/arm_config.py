@@ -14,7 +14,6 @@ from pydantic import Field
 from rbxcompose.base.config import Config
 from rbxcompose.base.geometry import Vector3
 from rbxcompose.base.units import ANGLE, LENGTH, Dimension
-from rbxcompose.domains.arms.manifest_model import AUTOMATIC, FAST, HandConfig
 from rbxcompose.domains.arms.motion import collisions
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.groups import ArmGroup, ArmJoint, JointSpace, interpolated
@@ -24,6 +23,7 @@ from rbxcompose.domains.arms.motion.numba_cache import is_installed
 from rbxcompose.domains.arms.motion.planner import MotionPlanner, PlannerSettings
 from rbxcompose.domains.arms.motion.scene import PairDistance, PlacedObject
 from rbxcompose.domains.arms.motion.second_checker import SecondChecker
+from rbxcompose.domains.arms.section_models import AUTOMATIC, FAST, HandConfig
 from rbxcompose.domains.body.description import Description
 from rbxcompose.domains.body.link_pairs import LinkPair
 from rbxcompose.domains.body.urdf import body_of

@@ -15,10 +15,10 @@ from rbxcompose.base.units import LENGTH, format_quantity
 from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.model.mission_facts import constants
 from rbxcompose.compiler.model.robot import Robot
-from rbxcompose.domains.arms.manifest_model import SpotModel
 from rbxcompose.domains.arms.mission_goals import WrittenReach, first_joint_in, length_of, word_of, written_reaches
 from rbxcompose.domains.arms.motion.grasps import grasps_of, least_width, reach_of, solid_of
 from rbxcompose.domains.arms.motion.scene import PlacedObject, settled
+from rbxcompose.domains.arms.section_models import SpotModel
 from rbxcompose.domains.arms.sections.arms import ArmOfRobot, arms, hand_in
 from rbxcompose.domains.arms.sections.heads import heads
 from rbxcompose.domains.arms.sections.scene import scene
@@ -49,6 +49,7 @@ def frame_of_object(robot: Robot) -> Iterator[Finding]:
                 f"nobody tells where '{shape.root}' is in '{thing.link}'",
                 help="leave 'frame' out: what stands beside the robot counts from its root",
                 related=[Related(shape.links[shape.root].span, "the root of the body")],
+                about=(shape.root, thing.link),
             )
 
 
@@ -173,10 +174,7 @@ def moving_stand(robot: Robot) -> Iterator[Finding]:
     description = robot.manifest.contents.of(body)
     for component, puts in robot.declared(PutsThings) if description else ():
         shape = description.body if description else Body("")
-        link, mover = puts.stands_in.value, None
-        while link in shape.joint_above and mover is None:
-            above = shape.joint_above[link]
-            link, mover = above.parent, above if above.moves else None
+        mover = next((joint for joint in shape.joints_above(puts.stands_in.value) if joint.moves), None)
         if mover is not None and component.is_sound:
             yield moving_stand.at(
                 robot.value(*component.place(puts.stands_in.field)),

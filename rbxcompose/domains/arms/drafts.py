@@ -164,9 +164,7 @@ class _Proposals:
                 yield ArmDraft(name, where, joints, poses, gripper=self._gripper(name, fingers))
 
     def _carrier(self, link: str) -> str:
-        while (above := self.body.joint_above.get(link)) is not None and not above.moves:
-            link = above.parent
-        return above.name if above is not None else ""
+        return next((joint.name for joint in self.body.joints_above(link) if joint.moves), "")
 
     def _row(self, last: str) -> list[BodyJoint]:
         """Return the joints from where the body branches to the last one; wheels of the body are no branch."""

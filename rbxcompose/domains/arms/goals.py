@@ -10,9 +10,9 @@ from rbxcompose.base.geometry import Quaternion, Transform3, quaternion_from_rpy
 from rbxcompose.base.units import ANGLE, LENGTH, RATIO, SPEED
 from rbxcompose.domains.arms.motion.arm_task import ArmGoal, ArmTask
 from rbxcompose.domains.arms.motion.inverse_kinematics import SOLVER, PoseTarget, SolverSettings
-from rbxcompose.domains.arms.motion.kept import ANGLE as SIGHT_ANGLE
-from rbxcompose.domains.arms.motion.kept import RADIUS, Keep, KeptSight
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory
+from rbxcompose.domains.arms.motion.path_constraints import ANGLE as SIGHT_ANGLE
+from rbxcompose.domains.arms.motion.path_constraints import RADIUS, Keep, KeptSight
 from rbxcompose.domains.arms.motion.trace_planner import ANY_SPEED, TraceWish, WayPoint
 from rbxcompose.msgs.control_msgs import FollowJointTrajectory
 from rbxcompose.msgs.fields import Measures

@@ -13,12 +13,12 @@ from rbxcompose.base.files import replace_file
 from rbxcompose.base.geometry import Quaternion, Transform3, quaternion_from_rpy
 from rbxcompose.base.units import LENGTH, RATIO
 from rbxcompose.domains.arms.arm_config import ArmConfig, ArmWorks
-from rbxcompose.domains.arms.manifest_model import GraspModel, HandConfig
 from rbxcompose.domains.arms.motion import hand_task as hand_tasks
 from rbxcompose.domains.arms.motion.arm_task import ArmGoal
 from rbxcompose.domains.arms.motion.grasps import Grasp
 from rbxcompose.domains.arms.motion.picture import ArmPicture, draw_arm
 from rbxcompose.domains.arms.reasons import GRASP_REASONS, MotionReason, StageFailure
+from rbxcompose.domains.arms.section_models import GraspModel, HandConfig
 from rbxcompose.domains.body.meshes import MissingLibraryError
 from rbxcompose.msgs.control_msgs import GripperCommand, GripperCommandMessage
 from rbxcompose.msgs.rbxcompose_msgs import AttachObject, DetachObject, PickObject, PlaceObject

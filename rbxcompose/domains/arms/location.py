@@ -21,7 +21,7 @@ def location_ports(config: ArmConfig) -> dict[str, Port[Any]]:
     return {LOCATE: Serves(LocateArm, f"{config.name}/locate", skill=f"locate_{config.name}").named(LOCATE)}
 
 
-class TellsWhereItIs:
+class LocationService:
     """Tells where an arm is, and remembers that."""
 
     config: ArmConfig

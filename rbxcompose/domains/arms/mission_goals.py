@@ -88,9 +88,4 @@ def first_joint_in(body: Body, arm: ArmOfRobot, frame: str) -> Vector3 | None:
 
 def _movers(body: Body, link: str) -> set[str]:
     """Return the joints that move a link in the frame of the root."""
-    found = set[str]()
-    while (above := body.joint_above.get(link)) is not None:
-        if above.kind != "fixed":
-            found.add(above.name)
-        link = above.parent
-    return found
+    return {joint.name for joint in body.joints_above(link) if joint.kind != "fixed"}

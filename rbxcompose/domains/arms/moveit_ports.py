@@ -55,37 +55,27 @@ def query(arm: ProgrammedArm) -> moveit.KinematicsQuery:
     return moveit.KinematicsQuery(arm.config.name, works.kinematics, works.space, works.planner.checker, positions)
 
 
-def forward(arm: ProgrammedArm, request: GetPositionFK.Request) -> GetPositionFK.Response:
-    """Return where links are."""
-    if arm.task is not None:
-        return GetPositionFK.Response(error_code=moveit.busy())
-    return query(arm).forward(request)
-
-
-def inverse(arm: ProgrammedArm, request: GetPositionIK.Request) -> GetPositionIK.Response:
-    """Return positions of joints that bring the tip to a pose."""
-    if arm.task is not None:
-        return GetPositionIK.Response(error_code=moveit.busy())
-    wanted, begin = request.ik_request, arm.now
-    most = min(to_seconds(wanted.timeout) or IK_TIME, IK_TIME)
-    for answer in query(arm).inverse(wanted, arm.config.planner.seed):
-        if answer is not None:
-            return answer
-        if arm.now - begin > most:
-            break
-    return GetPositionIK.Response(error_code=moveit.late(most))
-
-
-class AnswersPrograms:
-    """Answers what programs for MoveIt ask about the kinematics of an arm."""
+class KinematicsServices:
+    """The services for the kinematics of an arm, as programs for MoveIt call them."""
 
     def on_forward(self: ProgrammedArm, request: GetPositionFK.Request) -> GetPositionFK.Response:
-        """Tell where links are."""
-        return forward(self, request)
+        """Return where links are."""
+        if self.task is not None:
+            return GetPositionFK.Response(error_code=moveit.busy())
+        return query(self).forward(request)
 
     def on_inverse(self: ProgrammedArm, request: GetPositionIK.Request) -> GetPositionIK.Response:
-        """Tell positions of joints that bring the tip to a pose."""
-        return inverse(self, request)
+        """Return positions of joints that bring the tip to a pose."""
+        if self.task is not None:
+            return GetPositionIK.Response(error_code=moveit.busy())
+        wanted, begin = request.ik_request, self.now
+        most = min(to_seconds(wanted.timeout) or IK_TIME, IK_TIME)
+        for answer in query(self).inverse(wanted, self.config.planner.seed):
+            if answer is not None:
+                return answer
+            if self.now - begin > most:
+                break
+        return GetPositionIK.Response(error_code=moveit.late(most))
 
 
 def is_turned_away(goal: ServedGoal[Any, Any, Any]) -> bool:

@@ -251,6 +251,7 @@ def unplaced_base(robot: Robot) -> Iterator[Finding]:
                     f"which '{component.name}' looks up",
                     help="let the base publish its frame, or add what localises the robot",
                     related=[Related(robot.entry_span(component.name), "it looks it up")],
+                    about=(port.source, port.target, component.name),
                 )
                 return
 
@@ -273,6 +274,7 @@ def frame_without_publisher(robot: Robot) -> Iterator[Finding]:
             f"no component publishes the transform from '{joint.frame}' to '{root}'",
             help=f"write {names}" if frames else "write 'type: fixed' if it stands still, or add what localises it",
             related=[Related(description.body.links[root].span, "the root of the body")],
+            about=(root, joint.frame),
         )
 
 

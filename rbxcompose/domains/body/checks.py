@@ -42,7 +42,8 @@ def frame_of_body(robot: Robot) -> Iterator[Finding]:
                 if name not in placed and name not in shape.links:
                     message = f"'{component.name}' looks up the frame '{name}', which nobody places"
                     help_text = suggest(name, shape.links, "its links")
-                    yield _finding(shape, robot.entry_span(component.name), message, help_text)
+                    place = robot.entry_span(component.name)
+                    yield _finding(shape, place, message, help_text, (component.name, name))
 
 
 def _other_root(body: Body, moved: Setting[str]) -> str:
@@ -51,10 +52,10 @@ def _other_root(body: Body, moved: Setting[str]) -> str:
     return f"{named}call the root '{moved.value}'"
 
 
-def _finding(body: Body, place: Span, message: str, help_text: str) -> Finding:
+def _finding(body: Body, place: Span, message: str, help_text: str, about: tuple[str, ...] = ()) -> Finding:
     root = body.links[body.root]
     root_is = [Related(root.span, f"the root of the body is '{root.name}'")]
-    return frame_of_body.at(place, message, help=help_text, related=root_is)
+    return frame_of_body.at(place, message, help=help_text, related=root_is, about=about)
 
 
 STATIC = "_static"  # suffix of the topic of static transforms; both topics describe one tree

@@ -171,6 +171,12 @@ class Body:
         """Return the joint that places each link, by link; the root has none."""
         return {joint.child: joint for joint in self.joints.values()}
 
+    def joints_above(self, link: str) -> Iterator[BodyJoint]:
+        """Yield the joints from a link up to the root."""
+        while (joint := self.joint_above.get(link)) is not None:
+            yield joint
+            link = joint.parent
+
     @cached_property
     def joints_below(self) -> Mapping[str, list[BodyJoint]]:
         """Return the joints that each link carries, by link."""

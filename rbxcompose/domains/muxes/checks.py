@@ -194,7 +194,7 @@ def mux_source(robot: Robot) -> Iterator[Finding]:
                 span = robot.value("muxes", mux, "inputs", name, "from")
                 fix = correction(wrong.name, wrong.valid, span, within=source.source)
                 message = f"input '{name}' of mux '{mux}' {wrong.message}"
-                yield mux_source.at(span, message, help=wrong.help, fix=fix)
+                yield mux_source.at(span, message, help=wrong.help, fix=fix, about=[name, mux, wrong.name])
 
 
 def missing(robot: Robot, source: str) -> Wrong | None:
@@ -564,6 +564,7 @@ def two_writers(robot: Robot) -> Iterator[Finding]:
                 label="this one",
                 help=_remedy(robot, topic, writers, (first.instance, other.instance)),
                 related=related,
+                about=(other.instance, first.instance, topic),
             )
 
 
@@ -586,7 +587,8 @@ def _by_missions(robot: Robot, end: PortEnd, writer: PortEnd, related: list[Rela
             if resolve(message.target.text, robot.manifest.bus.namespace or "") == end.topic:
                 text = f"this mission and '{writer.instance}' both write commands on '{end.topic}'"
                 help_text = put if forwards else _new_mux(end.topic)
-                yield two_writers.at(message.target.span, text, help=help_text, related=related)
+                about = (writer.instance, end.topic)
+                yield two_writers.at(message.target.span, text, help=help_text, related=related, about=about)
 
 
 def _open_inputs(robot: Robot, mux: str, forwards: Forwards) -> list[str]:

@@ -116,42 +116,34 @@ class ServoBus(Protocol):
 
     def ping(self, id: int) -> FoundServo | None:
         """Return the servo at an id, None if it is silent."""
-        ...
 
     def scan(self, ids: Iterable[int]) -> Iterator[FoundServo]:
         """Yield the servos that answer, one id after the other."""
-        ...
 
     def read(self, ids: Sequence[int], items: Sequence[str], *, budget: float | None = None) -> dict[int, ServoReading]:
         """Return the items of all servos that answered; one that is silent costs only itself.
 
         What failed is tried again while less than `budget` [s] has passed.
         """
-        ...
 
     def write(self, values: Mapping[int, Mapping[str, int]], *, is_confirmed: bool = False) -> set[int]:
         """Write raw values, by id and item; return the ids that failed.
 
         Without a confirmation all are written at once, and only silence that is known already counts as failure.
         """
-        ...
 
     def reboot(self, id: int) -> bool:
         """Start a servo again, torque off; return whether it can and did."""
-        ...
 
     def reopen(self, *, is_relaxed: bool = True) -> dict[int, FoundServo | None]:
         """Connect again; return who answers at each id. With `is_relaxed`, torque is switched off first."""
-        ...
 
     @property
     def statistics(self) -> Mapping[int, ServoStatistics]:
         """Return how well each servo answers, by id."""
-        ...
 
     def close(self) -> None:
         """Give the port back."""
-        ...
 
 
 PLUGINS = Plugins("bus_type", "bus_types")
@@ -165,7 +157,6 @@ class OpensBus(Protocol):
         self, path: str, servos: Mapping[int, ServoModel], *, baud: int, clock: Callable[[], float], is_fast: bool
     ) -> ServoBus:
         """Return the bus; `is_fast` if it may use what old firmware lacks. PortError if there is no such port."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)

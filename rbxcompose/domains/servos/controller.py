@@ -40,7 +40,7 @@ class ControllerConfig(Config):
     type: str
     """How it leads its joints."""
     start: Literal["active", "inactive"] = "active"
-    """Whether it leads its joints from the start, or waits until somebody switches to it."""
+    """Whether it leads its joints from the start, or waits until it is switched on."""
 
     _sliding: frozenset[str] = PrivateAttr(default=frozenset())
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
 from enum import Enum
@@ -471,40 +472,25 @@ def hardware_errors(bits: int) -> tuple[str, ...]:
     return tuple(name for bit, name in HARDWARE_ERRORS.items() if bits & bit)
 
 
+_STALL = """
+AX-12 1.5 12.0 | AX-12W 0.2 12.0 | AX-18 1.8 12.0
+RX-24 2.6 12.0 | RX-28 3.7 18.5 | RX-64 5.3 18.5
+EX-106+ 10.9 18.5
+MX-12W 0.2 12.0 | MX-28 2.5 12.0 | MX-64 6.0 12.0 | MX-106 8.4 12.0 | MX-28(2.0) 2.5 12.0 | MX-64(2.0) 6.0 12.0
+MX-106(2.0) 8.4 12.0
+XL-320 0.39 7.4 | XL330-M077 0.215 5.0 | XL330-M288 0.52 5.0
+XC330-M181 0.60 5.0 | XC330-M288 0.93 5.0 | XC330-T181 0.80 12.0 | XC330-T288 1.00 12.0
+XL430-W250 1.5 12.0
+XC430-W150 1.6 12.0 | XC430-W240 1.9 12.0
+XM430-W210 3.0 12.0 | XM430-W350 4.1 12.0
+XH430-W210 2.5 12.0 | XH430-W350 3.4 12.0
+XM540-W150 7.3 12.0 | XM540-W270 10.6 12.0
+XH540-W150 7.1 12.0 | XH540-W270 9.9 12.0
+"""
 STALL_TORQUES: Mapping[str, tuple[float, float]] = MappingProxyType(
     {
-        "AX-12": (1.5, 12.0),
-        "AX-12W": (0.2, 12.0),
-        "AX-18": (1.8, 12.0),
-        "RX-24": (2.6, 12.0),
-        "RX-28": (3.7, 18.5),
-        "RX-64": (5.3, 18.5),
-        "EX-106+": (10.9, 18.5),
-        "MX-12W": (0.2, 12.0),
-        "MX-28": (2.5, 12.0),
-        "MX-64": (6.0, 12.0),
-        "MX-106": (8.4, 12.0),
-        "MX-28(2.0)": (2.5, 12.0),
-        "MX-64(2.0)": (6.0, 12.0),
-        "MX-106(2.0)": (8.4, 12.0),
-        "XL-320": (0.39, 7.4),
-        "XL330-M077": (0.215, 5.0),
-        "XL330-M288": (0.52, 5.0),
-        "XC330-M181": (0.60, 5.0),
-        "XC330-M288": (0.93, 5.0),
-        "XC330-T181": (0.80, 12.0),
-        "XC330-T288": (1.00, 12.0),
-        "XL430-W250": (1.5, 12.0),
-        "XC430-W150": (1.6, 12.0),
-        "XC430-W240": (1.9, 12.0),
-        "XM430-W210": (3.0, 12.0),
-        "XM430-W350": (4.1, 12.0),
-        "XH430-W210": (2.5, 12.0),
-        "XH430-W350": (3.4, 12.0),
-        "XM540-W150": (7.3, 12.0),
-        "XM540-W270": (10.6, 12.0),
-        "XH540-W150": (7.1, 12.0),
-        "XH540-W270": (9.9, 12.0),
+        name: (float(torque), float(volts))
+        for name, torque, volts in (words.split() for words in re.split(r"[|\n]", _STALL.strip()))
     }
 )
 """Torque [Nm] and voltage [V] by model."""

@@ -326,7 +326,6 @@ class GoalServer(Protocol):
     @property
     def current(self) -> Any:
         """Return the goal to carry out; a newer one of the same action replaces it."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)

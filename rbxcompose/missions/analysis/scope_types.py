@@ -138,7 +138,7 @@ def findings_of(
             named = f"'{unknown_word}' is a place" if is_place else f"nothing is named '{unknown_word}'"
             message = f"this must be {wanted.phrase}; {named}"
             help_text = "write a number such as 2" if wanted.kind is TypeKind.COUNT else problem.help
-            yield kind.at(span, message, help=help_text, fix=fix)
+            yield kind.at(span, message, help=help_text, fix=fix, about=[unknown_word])
         elif unknown_word and wanted == TEXT and unknown_word not in scope.removed:
             yield _no_text(unknown_word, span, scope, kind)
         elif unknown_word and problem.is_choice:
@@ -147,7 +147,7 @@ def findings_of(
             yield codes.removed_place(span, unknown_word, scope.removed[unknown_word])
         elif unknown_word and scope.word(unknown_word) is None:
             unquoted = f"there is no place '{unknown_word}'"
-            yield codes.UNKNOWN_PLACE.at(span, unquoted, help=problem.help, fix=fix)
+            yield codes.UNKNOWN_PLACE.at(span, unquoted, help=problem.help, fix=fix, about=[unknown_word])
         elif (name := _at(problem, ((name.name, name.start) for name in expression.names))) and not scope.variable(
             name
         ):

@@ -39,7 +39,7 @@ def nearest_of_no_places(mission: Examined) -> Iterator[Finding]:
                 yield nearest_of_no_places.at(asked.scalar.span, f"{_ASKED}, and this is {found.phrase}", help=_HELP)
             elif isinstance(item.tree, Text) and not _is_place(view, item.tree.value):
                 message, help_text = _not_a_place(view, item.tree.value)
-                yield nearest_of_no_places.at(asked.scalar.span, message, help=help_text)
+                yield nearest_of_no_places.at(asked.scalar.span, message, help=help_text, about=[item.tree.value])
 
 
 _ASKED = "'order: nearest' needs places"
@@ -58,7 +58,7 @@ def _in_list(view: View, items: Expression, found: Type) -> Iterator[Finding]:
             if not _is_place(view, word):
                 message, help_text = _not_a_place(view, word)
                 related = [Related(data[name].span, "its items")]
-                yield nearest_of_no_places.at(span, message, help=help_text, related=related)
+                yield nearest_of_no_places.at(span, message, help=help_text, related=related, about=[word])
                 return
 
 

@@ -167,13 +167,13 @@ def unknown_skill(mission: Examined) -> Iterator[findings.Finding]:
                     continue
                 if (called := _called(node)) in skills:
                     is_plain = f"a step is the name of its skill: '- {called}: ...'"
-                    yield unknown_skill.at(node.span, message, help=f"{is_plain}, with its arguments after the colon")
+                    help_text = f"{is_plain}, with its arguments after the colon"
+                    yield unknown_skill.at(node.span, message, help=help_text, about=[node.skill])
                     continue
                 if ours in kinds():
-                    fix = findings.replacement(
-                        node.span, node.skill, ours, is_safe=False
-                    )  # what is below it may differ
-                    yield unknown_skill.at(node.span, message, help=f"{findings.DID_YOU_MEAN} '{ours}'?", fix=fix)
+                    fix = findings.replacement(node.span, node.skill, ours, is_safe=False)  # what is below may differ
+                    help_text = f"{findings.DID_YOU_MEAN} '{ours}'?"
+                    yield unknown_skill.at(node.span, message, help=help_text, fix=fix, about=[node.skill])
                     continue
                 owner, is_other, own = node.skill.rpartition("/")
                 if is_other and not close:

@@ -1,7 +1,7 @@
 """Make a manifest from files of another program.
 
-Comments tell where each value stood; findings tell what was guessed, and what could not be carried over. Several files
-make one robot. Without `--out`, the manifest goes to stdout and the findings to stderr; a file is never overwritten.
+Comments show where each value stood; findings report what was guessed, and what could not be carried over. Several
+files make one robot. Without `--out`, the manifest goes to stdout and the findings to stderr; no file is overwritten.
 Exit codes: 0 fine, 1 errors found (what was understood is written nevertheless), 2 wrong usage.
 """
 

@@ -54,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     table: tuple[tuple[str, str, str, tuple[options.Declare, ...]], ...] = (
         ("ls", "nodes", "list parameters with their values", (only,)),
         ("get", "nodes", "print the value of a parameter", (component, name)),
-        ("describe", "nodes", "tell what a parameter is, its limits, and whether it may change", (component, any_name)),
+        ("describe", "nodes", "show what a parameter is, its limits, and whether it may change", (component, any_name)),
         ("set", "changes", "change parameters, all or none", (values,)),
         ("load", "changes", "set all parameters of a file, all or none", (file,)),
         ("reset", "files", "set parameters to the values in the manifest", (names,)),

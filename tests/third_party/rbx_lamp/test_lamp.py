@@ -13,7 +13,7 @@ from rbxcompose.testing import Bench, instance
 
 
 def test_it_flashes_as_often_as_it_is_asked_to() -> None:
-    """Count how often the light goes on, and hear how the goal ends."""
+    """Count how often the light goes on, and collect how the goal ends."""
     bench = Bench(instance("light", "lamp", {"period": "400 ms"}))
     lights = bench.collect("lamp/light", Bool)
     outcomes: list[Outcome] = []

@@ -22,6 +22,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from rbxcompose.base.config import Config, Length, Time
 from rbxcompose.base.findings import suggest
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.base.units import ANGLE, LENGTH
@@ -38,22 +39,21 @@ from rbxcompose.commands.options import (
 )
 from rbxcompose.commands.targets import add_layer_options, add_path_argument
 from rbxcompose.domains.arms.arm_config import ArmWorks
-from rbxcompose.domains.arms.command_goals import (
+from rbxcompose.domains.arms.command_line import (
     NO_MOTION,
     KeepModel,
     TraceModel,
     chosen_arm,
     chosen_robot,
-    done,
     keys_of,
     positions_in,
     read_joints,
     read_written,
     shown,
     values_of,
+    whole_number,
+    write_picture,
 )
-from rbxcompose.domains.arms.command_pictures import add_reach_options, draw_motion, run_reach
-from rbxcompose.domains.arms.command_setup import add_options, run_setup
 from rbxcompose.domains.arms.goals import goal_of
 from rbxcompose.domains.arms.motion.figures import (
     NO_TRIES,
@@ -61,19 +61,23 @@ from rbxcompose.domains.arms.motion.figures import (
     ProblemError,
     Tries,
     call_time,
+    ended,
     free_pairs,
     inverse_tries,
     motion_tries,
     problem_files,
     read_problem,
 )
+from rbxcompose.domains.arms.motion.groups import moved_links
 from rbxcompose.domains.arms.motion.inverse_kinematics import PoseSolutions, PoseTarget
-from rbxcompose.domains.arms.motion.kept import KeptTip
+from rbxcompose.domains.arms.motion.path_constraints import KeptTip
 from rbxcompose.domains.arms.motion.planner import MotionPlan, MotionRequest, Planning
 from rbxcompose.domains.arms.motion.pose_search import Posture, searched
+from rbxcompose.domains.arms.motion.reach import DIRECTIONS, Cut, ReachMap, reached
 from rbxcompose.domains.arms.motion.trace_planner import planned_trace
 from rbxcompose.domains.arms.reasons import MotionFailure
 from rbxcompose.domains.arms.sections.arms import ArmOfRobot, arms
+from rbxcompose.domains.arms.setup_assistant import add_options, run_setup
 from rbxcompose.manifest.fields import FramePose
 from rbxcompose.msgs.plain import from_plain
 from rbxcompose.msgs.rbxcompose_msgs import MoveArm, TraceArm
@@ -97,10 +101,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     shared = (add_path_argument, add_layer_options, json_)
     of_arm = (add_path_argument, arm, add_layer_options, json_)
     ik = "print positions of joints that bring the tip to a pose (inverse kinematics)"
-    trace = "plan a way of the tip along lines and arcs, or tell how far it gets"
+    trace = "plan a way of the tip along lines and arcs, or print how far it gets"
     setup = "find pairs of links that need not be watched, and write their file"
     bench = "measure kinematics, and motions, also those of published problems"
-    plan = "plan a motion and tell how long it takes, or why there is none"
+    plan = "plan a motion and print how long it takes, or why there is none"
     actions = (
         Subcommand("ls", "list the arms of a robot with their joints and poses", _ls, shared),
         Subcommand("fk", "print where the tip is (forward kinematics)", _fk, (goal, fk_picture, *of_arm)),
@@ -225,7 +229,7 @@ def _tell_plan(
         NotDoneError: if there is none.
     """
     began = perf_counter()
-    found = done(planning)
+    found = ended(planning)
     took = perf_counter() - began
     if goal is None:
         goal = found.waypoints[-1] if isinstance(found, MotionPlan) else start
@@ -317,7 +321,7 @@ def _found(
 ) -> PoseSolutions:
     solver, began = works.solver, perf_counter()
     prefer = arguments.prefer or solver.prefer
-    return done(
+    return ended(
         searched(
             works.kinematics,
             works.space,
@@ -392,15 +396,9 @@ HEAD = ("what", "solved", "median", "p95", "length", "collide")
 def add_bench_options(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `arm bench`."""
     words = "poses, motions, and problems of each scenario (default: 100)"
-    parser.add_argument("--count", type=_count, default=COUNT, metavar="N", help=words)
+    parser.add_argument("--count", type=whole_number(1, MOST), default=COUNT, metavar="N", help=words)
     words = "published problems: SCENARIO/scene0001.yaml with SCENARIO/request0001.yaml, as MotionBenchMaker has them"
     parser.add_argument("--problems", type=Path, metavar="FOLDER", help=words)
-
-
-def _count(text: str) -> int:
-    if not text.isdecimal() or not 0 < len(text) <= len(str(MOST)) or not 0 < int(text) <= MOST:
-        raise argparse.ArgumentTypeError(f"must be a whole number from 1 to {MOST}, not '{text}'")
-    return int(text)
 
 
 def run_bench(arguments: argparse.Namespace, works: ArmWorks) -> int:
@@ -482,3 +480,161 @@ def _data(one: Tries) -> dict[str, object]:
     figures = {"median": one.median, "p95": one.p95, "length": one.length}
     known = {name: value for name, value in figures.items() if math.isfinite(value)}
     return {"count": one.count, "solved": one.solved, **known, "colliding": one.colliding}
+
+
+def draw_motion(
+    arguments: argparse.Namespace,
+    works: ArmWorks,
+    start: NDArray[np.float64],
+    goal: NDArray[np.float64],
+    found: MotionPlan | MotionFailure | None,
+) -> int:
+    """Draw a motion, or why there is none; return the exit code."""
+    from rbxcompose.domains.arms.motion.picture import ArmPicture, draw_arm  # its libraries take long
+
+    names, failure = works.space.names, found if isinstance(found, MotionFailure) else None
+    is_at_start = found is None or (failure is not None and failure.reason.startswith("start"))
+    way = works.way(found.waypoints) if isinstance(found, MotionPlan) else ()
+    colliding = [] if way else works.planner.checker.colliding(start if is_at_start else goal)
+    positions = [dict(zip(names, values.tolist(), strict=True)) for values in (start, goal)]
+    shown = ArmPicture(
+        works.kinematics.body,
+        works.meshes,
+        positions[0],
+        works.objects,
+        {} if is_at_start else positions[1],
+        [link for link, joints in moved_links(works.kinematics.body, names).items() if joints],
+        way,
+        {link for pair in colliding for link in pair},
+        f"{arguments.goal}" if found is None else f"{arguments.start or 'at rest'} to {arguments.goal} (green)",
+        f"{failure.reason}: {failure.text}" if failure is not None else "",
+    )
+    return write_picture("arm", Path(arguments.picture), lambda: draw_arm(shown))
+
+
+REACH, EASE = "reach", "manipulability"
+SAMPLES, MOST_TIME = 1_000_000, 3600.0
+LEAST_SIDE = 0.002  # [m] of a cell
+
+
+class _ReachModel(Config):
+    """Options with units."""
+
+    cell: Length = 0.04
+    """Side of a cell."""
+    time: Time = 20.0
+    """How long positions are tried, at most."""
+    x: Length | None = None
+    """Where a layer is."""
+    y: Length | None = None
+    """Where a layer is."""
+    z: Length | None = None
+    """Where a layer is."""
+
+
+def add_reach_options(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `arm picture`."""
+    parser.add_argument("what", choices=(REACH, EASE), help=f"{REACH}: of {DIRECTIONS} directions; {EASE}: Yoshikawa's")
+    parser.add_argument("--out", metavar="FILE", required=True, help="the picture, a PNG")
+    words = "the layer that is shown, such as 'y: -10 cm' of the root, or 'all' (default: through the arm's base)"
+    parser.add_argument("--layer", metavar="AXIS: AT", default="", help=words)
+    parser.add_argument("--cell", metavar="LENGTH", default="4 cm", help="side of a cell (default: 4 cm)")
+    parser.add_argument(
+        "--samples", type=whole_number(1), default=SAMPLES, metavar="N", help=f"positions (default: {SAMPLES})"
+    )
+    parser.add_argument(
+        "--seed", type=whole_number(0), default=1, metavar="S", help="the same one tries the same positions"
+    )
+    parser.add_argument("--time", metavar="T", default="20 s", help="when it ends at the latest (default: 20 s)")
+    parser.add_argument(
+        "--from", dest="start", metavar="GOAL", default="", help="how the arm is drawn (default: at rest)"
+    )
+
+
+def run_reach(arguments: argparse.Namespace, works: ArmWorks, start: NDArray[np.float64]) -> int:
+    """Try positions, draw the picture, tell what is in it; return the exit code."""
+    layer = "" if arguments.layer in ("", "all") else f", {arguments.layer}"
+    wish = read_written(_ReachModel, f"{{cell: {arguments.cell}, time: {arguments.time}{layer}}}")
+    if not (wish.cell >= LEAST_SIDE and 0.0 < wish.time <= MOST_TIME):
+        words = f"a cell is at least {LEAST_SIDE * 1000:g} mm, and the time above 0 and at most {MOST_TIME:g} s"
+        raise NotDoneError(NO_MOTION.at(None, words))
+    cut, began = _cut(arguments, works, wish, start), perf_counter()
+    found = _tried(arguments, works, wish, cut)
+    text = _told(arguments, found, cut, perf_counter() - began)
+    if failed := write_picture(
+        "arm", Path(arguments.out), lambda: _drawn(arguments.what, works, start, found, cut, text)
+    ):
+        return failed
+    if arguments.json:
+        told = [
+            {"cell": list(cell), "directions": len(found_cell.directions), "manipulability": found_cell.manipulability}
+            for cell, found_cell in sorted(found.cells.items())
+        ]
+        data = {"side": found.side, "of": DIRECTIONS, "samples": found.tried, "seed": arguments.seed, "cells": told}
+        tell(json.dumps({**data, "colliding": found.colliding, "joints": list(works.space.names)}))
+        return 0
+    tell(text)
+    tell(f"wrote {arguments.out}")
+    return 0
+
+
+def _cut(arguments: argparse.Namespace, works: ArmWorks, wish: _ReachModel, start: NDArray[np.float64]) -> Cut | None:
+    """Return the layer to show; None for all cells."""
+    given = [(axis, at) for axis, at in enumerate((wish.x, wish.y, wish.z)) if at is not None]
+    if arguments.layer == "all":
+        return None
+    if len(given) > 1:
+        raise NotDoneError(NO_MOTION.at(None, "a layer has one of x, y and z"))
+    if given:
+        return Cut(*given[0])
+    kinematics = works.kinematics
+    return Cut(1, kinematics.poses(start)[kinematics.group.base].translation[1])
+
+
+def _tried(arguments: argparse.Namespace, works: ArmWorks, wish: _ReachModel, cut: Cut | None) -> ReachMap:
+    began, found = perf_counter(), ReachMap({}, wish.cell, 0, 0)
+    work = reached(
+        works.kinematics,
+        works.space,
+        works.planner.checker,
+        side=wish.cell,
+        samples=arguments.samples,
+        seed=arguments.seed,
+        cut=cut,
+    )
+    while perf_counter() - began < wish.time:
+        try:
+            found = next(work)
+        except StopIteration:
+            break
+    return found
+
+
+def _told(arguments: argparse.Namespace, found: ReachMap, cut: Cut | None, took: float) -> str:
+    where = "" if cut is None else f" at {'xyz'[cut.axis]} {cut.at * 100:.1f} cm"
+    tried = f"{found.tried:,} random positions, seed {arguments.seed}, {took:.1f} s"
+    if not found.cells:
+        return f"the tip gets to no cell{where} ({tried})"
+    counts = [len(cell.directions) for cell in found.cells.values()]
+    best = max(cell.manipulability for cell in found.cells.values())
+    some = f"{sum(counts) / len(counts):.1f} of {DIRECTIONS} directions on average, at most {max(counts)}"
+    words = some if arguments.what == REACH else f"manipulability up to {best:.3g} m^3/rad^3"
+    return f"the tip gets to {len(counts):,} cells of {found.side * 100:g} cm{where}: {words} ({tried})"
+
+
+def _drawn(
+    what: str, works: ArmWorks, start: NDArray[np.float64], found: ReachMap, cut: Cut | None, text: str
+) -> bytes:
+    from rbxcompose.domains.arms.motion.picture import ArmPicture
+    from rbxcompose.domains.arms.motion.reach import ReachPicture, draw_reach
+
+    positions = dict(zip(works.space.names, start.tolist(), strict=True))
+    robot = ArmPicture(works.kinematics.body, works.meshes, positions, works.objects, told=text)
+    if what == REACH:
+        values = {cell: float(len(found_cell.directions)) for cell, found_cell in found.cells.items()}
+        legend = f"directions of the tip's x axis, of {DIRECTIONS}"
+    else:
+        values = {cell: found_cell.manipulability for cell, found_cell in found.cells.items()}
+        legend = "manipulability of the tip's position [m^3/rad^3]"
+    most = max(values.values(), default=math.nan)
+    return draw_reach(ReachPicture(robot, values, found.side, most, legend, cut is not None))

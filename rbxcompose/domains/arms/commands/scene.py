@@ -54,9 +54,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     hold = "let an object move with a link, as when a gripper holds it"
     stays = "It stays where it is, and may touch the link and all that this carries, or the links of --touch."
     save = "write the objects around the robot into a file, in the frame of the body's root"
-    watch = "tell the goals and plans of arms, and the scene, as they change, until Ctrl-C"
-    check = "tell what collides now: links and objects that are nearer than they may be"
-    distance = "tell which two links or objects are the nearest to each other, or those of A [and B]"
+    watch = "print the goals and plans of arms, and the scene, as they change, until Ctrl-C"
+    check = "report what collides now: links and objects that are nearer than they may be"
+    distance = "report which two links or objects are the nearest to each other, or those of A [and B]"
     picture = "draw the robot as it stands now, with what is around it, and the way that is planned"
     table: tuple[tuple[str, str, Do, tuple[Declare, ...]], ...] = (
         ("ls", "list the objects", _ls, (ask,)),
@@ -229,7 +229,7 @@ def _distance_row(pair: PairDistance) -> tuple[str, str, str]:
 
 
 def _picture(arguments: argparse.Namespace) -> int:
-    from rbxcompose.domains.arms.command_pictures import write_picture  # numpy, which other actions do not need
+    from rbxcompose.domains.arms.command_line import write_picture  # numpy, which other actions do not need
     from rbxcompose.domains.arms.motion.picture import ArmPicture, draw_arm
 
     view = _view(arguments)

@@ -14,8 +14,7 @@ from rbxcompose.domains.arms import goals as arm_goals
 from rbxcompose.domains.arms import scene_view
 from rbxcompose.domains.arms.arm_config import ArmConfig, ArmWorks, dimensions_of, mesh_bytes
 from rbxcompose.domains.arms.hand import PICK, PLACE, PicksAndPlaces, hand_ports, hand_task, result_of
-from rbxcompose.domains.arms.location import TellsWhereItIs, location_ports
-from rbxcompose.domains.arms.manifest_model import FAST
+from rbxcompose.domains.arms.location import LocationService, location_ports
 from rbxcompose.domains.arms.motion.arm_task import ArmTask
 from rbxcompose.domains.arms.motion.collisions import readers_of, told
 from rbxcompose.domains.arms.motion.hand_task import HandTask
@@ -26,7 +25,7 @@ from rbxcompose.domains.arms.motion.scene_messages import path_of, placed_object
 from rbxcompose.domains.arms.moveit_ports import (
     GIVEN,
     MOTION,
-    AnswersPrograms,
+    KinematicsServices,
     around,
     is_turned_away,
     moveit_ports,
@@ -34,7 +33,8 @@ from rbxcompose.domains.arms.moveit_ports import (
 )
 from rbxcompose.domains.arms.planning_processes import compile_elsewhere, planning_processes
 from rbxcompose.domains.arms.reasons import REASONS
-from rbxcompose.domains.arms.servo_ports import PERIOD, ArmServo, servo_ports
+from rbxcompose.domains.arms.section_models import FAST
+from rbxcompose.domains.arms.teleoperation import PERIOD, ArmServo, servo_ports
 from rbxcompose.msgs.control_msgs import FollowJointTrajectory
 from rbxcompose.msgs.fields import ArrayEntries
 from rbxcompose.msgs.geometry_msgs import PoseStamped, TwistStamped
@@ -53,7 +53,7 @@ AnyTask = ArmTask | HandTask | MoveItTask
 
 
 @sdk.component("arm")
-class Arm(PicksAndPlaces, TellsWhereItIs, AnswersPrograms, sdk.Component[ArmConfig]):
+class Arm(PicksAndPlaces, LocationService, KinematicsServices, sdk.Component[ArmConfig]):
     """Moves an arm to poses by name, to positions of its joints, or its tip to a pose, on ways without collisions.
 
     The actions are `NAME/move`, `NAME/reach` and `NAME/trace`, with a gripper also `NAME/pick` and `NAME/place`; the

@@ -39,7 +39,7 @@ class SeenObjectsConfig(sdk.Config):
     near: sdk.Length = Field(0.1, gt=0)
     """Detections of the same class so near to each other are of the same thing, unless a tracker gives them ids."""
     still: sdk.Length = Field(0.005, ge=0)
-    """By how much a thing must be elsewhere until the scene is told."""
+    """By how much a thing must be elsewhere until the scene is updated."""
     forget: sdk.Time = Field(30.0, gt=0)
     """What was not seen for so long is gone: longer than an arm that reaches for a thing hides it."""
 

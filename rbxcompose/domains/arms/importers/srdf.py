@@ -240,6 +240,4 @@ class _Drafts:
         return None
 
     def _carrier(self, link: str) -> str:
-        while (above := self.body.joint_above.get(link)) is not None and not above.moves:
-            link = above.parent
-        return above.name if above is not None else ""
+        return next((joint.name for joint in self.body.joints_above(link) if joint.moves), "")

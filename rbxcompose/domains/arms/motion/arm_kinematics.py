@@ -13,7 +13,6 @@ from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.arms.motion.groups import ArmGroup, leader_of
 from rbxcompose.domains.arms.motion.numba_cache import is_installed
 from rbxcompose.domains.body.description import Description
-from rbxcompose.domains.body.model import Body, BodyJoint
 from rbxcompose.domains.body.pinocchio_model import PinocchioModel
 
 Array = NDArray[np.float64]
@@ -63,7 +62,7 @@ class ArmKinematics:
         self._positions: Mapping[str, float] = {}
         self._base = self.whole.q({})
         self._tip = self.whole.frames[group.tip]
-        self._way = _way(self.body, group.tip)
+        self._way = list(self.body.joints_above(group.tip))[::-1]
         entries = [entry for name in self.whole.places if (entry := self._entry(name)) is not None]
         self._entries = _Entries.of([one for one in entries if not one.turns])
         self._turning = _Entries.of([one for one in entries if one.turns])
@@ -167,12 +166,3 @@ class ArmKinematics:
         index = self.group.joints.index(leader)
         column = self.whole.model.joints[self.whole.model.getJointId(name)].idx_v
         return _Entry(self.whole.places[name], column, index, multiplier, offset, joint.kind == "continuous")
-
-
-def _way(body: Body, link: str) -> list[BodyJoint]:
-    """Return the joints from the root to a link."""
-    found: list[BodyJoint] = []
-    while (above := body.joint_above.get(link)) is not None:
-        found.append(above)
-        link = above.parent
-    return found[::-1]

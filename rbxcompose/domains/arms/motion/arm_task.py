@@ -17,8 +17,8 @@ from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.collisions import told
 from rbxcompose.domains.arms.motion.groups import JointSpace
 from rbxcompose.domains.arms.motion.inverse_kinematics import ENOUGH, SOLVER, PoseSolutions, PoseTarget, SolverSettings
-from rbxcompose.domains.arms.motion.kept import Keep, KeptTip
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory, speeds_of
+from rbxcompose.domains.arms.motion.path_constraints import Keep, KeptTip
 from rbxcompose.domains.arms.motion.planner import (
     FINE,
     MotionPlan,

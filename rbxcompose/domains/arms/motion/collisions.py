@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
-from rbxcompose.domains.arms.motion.groups import JointSpace, moved_links
+from rbxcompose.domains.arms.motion.groups import JointSpace, moved_links, solid_link
 from rbxcompose.domains.arms.motion.octree_files import read_cells
 from rbxcompose.domains.arms.motion.parametrisation import toppra
 from rbxcompose.domains.arms.motion.scene import PairDistance, PlacedObject
@@ -162,19 +162,15 @@ class Checker(Protocol):
 
     def is_free(self, values: Array) -> bool:
         """Return whether nothing collides."""
-        ...
 
     def colliding(self, values: Array) -> list[LinkPair]:
         """Return all pairs that collide."""
-        ...
 
     def without(self, pairs: Collection[LinkPair]) -> Checker:
         """Return a checker that does not watch some pairs."""
-        ...
 
     def in_the_way(self, values: Array, shape: Geometry, at: Transform3, ignored: Collection[str]) -> list[str]:
         """Return the links and objects but those `ignored` that a shape, at a pose in the root's frame, is within."""
-        ...
 
 
 @runtime_checkable
@@ -183,17 +179,14 @@ class SearchingChecker(Checker, Protocol):
 
     def first_bad(self, points: Array) -> int | None:
         """Return the first of some positions, of shape (m, n), where something collides; None if there is none."""
-        ...
 
     def prepare(self, space: JointSpace) -> None:
         """Do at once what would delay the first motion."""
-        ...
 
     def ways(
         self, space: JointSpace, start: Array, goal: Array, *, seed: int, resolution: float, simplify: bool
     ) -> Generator[int, None, Array | str]:
         """Search a way; return its points, of shape (m, n), or why there is none. Yield how many were examined."""
-        ...
 
 
 def told(pairs: Collection[LinkPair], most: int = 3) -> str:
@@ -204,13 +197,7 @@ def told(pairs: Collection[LinkPair], most: int = 3) -> str:
 
 def adjacent_pairs(body: Body) -> frozenset[LinkPair]:
     """Return the links that a joint connects, also if frames without a shape are fixed between it and the upper one."""
-    found = set()
-    for joint in body.joints.values():
-        link = joint.parent
-        while not body.links[link].collisions and link in body.joint_above and not body.joint_above[link].moves:
-            link = body.joint_above[link].parent
-        found.add(pair_of(link, joint.child))
-    return frozenset(found)
+    return frozenset(pair_of(solid_link(body, joint.parent), joint.child) for joint in body.joints.values())
 
 
 @dataclass(frozen=True, slots=True)

@@ -135,7 +135,7 @@ def free_pairs(planner: MotionPlanner, count: int, seed: int) -> list[tuple[Arra
 
 
 def ended(work: Generator[object, None, T]) -> T:
-    """Return what a generator returns."""
+    """Return what a generator returns, after all that it yields."""
     while True:
         try:
             next(work)

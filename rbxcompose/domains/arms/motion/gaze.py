@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3, Vector3, composed
-from rbxcompose.domains.body.model import Body, BodyJoint
+from rbxcompose.domains.body.model import Body
 from rbxcompose.domains.servos.limits import MotionLimits
 
 Array = NDArray[np.float64]
@@ -42,7 +42,7 @@ class Gaze:
     """Aims a camera; `joints` are those of the head with their limits, all between the body's root and the camera."""
 
     def __init__(self, body: Body, camera: str, joints: Mapping[str, MotionLimits]) -> None:
-        self._body, self._chain, self._names = body, _above(body, camera), tuple(joints)
+        self._body, self._chain, self._names = body, tuple(body.joints_above(camera)), tuple(joints)
         self._least = np.array([max(joint.least, -WIDEST) for joint in joints.values()])
         self._greatest = np.array([min(joint.greatest, WIDEST) for joint in joints.values()])
 
@@ -121,12 +121,3 @@ def past(point: Vector3) -> float:
     """Return the angle between x and a point in the frame of a camera [rad]."""
     x, y, z = point
     return math.atan2(math.hypot(y, z), x)
-
-
-def _above(body: Body, link: str) -> tuple[BodyJoint, ...]:
-    """Return the joints from a link up to the root of a body."""
-    joints: list[BodyJoint] = []
-    while (joint := body.joint_above.get(link)) is not None:
-        joints.append(joint)
-        link = joint.parent
-    return tuple(joints)

@@ -77,6 +77,13 @@ def moved_links(body: Body, joints: Iterable[str]) -> dict[str, frozenset[str]]:
     return found
 
 
+def solid_link(body: Body, link: str) -> str:
+    """Return the link whose shapes are around a frame: itself, or the one that a frame without shapes is fixed to."""
+    while not body.links[link].collisions and link in body.joint_above and not body.joint_above[link].moves:
+        link = body.joint_above[link].parent
+    return link
+
+
 def leader_of(joint: BodyJoint, joints: Mapping[str, BodyJoint]) -> tuple[str, float, float]:
     """Return the joint that a joint mimics at last, itself if none, with the multiplier and the offset of all."""
     multiplier, offset = 1.0, 0.0

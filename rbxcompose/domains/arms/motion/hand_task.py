@@ -128,11 +128,9 @@ class ContactCheckers(Protocol):
 
     def coming(self, contact: Contact) -> Checker:
         """Return the checker of the line to it, and of its end."""
-        ...
 
     def leaving(self, contact: Contact) -> Checker:
         """Return the checker of the line from it."""
-        ...
 
 
 class NearChecker:
@@ -279,19 +277,15 @@ class PlanningHelper(Protocol):
     @property
     def is_idle(self) -> bool:
         """Return whether it can begin a job."""
-        ...
 
     def begin(self, job: PlanJob) -> None:
         """Plan a motion."""
-        ...
 
     def answer(self, job: PlanJob) -> Planned | None:
         """Return what was planned, once; None if that is not known yet, or never will be."""
-        ...
 
     def abandon(self) -> None:
         """Let go of the job."""
-        ...
 
 
 class PlansWithHelp(Protocol):

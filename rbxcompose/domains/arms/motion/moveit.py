@@ -13,15 +13,14 @@ from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3, conjugate, multiply
-from rbxcompose.domains.arms.manifest_model import OMPL, PLANNERS
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.arm_task import ArmGoal, ArmSite, ArmTask, GivenTask
 from rbxcompose.domains.arms.motion.collisions import Checker, told
 from rbxcompose.domains.arms.motion.groups import JointSpace
 from rbxcompose.domains.arms.motion.inverse_kinematics import PoseSolutions, PoseTarget, SolverSettings
-from rbxcompose.domains.arms.motion.kept import Keep, KeptRange
 from rbxcompose.domains.arms.motion.octree_files import cells_of_octomap
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory
+from rbxcompose.domains.arms.motion.path_constraints import Keep, KeptRange
 from rbxcompose.domains.arms.motion.planner import MotionPlanner, PlannerSettings
 from rbxcompose.domains.arms.motion.pose_search import Posture, searched
 from rbxcompose.domains.arms.motion.scene import (
@@ -34,6 +33,7 @@ from rbxcompose.domains.arms.motion.scene import (
 )
 from rbxcompose.domains.arms.motion.scene_messages import pose_message, pose_of
 from rbxcompose.domains.arms.reasons import MotionFailure, MotionReason
+from rbxcompose.domains.arms.section_models import OMPL, PLANNERS
 from rbxcompose.domains.body.model import Body, Geometry
 from rbxcompose.msgs.geometry_msgs import Point, Pose, PoseStamped, Quaternion
 from rbxcompose.msgs.moveit_msgs import (
@@ -48,7 +48,6 @@ from rbxcompose.msgs.moveit_msgs import (
     LinkPadding,
     MotionPlanRequest,
     MoveGroup,
-    MoveItErrorCodes,
     ObjectColor,
     OrientationConstraint,
     PlanningOptions,
@@ -60,7 +59,6 @@ from rbxcompose.msgs.moveit_msgs import (
 )
 from rbxcompose.msgs.moveit_msgs import MoveItErrorCodes as Codes
 from rbxcompose.msgs.moveit_msgs import PlanningScene as PlanningSceneMessage
-from rbxcompose.msgs.moveit_msgs import PlanningScene as PlanningSceneOfMoveitTask
 from rbxcompose.msgs.octomap_msgs import OctomapWithPose
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.shape_msgs import Mesh, MeshTriangle, Plane, SolidPrimitive
@@ -96,7 +94,7 @@ def pieces_of(message: CollisionObject) -> Iterator[ScenePiece]:
     """Yield the shapes of a message, in the frame of the object; raises as `object_of` does."""
     yield from _placed([_primitive(primitive) for primitive in message.primitives], message.primitive_poses)
     yield from _placed([_mesh(mesh) for mesh in message.meshes], message.mesh_poses)
-    yield from _placed([_plane(plane) for plane in message.planes], message.plane_poses)
+    yield from _placed([Geometry("plane", tuple(plane.coef.tolist())) for plane in message.planes], message.plane_poses)
 
 
 def _placed(shapes: Sequence[Geometry], poses: Sequence[Pose]) -> Iterator[ScenePiece]:
@@ -120,10 +118,6 @@ def _mesh(message: Mesh) -> Geometry:
     points = tuple(value for vertex in message.vertices for value in (vertex.x, vertex.y, vertex.z))
     triangles = tuple(value for triangle in message.triangles for value in triangle.vertex_indices.tolist())
     return Geometry("mesh", (1.0, 1.0, 1.0), points=points, triangles=triangles)
-
-
-def _plane(message: Plane) -> Geometry:
-    return Geometry("plane", tuple(message.coef.tolist()))
 
 
 def collision_object(thing: PlacedObject) -> CollisionObject:
@@ -197,15 +191,15 @@ class RequestReader:
     def wish(self, request: MotionPlanRequest, options: PlanningOptions) -> MotionWish:
         """Return what is asked for."""
         if request.group_name not in ("", self.name):
-            raise RequestError(MoveItErrorCodes.INVALID_GROUP_NAME, f"this arm is '{self.name}'")
+            raise RequestError(Codes.INVALID_GROUP_NAME, f"this arm is '{self.name}'")
         _require_plain(request, options)
         start = self._start(request.start_state)
         if start and not options.plan_only:
             words = "the arm is elsewhere than 'start_state': only 'plan_only' begins there"
-            raise RequestError(MoveItErrorCodes.START_STATE_INVALID, words)
+            raise RequestError(Codes.START_STATE_INVALID, words)
         if len(request.goal_constraints) != 1:
             words = f"there are {len(request.goal_constraints)} alternatives in 'goal_constraints': one is taken"
-            raise RequestError(MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS, words)
+            raise RequestError(Codes.INVALID_GOAL_CONSTRAINTS, words)
         at = {**self.positions, **start}
         goal = replace(
             self._goal(request.goal_constraints[0]),
@@ -219,9 +213,9 @@ class RequestReader:
     def _settings(self, request: MotionPlanRequest) -> PlannerSettings:
         time, attempts, own = request.allowed_planning_time, request.num_planning_attempts, self.settings
         if not 0.0 <= time <= LONGEST:
-            raise RequestError(MoveItErrorCodes.FAILURE, f"an 'allowed_planning_time' of {time:g} s: up to {LONGEST:g}")
+            raise RequestError(Codes.FAILURE, f"an 'allowed_planning_time' of {time:g} s: up to {LONGEST:g}")
         if attempts > MOST_ATTEMPTS:
-            raise RequestError(MoveItErrorCodes.FAILURE, f"{attempts} planning attempts: up to {MOST_ATTEMPTS}")
+            raise RequestError(Codes.FAILURE, f"{attempts} planning attempts: up to {MOST_ATTEMPTS}")
         planner = planner_of(request.planner_id) if request.planner_id else own.planner
         return replace(own, planner=planner, time=time or own.time, attempts=max(own.attempts, attempts))
 
@@ -229,13 +223,13 @@ class RequestReader:
         """Return the joints that are elsewhere than they are measured, with their positions there."""
         if state.multi_dof_joint_state.joint_names or state.attached_collision_objects:
             words = "'start_state' has positions of joints alone; 'planning_scene_diff' attaches objects"
-            raise RequestError(MoveItErrorCodes.INVALID_ROBOT_STATE, words)
+            raise RequestError(Codes.INVALID_ROBOT_STATE, words)
         names, values = state.joint_state.name, state.joint_state.position.tolist()
         if len(names) != len(values) or not all(map(math.isfinite, values)):
             words = "'start_state' does not have a finite position for each joint"
-            raise RequestError(MoveItErrorCodes.INVALID_ROBOT_STATE, words)
+            raise RequestError(Codes.INVALID_ROBOT_STATE, words)
         if strange := [name for name in names if name not in self.kinematics.body.joints]:
-            raise RequestError(MoveItErrorCodes.INVALID_ROBOT_STATE, f"there is no joint '{strange[0]}'")
+            raise RequestError(Codes.INVALID_ROBOT_STATE, f"there is no joint '{strange[0]}'")
         given = dict(zip(names, values, strict=True))
         return {name: at for name, at in given.items() if abs(at - self.positions.get(name, math.inf)) > STILL}
 
@@ -247,7 +241,7 @@ class RequestReader:
             return ArmGoal(positions={joint.joint_name: self._joint(joint) for joint in joints}, tolerance=tolerance)
         if joints or len(places) > 1 or len(turns) > 1 or not (places or turns):
             words = "a goal is made of positions of joints, or of a position of the tip, an orientation, or both"
-            raise RequestError(MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS, words)
+            raise RequestError(Codes.INVALID_GOAL_CONSTRAINTS, words)
         return self._pose(places[0], turns[0] if turns else None) if places else self._turn(turns[0])
 
     def _turn(self, turn: OrientationConstraint) -> ArmGoal:
@@ -261,11 +255,9 @@ class RequestReader:
         """Return where a joint is wanted."""
         if constraint.joint_name not in self.kinematics.group.joints:
             words = f"'{constraint.joint_name}' is no joint of the arm '{self.name}'"
-            raise RequestError(MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS, words)
+            raise RequestError(Codes.INVALID_GOAL_CONSTRAINTS, words)
         if min(constraint.tolerance_above, constraint.tolerance_below) < 0.0 or not math.isfinite(constraint.position):
-            raise RequestError(
-                MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS, f"'{constraint.joint_name}' is wanted nowhere"
-            )
+            raise RequestError(Codes.INVALID_GOAL_CONSTRAINTS, f"'{constraint.joint_name}' is wanted nowhere")
         return constraint.position
 
     def _pose(self, place: PositionConstraint, turn: OrientationConstraint | None) -> ArmGoal:
@@ -275,12 +267,11 @@ class RequestReader:
         if turn is None or all(one >= math.pi for one in _tolerances(turn)):
             if any((offset.x, offset.y, offset.z)):
                 words = "a point beside the tip is taken together with an orientation alone"
-                raise RequestError(MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS, words)
+                raise RequestError(Codes.INVALID_GOAL_CONSTRAINTS, words)
             return ArmGoal(target=PoseTarget(middle, True, tolerance), frame=frame)
         self._require_tip(turn.link_name)
         if self._frame(turn.header.frame_id) != frame:
-            words = "position and orientation are in different frames"
-            raise RequestError(MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS, words)
+            raise RequestError(Codes.INVALID_GOAL_CONSTRAINTS, "position and orientation are in different frames")
         point = Transform3((offset.x, offset.y, offset.z))
         pose = Transform3(middle.translation, _rotation(turn.orientation)).compose(point.inverse())
         return ArmGoal(target=PoseTarget(pose, False, tolerance, min(_tolerances(turn))), frame=frame)
@@ -290,8 +281,7 @@ class RequestReader:
         places, turns = wanted.position_constraints, wanted.orientation_constraints
         _require_visible(wanted)
         if len(places) > 1 or len(turns) > 1:
-            words = "on the way, one position and one orientation are kept"
-            raise RequestError(MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS, words)
+            raise RequestError(Codes.INVALID_GOAL_CONSTRAINTS, "on the way, one position and one orientation are kept")
         joints = {}
         for constraint in wanted.joint_constraints:
             middle = self._joint(constraint)
@@ -303,7 +293,7 @@ class RequestReader:
         turned, is_along_frame = self._turned(turns[0], at)
         if places and not (is_along_frame and frame == self._frame(turns[0].header.frame_id)):
             words = "position and orientation are kept together only along the axes of one frame"
-            raise RequestError(MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS, words)
+            raise RequestError(Codes.INVALID_GOAL_CONSTRAINTS, words)
         return Keep(turned, inside, joints, frame if places else self.kinematics.group.tip)
 
     def _box(self, place: PositionConstraint) -> tuple[KeptRange | None, KeptRange | None, KeptRange | None]:
@@ -313,7 +303,7 @@ class RequestReader:
         pose = pose_of(region.primitive_poses[0]) if region.primitive_poses else Transform3()
         if not is_box or region.meshes or any((offset.x, offset.y, offset.z)) or _angle(pose.rotation) > AS_BEFORE:
             words = "on the way, the tip is kept in one box along the axes of its frame"
-            raise RequestError(MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS, words)
+            raise RequestError(Codes.INVALID_GOAL_CONSTRAINTS, words)
         sides = region.primitives[0].dimensions.tolist()
         x, y, z = ((at - side / 2, at + side / 2) for at, side in zip(pose.translation, sides, strict=True))
         return x, y, z
@@ -333,7 +323,7 @@ class RequestReader:
         tolerances = _tolerances(turn)
         if away > AS_BEFORE or min(tolerances) <= away:
             words = f"the tip is turned by {math.degrees(away):.1f} deg from the orientation to keep: it begins with it"
-            raise RequestError(MoveItErrorCodes.START_STATE_VIOLATES_PATH_CONSTRAINTS, words)
+            raise RequestError(Codes.START_STATE_VIOLATES_PATH_CONSTRAINTS, words)
         a, b, c = (0.0 if tolerance >= math.pi else tolerance - away for tolerance in tolerances)  # 0 is any
         return (a, b, c), _angle(_rotation(turn.orientation)) <= AS_BEFORE
 
@@ -341,13 +331,13 @@ class RequestReader:
         """Return a frame of a goal: nothing for the root."""
         body = self.kinematics.body
         if name and name not in body.links:
-            raise RequestError(MoveItErrorCodes.FRAME_TRANSFORM_FAILURE, f"there is no link '{name}'")
+            raise RequestError(Codes.FRAME_TRANSFORM_FAILURE, f"there is no link '{name}'")
         return "" if name == body.root else name
 
     def _require_tip(self, link: str) -> None:
         tip = self.kinematics.group.tip
         if link not in ("", tip):
-            raise RequestError(MoveItErrorCodes.INVALID_LINK_NAME, f"goals are for '{tip}', not for '{link}'")
+            raise RequestError(Codes.INVALID_LINK_NAME, f"goals are for '{tip}', not for '{link}'")
 
 
 def planner_of(name: str) -> str:
@@ -358,13 +348,13 @@ def planner_of(name: str) -> str:
         theirs = OMPL.get(own, own).lower()
         if name.lower() in (own, theirs, theirs.removesuffix("1")):
             return own
-    raise RequestError(MoveItErrorCodes.FAILURE, f"there is no planner '{name}': {', '.join(PLANNERS)}")
+    raise RequestError(Codes.FAILURE, f"there is no planner '{name}': {', '.join(PLANNERS)}")
 
 
 def _require_plain(request: MotionPlanRequest, options: PlanningOptions) -> None:
     """Refuse what no arm knows."""
     if request.pipeline_id not in PIPELINES:
-        raise RequestError(MoveItErrorCodes.FAILURE, f"there is no pipeline '{request.pipeline_id}': ompl")
+        raise RequestError(Codes.FAILURE, f"there is no pipeline '{request.pipeline_id}': ompl")
     odd = {
         "trajectory_constraints": request.trajectory_constraints.constraints,
         "reference_trajectories": request.reference_trajectories,
@@ -372,23 +362,23 @@ def _require_plain(request: MotionPlanRequest, options: PlanningOptions) -> None
         "look_around": options.look_around,
     }
     if words := ", ".join(f"'{name}'" for name, is_there in odd.items() if is_there):
-        raise RequestError(MoveItErrorCodes.FAILURE, f"an arm knows no {words}")
+        raise RequestError(Codes.FAILURE, f"an arm knows no {words}")
 
 
 def _require_visible(wanted: Constraints) -> None:
     if wanted.visibility_constraints:
-        raise RequestError(MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS, "an arm does not know what is visible")
+        raise RequestError(Codes.INVALID_GOAL_CONSTRAINTS, "an arm does not know what is visible")
 
 
 def _region(place: PositionConstraint) -> tuple[Transform3, float]:
     """Return the middle of the part of space where the tip has to be, and how far from it that reaches [m]."""
     region = place.constraint_region
     if len(region.primitives) != 1 or region.meshes or len(region.primitive_poses) > 1:
-        raise RequestError(MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS, "a position is wanted in one sphere or box")
+        raise RequestError(Codes.INVALID_GOAL_CONSTRAINTS, "a position is wanted in one sphere or box")
     shape, sizes = region.primitives[0], region.primitives[0].dimensions.tolist()
     wanted = {SolidPrimitive.SPHERE: (1, 1.0), SolidPrimitive.BOX: (3, 0.5)}.get(shape.type)
     if wanted is None or len(sizes) != wanted[0] or not min(sizes) > 0.0:
-        raise RequestError(MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS, "a position is wanted in one sphere or box")
+        raise RequestError(Codes.INVALID_GOAL_CONSTRAINTS, "a position is wanted in one sphere or box")
     pose = pose_of(region.primitive_poses[0]) if region.primitive_poses else Transform3()
     return Transform3(pose.translation), min(sizes) * wanted[1]
 
@@ -396,10 +386,9 @@ def _region(place: PositionConstraint) -> tuple[Transform3, float]:
 def _tolerances(turn: OrientationConstraint) -> Triple:
     found = (turn.absolute_x_axis_tolerance, turn.absolute_y_axis_tolerance, turn.absolute_z_axis_tolerance)
     if not min(found) > 0.0:
-        raise RequestError(MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS, "a tolerance of an orientation is not above 0")
+        raise RequestError(Codes.INVALID_GOAL_CONSTRAINTS, "a tolerance of an orientation is not above 0")
     if turn.parameterization != OrientationConstraint.XYZ_EULER_ANGLES and len(set(found)) > 1:
-        words = "a rotation vector is taken with one tolerance for all axes"
-        raise RequestError(MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS, words)
+        raise RequestError(Codes.INVALID_GOAL_CONSTRAINTS, "a rotation vector is taken with one tolerance for all axes")
     return found
 
 
@@ -407,7 +396,7 @@ def _rotation(message: Quaternion) -> tuple[float, float, float, float]:
     found = (message.x, message.y, message.z, message.w)
     length = math.hypot(*found)
     if not abs(length - 1.0) <= AS_BEFORE:
-        raise RequestError(MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS, "an orientation is no rotation")
+        raise RequestError(Codes.INVALID_GOAL_CONSTRAINTS, "an orientation is no rotation")
     x, y, z, w = found
     return x / length, y / length, z / length, w / length
 
@@ -454,13 +443,13 @@ class KinematicsQuery:
         wrong = self._mistake(frame, given) or self._unfit(request)
         pose = PoseTarget(pose_of(target.pose))
         if wrong or pose.mistake:
-            yield GetPositionIK.Response(error_code=wrong or _code(MoveItErrorCodes.NO_IK_SOLUTION, pose.mistake))
+            yield GetPositionIK.Response(error_code=wrong or not_done(Codes.NO_IK_SOLUTION, pose.mistake))
             return
         at = {**self.positions, **dict(zip(given.name, given.position.tolist(), strict=False))}
         start = np.array([at[name] for name in self.space.names])
         links = self.kinematics.poses(start)
         pose = PoseTarget((links[frame] if frame else Transform3()).compose(pose.pose))
-        is_free = self.checker.is_free if request.avoid_collisions else _always
+        is_free = self.checker.is_free if request.avoid_collisions else lambda values: True
         space, posture = self._constrained(request.constraints.joint_constraints)
         search = searched(
             self.kinematics, space, pose, start, is_free, seed=seed, posture=posture, restarts=TRIES, enough=1
@@ -487,38 +476,37 @@ class KinematicsQuery:
             return GetPositionIK.Response(solution=state, error_code=_done())
         if found.colliding:
             text = told(self.checker.colliding(found.colliding[0]))
-            return GetPositionIK.Response(error_code=_code(MoveItErrorCodes.GOAL_IN_COLLISION, text))
+            return GetPositionIK.Response(error_code=not_done(Codes.GOAL_IN_COLLISION, text))
         text = f"the tip got within {found.nearest[0] * 100:.1f} cm of it"
-        return GetPositionIK.Response(error_code=_code(MoveItErrorCodes.NO_IK_SOLUTION, text))
+        return GetPositionIK.Response(error_code=not_done(Codes.NO_IK_SOLUTION, text))
 
-    def _mistake(self, frame: str, given: JointState) -> MoveItErrorCodes | None:
+    def _mistake(self, frame: str, given: JointState) -> Codes | None:
         """Return what is wrong with a frame or the positions of joints."""
         if frame and (wrong := _unknown((frame,), self.kinematics.body.links)) is not None:
-            return _code(MoveItErrorCodes.FRAME_TRANSFORM_FAILURE, wrong.message)
+            return not_done(Codes.FRAME_TRANSFORM_FAILURE, wrong.message)
         joints = self.kinematics.body.joints
         known = {**self.positions, **dict.fromkeys(given.name, 0.0)}
         missing = [name for name in self.space.names if name not in known]
         if len(given.name) != len(given.position) or not np.all(np.isfinite(given.position)):
-            return _code(MoveItErrorCodes.INVALID_ROBOT_STATE, "there is no finite position for each joint")
+            return not_done(Codes.INVALID_ROBOT_STATE, "there is no finite position for each joint")
         if strange := [name for name in given.name if name not in joints]:
-            return _code(MoveItErrorCodes.INVALID_ROBOT_STATE, f"there is no joint '{strange[0]}'")
+            return not_done(Codes.INVALID_ROBOT_STATE, f"there is no joint '{strange[0]}'")
         if missing:
-            text = f"nothing has reported where '{missing[0]}' is"
-            return _code(MoveItErrorCodes.INVALID_ROBOT_STATE, text)
+            return not_done(Codes.INVALID_ROBOT_STATE, f"nothing has reported where '{missing[0]}' is")
         return None
 
-    def _unfit(self, request: PositionIKRequest) -> MoveItErrorCodes | None:
+    def _unfit(self, request: PositionIKRequest) -> Codes | None:
         """Return what is asked for that there is not: other groups, other links, constraints."""
         if request.group_name not in ("", self.name):
-            return _code(MoveItErrorCodes.INVALID_GROUP_NAME, f"this arm is '{self.name}'")
+            return not_done(Codes.INVALID_GROUP_NAME, f"this arm is '{self.name}'")
         tip, one = self.kinematics.group.tip, request.constraints
         if request.ik_link_name not in ("", tip) or request.ik_link_names or request.pose_stamped_vector:
-            return _code(MoveItErrorCodes.INVALID_LINK_NAME, f"poses are those of '{tip}' alone")
+            return not_done(Codes.INVALID_LINK_NAME, f"poses are those of '{tip}' alone")
         if any((one.position_constraints, one.orientation_constraints, one.visibility_constraints)):
             text = "of constraints, those of joints are taken here: the pose is asked for as it is"
-            return _code(MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS, text)
+            return not_done(Codes.INVALID_GOAL_CONSTRAINTS, text)
         wrong = next(filter(None, map(self._unfit_joint, one.joint_constraints)), "")
-        return _code(MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS, wrong) if wrong else None
+        return not_done(Codes.INVALID_GOAL_CONSTRAINTS, wrong) if wrong else None
 
     def _unfit_joint(self, wanted: JointConstraint) -> str:
         """Return why a joint cannot be where it is wanted, nothing if it can."""
@@ -533,35 +521,27 @@ class KinematicsQuery:
         return ""
 
 
-def busy() -> MoveItErrorCodes:
+def busy() -> Codes:
     """Return that an arm plans or moves."""
-    return _code(MoveItErrorCodes.FAILURE, "the arm moves")
+    return not_done(Codes.FAILURE, "the arm moves")
 
 
-def late(seconds: float) -> MoveItErrorCodes:
+def late(seconds: float) -> Codes:
     """Return that the search took too long."""
-    return _code(MoveItErrorCodes.TIMED_OUT, f"nothing was found in {seconds:g} s")
+    return not_done(Codes.TIMED_OUT, f"nothing was found in {seconds:g} s")
 
 
-def _unknown(names: tuple[str, ...], known: Mapping[str, object]) -> MoveItErrorCodes | None:
+def _unknown(names: tuple[str, ...], known: Mapping[str, object]) -> Codes | None:
     unknown = [name for name in names if name not in known]
-    return _code(MoveItErrorCodes.INVALID_LINK_NAME, f"there is no link '{unknown[0]}'") if unknown else None
+    return not_done(Codes.INVALID_LINK_NAME, f"there is no link '{unknown[0]}'") if unknown else None
 
 
 def _range(wanted: JointConstraint) -> tuple[float, float]:
     return wanted.position - wanted.tolerance_below, wanted.position + wanted.tolerance_above
 
 
-def _always(values: Array) -> bool:
-    return True
-
-
-def _code(value: int, text: str) -> MoveItErrorCodes:
-    return MoveItErrorCodes(val=value, message=text, source="rbxcompose")
-
-
-def _done() -> MoveItErrorCodes:
-    return MoveItErrorCodes(val=MoveItErrorCodes.SUCCESS)
+def _done() -> Codes:
+    return Codes(val=Codes.SUCCESS)
 
 
 OCTOMAP = "<octomap>"
@@ -828,7 +808,7 @@ def differs(message: PlanningSceneMessage) -> bool:
         "default_entry_names": matrix.default_entry_names,
     }
     if words := ", ".join(f"'{name}'" for name, is_there in odd.items() if is_there):
-        raise RequestError(MoveItErrorCodes.FAILURE, f"'planning_scene_diff' has {words}, which is not taken")
+        raise RequestError(Codes.FAILURE, f"'planning_scene_diff' has {words}, which is not taken")
     parts = (
         state.attached_collision_objects,
         matrix.entry_names,
@@ -857,8 +837,7 @@ def with_difference(
     try:
         scene.apply(difference, body.poses(positions))
     except SceneError as error:
-        words = f"'planning_scene_diff' cannot be: {error}"
-        raise RequestError(MoveItErrorCodes.INVALID_OBJECT_NAME, words) from error
+        raise RequestError(Codes.INVALID_OBJECT_NAME, f"'planning_scene_diff' cannot be: {error}") from error
     return tuple(scene.scene.objects.values()), scene.paddings
 
 
@@ -884,10 +863,10 @@ class MoveItTask:
 
     def __init__(self, site: MoveItSite, planner: MotionPlanner) -> None:
         self._site, self._planner, self._own = site, planner, planner.settings
-        self.difference: PlanningSceneOfMoveitTask | None = None
+        self.difference: PlanningSceneMessage | None = None
         """By which the scene differs from that of the robot until it is over."""
         self._task: ArmTask | None = None
-        self._refusal: MoveItErrorCodes | None = None
+        self._refusal: Codes | None = None
         self._start: dict[str, float] = {}
         self._is_plan = False
         self._began = self._planned_at = site.now
@@ -943,7 +922,7 @@ class MoveItTask:
         self._planner.settings = self._own
 
     @property
-    def code(self) -> MoveItErrorCodes:
+    def code(self) -> Codes:
         """Return how it ended."""
         return self._refusal or code_of(self.failure, is_moving=bool(self._rows))
 

@@ -25,7 +25,6 @@ Numba = Any  # its types and code
 class _Borrow(Protocol):
     def __call__(self, one: T, /) -> T:
         """Return an array, or a tuple of arrays and tuples, whose references are not counted: its owner outlives it."""
-        ...
 
 
 def _typed(_: Numba, one: Numba) -> tuple[Numba, Callable[..., Numba]]:

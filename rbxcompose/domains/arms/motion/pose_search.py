@@ -15,7 +15,7 @@ from rbxcompose.domains.arms.motion import inverse_kinematics
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.collisions import Checker
 from rbxcompose.domains.arms.motion.groups import JointSpace
-from rbxcompose.domains.arms.motion.kept import Keep, KeptTip
+from rbxcompose.domains.arms.motion.path_constraints import Keep, KeptTip
 
 Array = NDArray[np.float64]
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rbxcompose.domains.arms.manifest_model import OMPL
 from rbxcompose.domains.arms.motion.groups import JointSpace
+from rbxcompose.domains.arms.section_models import OMPL
 
 Array = NDArray[np.float64]
 IsFree = Callable[[Array], bool]

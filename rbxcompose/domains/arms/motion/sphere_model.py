@@ -93,11 +93,8 @@ def _chain(
 
     def carrier(link: str) -> str:
         """Return the link that moves as this one does, and that a joint of the arm moves."""
-        while (above := body.joint_above.get(link)) is not None:
-            if above.moves and leader_of(above, body.joints)[0] in group.joints:
-                break
-            link = above.parent
-        return link
+        above = (joint for joint in body.joints_above(link) if joint.moves)
+        return next((joint.child for joint in above if leader_of(joint, body.joints)[0] in group.joints), body.root)
 
     carriers = {link: carrier(link) for link in links}
     chain, index = compiled_collisions.chain_of(body, group, positions, {body.root, *carriers.values()})

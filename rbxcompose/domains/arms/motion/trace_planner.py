@@ -48,11 +48,9 @@ class Leg(Protocol):
     @property
     def length(self) -> float:
         """Return how long it is [m]."""
-        ...
 
     def at(self, share: float) -> Transform3:
         """Return the pose there."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)

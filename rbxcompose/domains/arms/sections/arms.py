@@ -11,7 +11,7 @@ from rbxcompose.base.config import ARM, CONTROLLER, Config, JointName, Length, L
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, Related, kind
 from rbxcompose.base.units import ANGLE, LENGTH, Quantity, format_quantity
-from rbxcompose.domains.arms import manifest_model
+from rbxcompose.domains.arms import section_models
 from rbxcompose.domains.arms.motion.groups import ArmGroup, carrying, chain, group_of, moved_links, together
 from rbxcompose.domains.body.description import Description
 from rbxcompose.domains.body.link_pairs import LinkPair, PairReason
@@ -44,7 +44,7 @@ _ROUNDING = 1e-6  # [rad or m]
 class ArmModel(Config):
     """Joints that move together."""
 
-    chain: manifest_model.ChainModel | None = None
+    chain: section_models.ChainModel | None = None
     """Its joints are those between these links."""
     joints: list[JointName] = []
     """Its joints, instead of a chain."""
@@ -62,17 +62,17 @@ class ArmModel(Config):
     """The frame between the fingers of the gripper: x ahead, y across; without it, the tip."""
     squeeze: Length = Field(0.0, ge=0)
     """By how much the gripper is asked to close farther than an object is wide; simulated fingers feel no objects."""
-    grasps: dict[Name, list[manifest_model.GraspModel]] = {}
+    grasps: dict[Name, list[section_models.GraspModel]] = {}
     """How objects may be held, by their names; grasps of others follow from their shapes."""
     pictures: str | None = Field(None, min_length=1)
     """A folder, relative to this file, into which each failure of picking and placing draws the scene; 20 are kept."""
-    spots: dict[Name, manifest_model.SpotModel] = {}
+    spots: dict[Name, section_models.SpotModel] = {}
     """Where the arm may put things, by name."""
     poses: dict[Name, dict[JointName, JointPosition]] = {}
     """Positions of joints by the name of the pose; a joint that a pose leaves out stays where it is."""
-    planner: manifest_model.PlannerModel = manifest_model.PlannerModel()
+    planner: section_models.PlannerModel = section_models.PlannerModel()
     """How its motions are planned."""
-    kinematics: manifest_model.SolverModel = manifest_model.SolverModel()
+    kinematics: section_models.SolverModel = section_models.SolverModel()
     """How positions of joints are searched for a pose of the tip."""
 
     @model_validator(mode="after")
@@ -145,7 +145,7 @@ def _pairs(description: Description, group: ArmGroup) -> dict[str, list[LinkPair
     }
 
 
-def hand_in(contents: Contents, arm: ArmOfRobot) -> manifest_model.HandConfig | None:
+def hand_in(contents: Contents, arm: ArmOfRobot) -> section_models.HandConfig | None:
     """Return the gripper of an arm, if it has one."""
     model, there = arm.model, contents.of(controllers).get(arm.model.gripper or "")
     if model.gripper is None or there is None:
@@ -153,7 +153,7 @@ def hand_in(contents: Contents, arm: ArmOfRobot) -> manifest_model.HandConfig | 
     name = model.gripper
     bounds = (each for each in controller_type(there.type).capabilities(name, there) if isinstance(each, BoundsGoals))
     ranges = [pair for each in bounds if each.ranges is not None for pair in each.ranges.value.values()]
-    return manifest_model.HandConfig(
+    return section_models.HandConfig(
         controller=name,
         command=served_topic(name, there, GripperCommand),
         opening=ranges[0] if ranges else None,
@@ -218,11 +218,11 @@ def arms(reading: Reading[ArmModel]) -> dict[str, ArmOfRobot]:
     description, entries, found = reading.contents.of(body), reading.entries(), dict[str, ArmOfRobot]()
     groups: dict[str, ArmGroup | None] = {}
     for name, entry in entries.items():
-        if entry.planner.type not in manifest_model.PLANNERS:
+        if entry.planner.type not in section_models.PLANNERS:
             path = ("arms", name, "planner", "type")
             node = at(reading.contents.root, path)
             reading.report.add(
-                not_a_choice(value_span(reading.contents.root, path), "type", node, list(manifest_model.PLANNERS))
+                not_a_choice(value_span(reading.contents.root, path), "type", node, list(section_models.PLANNERS))
             )
         if description is None:
             continue  # it is missing or has a mistake, which is told
@@ -231,7 +231,7 @@ def arms(reading: Reading[ArmModel]) -> dict[str, ArmOfRobot]:
             continue
         wrong = list(_mistakes(reading, name, entry, group, description.body))
         reading.report.extend(wrong)
-        found[name] = ArmOfRobot(entry, group, not wrong and entry.planner.type in manifest_model.PLANNERS)
+        found[name] = ArmOfRobot(entry, group, not wrong and entry.planner.type in section_models.PLANNERS)
     return found
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import field, replace
+from dataclasses import asdict, field, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -15,9 +15,9 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import read_regular
 from rbxcompose.base.findings import Finding, Span, kind
 from rbxcompose.base.printable import plain
-from rbxcompose.domains.arms.manifest_model import CloudModel
 from rbxcompose.domains.arms.motion.scene import MOST_PADDING, MOST_SHAPES, PlacedObject, mistake_in, settled
 from rbxcompose.domains.arms.motion.scene_text import LARGEST, NO_SCENE, SceneFile, read_scene
+from rbxcompose.domains.arms.section_models import CloudModel
 from rbxcompose.domains.arms.sections.arms import arms
 from rbxcompose.domains.body.files import FORMATS, mesh_problem
 from rbxcompose.domains.body.model import Body, Geometry
@@ -110,7 +110,7 @@ class ObjectModel(Config):
     @field_validator("touches", mode="before")
     @classmethod
     def _are_links(cls, names: object, info: ValidationInfo) -> object:
-        known = info.context or {}
+        known = {} if info.context is None else info.context
         for name in names if isinstance(names, list) else ():
             if isinstance(name, str) and name in known.get(OBJECT, ()) and name not in known.get(LINK, ()):
                 context = {"name": name, "help": f"write 'touches_objects: [{name}]'"}
@@ -227,15 +227,7 @@ def _config(thing: PlacedObject) -> dict[str, object]:
         "position": thing.pose.translation,
         "rotation": thing.pose.rotation,
         "shapes": [
-            {
-                "kind": each.shape.kind,
-                "size": each.shape.size,
-                "file": each.shape.file,
-                "points": each.shape.points,
-                "triangles": each.shape.triangles,
-                "position": each.pose.translation,
-                "rotation": each.pose.rotation,
-            }
+            {**asdict(each.shape), "position": each.pose.translation, "rotation": each.pose.rotation}
             for each in thing.own_pieces
         ],
         "touches": thing.touches,

@@ -28,12 +28,12 @@ NO_REST = kind("RBX2356")
 
 
 class TrackerModel(Config):
-    """An arm, and where the point is told that it follows."""
+    """An arm, and the topic of the point that it follows."""
 
     arm: Annotated[Name, Refers(ARM)]
     """The arm."""
     frame: LinkName
-    """The frame in which the point is told, such as that of a camera."""
+    """The frame of the point, such as that of a camera."""
     target: TopicName = "target"
     """The topic with the point, a `PointStamped`."""
     head: Annotated[Name, Refers(HEAD)] | None = None
@@ -86,7 +86,7 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
     "trackers", TrackerModel, order=39, names=TRACKER, runs=True, wires=True, entry="tracker", components=_components
 )
 def trackers(reading: Reading[TrackerModel]) -> dict[str, TrackerOfRobot]:
-    """Arms that follow a point which somebody tells, by name. `follow_NAME` is a skill of missions.
+    """Arms that follow a point from a topic, by name. `follow_NAME` is a skill of missions.
 
     Example:
         body:

@@ -45,7 +45,7 @@ PLANAR = (0, 1, 5)  # x, y, and the turn about z, of the six that a covariance h
 
 
 class OdometryConfig(Config):
-    """What is told of the way of the base."""
+    """The odometry of the base."""
 
     topic: TopicName = "odom"
     """Where poses and velocities are published."""
@@ -91,7 +91,7 @@ class DiffDriveConfig(ControllerConfig):
     turn_jerk: AngularJerk | None = Field(None, gt=0)
     """Largest change of the acceleration of a turn."""
     odometry: OdometryConfig = OdometryConfig()
-    """What is told of its way."""
+    """Its odometry."""
 
     @property
     def claimed(self) -> tuple[str, ...]:
@@ -101,7 +101,7 @@ class DiffDriveConfig(ControllerConfig):
 
 @controller("diff_drive")
 class DiffDriveController(Controller[DiffDriveConfig]):
-    """Drives a base on two wheels by `cmd_vel`, and tells its way by `odom` and among the frames.
+    """Drives a base on two wheels by `cmd_vel`, and publishes its odometry as `odom` and as a transform.
 
     What is too fast is slowed down as a whole, so that the curvature is kept. Without commands, at a stop, or when a
     wheel fails, the base brakes within its limits. Its wheels have no torque before the first command.

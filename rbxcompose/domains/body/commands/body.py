@@ -217,7 +217,7 @@ def _position(body: Body, written: str) -> tuple[str, float]:
 
 WOULD_REPLACE = kind("RBX2017")
 _HEAD = ("mesh", "triangles", "bytes", "largest error", "mean error", "file")
-_SIMPLIFY = "write meshes with fewer triangles, as binary STL files, and tell how far they are from the originals"
+_SIMPLIFY = "write meshes with fewer triangles, as binary STL files, and report how far they are from the originals"
 _SIMPLIFY_MORE = """\
 The error is the distance from points of the original surface to the nearest point of the simplified one:
 10,000 points, spread evenly with a fixed seed, for the mean, and also up to 10,000 of its corners for the largest. It

@@ -46,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         options.add_count_options,
     )
     shared = (partial(options.add_timeout_option, default="2s"), add_bus_options, options.add_system_options)
-    place = "place CHILD in PARENT until Ctrl-C; who has heard of it keeps it there"
+    place = "place CHILD in PARENT until Ctrl-C; whoever has received it keeps it"
     actions = (
         options.Subcommand("tree", "show the tree of frames", _tree, (*shared, options.add_json_option)),
         options.Subcommand(

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, StringConstraints, model_validator
+from pydantic_core import PydanticCustomError
 
 from rbxcompose.base.config import JOINT, LINK, Config, Name
 from rbxcompose.base.findings import Finding, Report, Severity, Span, kind, replacement
@@ -51,7 +52,7 @@ class BodyFileModel(Config):
         if self.with_ and self.xacro is None:
             raise ValueError("'with' is for a xacro: a URDF has no arguments")
         if self.urdf is None and self.xacro is None and (missing := self.lacks_file()):
-            raise ValueError(missing)
+            raise PydanticCustomError("no_file", "{missing}", {"missing": missing, "about": ("urdf", "xacro")})
         return self
 
     def lacks_file(self) -> str:

@@ -30,7 +30,7 @@ _PERIOD = 0.2  # [s] between two requests to a robot that is followed
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    values = argument("-v", "--values", action="store_true", help="also the values that parts tell")
+    values = argument("-v", "--values", action="store_true", help="also the values that parts report")
     below = argument("path", nargs="?", default="", metavar="PATH", help="only of this group and what is below it")
     group = argument("path", nargs="?", default="", metavar="PATH", help="the group, such as /power; without it, all")
     actions = (

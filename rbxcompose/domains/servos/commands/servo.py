@@ -47,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     made = "write a robot made of the servos that answer, with a joint and a controller for them"
     table: tuple[tuple[str, str, tuple[options.Declare, ...]], ...] = (
         ("scan", "list the servos that answer, with their models", (last,)),
-        ("ping", "tell which of some ids answer", (ids,)),
+        ("ping", "report which of some ids answer", (ids,)),
         ("info", "show all values of a servo", (id_,)),
         ("read", "read values of a servo", (id_, items)),
         ("write", "write values of a servo, raw or with a unit", (id_, values)),

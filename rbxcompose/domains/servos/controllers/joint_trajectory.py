@@ -61,7 +61,7 @@ class JointTrajectoryController(Controller[JointTrajectoryConfig]):
     """Follows trajectories, by the action `NAME/follow_joint_trajectory` of ROS; `NAME/move` is the skill of missions.
 
     Trajectories on the topic `NAME/joint_trajectory` need no goal, as in ROS 2: each replaces what leads the joints,
-    and nobody is told how it ends. One without points brings them to rest.
+    and its end is not reported. One without points brings them to rest.
 
     Trajectories are linear, cubic or quintic by what their points hold; one at 0 s is reached as fast as the limits
     allow. A new goal replaces the old one. However a trajectory ends, its joints come to rest within their limits.

@@ -100,20 +100,13 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
             "kind": bus.type,
             "port": port_name(contents, bus.port),
             "baud": round(bus.baud),
-            "rate": bus.rate,
-            "fast": bus.fast,
+            **bus.model_dump(include={"rate", "fast", "return_delay"}),
             "watchdog": max(bus.watchdog, WATCHED / bus.rate) if bus.watchdog else 0.0,
-            "return_delay": bus.return_delay,
             "twin": bus.sim if contents.is_simulated else "",
-            "noise": bus.twin.noise,
-            "seed": bus.twin.seed,
+            **bus.twin.model_dump(),
             "faults": faults_of(contents, name),
-            "on_start": care.on_start,
-            "on_shutdown": care.on_shutdown,
+            **care.model_dump(include={"on_start", "on_shutdown", "park_time", "start_speed", "thermal"}),
             "park": {joint: entry.value for joint, entry in care.park.items() if joint in own},
-            "park_time": care.park_time,
-            "start_speed": care.start_speed,
-            "thermal": care.thermal.model_dump(),
             "joints": {
                 joint: _joint(known.joints.get(joint), entry, [servos[each] for each in entry.servos])
                 for joint, entry in own.items()
@@ -156,7 +149,7 @@ def _is_led(
 
 
 def _servo(actuator: ActuatorModel) -> dict[str, object]:
-    return {"id": actuator.id, "model": actuator.model, "neutral": actuator.neutral, "invert": actuator.invert}
+    return actuator.model_dump(include={"id", "model", "neutral", "invert"})
 
 
 def _joint(joint: BodyJoint | None, driven: JointModel, servos: list[ActuatorModel]) -> dict[str, object]:
@@ -170,10 +163,7 @@ def _joint(joint: BodyJoint | None, driven: JointModel, servos: list[ActuatorMod
         "offset": driven.offset,
         "calibration": table_of(driven),
         "is_continuous": joint is not None and joint.kind == "continuous",
-        "lower": limits.lower,
-        "upper": limits.upper,
-        "velocity": limits.velocity,
-        "acceleration": limits.acceleration,
+        **{name: getattr(limits, name) for name in ("lower", "upper", "velocity", "acceleration")},
         "mimic": mimic.joint if mimic else "",
         "multiplier": mimic.multiplier if mimic else 1.0,
         "mimic_offset": mimic.offset if mimic else 0.0,

@@ -154,7 +154,7 @@ def _undriven(reading: Reading[ControllerConfig], name: str, config: ControllerC
             message = f"the controller '{name}' leads '{joint}', which no servo drives"
             if (description := reading.contents.of(body)) and joint in description.body.joints:
                 help_text = f"give it an actuator: '{joint}: {{actuator: ...}}' below 'joints', or leave it out here"
-                yield NOT_DRIVEN.at(span, message, help=help_text)
+                yield NOT_DRIVEN.at(span, message, help=help_text, about=[joint])
             else:
                 others = {each: entry for each, entry in driven.items() if each not in config.claimed}
                 yield NOT_DRIVEN.misspelt(span, message, joint, others, "joints with a servo")

@@ -98,5 +98,6 @@ def _mistake(reading: Reading[FaultModel], name: str, model: FaultModel) -> Find
         message, span = f"no servo drives '{model.joint}'", value_span(root, ("faults", name, "joint"))
         return NO_SERVO.misspelt(span, message, model.joint, driven, "joints with a servo")
     if model.bus is not None and model.bus not in driven.values():
-        return NO_SERVO.at(value_span(root, ("faults", name, "bus")), f"no joint is driven by the bus '{model.bus}'")
+        span = value_span(root, ("faults", name, "bus"))
+        return NO_SERVO.at(span, f"no joint is driven by the bus '{model.bus}'", about=[model.bus])
     return None

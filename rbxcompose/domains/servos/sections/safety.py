@@ -35,7 +35,7 @@ class ThermalModel(Config):
 
 
 class EstopModel(Config):
-    """An emergency stop: a topic that tells whether it is pressed."""
+    """An emergency stop: a topic that reports whether it is pressed."""
 
     topic: str = "estop"
     """Where messages of `std_msgs/Bool` come; the first that is true stops the robot until `release`."""

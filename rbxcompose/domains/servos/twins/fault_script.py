@@ -50,11 +50,9 @@ class Plug(Protocol):
 
     def unplug(self) -> None:
         """Take the port away."""
-        ...
 
     def replug(self) -> None:
         """Bring it back."""
-        ...
 
 
 class FaultScript:

@@ -1,4 +1,4 @@
-"""The check of blinking that nobody can see."""
+"""The check of blinking that is too fast to see."""
 
 from __future__ import annotations
 

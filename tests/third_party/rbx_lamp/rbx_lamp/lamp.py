@@ -1,4 +1,4 @@
-"""A lamp that blinks as often as it is asked to, and gets as bright as it is told to."""
+"""A lamp that blinks, and gets as bright, as it is asked to."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Lamp(Component[LampConfig]):
         return "" if goal.flashes > 0 else "a lamp flashes at least once"
 
     def on_dim(self, order: Float64) -> None:
-        """Begin to change the brightness, or tell why not."""
+        """Begin to change the brightness, or refuse with the reason."""
         if 0 < order.data <= 1:
             self.wanted = order.data
         else:
@@ -57,7 +57,7 @@ class Lamp(Component[LampConfig]):
             self.dimmed(Dimmed(message=f"no lamp is {order.data:g} bright", brightness=self.brightness))
 
     def on_stay(self, message: Empty) -> None:
-        """Stay as bright as it is: who is halted tells no end."""
+        """Stay as bright as it is: who is halted reports no end."""
         self.wanted = None
 
     def stop(self) -> None:
@@ -70,7 +70,7 @@ class Lamp(Component[LampConfig]):
         self.flash(dt)
 
     def fade(self, dt: float) -> None:
-        """Come nearer to the brightness that is wanted, and tell when it is there."""
+        """Come nearer to the brightness that is wanted, and report when it is there."""
         if self.wanted is None:
             return
         left = self.wanted - self.brightness

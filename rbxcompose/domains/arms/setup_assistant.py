@@ -21,7 +21,7 @@ from rbxcompose.commands.targets import compiled, missing_extras, robot_path
 from rbxcompose.compiler.compile import Compilation
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.domains.arms.arm_config import ArmConfig
-from rbxcompose.domains.arms.command_goals import works_of
+from rbxcompose.domains.arms.command_line import whole_number, works_of
 from rbxcompose.domains.arms.drafts import manifest_of, proposed_arms
 from rbxcompose.domains.arms.motion.collisions import MeshChecker, adjacent_pairs
 from rbxcompose.domains.arms.sections.arms import arms
@@ -35,35 +35,22 @@ from rbxcompose.manifest.tree import ScalarNode, at
 
 NO_SETUP = kind("RBX9420")
 TOUCH_AT_REST = kind("RBX9421", Severity.WARNING)
-SAMPLES, LEAST = 50_000, 100
+SAMPLES, LEAST = 50_000, 100  # with fewer, what collides at rest by chance would be left out for ever
 _BAR = 30
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `arm setup`."""
     parser.add_argument(
-        "--samples", type=_samples, default=SAMPLES, metavar="N", help=f"positions (default: {SAMPLES})"
+        "--samples", type=whole_number(LEAST), default=SAMPLES, metavar="N", help=f"positions (default: {SAMPLES})"
     )
-    parser.add_argument("--seed", type=_count, default=1, metavar="S", help="the same one gives the same file")
+    parser.add_argument("--seed", type=whole_number(0), default=1, metavar="S", help="the same one gives the same file")
     words = "the file (default: the one under 'collisions', or ROBOT.collisions.yaml; a profile has its own)"
     parser.add_argument("--out", metavar="FILE", help=words)
-    words = "examine all poses on the shapes of the body instead, and tell what collides"
+    words = "examine all poses on the shapes of the body instead, and report what collides"
     parser.add_argument("--check", action="store_true", help=words)
     words = "print a robot with the arms that a .urdf file seems to have, or write it to the file of --out"
     parser.add_argument("--propose", action="store_true", help=words)
-
-
-def _count(text: str) -> int:
-    if not text.isdecimal() or len(text) > 9:
-        raise argparse.ArgumentTypeError(f"must be a whole number of at least 0, not '{text}'")
-    return int(text)
-
-
-def _samples(text: str) -> int:
-    count = _count(text)
-    if count < LEAST:  # else what collides at rest by chance would be left out for ever
-        raise argparse.ArgumentTypeError(f"must be at least {LEAST}, not {count}")
-    return count
 
 
 def run_setup(arguments: argparse.Namespace) -> int:

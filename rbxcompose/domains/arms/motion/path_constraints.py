@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Quaternion, Transform3, Vector3, conjugate, multiply
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
-from rbxcompose.domains.arms.motion.groups import ArmJoint, JointSpace
+from rbxcompose.domains.arms.motion.groups import ArmJoint, JointSpace, solid_link
 from rbxcompose.domains.body.model import Body, Geometry
 
 Array = NDArray[np.float64]
@@ -62,7 +62,6 @@ class SeesThings(Protocol):
 
     def in_the_way(self, values: Array, shape: Geometry, at: Transform3, ignored: Collection[str]) -> list[str]:
         """Return the links and objects that a shape at a pose in the root's frame would be within."""
-        ...
 
 
 class SightLine:
@@ -72,7 +71,7 @@ class SightLine:
         self.wanted, self._kinematics, self._things = wanted, kinematics, things
         body = kinematics.body
         self._target = wanted.target or body.root
-        self._ignored = {*wanted.through, *(_carrier(body, text) for text in (wanted.sensor, self._target))}
+        self._ignored = {*wanted.through, *(solid_link(body, text) for text in (wanted.sensor, self._target))}
 
     def beyond(self, values: Array) -> Iterator[str]:
         """Yield in words what is in the way, or that the target is off the axis; it uses our own kinematics."""
@@ -127,13 +126,6 @@ class SightLine:
         ]
         axis = np.array(frames[0].rotation[:, self.wanted.axis])
         return np.array(frames[0].translation), axis, np.asarray(frames[1].act(np.array(self.wanted.at)))
-
-
-def _carrier(body: Body, link: str) -> str:
-    """Return the link whose shapes are around a frame: itself, or the one that a frame without shapes is fixed to."""
-    while not body.links[link].collisions and link in body.joint_above and not body.joint_above[link].moves:
-        link = body.joint_above[link].parent
-    return link
 
 
 def _unit(axis: int) -> Vector3:

@@ -1,25 +1,33 @@
-"""What of a robot is in doubt because errors were found there: rules must not report what may only follow from them."""
+"""Which findings are withheld because they may only follow from another mistake, or from what a profile removes.
+
+Where something has errors, or could not be read, rules must not report what may only follow from that. All is decided
+by what findings carry: their codes, their places, and the names that they are about.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
 from typing import Any
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.findings import Finding, Severity, Span
+from rbxcompose.base.findings import Finding, Related, Severity, Span, kind
 from rbxcompose.base.rules import ALL, MISSIONS, NAMES, OWN, WIRING
-from rbxcompose.compiler.composition.robot_manifest import RobotManifest
+from rbxcompose.compiler.composition.overlay import NOTHING_TO_CHANGE
+from rbxcompose.compiler.composition.robot_manifest import History, RobotManifest
 from rbxcompose.compiler.sections.include import include
 from rbxcompose.manifest.documents import ManifestHeader
 from rbxcompose.manifest.files import shown_name
-from rbxcompose.manifest.registry import section_named, sections
+from rbxcompose.manifest.registry import section_named, sections_in_use
 from rbxcompose.manifest.section import ROBOT, Section
 from rbxcompose.manifest.shapes import refers_below
-from rbxcompose.manifest.tree import BROKEN, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode, at
+from rbxcompose.manifest.tree import BROKEN, Entry, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode, at
 from rbxcompose.manifest.validate import MISSING_KEY
+from rbxcompose.manifest.walk import TWICE
 
+STILL_USED = kind("RBX1310")
+_MOST_SHOWN = 8
 ENTRY = 2  # length of the path of an entry: section and name
 _WORD = re.compile(r"[A-Za-z_/.][\w/.]*")  # what may be the name of a component or of a topic
 
@@ -178,7 +186,7 @@ def _is_plain(section: Section[Any, Any], manifest: RobotManifest, path: KeyPath
 
 def _lost(manifest: RobotManifest) -> Iterator[tuple[Section[Any, Any], str]]:
     """Yield the entries that were written and could not be read at all."""
-    for section in sections(ROBOT):
+    for section in sections_in_use(ROBOT):
         if not section.is_composed or section.name not in manifest.root:
             continue
         read, written = manifest.contents.of(section), at(manifest.root, (section.name, *section.at))
@@ -186,3 +194,69 @@ def _lost(manifest: RobotManifest) -> Iterator[tuple[Section[Any, Any], str]]:
             yield from ((section, name) for name in written.entries if name not in read)
         elif read is None:
             yield section, ""
+
+
+def half_read(findings: Iterable[Finding]) -> set[str]:
+    """Return the files in which a key is written twice, so that what stands below one of them was not read."""
+    return {finding.span.file for finding in findings if finding.code == TWICE.code and finding.span}
+
+
+def has_a_section_twice(findings: Iterable[Finding], root: MappingNode) -> bool:
+    """Return whether a file has a section with names twice, so that what stands in the second one is not read."""
+    words = {entry.key.span for entry in root.entries.values() if isinstance(entry.value, ScalarNode)}
+    twice = (one for one in findings if one.code == TWICE.code and one.span and one.span.column == 1)
+    return any(words.isdisjoint(other.span for other in finding.related) for finding in twice)
+
+
+def without_half_entries(
+    findings: Sequence[Finding], read_so_far: int, root: MappingNode, given: MappingNode
+) -> list[Finding]:
+    """Return findings without those about entries that may only change what was not read: what a part brings, or so.
+
+    `read_so_far` is the number of findings from before the sections were read, `given` what the file includes.
+    """
+    prefixes = tuple(f"{name}_" for name in _entries(given, include.name))
+    halves = Doubts(
+        places=_by_line(
+            span
+            for section in sections_in_use(ROBOT)
+            for name, entry in _entries(root, section.name).items()
+            if section.has_topics or name.startswith(prefixes) or not prefixes
+            for span in (entry.key.span, entry.value.span)
+        )
+    )
+    return [
+        *(one for one in findings[:read_so_far] if one.code != NOTHING_TO_CHANGE.code),
+        *(one for one in findings[read_so_far:] if one.code != MISSING_KEY.code or not halves.touch(one, ())),
+    ]
+
+
+def _entries(root: MappingNode, section: str) -> Mapping[str, Entry]:
+    there = root.get(section)
+    return there.entries if isinstance(there, MappingNode) else {}
+
+
+def with_removals(
+    findings: Iterable[Finding], history: History, profile: Span, ends: Iterable[tuple[str, str]]
+) -> Iterator[Finding]:
+    """Yield what only a profile causes: one finding for each thing that it removes, instead of those about its absence.
+
+    `ends` are the topics and skills of the robot without the profile, each with its component.
+    """
+    gone = {name: span for section in sections_in_use() for name, span in history.removed(section.name).items()}
+    gone = {name: span for name, span in gone.items() if profile.contains(span)}
+    owners = {name: name for name in gone} | {name: component for name, component in ends if component in gone}
+    users: dict[str, list[Finding]] = {}
+    for finding in findings:
+        name = next((owners[name] for name in finding.about if name in owners), None)
+        if name is None:
+            yield finding
+        else:
+            users.setdefault(name, []).append(finding)
+    for name, used in users.items():
+        yield STILL_USED.at(
+            gone[name],
+            f"this profile removes '{name}', which is still used",
+            help="keep it, or let the profile remove or change what uses it, too",
+            related=[Related(user.span, user.message) for user in used if user.span][:_MOST_SHOWN],
+        )

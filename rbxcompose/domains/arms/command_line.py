@@ -1,9 +1,10 @@
-"""The robot, the arm and the goal that a command names, with the words that missions have for them."""
+"""What the commands `arm` and `scene` share: the robot, the arm and the goal on the command line, and pictures."""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Generator, Mapping
+from collections.abc import Callable, Mapping
+from pathlib import Path
 from time import perf_counter
 from typing import Any, TypeVar
 
@@ -11,15 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbxcompose.base.config import Angle, Config, Length, Ratio, Speed
+from rbxcompose.base.files import replace_file
 from rbxcompose.base.findings import Report, kind, suggest
 from rbxcompose.base.units import ANGLE, LENGTH, Dimension
-from rbxcompose.commands.console import NotDoneError, tell_report
+from rbxcompose.commands.console import NotDoneError, misused, refuse, tell_report
 from rbxcompose.commands.targets import compiled, missing_extras, robot_path
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.domains.arms.arm_config import ArmConfig, ArmWorks
 from rbxcompose.domains.arms.sections.arms import ArmOfRobot, arms
 from rbxcompose.domains.arms.sections.scene import scene
 from rbxcompose.domains.body.description import Description
+from rbxcompose.domains.body.meshes import MissingLibraryError
 from rbxcompose.domains.body.sections.body import body
 from rbxcompose.domains.servos.sections.joints import JointPosition
 from rbxcompose.manifest.fields import FramePose
@@ -222,8 +225,7 @@ def read_joints(written: str, dimensions: Mapping[str, Dimension]) -> dict[str, 
             raise NotDoneError(NO_MOTION.at(None, message))
         if position.dimension != dimensions[name]:
             word = "slides" if dimensions[name] == LENGTH else "turns"
-            message = f"'{name}' {word}, and this is {position.dimension.phrase}"
-            raise NotDoneError(NO_MOTION.at(None, message))
+            raise NotDoneError(NO_MOTION.at(None, f"'{name}' {word}, and this is {position.dimension.phrase}"))
     return {name: position.value for name, position in read.items()}
 
 
@@ -239,11 +241,25 @@ def shown(works: ArmWorks, solution: Mapping[str, float]) -> str:
     return ", ".join(f"{joint.name}: {joint.shown(solution[joint.name])}" for joint in works.space.joints)
 
 
-def done(work: Generator[None, None, T]) -> T:
-    """Return the result of some work."""
-    while True:
-        try:
-            next(work)
-        except StopIteration as ended:
-            result: T = ended.value
-            return result
+def write_picture(verb: str, file: Path, draw: Callable[[], bytes]) -> int:
+    """Draw a picture into a file; return the exit code."""
+    try:
+        replace_file(file.resolve(), draw())
+    except MissingLibraryError as error:
+        return refuse(error.finding)
+    except ValueError as error:
+        return misused(verb, str(error))
+    except OSError as error:
+        return misused(verb, f"'{file}' cannot be written: {error.strerror}")
+    return 0
+
+
+def whole_number(least: int, most: int = 999_999_999) -> Callable[[str], int]:
+    """Return a reader of whole numbers within a range, for the type of an option."""
+
+    def read(text: str) -> int:
+        if not text.isdecimal() or len(text) > len(str(most)) or not least <= int(text) <= most:
+            raise argparse.ArgumentTypeError(f"must be a whole number from {least} to {most}, not '{text}'")
+        return int(text)
+
+    return read
