@@ -28,8 +28,8 @@ from rbxcompose.testing.bench import Bench
 from rbxcompose.tools import mission_view as live_view
 from rbxcompose.tools.inspection.mission_html import STYLE, mission_html
 from rbxcompose.tools.inspection.mission_text import running_lines
-from rbxcompose.tools.robot_picture import ComponentPicture, RobotPicture, Tree
-from rbxcompose.tools.robot_picture import lines_of as lines_of_top
+from rbxcompose.tools.top import ComponentPicture, RobotPicture, Tree
+from rbxcompose.tools.top import lines_of as lines_of_top
 
 DOCS = Path(__file__).parent
 ROBOT, MISSION = DOCS.parent / "robots/turtlebot/robot.yaml", "patrol"

@@ -159,7 +159,7 @@ def plural(kind: str) -> str:
 class Config(pydantic.BaseModel):
     """A closed, frozen set of fields; a key that it does not declare is a finding."""
 
-    model_config = pydantic.ConfigDict(frozen=True, extra="forbid")
+    model_config = pydantic.ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: pydantic.GetJsonSchemaHandler) -> dict[str, Any]:

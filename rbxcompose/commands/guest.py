@@ -45,10 +45,13 @@ _EACH = zenoh.ConsolidationMode.NONE
 _PAUSE = 0.01  # [s] between two looks for the router
 NO_HASHES = "TypeHashNotSupported"  # ROS 2 Humble writes this in place of a hash
 NO_ROUTER = kind("RBX9020")
+NO_NAME = kind("RBX9022")
+NOBODY = kind("RBX9025")
+SAID_NO = kind("RBX9026")
 
 
 @dataclass(frozen=True, slots=True)
-class HeardMessage:
+class ReceivedMessage:
     """A message as it arrived: its time [s of the guest's clock], its type, and its bytes."""
 
     time: float
@@ -91,7 +94,7 @@ class Guest:
         self._inbox = CallbackInbox()
         self.transport = ZenohTransport(self._session, self._inbox.put)
         self._bus: Bus | None = None
-        self._queues: list[Inbox[HeardMessage]] = []
+        self._queues: list[Inbox[ReceivedMessage]] = []
         self._selector = selectors.SelectSelector()  # unlike other selectors, it can wait for less than a millisecond
         self._selector.register(self._inbox, selectors.EVENT_READ, lambda: None)
 
@@ -130,10 +133,10 @@ class Guest:
             )
         return self._bus
 
-    def listen(self, topic: GraphName, heard: Callable[[HeardMessage], None]) -> None:
-        """Pass each message of a topic to `heard`, undecoded; if latched, also messages sent before."""
+    def listen(self, topic: GraphName, receive: Callable[[ReceivedMessage], None]) -> None:
+        """Pass each message of a topic to `receive`, undecoded; if latched, also messages sent before."""
         is_latched = any(end.qos is not None and end.qos.is_transient_local for end in topic.givers)
-        queue: Inbox[HeardMessage] = Inbox(NAME, LONGEST_QUEUE, heard, self.scheduler.post)
+        queue: Inbox[ReceivedMessage] = Inbox(NAME, LONGEST_QUEUE, receive, self.scheduler.post)
         self._queues.append(queue)
         for wire_type in topic.kinds:
             if wire_type.type.count("/") == 2:
@@ -199,9 +202,9 @@ class Guest:
             time.sleep(_PAUSE)
         return session
 
-    def _arrived(self, queue: Inbox[HeardMessage], kind: WireType) -> Callable[[Arrival], None]:
+    def _arrived(self, queue: Inbox[ReceivedMessage], kind: WireType) -> Callable[[Arrival], None]:
         # In a thread of the transport: a message is stamped when it arrives, not when it is shown.
-        return lambda arrival: queue.put(HeardMessage(self.clock.now(), kind, arrival), self.transport.wake)
+        return lambda arrival: queue.put(ReceivedMessage(self.clock.now(), kind, arrival), self.transport.wake)
 
 
 def _short(router: str) -> zenoh.Session:
@@ -216,9 +219,6 @@ def _complain(owner: str, text: str) -> None:
 
 
 Do = Callable[[Guest, argparse.Namespace], int]
-NO_NAME = kind("RBX9022")
-NOBODY = kind("RBX9025")
-SAID_NO = kind("RBX9026")
 
 
 def visit(arguments: argparse.Namespace, do: Callable[[Guest], int]) -> int:

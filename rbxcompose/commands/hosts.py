@@ -100,7 +100,7 @@ def send(remote: Remote, bundle: Bundle) -> str | Finding:
 
 def _last(stderr: bytes) -> str:
     lines = stderr.decode(errors="replace").strip().splitlines()
-    return plain(lines[-1]) if lines else "no reason is told"
+    return plain(lines[-1]) if lines else "no reason given"
 
 
 def send_all(remotes: Iterable[Remote], bundle: Bundle) -> dict[str, str | Finding]:
@@ -150,7 +150,7 @@ class Running:
 
     @property
     def answer(self) -> Any:
-        """Return the last line that is JSON, as data; None if there is none. Others are told beside it."""
+        """Return the last line that is JSON, as data; None if there is none. Others are shown beside it."""
         for line in reversed(self.lines):
             with suppress(ValueError):
                 return json.loads(line)
@@ -186,7 +186,7 @@ def shares_of(system: System, config: Path | None) -> Shares:
 
 
 def is_reachable(system: System) -> bool:
-    """Return whether each host can be told from the others; if not, tell why."""
+    """Return whether each host can be distinguished from the others; if not, report why."""
     here = [name for name, host in system.hosts.items() if host.ssh is None]
     if len(here) > 1:
         message = f"'{here[0]}' and '{here[1]}' have no 'ssh', and only one of them can be this machine"
@@ -214,7 +214,7 @@ def every_share(path: str, arguments: argparse.Namespace) -> Shares | None:
 def reached(shares: Shares, bundle: Bundle, *, needs_all: bool = True) -> dict[str, str] | None:
     """Bring the files to all hosts and return their folders there; None after telling which host has not got them.
 
-    One that is `optional` is told, and left out; so are all unless it `needs_all`.
+    One that is `optional` is reported, and left out; so are all unless it `needs_all`.
     """
     folders, is_complete = dict[str, str](), True
     optional = {share.name for share in shares.values() if share.model.optional}
@@ -297,7 +297,7 @@ def ask_all(shares: Shares, words: Callable[[str], Sequence[str]], *, in_json: b
 
 def _data(label: str, one: Running) -> dict[str, object]:
     host, _, robot = label.partition(" ")
-    is_one = len(one.lines) == 1 or one.wait() != 0  # what failed has told people, too
+    is_one = len(one.lines) == 1 or one.wait() != 0  # what failed has written for people, too
     answer = one.answer if is_one else None
     answer = {"text": "\n".join(one.lines)} if answer is None else answer
     return {"host": host, "robot": robot, "exit_code": one.wait(), "answer": answer}
@@ -425,7 +425,7 @@ def _run_there(remote: Remote, words: Sequence[str]) -> int:
     finally:
         signal.signal(signal.SIGINT, before)
     if code == SSH_FAILED and not remote.is_here:
-        return refuse(UNREACHED.at(None, f"'{remote.name}' cannot be reached: ssh tells why"))
+        return refuse(UNREACHED.at(None, f"'{remote.name}' cannot be reached: see the message of ssh"))
     return code if code >= 0 else 128 - code
 
 

@@ -17,7 +17,7 @@ from rbxcompose.base.printable import FORBIDDEN
 from rbxcompose.bus.graph import GraphName, WireType, find
 from rbxcompose.bus.names import name_problem
 from rbxcompose.commands.console import NotDoneError, emit, refuse, write_report
-from rbxcompose.commands.guest import NAME, NO_NAME, NOBODY, SAID_NO, Guest, HeardMessage, wanted
+from rbxcompose.commands.guest import NAME, NO_NAME, NOBODY, SAID_NO, Guest, ReceivedMessage, wanted
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode, key_span, value_span
@@ -33,6 +33,8 @@ MOST_SHOWN = 128  # values of a list that text shows; JSON shows all
 _SHOWN = "MESSAGE"  # name of the message text in findings
 M = TypeVar("M", bound=Message)
 T = TypeVar("T", bound=Interface)
+_PERIOD = 1.0  # [s] between two notices about messages left out
+_INTERRUPTED = 130
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,20 +159,17 @@ class EchoReader:
                 refuse(error.finding)
         self.is_useless = not self._types
 
-    def read(self, heard: HeardMessage) -> Message | None:
+    def read(self, received: ReceivedMessage) -> Message | None:
         """Return the message, or None if it cannot be read."""
-        if heard.kind not in self._types:
+        if received.kind not in self._types:
             return None
         try:
-            return decode(self._types[heard.kind], heard.arrival.payload)
+            return decode(self._types[received.kind], received.arrival.payload)
         except CdrError as error:
             self.malformed += 1
             if self.malformed == 1:
                 sys.stderr.write(f"left out: {error}\n")
             return None
-
-
-_PERIOD = 1.0  # [s] between two notices about messages left out
 
 
 class _Echo:
@@ -185,9 +184,9 @@ class _Echo:
         """Return whether enough has been printed."""
         return self._arguments.count is not None and self._count >= self._arguments.count
 
-    def heard(self, heard: HeardMessage) -> None:
+    def received(self, received: ReceivedMessage) -> None:
         """Print a message, unless it is one too many."""
-        message = None if self.is_over else self.reader.read(heard)
+        message = None if self.is_over else self.reader.read(received)
         if message is not None:
             self._count += 1
             text = shown(to_plain(message), self._arguments.json)
@@ -200,7 +199,7 @@ def echo(guest: Guest, arguments: argparse.Namespace) -> int:
     printer = _Echo(topic, arguments)
     if printer.reader.is_useless:
         return 1
-    guest.listen(topic, printer.heard)
+    guest.listen(topic, printer.received)
     dropped = 0
     while not guest.run(lambda: printer.is_over, _PERIOD):
         if guest.dropped > dropped:
@@ -262,9 +261,6 @@ def call(guest: Guest, arguments: argparse.Namespace) -> int:
         return refuse(SAID_NO.at(None, f"'{found.name}': {replies[0].error}"))
     emit(shown(to_plain(replies[0].response), arguments.json))
     return 0
-
-
-_INTERRUPTED = 130
 
 
 def send(guest: Guest, arguments: argparse.Namespace) -> int:

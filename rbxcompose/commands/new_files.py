@@ -30,6 +30,10 @@ ANSWER = kind("RBX9103")
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
 _YAML_WORDS = frozenset({"true", "false", "null"})  # as YAML values these are not texts
+EXISTS = kind("RBX9101")
+NOT_WRITTEN = kind("RBX9104")
+_PLAIN_TEXT = re.compile(r"[A-Za-z][A-Za-z0-9 ,.()/'-]*")
+_WORDS = frozenset({"true", "false", "null"})
 
 
 class AnswerError(Exception):
@@ -114,10 +118,6 @@ def read_place(text: str, taken: Collection[str] = ()) -> Place:
     return Place(name, x, y, heading)
 
 
-EXISTS = kind("RBX9101")
-NOT_WRITTEN = kind("RBX9104")
-
-
 def taken(folder: Path, names: Iterable[str]) -> Finding | None:
     """Return the finding about the first of some paths below `folder` that exists, before work is spent on them."""
     return next((_exists(folder / name) for name in names if os.path.lexists(folder / name)), None)
@@ -174,10 +174,6 @@ def _missing_folders(path: Path) -> Iterator[Path]:
 def _remove_if_empty(folder: Path) -> None:
     with suppress(OSError):  # somebody else has put a file into it
         folder.rmdir()
-
-
-_PLAIN_TEXT = re.compile(r"[A-Za-z][A-Za-z0-9 ,.()/'-]*")
-_WORDS = frozenset({"true", "false", "null"})
 
 
 def render(template: str, **answers: object) -> str:

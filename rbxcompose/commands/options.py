@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import re
 from collections.abc import Callable, Iterable
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,8 @@ EACH, BUS = "each host", "bus"
 that reaches its bus; any other word is the type of the component that answers."""
 
 Declare = Callable[[argparse.ArgumentParser], object]  # declares some arguments
+_KIND = re.compile(rb"^kind:[ \t]*['\"]?(\w+)", re.MULTILINE)
+_HEAD = 4096  # bytes at the start of a file that contain its kind
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +37,11 @@ class Subcommand:
 def argument(*names: str, **options: Any) -> Declare:
     """Return what declares one argument, as `add_argument` takes it."""
     return lambda parser: parser.add_argument(*names, **options)
+
+
+def deferred(module: str, function: str) -> Callable[..., int]:
+    """Return what calls a function of a module that is imported only then, since it needs more than others do."""
+    return lambda *arguments: int(getattr(import_module(module), function)(*arguments))
 
 
 def add_actions(
@@ -65,10 +73,6 @@ def add_system_options(parser: argparse.ArgumentParser, *, has_profile: bool = F
             "--profile", action="append", default=[], metavar="P", help="of a system: apply this profile"
         )
     parser.add_argument("--ssh-config", metavar="FILE", help="of a system: ssh's configuration, instead of the user's")
-
-
-_KIND = re.compile(rb"^kind:[ \t]*['\"]?(\w+)", re.MULTILINE)
-_HEAD = 4096  # bytes at the start of a file that contain its kind
 
 
 def kind_of(path: Path) -> str:

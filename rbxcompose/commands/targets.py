@@ -25,6 +25,10 @@ UNUSED = kind("RBX9007", Severity.WARNING)
 _USE = "name it in a robot ('missions:', 'include:')"
 _MANIFESTS = ("*.yaml", "*.yml")
 _ROBOTS, _SYSTEMS = "robots", "systems"
+UNNAMED = kind("RBX9031")
+_MOST = 5  # robots that are listed
+_ABOUT = "the robot's file, its folder, or rbx:robots/NAME of the library; without it, the only one"
+NO_EXTRA = kind("RBX2253")
 
 
 @dataclass(slots=True)
@@ -112,11 +116,6 @@ def projects_of(paths: Iterable[str]) -> list[Path]:
     return list(dict.fromkeys(project_of(file) for file in files if isinstance(file, Path)))
 
 
-UNNAMED = kind("RBX9031")
-_MOST = 5  # robots that are listed
-_ABOUT = "the robot's file, its folder, or rbx:robots/NAME of the library; without it, the only one"
-
-
 def add_path_argument(parser: argparse.ArgumentParser) -> None:
     """Declare the robot's path, which may be left out."""
     parser.add_argument("path", nargs="?", metavar="PATH", help=_ABOUT)
@@ -194,9 +193,6 @@ def chosen_layers(arguments: argparse.Namespace) -> ChosenLayers:
 def compiled(robot: str, arguments: argparse.Namespace) -> Compilation:
     """Compile a robot with all layers that a command puts over its file."""
     return compile_robot(robot, **layers_of(arguments))
-
-
-NO_EXTRA = kind("RBX2253")
 
 
 def missing_extras(robot: Robot) -> Iterator[Finding]:

@@ -23,6 +23,19 @@ from rbxcompose.domains.devices.serial_ports import SerialPort
 from rbxcompose.runtime.folder import RobotFolder, RobotState
 from rbxcompose.runtime.processes import Process, titled
 
+PLUGINS = Plugins("doctor", "examinations")
+FINE = "ok"
+NAME = "rbxcompose"
+_PROC, _SHARED = Path("/proc"), Path("/dev/shm")  # noqa: S108
+_LISTENS = "0A"  # the state of a socket in /proc/net/tcp
+_ADDRESS, _STATE, _INODE = 1, 3, 9  # fields of its lines
+_SOCKET = re.compile(r"socket:\[(\d+)\]")
+_LOCKED = re.compile(r"^([A-Za-z0-9_.-]+)==([^\s;\\]+)", re.MULTILINE)
+_REQUIRED = re.compile(r"[A-Za-z0-9_.-]+")
+_TIMEX = 256  # [B], more than adjtimex(2) writes
+_UNSYNCHRONISED = 5  # TIME_ERROR
+_DAY = 86_400.0  # [s]
+
 
 @dataclass(frozen=True, slots=True)
 class BusFacts:
@@ -125,9 +138,7 @@ class HostFacts:
 Examine = Callable[[HostFacts], Iterable[str | Finding]]
 """Yields findings, and words on what is fine."""
 
-PLUGINS = Plugins("doctor", "examinations")
 EXAMINATIONS: dict[str, Examine] = {}  # every one that has been imported, by name
-FINE = "ok"
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,18 +183,6 @@ def examine_all(facts: HostFacts) -> list[ExaminationResult]:
 def has_errors(answers: Sequence[ExaminationResult]) -> bool:
     """Return whether anything keeps a robot from running."""
     return any(result.level == Severity.ERROR.value for result in answers)
-
-
-NAME = "rbxcompose"
-_PROC, _SHARED = Path("/proc"), Path("/dev/shm")  # noqa: S108
-_LISTENS = "0A"  # the state of a socket in /proc/net/tcp
-_ADDRESS, _STATE, _INODE = 1, 3, 9  # fields of its lines
-_SOCKET = re.compile(r"socket:\[(\d+)\]")
-_LOCKED = re.compile(r"^([A-Za-z0-9_.-]+)==([^\s;\\]+)", re.MULTILINE)
-_REQUIRED = re.compile(r"[A-Za-z0-9_.-]+")
-_TIMEX = 256  # [B], more than adjtimex(2) writes
-_UNSYNCHRONISED = 5  # TIME_ERROR
-_DAY = 86_400.0  # [s]
 
 
 def listeners(proc: Path = _PROC) -> dict[int, Listener]:

@@ -43,6 +43,12 @@ FORMATS = {"text": mission_text, "mermaid": mission_mermaid, "dot": mission_dot,
 USAGE = 2
 _SAMPLES: Mapping[str, str] = {"TEXT": "hello", "FLAG": "true", "COUNT": "2", "PLACE": "dock", "POSE": "dock"}
 NO_MISSION = kind("RBX9040")
+_LARGEST = 16_000_000  # [B] largest log that is replayed
+_MOST_VALUES = 1_500_000  # in it, as far as they are easily counted
+_MOST_RUNS = 10_000
+_DEEPEST = 200  # levels of lists and maps in a record, which are twice those of the values in it
+_OWN = ("mission", "run")  # keys of a record that identify its run
+NO_LOG = kind("RBX9041")
 
 
 def robot_of(path: str | None) -> Robot | None:
@@ -188,14 +194,6 @@ def _data(source: SkillSource) -> dict[str, Any]:
         "topic": source.topic,
         "example": _example(skill),
     }
-
-
-_LARGEST = 16_000_000  # [B] largest log that is replayed
-_MOST_VALUES = 1_500_000  # in it, as far as they are easily counted
-_MOST_RUNS = 10_000
-_DEEPEST = 200  # levels of lists and maps in a record, which are twice those of the values in it
-_OWN = ("mission", "run")  # keys of a record that identify its run
-NO_LOG = kind("RBX9041")
 
 
 @dataclass(slots=True)

@@ -28,6 +28,8 @@ from rbxcompose.tools.inspection.plan_text import changes_text, with_places
 
 _COMPARE = 10.0  # [s] for the supervisor to read a plan
 LONGEST_CHANGE = LONGEST + _COMPARE  # [s]
+_LOOK = 0.25  # [s] between checks of the files; a change is taken at the second check that finds it unchanged
+_AGAIN = 0.5  # [s] between retries of what the robot cannot do now
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,10 +140,6 @@ def _stamp(path: Path) -> _Stamp:
     except OSError:
         return None
     return found.st_ctime_ns, found.st_size, found.st_ino
-
-
-_LOOK = 0.25  # [s] between checks of the files; a change is taken at the second check that finds it unchanged
-_AGAIN = 0.5  # [s] between retries of what the robot cannot do now
 
 
 class LiveReload:

@@ -87,7 +87,7 @@ class _Watch:
                 return None
             case launch.Up(components, processes, seconds):
                 self._is_up = True
-                took = "" if self._options.is_stepped else f", {seconds:.2f} s"  # each stepped run tells the same
+                took = "" if self._options.is_stepped else f", {seconds:.2f} s"  # all stepped runs write the same
                 emit(f"{name} is up: {extent(components, processes)}{took}")
                 if self._options.is_detached:
                     self._started.let_go()

@@ -59,7 +59,7 @@ def test_what_moveit_alone_understands_is_kept_with_its_place() -> None:
 </robot>"""
     said = read_semantics(read(text))
     assert [(words, span.line) for words, span in said.others] == [
-        ("'1 2' is no single position of a joint", 4),
+        ("'1 2' is not a single position of a joint", 4),
         ("the element 'link_sphere_approximation'", 3),
     ]
     assert said.pairs == {("a", "b"): "user"}

@@ -14,7 +14,7 @@ from rbxcompose.runtime.folder import Gauge
 from rbxcompose.runtime.supervision.supervisor import gauges_of
 from rbxcompose.sdk import Drains, Setting
 from rbxcompose.testing import check_text
-from rbxcompose.tools.scaffold.robot import RobotAnswers, read_base, robot_files
+from rbxcompose.tools.scaffold import RobotAnswers, read_base, robot_files
 from tests.checks import strangers
 from tests.misconfig.corpus import Case, cases, run
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.bus.graph import find
-from rbxcompose.commands.guest import Guest, HeardMessage
+from rbxcompose.commands.guest import Guest, ReceivedMessage
 from rbxcompose.msgs.cdr import decode
 from rbxcompose.msgs.geometry_msgs import Twist
 from tests.cli.live_robot import PATIENCE, Keyboard, Robot
@@ -80,7 +80,7 @@ def test_what_is_published_arrives(robot: Robot) -> None:
     with Guest(robot.place()) as guest:
         topic = find(guest.graph().topics, "/cmd_vel/teleop")
         assert topic is not None
-        heard: list[HeardMessage] = []
+        heard: list[ReceivedMessage] = []
         guest.listen(topic, heard.append)
         words = ("/cmd_vel/teleop", "geometry_msgs/Twist", "{angular: {z: 0.25}}", "--rate", "50Hz", "-n", "3")
         assert robot.told("topic", "pub", *words)["sent"] == 3

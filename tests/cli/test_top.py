@@ -26,7 +26,7 @@ from rbxcompose.base.levels import Level
 from rbxcompose.base.printable import FORBIDDEN, columns
 from rbxcompose.runtime.log import Record
 from rbxcompose.testing.golden import Golden
-from rbxcompose.tools.robot_picture import ComponentPicture, Load, RobotPicture, Tree, lines_of
+from rbxcompose.tools.top import ComponentPicture, Load, RobotPicture, Tree, lines_of
 from tests.third_party.places import put
 
 ROOT = Path(__file__).parents[2]

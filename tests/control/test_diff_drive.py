@@ -123,8 +123,8 @@ def test_while_braking_commands_are_ignored_and_after_it_the_next_one_counts() -
 @pytest.mark.parametrize(
     ("velocity", "reason"),
     [
-        (Velocity2(math.nan, 0.0), "nan m/s and 0 rad/s is no velocity"),
-        (Velocity2(0.0, math.inf), "0 m/s and inf rad/s is no velocity"),
+        (Velocity2(math.nan, 0.0), "nan m/s and 0 rad/s is not a finite velocity"),
+        (Velocity2(0.0, math.inf), "0 m/s and inf rad/s is not a finite velocity"),
         (Velocity2(2.0, 0.0), "2 m/s and 0 rad/s is 4.0 times too fast"),
     ],
 )
@@ -146,11 +146,11 @@ def test_a_command_that_is_scaled_down_is_counted() -> None:
 
 
 def test_what_cannot_be_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"a distance or a radius of 0\.0 is none"):
+    with pytest.raises(ValueError, match=r"must be positive and finite, not 0\.0"):
         WheelGeometry.of_radius(0.0, 0.26)
-    with pytest.raises(ValueError, match="is none"):
+    with pytest.raises(ValueError, match="positive and finite"):
         WheelGeometry.of_ticks(0.0, 0.26)
     with pytest.raises(ValueError, match="above 0"):
         BaseLimits(jerk=0.0)
-    with pytest.raises(ValueError, match="no step"):
+    with pytest.raises(ValueError, match="a step must be positive"):
         WheelDrive(GEOMETRY, LIMITS).step(0.0, 0.0)

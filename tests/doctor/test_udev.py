@@ -50,7 +50,7 @@ def test_adapters_with_one_serial_number_are_told() -> None:
     copy = SerialPort("/dev/ttyUSB2", (), UsbDevice("0403", "6014", "FT4", "1-3", 0))
     assert told(PORT, copy) == [
         FINE,
-        ("RBX9415", "2 adapters tell the same serial number 'FT4': /dev/ttyUSB0, /dev/ttyUSB2"),
+        ("RBX9415", "2 adapters report the same serial number 'FT4': /dev/ttyUSB0, /dev/ttyUSB2"),
     ]
 
 

@@ -18,7 +18,7 @@ import pytest
 
 from rbxcompose.commands.guest import Guest
 from rbxcompose.commands.lookup import BusPlace
-from rbxcompose.tools.sampler import MissionsSeen
+from rbxcompose.tools.top import MissionsSeen
 
 ROOT = Path(__file__).parents[2]
 PATIENCE = 20.0  # [s]

@@ -9,7 +9,7 @@ import pytest
 
 from rbxcompose.testing.golden import Golden
 from rbxcompose.tools.mission_tests.coverage import Coverage
-from rbxcompose.tools.mission_tests.report import MOST_LINES, FileOutcome, Teller, as_json, coverage_text, junit
+from rbxcompose.tools.mission_tests.report import MOST_LINES, FileOutcome, TrialWriter, as_json, coverage_text, junit
 from rbxcompose.tools.mission_tests.runner import Verdict
 from tests.mission_tests.trying import Trying
 
@@ -63,9 +63,9 @@ def test_a_failed_test_shows_its_trace_with_what_is_missing(trying: Trying, gold
     verdict = trying.verdict(WRONG)
     assert not verdict.passed
     file_outcome = outcome(verdict, trying)
-    teller = Teller()
+    writer = TrialWriter()
     text = "\n".join(
-        [teller.line(file_outcome), teller.trace(verdict), teller.summary([file_outcome], covered(verdict)), ""]
+        [writer.line(file_outcome), writer.trace(verdict), writer.summary([file_outcome], covered(verdict)), ""]
     )
     golden.check("failed.txt", text.replace(f"{trying.folder}/", ""))
 
@@ -73,7 +73,7 @@ def test_a_failed_test_shows_its_trace_with_what_is_missing(trying: Trying, gold
 def test_a_long_trace_shows_its_ends_and_what_is_wrong(trying: Trying) -> None:
     test = RIGHT.replace("rounds: 1", "rounds: 100").replace("outcome: success", "never:\n        - go_to: dock")
     verdict = trying.verdict(test)
-    lines = Teller().trace(verdict).splitlines()
+    lines = TrialWriter().trace(verdict).splitlines()
     assert len(verdict.record.lines) > MOST_LINES * 3 > len(lines)
     assert any("more lines" in line for line in lines)
     assert sum(">>>" in line for line in lines) == len(verdict.problems) == 1
@@ -125,4 +125,4 @@ def test_json_has_what_the_text_has(trying: Trying) -> None:
 
 @pytest.mark.parametrize("colour", [True, False])
 def test_colours_are_only_for_terminals(trying: Trying, colour: bool) -> None:
-    assert ("\x1b[" in Teller(colour).trace(trying.verdict(WRONG))) == colour
+    assert ("\x1b[" in TrialWriter(colour).trace(trying.verdict(WRONG))) == colour

@@ -161,7 +161,7 @@ def test_coverage_counts_its_ways() -> None:
     simulated = Simulated(program_of(TEXT), settings=Settings(observer=seen))
     simulated.advance(10)
     for _, event in simulated.events:
-        seen.hear(event)
+        seen.receive(event)
     coverage.add(link(simulated.program, {}), ROBOT, seen.keys)
     assert "do.persist: body" in {way.text for way in coverage.taken}
     assert {way.text for way in coverage.missing} == {"do.persist.go_to: failure"}

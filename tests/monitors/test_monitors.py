@@ -85,7 +85,7 @@ def test_the_battery_of_a_computer_takes_the_place_of_a_simulated_one(tmp_path: 
     assert levels[-1].data == 30.0
     (battery / "type").unlink()
     bench.advance(1.0)
-    assert (found[-1].level, found[-1].message) == (Level.ERROR, "no battery tells its charge: there is none")
+    assert (found[-1].level, found[-1].message) == (Level.ERROR, "no battery reports its charge: there is none")
 
 
 def test_a_time_server_that_does_not_answer_leaves_the_offset_unknown() -> None:

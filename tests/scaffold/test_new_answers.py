@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from rbxcompose.commands.new_files import AnswerError, read_name, read_place, read_text, read_yes
 from rbxcompose.testing import check_file
-from rbxcompose.tools.scaffold.robot import RobotAnswers, read_base, read_component_name, robot_files
+from rbxcompose.tools.scaffold import RobotAnswers, read_base, read_component_name, robot_files
 
 WRONG_NAMES = ["", "Cart", "my-cart", "1st", "_x", "a b", "../x", "a/b", "a" * 61, "ä", "a\n", "true", "null"]
 
@@ -70,7 +70,7 @@ def test_a_sentence_is_one_line_that_a_manifest_may_hold(text: str) -> None:
     assert refusal(read_text, text).startswith("RBX9103")
 
 
-@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     st.text(min_size=1, max_size=30)
     | st.sampled_from(["a: b", "$", "# x", "$x ${y}", "it's", '"', "true", "- a", "\\n"])

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from rbxcompose.commands.new_files import write_new
 from rbxcompose.testing import Golden
-from rbxcompose.tools.scaffold.robot import component_files, read_component_name
+from rbxcompose.tools.scaffold import component_files, read_component_name
 
 ROBOT = """
 rbx: 1

@@ -8,7 +8,7 @@ import pytest
 
 from rbxcompose.base.config import Place
 from rbxcompose.testing import Golden
-from rbxcompose.tools.scaffold.robot import MissionAnswers, mission_files, with_entry
+from rbxcompose.tools.scaffold import MissionAnswers, mission_files, with_entry
 
 ROBOT = PurePosixPath("robots/cart/robot.yaml")
 LAP = MissionAnswers("lap", ROBOT)

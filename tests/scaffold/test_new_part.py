@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rbxcompose.testing import Golden
-from rbxcompose.tools.scaffold.robot import part_files
+from rbxcompose.tools.scaffold import part_files
 
 
 def test_it_is_written_as_people_would_write_it(golden: Golden) -> None:

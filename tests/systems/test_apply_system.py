@@ -15,7 +15,7 @@ from rbxcompose.commands.hosts import Remote
 from rbxcompose.compiler.systems.model import System
 from rbxcompose.manifest.system_file import HostModel
 from rbxcompose.testing.golden import Golden
-from rbxcompose.tools import apply_system
+from rbxcompose.tools import system_runs
 
 _HOST = """
 import json, pathlib, sys
@@ -53,13 +53,13 @@ def applied(folder: Path, monkeypatch: pytest.MonkeyPatch, hosts: Sequence[_Host
     """Return the exit code of `apply SYSTEM --yes` on these hosts, and what each was asked."""
     shares = {(host.name, "r"): host for host in hosts}
     system = System(Path("s.yaml"), "s", hosts={host.name: host.model for host in hosts})
-    monkeypatch.setattr(apply_system, "compiled_for", lambda path, arguments, verb: system)
-    monkeypatch.setattr(apply_system, "is_reachable", lambda system: True)
-    monkeypatch.setattr(apply_system, "shares_of", lambda system, config: shares)
-    monkeypatch.setattr(apply_system, "bundle_of", lambda system: argparse.Namespace(system="s.yaml"))
+    monkeypatch.setattr(system_runs, "compiled_for", lambda path, arguments, verb: system)
+    monkeypatch.setattr(system_runs, "is_reachable", lambda system: True)
+    monkeypatch.setattr(system_runs, "shares_of", lambda system, config: shares)
+    monkeypatch.setattr(system_runs, "bundle_of", lambda system: argparse.Namespace(system="s.yaml"))
     given = {"undo": None, "host": None, "robot": None, "partial": False, "json": False, "dry_run": False}
     given |= {"yes": True, "real": False, "ssh_config": None, **options}
-    code = apply_system.apply_system("s.yaml", argparse.Namespace(**given))
+    code = system_runs.apply_system("s.yaml", argparse.Namespace(**given))
     log = folder / "log"
     return code, " ".join(log.read_text(encoding="utf-8").split()) if log.exists() else ""
 

@@ -10,7 +10,7 @@ from rbxcompose.commands.hosts import Remote
 from rbxcompose.manifest.system_file import HostModel
 from rbxcompose.testing.golden import Golden
 from rbxcompose.tools.commands.top import LiveShare
-from rbxcompose.tools.robot_picture import SILENT, ShareView, system_lines
+from rbxcompose.tools.top import SILENT, ShareView, system_lines
 from tests.systems.test_links import until
 
 TOLD: dict[str, Any] = {

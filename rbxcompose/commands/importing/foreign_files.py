@@ -20,6 +20,25 @@ from rbxcompose.manifest.scalars import number_trouble, plain_value
 from rbxcompose.manifest.tree import KEY, MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.manifest.walk import TAG
 
+PYTHON_OBJECT = kind("RBX2292", Severity.WARNING)
+_XML = (".srdf", ".urdf")
+_PYTHON = "!!python/"
+_OF_YAML = ("str", "int", "float", "bool", "null", "seq", "map")
+_OF_PYTHON = ("unicode", "str", "bytes", "int", "long", "float", "bool", "none", "tuple", "list", "dict")
+_PLAIN_TAGS = frozenset(
+    {
+        "!!python/object/new:dynamic_reconfigure.encoding.Config",
+        "!!python/object:dynamic_reconfigure.encoding.Config",
+        *(f"!!{text}" for text in _OF_YAML),
+        *(f"{_PYTHON}{text}" for text in _OF_PYTHON),
+    }
+)
+_OCTAL = re.compile(r"[-+]?0[0-9]+")
+_FLAGS = {
+    **dict.fromkeys(("yes", "on", "true", "y"), True),
+    **dict.fromkeys(("no", "off", "false", "n"), False),
+}  # of YAML 1.1, in any case
+
 
 class FreeNames:
     """Gives names that manifests may have, each once."""
@@ -40,26 +59,6 @@ class FreeNames:
 
 
 T = TypeVar("T")
-
-PYTHON_OBJECT = kind("RBX2292", Severity.WARNING)
-
-_XML = (".srdf", ".urdf")
-_PYTHON = "!!python/"
-_OF_YAML = ("str", "int", "float", "bool", "null", "seq", "map")
-_OF_PYTHON = ("unicode", "str", "bytes", "int", "long", "float", "bool", "none", "tuple", "list", "dict")
-_PLAIN_TAGS = frozenset(
-    {
-        "!!python/object/new:dynamic_reconfigure.encoding.Config",
-        "!!python/object:dynamic_reconfigure.encoding.Config",
-        *(f"!!{text}" for text in _OF_YAML),
-        *(f"{_PYTHON}{text}" for text in _OF_PYTHON),
-    }
-)
-_OCTAL = re.compile(r"[-+]?0[0-9]+")
-_FLAGS = {
-    **dict.fromkeys(("yes", "on", "true", "y"), True),
-    **dict.fromkeys(("no", "off", "false", "n"), False),
-}  # of YAML 1.1, in any case
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +97,7 @@ def _read(path: Path, report: Report, sources: MutableMapping[str, str]) -> Fore
 
 
 def _without_objects(finding: Finding, shown: str) -> Finding:
-    """Return what to tell of a tag of Python: the object is not made, its parts are read as plain data."""
+    """Return the finding about a tag of Python: the object is not made, its parts are read as plain data."""
     if finding.code != TAG.code or _PYTHON not in finding.message:
         return finding
     words = f"'{plain(shown)}' asks for an object of Python here, which is not made"
@@ -106,7 +105,7 @@ def _without_objects(finding: Finding, shown: str) -> Finding:
 
 
 class ForeignMap:
-    """A map in a foreign file. Whoever has asked for all keys that there may be tells the others with `tell_others`.
+    """A map in a foreign file. After all known keys were read, `report_unknown_keys` reports the others.
 
     A value of the wrong type is reported and then counts as not given. `what` names the map in findings.
     """

@@ -17,6 +17,7 @@ DISAGREES = kind("RBX2232")
 NOTHING_LEFT = kind("RBX2238")
 
 PLUGINS = Plugins("importer", "importers")
+_IMPORTERS: dict[str, Importer] = {}  # those that have been imported, by name
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,9 +39,6 @@ class Importer:
     name: str
     about: str
     run: Import
-
-
-_IMPORTERS: dict[str, Importer] = {}  # those that have been imported, by name
 
 
 def importer(name: str, about: str) -> Callable[[Import], Import]:

@@ -53,7 +53,7 @@ def _line(one: Row, column: int) -> str:
 
 
 def place(span: Span) -> str:
-    """Return a place as a comment tells it: the name of its file, and the line."""
+    """Return a place as a comment has it: the name of its file, and the line."""
     return f"{plain(PurePath(span.file).name, 60)}:{span.line}"
 
 

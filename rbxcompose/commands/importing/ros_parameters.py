@@ -16,6 +16,11 @@ from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNod
 
 ParameterData = bool | int | float | str | list[bool | int | float | str]
 _LONGEST = 10_000  # items of a list, as a manifest has them
+ROS_2 = "ros__parameters"
+_DUMPED = "dictitems"  # what Python's classes of maps are written as
+_GROUPS = "groups"
+_OF_A_GROUP = frozenset({"id", "name", "parameters", "parent", "state", "type"})
+ALL_NODES = "/**"
 
 
 def value_of(node: TreeNode) -> Given[ParameterData] | None:
@@ -76,13 +81,6 @@ def written(value: ParameterData) -> str:
 def shown_name(path: tuple[str, ...]) -> str:
     """Return the name of a parameter as ROS 2 writes it."""
     return ".".join(key(text) for text in path)
-
-
-ROS_2 = "ros__parameters"
-_DUMPED = "dictitems"  # what Python's classes of maps are written as
-_GROUPS = "groups"
-_OF_A_GROUP = frozenset({"id", "name", "parameters", "parent", "state", "type"})
-ALL_NODES = "/**"
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,6 +23,11 @@ from rbxcompose.msgs.geometry_msgs import Twist
 from rbxcompose.sdk.capabilities import Drives, Setting, WritesFrame
 from rbxcompose.sdk.ports import Looks
 
+LONGEST = 10.0  # [s]: commands come many times a second
+FARTHEST = 2.0  # [m] driven blind; the usual 0.5 s are that far at 4 m/s only
+ROUNDING = 1e-3  # of a speed
+_FIELDS = {("linear", "x"): ("max_speed", SPEED, "m/s"), ("angular", "z"): ("max_turn_rate", ANGULAR_SPEED, "rad/s")}
+
 
 @check("RBX3503", Severity.WARNING, closed=(WIRING, NAMES))
 def clamped_speed(robot: Robot) -> Iterator[Finding]:
@@ -109,10 +114,6 @@ def command_timeout(robot: Robot) -> Iterator[Finding]:
                 )
 
 
-LONGEST = 10.0  # [s]: commands come many times a second
-FARTHEST = 2.0  # [m] driven blind; the usual 0.5 s are that far at 4 m/s only
-
-
 @check("RBX3509", Severity.WARNING, closed=())
 def late_brake(robot: Robot) -> Iterator[Finding]:
     """A base goes on long after the last command."""
@@ -153,9 +154,6 @@ def wheel_sides(robot: Robot) -> Iterator[Finding]:
                     help="turn the axis round in the URDF; if it runs backwards then, change 'invert' of its actuator",
                     related=[Related(wheel.joint.axis_span or wheel.joint.span, "the axis")],
                 )
-
-
-ROUNDING = 1e-3  # of a speed
 
 
 @check("RBX2283", Severity.WARNING, closed=(WIRING,))
@@ -276,9 +274,6 @@ def frame_without_publisher(robot: Robot) -> Iterator[Finding]:
             related=[Related(description.body.links[root].span, "the root of the body")],
             about=(root, joint.frame),
         )
-
-
-_FIELDS = {("linear", "x"): ("max_speed", SPEED, "m/s"), ("angular", "z"): ("max_turn_rate", ANGULAR_SPEED, "rad/s")}
 
 
 @check("RBX4172", closed=(WIRING, NAMES))

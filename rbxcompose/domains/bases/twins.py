@@ -9,6 +9,7 @@ from rbxcompose.base.geometry import AT_REST, Pose2, Velocity2
 
 ABSURD = 2.0  # a command above this many times a limit is a fault of its sender, not a wish to go fast
 ROUNDING = 1e-12  # a smaller difference of velocities counts as none [m/s, rad/s]
+NOTHING_LEFT = 1e-9  # [s]; anything less is rounding from many small steps, not work
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,9 +121,6 @@ def _towards(value: float, target: float, most: float) -> float:
     """Return `value` moved towards `target` by at most `most`."""
     change = target - value
     return target if abs(change) <= most + ROUNDING else value + math.copysign(most, change)
-
-
-NOTHING_LEFT = 1e-9  # [s]; anything less is rounding from many small steps, not work
 
 
 @dataclass(frozen=True, slots=True)

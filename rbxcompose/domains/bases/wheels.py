@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import AT_REST, Pose2, Velocity2
 
+ABSURD = 2.0  # a command above this many times a limit is a fault of its sender, not a wish to go fast
+ROUNDING = 1e-12  # a smaller difference of velocities counts as none [m/s, rad/s]
+
 
 class VelocityWindow:
     """Averages a velocity over the last `duration` [s]; between two steps it is a straight line.
@@ -47,10 +50,6 @@ class VelocityWindow:
         return Velocity2(linear / self.duration, angular / self.duration)
 
 
-ABSURD = 2.0  # a command above this many times a limit is a fault of its sender, not a wish to go fast
-ROUNDING = 1e-12  # a smaller difference of velocities counts as none [m/s, rad/s]
-
-
 @dataclass(frozen=True, slots=True)
 class WheelGeometry:
     """Wheels and what is measured of them. ValueError if it cannot be."""
@@ -65,7 +64,7 @@ class WheelGeometry:
     def __post_init__(self) -> None:
         for value in (self.wheel_distance, self.metres_per_unit):
             if not (math.isfinite(value) and value > 0.0):
-                raise ValueError(f"a distance or a radius of {value} is none")
+                raise ValueError(f"distances and radii must be positive and finite, not {value}")
 
     @classmethod
     def of_radius(cls, wheel_radius: float, wheel_distance: float) -> WheelGeometry:
@@ -251,7 +250,7 @@ class WheelDrive:
         A command holds up to its deadline, not to the end of the step. ValueError if `dt` is not above 0.
         """
         if not (math.isfinite(dt) and dt > 0.0):
-            raise ValueError(f"a step of {dt} s is no step")
+            raise ValueError(f"a step must be positive and finite, not {dt} s")
         driven = min(max(self._until - (now - dt), 0.0), dt)
         if driven > 0.0:
             self.limiter.step(self._target, driven)
@@ -263,7 +262,7 @@ class WheelDrive:
 
 def _refusal(velocity: Velocity2, excess: float) -> str:
     command = f"{velocity.linear:g} m/s and {velocity.angular:g} rad/s"
-    return f"{command} is {excess:.1f} times too fast" if velocity.is_finite else f"{command} is no velocity"
+    return f"{command} is {excess:.1f} times too fast" if velocity.is_finite else f"{command} is not a finite velocity"
 
 
 def _scaled(velocity: Velocity2, factor: float) -> Velocity2:

@@ -15,6 +15,8 @@ from rbxcompose.domains.body.sections.body import body
 from rbxcompose.sdk.capabilities import Drives, Setting, WritesFrame
 from rbxcompose.sdk.ports import Looks
 
+STATIC = "_static"  # suffix of the topic of static transforms; both topics describe one tree
+
 
 @check("RBX2019", Severity.WARNING, closed=(WIRING,))
 def frame_of_body(robot: Robot) -> Iterator[Finding]:
@@ -40,7 +42,7 @@ def frame_of_body(robot: Robot) -> Iterator[Finding]:
         for port in (end.port for end in component.ends):
             for name in (port.source, port.target) if isinstance(port, Looks) else ():
                 if name not in placed and name not in shape.links:
-                    message = f"'{component.name}' looks up the frame '{name}', which nobody places"
+                    message = f"'{component.name}' looks up the frame '{name}', which no component publishes"
                     help_text = suggest(name, shape.links, "its links")
                     place = robot.entry_span(component.name)
                     yield _finding(shape, place, message, help_text, (component.name, name))
@@ -56,9 +58,6 @@ def _finding(body: Body, place: Span, message: str, help_text: str, about: tuple
     root = body.links[body.root]
     root_is = [Related(root.span, f"the root of the body is '{root.name}'")]
     return frame_of_body.at(place, message, help=help_text, related=root_is, about=about)
-
-
-STATIC = "_static"  # suffix of the topic of static transforms; both topics describe one tree
 
 
 @check("RBX3014", Severity.WARNING, closed=(WIRING, NAMES))

@@ -1,4 +1,4 @@
-"""What a robot on the bus tells of its body: the description, and the tree of frames."""
+"""What a robot on the bus publishes about its body: the description, and the tree of frames."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from rbxcompose.base.printable import plain
 from rbxcompose.base.transforms import TransformTree
 from rbxcompose.bus.graph import GraphName, WireType, find
 from rbxcompose.commands.console import NotDoneError
-from rbxcompose.commands.guest import NO_NAME, NOBODY, Guest, HeardMessage
+from rbxcompose.commands.guest import NO_NAME, NOBODY, Guest, ReceivedMessage
 from rbxcompose.commands.messages import EchoReader
 from rbxcompose.domains.body.model import Body
 from rbxcompose.domains.body.urdf import read_body
@@ -18,6 +18,7 @@ from rbxcompose.msgs.std_msgs import String
 from rbxcompose.msgs.tf2_msgs import TFMessage
 
 DESCRIPTION = "robot_description"
+_TOPICS = ("/tf", "/tf_static")
 
 
 def described(guest: Guest, wanted: str | None) -> GraphName:
@@ -54,11 +55,11 @@ def described_body(guest: Guest, topic: GraphName, timeout: float) -> Body:
     texts: list[str] = []
     reader = EchoReader(topic)
 
-    def heard(one: HeardMessage) -> None:
+    def received(one: ReceivedMessage) -> None:
         message = reader.read(one)
         texts.extend([message.data] if isinstance(message, String) else [])
 
-    guest.listen(topic, heard)
+    guest.listen(topic, received)
     if not guest.run(lambda: bool(texts), timeout):
         raise NotDoneError(NOBODY.at(None, f"no URDF comes on '{topic.name}'"))
     root = read_urdf(texts[-1], topic.name)
@@ -68,10 +69,7 @@ def described_body(guest: Guest, topic: GraphName, timeout: float) -> Body:
     return body
 
 
-_TOPICS = ("/tf", "/tf_static")
-
-
-class HeardFrames:
+class ReceivedFrames:
     """The tree as received so far, and who has placed each frame."""
 
     def __init__(self, guest: Guest) -> None:
@@ -97,16 +95,16 @@ class HeardFrames:
 
     def _listen(self, topic: GraphName) -> None:
         reader, is_static = EchoReader(topic), topic.name.endswith("_static")
-        self._guest.listen(topic, lambda heard: self._heard(reader, heard, is_static))
+        self._guest.listen(topic, lambda received: self._receive(reader, received, is_static))
 
-    def _heard(self, reader: EchoReader, heard: HeardMessage, is_static: bool) -> None:
-        self._waiting.discard(heard.sender)
-        message = reader.read(heard)
+    def _receive(self, reader: EchoReader, received: ReceivedMessage, is_static: bool) -> None:
+        self._waiting.discard(received.sender)
+        message = reader.read(received)
         for link in message.transforms if isinstance(message, TFMessage) else ():
             parent, child, time = link.header.frame_id, link.child_frame_id, to_nanoseconds(link.header.stamp)
             moved, turned = link.transform.translation, link.transform.rotation
             pose = Transform3((moved.x, moved.y, moved.z), (turned.x, turned.y, turned.z, turned.w))
-            measured = time or heard.stamp or None
-            answer = self.tree.set(parent, child, pose, stamp=heard.time, static=is_static, measured=measured)
+            measured = time or received.stamp or None
+            answer = self.tree.set(parent, child, pose, stamp=received.time, static=is_static, measured=measured)
             if answer.accepted:
-                self.writers[child] = self._nodes.get(heard.sender, "")
+                self.writers[child] = self._nodes.get(received.sender, "")

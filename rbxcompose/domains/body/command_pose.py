@@ -20,7 +20,7 @@ from rbxcompose.bus.topics import Publisher
 from rbxcompose.commands.console import NotDoneError, emit, misused, refuse
 from rbxcompose.commands.guest import NAME, NOBODY, Guest, visit
 from rbxcompose.commands.terminal import NO_TERMINAL, LiveScreen, is_terminal
-from rbxcompose.domains.body.command_body import HeardFrames, described, described_body
+from rbxcompose.domains.body.command_body import ReceivedFrames, described, described_body
 from rbxcompose.domains.body.model import Body, BodyJoint
 from rbxcompose.domains.body.source import UNKNOWN
 from rbxcompose.msgs.sensor_msgs import JointState
@@ -49,6 +49,8 @@ _MOVE = {
 }
 
 Draw = Callable[[float, float], float]
+HEARD = 1.5  # [s] in which transforms of all joints should come
+_JOINTS = "joint_states"
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,10 +201,6 @@ def bar(slider: Slider, at: float, width: int) -> str:
     return f"[{'-' * place}#{'-' * (inside - 1 - place)}]"
 
 
-HEARD = 1.5  # [s] in which transforms of all joints should come
-_JOINTS = "joint_states"
-
-
 def pose(arguments: argparse.Namespace) -> int:
     """Move the joints of a robot by sliders, or to the positions that are given."""
     if arguments.duration is not None and not arguments.joint:
@@ -233,8 +231,8 @@ def _posed(guest: Guest, arguments: argparse.Namespace) -> int:
 
 
 def _start(guest: Guest, body: Body) -> dict[str, float]:
-    """Return where the joints are now, as far as transforms tell: opening the sliders must not move anything."""
-    frames = HeardFrames(guest)
+    """Return where the joints are now, as far as they are published: opening the sliders moves nothing."""
+    frames = ReceivedFrames(guest)
     guest.run(lambda: all(frames.tree.parent_of(joint.child) for joint in body.moving), HEARD)
     found = ((joint, frames.tree.lookup(joint.parent, joint.child)) for joint in body.moving)
     return {joint.name: joint.position_of(pose) for joint, pose in found if pose is not None}

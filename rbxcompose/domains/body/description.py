@@ -26,6 +26,8 @@ MOUNT = "mount"
 _NAMES = {"link": ("name",), "joint": ("name",), "parent": ("link",), "child": ("link",), "mimic": ("joint",),
           "material": ("name",)}  # fmt: skip
 _OTHERS = ("name", "reference", "joint", "link")  # attributes of further elements that may name a link or a joint
+_OF_SHAPE = ("origin", "geometry")  # what a visual has in common with a collision
+MISFIT = kind("RBX2249")
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +88,7 @@ def _named(root: XmlElement, name: str) -> Iterator[str]:
 
 
 def _first_link(root: XmlElement) -> str | None:
-    """Return the link that is no joint's child; if there are several, the rest is told when the tree is checked."""
+    """Return the link that is no joint's child; if there are several, the rest is reported when the tree is checked."""
     children = {child.attributes.get("link") for joint in root.all("joint") for child in joint.all("child")}
     return next((link for link in _named(root, "link") if link not in children), None)
 
@@ -149,9 +151,6 @@ def _lines(element: XmlElement, indent: str) -> Iterator[str]:
     yield f"{indent}</{element.name}>"
 
 
-_OF_SHAPE = ("origin", "geometry")  # what a visual has in common with a collision
-
-
 def covering(root: XmlElement, body: Body) -> XmlElement:
     """Return the URDF of a body whose visual shapes are collision shapes, too; none that is one is there twice."""
     children = [
@@ -173,7 +172,6 @@ def _seen(element: XmlElement, link: BodyLink) -> Iterator[XmlElement]:
 
 
 VirtualKind = Literal["fixed", "planar", "floating"]
-MISFIT = kind("RBX2249")
 
 
 @dataclass(frozen=True, slots=True)
@@ -267,9 +265,11 @@ def describe(
     files = [one for one in read if isinstance(one, ReadFile)]
     notes = [note for one in files for note in one.notes]
     meshes = [part.file.meshes(one.root) for part, one in zip(parts, files, strict=True)]
-    meant = {k: v for part, one in zip(parts, files, strict=True) for k, v in part.file.meant_meshes(one.root).items()}
+    respelt = {
+        k: v for part, one in zip(parts, files, strict=True) for k, v in part.file.respelt_meshes(one.root).items()
+    }
     if len(parts) == 1 and not parts[0].name:
-        return _checked(files[0].root, files[0].text, (meshes[0], meant), notes, covers_visuals=covers_visuals)
+        return _checked(files[0].root, files[0].text, (meshes[0], respelt), notes, covers_visuals=covers_visuals)
     pieces: list[PieceOfBody] = []
     there: dict[str, Path] = {}
     for part, file, found in zip(parts, files, meshes, strict=True):
@@ -279,7 +279,7 @@ def describe(
     joined = assembled(name, pieces)
     if isinstance(joined, list):
         return None, [*notes, *joined]
-    return _checked(joined, to_xml(joined), (there, meant), notes, covers_visuals=covers_visuals)
+    return _checked(joined, to_xml(joined), (there, respelt), notes, covers_visuals=covers_visuals)
 
 
 def _checked(
@@ -291,10 +291,10 @@ def _checked(
     covers_visuals: bool,
 ) -> tuple[Description | None, list[Finding]]:
     body, findings = read_body(root)
-    meshes, meant = files
+    meshes, respelt = files
     if findings:
         return None, [*notes, *findings]
-    mistakes = [*notes, *lint(body, meshes, meant), *orientations(root), *mesh_mistakes(body, meshes)]
+    mistakes = [*notes, *lint(body, meshes, respelt), *orientations(root), *mesh_mistakes(body, meshes)]
     if covers_visuals:
         covered = covering(root, body)
         text, (body, _) = to_xml(covered), read_body(covered)

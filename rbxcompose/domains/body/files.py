@@ -26,6 +26,9 @@ _HEAD = 8_192  # [bytes] that are read
 _SHOWN = 200
 _TEXT = {7, 8, 9, 10, 12, 13, 27, *range(32, 256)}
 _ELEMENTS = re.compile(rb"^element\s+\w+\s+(\d{1,20})\s*$", re.MULTILINE)
+PACKAGE = "package://"
+LIBRARY = "rbxcompose"
+"""The package of the shipped library, for `$(find rbxcompose)`."""
 
 
 def mesh_mistakes(body: Body, meshes: Mapping[str, Path]) -> Iterator[Finding]:
@@ -98,11 +101,6 @@ _FORMATS: Mapping[str, Callable[[bytes, int], str]] = {
 FORMATS = (*_FORMATS,)
 
 
-PACKAGE = "package://"
-LIBRARY = "rbxcompose"
-"""The package of the shipped library, for `$(find rbxcompose)`."""
-
-
 @dataclass(frozen=True, slots=True)
 class BodyFile:
     """A file that describes a body. `span` is the place that names it; `arguments` are those of a xacro."""
@@ -127,7 +125,7 @@ class BodyFile:
         found = {name: mesh for name in set(mesh_names(root)) if (mesh := self._mesh(name)) is not None}
         return {name: mesh for name, mesh in found.items() if self._is_ours(mesh)}
 
-    def meant_meshes(self, root: XmlElement) -> dict[str, str]:
+    def respelt_meshes(self, root: XmlElement) -> dict[str, str]:
         """Return, for each mesh that is not there, the name of a file that differs only in its capitals."""
         missing = set(mesh_names(root)) - self.meshes(root).keys()
         return {name: near for name in missing if (near := self._in_other_letters(name))}

@@ -120,7 +120,7 @@ def digest_of(body: Body, meshes: Mapping[str, Path]) -> str:
         found.update(f"{row}\n".encode())
     used = {shape.geometry.file for link in body.links.values() for shape in link.collisions}
     for name in sorted(used & meshes.keys()):
-        with suppress(OSError):  # a mesh that cannot be read is told elsewhere
+        with suppress(OSError):  # a mesh that cannot be read is reported elsewhere
             found.update(read_regular(meshes[name], LARGEST))
     return found.hexdigest()[:16]
 

@@ -18,6 +18,24 @@ Tensor = tuple[Vector3, Vector3, Vector3]
 """A symmetric matrix [kg m^2], row by row."""
 _SWEEPS = 12  # half of them suffice: each squares what is left beside the diagonal
 _PLANES = ((0, 1, 2), (0, 2, 1), (1, 2, 0))  # two axes, and the one that they turn about
+NO_MASS = kind("RBX2009", Severity.WARNING)
+NO_INERTIA = kind("RBX2010", Severity.WARNING)
+TOO_DENSE = kind("RBX2022", Severity.WARNING)
+_DENSEST = 100_000.0  # [kg/m^3]: four times osmium, since shapes may leave something out
+_TOLERANCE = 1e-6  # relative, of moments that were rounded when they were written
+_THIN = 1e-6  # [m]: a mass that is nearer than this to an axis has no moment about it
+_SHOWN = 60
+NO_MOTION = kind("RBX2011", Severity.WARNING)
+NO_MESH = kind("RBX2012")
+MILLIMETRES = kind("RBX2013", Severity.WARNING)
+DEGREES = kind("RBX2021", Severity.WARNING)
+TURNED_IN_DEGREES = kind("RBX2023", Severity.WARNING)
+LARGEST = 20.0  # [m]
+_WRITE = "write what the motor can do"
+_UNWRITTEN = "a limit that is not written is 0; joints without limits are 'continuous', those that never move 'fixed'"
+_LACKS_UNIT = "are these millimetres, or does a size lack its unit?"
+_TURN = math.tau + 0.01  # [rad]
+_WITH_ORIGINS = ("link", "joint", "visual", "collision", "inertial")
 
 
 def principal_moments(tensor: Tensor) -> tuple[float, float, float]:
@@ -77,15 +95,6 @@ def added(tensors: list[Tensor]) -> Tensor:
 def _sum(rows: list[Vector3]) -> Vector3:
     x, y, z = map(sum, zip(*rows, strict=True))
     return x, y, z
-
-
-NO_MASS = kind("RBX2009", Severity.WARNING)
-NO_INERTIA = kind("RBX2010", Severity.WARNING)
-TOO_DENSE = kind("RBX2022", Severity.WARNING)
-_DENSEST = 100_000.0  # [kg/m^3]: four times osmium, since shapes may leave something out
-_TOLERANCE = 1e-6  # relative, of moments that were rounded when they were written
-_THIN = 1e-6  # [m]: a mass that is nearer than this to an axis has no moment about it
-_SHOWN = 60
 
 
 def mass_mistakes(body: Body) -> Iterator[Finding]:
@@ -199,27 +208,14 @@ def _together(body: Body, links: Sequence[BodyLink]) -> tuple[float, Tensor]:
     return mass, added([about((x, y, z), at, inertial.mass, _tensor(inertial)) for at, inertial in places])
 
 
-NO_MOTION = kind("RBX2011", Severity.WARNING)
-NO_MESH = kind("RBX2012")
-MILLIMETRES = kind("RBX2013", Severity.WARNING)
-DEGREES = kind("RBX2021", Severity.WARNING)
-TURNED_IN_DEGREES = kind("RBX2023", Severity.WARNING)
-LARGEST = 20.0  # [m]
-_WRITE = "write what the motor can do"
-_UNWRITTEN = "a limit that is not written is 0; joints without limits are 'continuous', those that never move 'fixed'"
-_LACKS_UNIT = "are these millimetres, or does a size lack its unit?"
-_TURN = math.tau + 0.01  # [rad]
-_WITH_ORIGINS = ("link", "joint", "visual", "collision", "inertial")
-
-
-def lint(body: Body, meshes: Collection[str], meant: Mapping[str, str] = MappingProxyType({})) -> Iterator[Finding]:
+def lint(body: Body, meshes: Collection[str], respelt: Mapping[str, str] = MappingProxyType({})) -> Iterator[Finding]:
     """Yield what is wrong with a body; `meshes` are the names of the mesh files that exist.
 
-    `meant` has names of files that exist, for those that differ only in their capitals.
+    `respelt` has names of files that exist, for those that differ only in their capitals.
     """
     yield from mass_mistakes(body)
     for link in body.links.values():
-        yield from _shapes(link, meshes, meant)
+        yield from _shapes(link, meshes, respelt)
     for joint in body.joints.values():
         if (away := math.hypot(*joint.origin.translation)) > LARGEST:
             message = f"joint '{plain(joint.name, _SHOWN)}' is {away:g} m away from the link that carries it"
@@ -271,12 +267,12 @@ def _be(words: list[str]) -> str:
     return "is" if len(words) == 1 else "are"
 
 
-def _shapes(link: BodyLink, meshes: Collection[str], meant: Mapping[str, str]) -> Iterator[Finding]:
+def _shapes(link: BodyLink, meshes: Collection[str], respelt: Mapping[str, str]) -> Iterator[Finding]:
     for shape in (*link.visuals, *link.collisions):
         geometry = shape.geometry
         if geometry.kind == "mesh" and geometry.file not in meshes:
             message = f"the mesh '{plain(geometry.file)}' does not exist"
-            near = meant.get(geometry.file, "")
+            near = respelt.get(geometry.file, "")
             help_text = f"{DID_YOU_MEAN} '{near}'? Capitals count" if near else _where_meshes_are(geometry.file)
             yield NO_MESH.at(shape.size_span or shape.span, message, help=help_text)
         if largest := _extent(shape):

@@ -20,6 +20,15 @@ from rbxcompose.base.printable import plain
 from rbxcompose.domains.body.files import FORMATS, LARGEST, mesh_problem
 
 NOT_DRAWN = kind("RBX9042")
+GREY = (0.6, 0.62, 0.65)
+_COLLADA = ".dae"
+_MATERIALS = ("bind_material", "library_materials", "library_effects", "library_images")
+LARGEST_FILE = 512_000_000  # [bytes]
+LEAST_FACES = 4  # of a closed body
+POINTS = 10_000  # on the original surface, and at most as many of its corners
+_SEED = 0
+_AT_ONCE = 250  # points, each with all triangles that may be nearest
+_SLACK = 1e-9  # relative, so that rounding loses no triangle
 
 
 class MissingLibraryError(Exception):
@@ -43,9 +52,6 @@ def need(what: str, *names: str) -> None:
 
 Trimesh = Any  # of an extra, which may be missing
 Array = NDArray[np.float64]
-GREY = (0.6, 0.62, 0.65)
-_COLLADA = ".dae"
-_MATERIALS = ("bind_material", "library_materials", "library_effects", "library_images")
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +76,7 @@ def joined(solids: Sequence[Solid]) -> Solid:
 def read_mesh(path: Path, name: str, most: int = LARGEST) -> Solid:
     """Return the triangles of a file of at most `most` bytes; `name` is that in messages.
 
-    Lengths are those of the file, but in metres if it tells its unit. Its upward axis is ignored.
+    Lengths are those of the file, but in metres if it has a unit. Its upward axis is ignored.
 
     Raises:
         MissingLibraryError: if a library for this format is missing.
@@ -79,7 +85,7 @@ def read_mesh(path: Path, name: str, most: int = LARGEST) -> Solid:
     if problem := mesh_problem(path, most):
         raise ValueError(f"the mesh '{plain(name)}' {problem}")
     if (ending := path.suffix.lower()) not in FORMATS:
-        raise ValueError(f"the mesh '{plain(name)}' is none of {', '.join(FORMATS)}")
+        raise ValueError(f"the mesh '{plain(name)}' must be one of {', '.join(FORMATS)}")
     if ending == _COLLADA:
         need("Collada files", "collada")
     try:
@@ -126,13 +132,6 @@ def _without_materials(data: bytes) -> Iterator[Solid]:
                 parent.remove(child)
     yield from _pieces(ElementTree.tostring(root), _COLLADA)
 
-
-LARGEST_FILE = 512_000_000  # [bytes]
-LEAST_FACES = 4  # of a closed body
-POINTS = 10_000  # on the original surface, and at most as many of its corners
-_SEED = 0
-_AT_ONCE = 250  # points, each with all triangles that may be nearest
-_SLACK = 1e-9  # relative, so that rounding loses no triangle
 
 Scale = tuple[float, ...]
 

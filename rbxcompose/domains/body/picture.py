@@ -17,6 +17,16 @@ from rbxcompose.domains.body.model import Body, Geometry
 
 _ROUND = 48  # faces around a cylinder
 _AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+SIZE = 800  # [pixels] of each side
+_FINER = 2  # rays per pixel and direction
+_LETTERS = 15  # [pixels] of a line of text
+_VIEW = (1.0, -1.3, 0.75)  # direction from which it is seen: from the right front, and above
+_LIGHT = (0.4, -0.75, 1.0)
+_AMBIENT = 0.35
+_FIELD = math.radians(30)  # of view
+_MARGIN = 1.08
+_FARTHEST = 1e6  # [m] from the root: more is no robot, and rays are computed with few digits
+_NEEDED = ("trimesh", "embreex", "PIL")
 
 
 def solid_of(body: Body, positions: Mapping[str, float], meshes: Mapping[str, Path]) -> Solid | None:
@@ -81,17 +91,6 @@ def _mesh(geometry: Geometry, path: Path) -> Solid:
     solid = read_mesh(path, geometry.file)
     return Solid(solid.vertices * geometry.size, solid.faces, solid.colours)
 
-
-SIZE = 800  # [pixels] of each side
-_FINER = 2  # rays per pixel and direction
-_LETTERS = 15  # [pixels] of a line of text
-_VIEW = (1.0, -1.3, 0.75)  # direction from which it is seen: from the right front, and above
-_LIGHT = (0.4, -0.75, 1.0)
-_AMBIENT = 0.35
-_FIELD = math.radians(30)  # of view
-_MARGIN = 1.08
-_FARTHEST = 1e6  # [m] from the root: more is no robot, and rays are computed with few digits
-_NEEDED = ("trimesh", "embreex", "PIL")
 
 Array = NDArray[np.float64]
 

@@ -24,6 +24,8 @@ URDF, XACRO = ".urdf", ".xacro"
 _LAYERS: Mapping[str, str] = {"profile": "--profile", "overlays": "-f", "sets": "--set", "real": "--real"}
 _FILES: Mapping[str, str] = {"with_": "--with", "packages": "--package"}
 _ALL = {**_LAYERS, **_FILES}
+NO_BODY = kind("RBX2008")
+UNKNOWN = kind("RBX2018")
 
 
 @dataclass(slots=True)
@@ -132,8 +134,6 @@ def _folder(written: str) -> Path:
     return folder
 
 
-NO_BODY = kind("RBX2008")
-UNKNOWN = kind("RBX2018")
 Use = Callable[[argparse.Namespace, Description], int]
 Read = Callable[[argparse.Namespace, DescribedBody], int]
 Do = Callable[[argparse.Namespace], int]

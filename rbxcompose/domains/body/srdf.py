@@ -82,7 +82,7 @@ def read_semantics(root: XmlElement) -> Semantics:
         for joint in state.all("joint"):
             value = _number(joint)
             if value is None:
-                others.append((f"'{_text(joint, 'value')}' is no single position of a joint", joint.span))
+                others.append((f"'{_text(joint, 'value')}' is not a single position of a joint", joint.span))
             else:
                 positions[_text(joint, "name")] = value
     pairs = {

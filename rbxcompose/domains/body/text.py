@@ -12,6 +12,11 @@ from rbxcompose.domains.body.model import FLOATING, Body, BodyJoint, BodyLink
 
 LINKS = ("link", "on", "by", "mass", "shapes")
 JOINTS = ("joint", "type", "from", "to", "effort", "speed")
+FORMATS = ("svg", "pdf")
+_MOVES = 'color="#1f6feb" fontcolor="#1f6feb" penwidth=2.2'
+_FIXED = 'color="#6e7781" fontcolor="#6e7781"'
+_FLOATS = f"{_FIXED} style=dashed"
+_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
 def extent_of(body: Body) -> str:
@@ -71,13 +76,6 @@ def _amount(value: float | None, unit: str) -> str:
     if value is None:
         return ""
     return f"{math.degrees(value):.4g} {unit}" if unit.startswith("deg") else f"{value:.4g} {unit}"
-
-
-FORMATS = ("svg", "pdf")
-_MOVES = 'color="#1f6feb" fontcolor="#1f6feb" penwidth=2.2'
-_FIXED = 'color="#6e7781" fontcolor="#6e7781"'
-_FLOATS = f"{_FIXED} style=dashed"
-_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
 def draw_graph(body: Body, form: str) -> bytes:

@@ -19,6 +19,12 @@ from rbxcompose.domains.body.xml_reader import XmlElement, read_urdf
 NO_LINK = kind("RBX2005")
 NO_TREE = kind("RBX2006")
 _SHOWN = 60
+WRONG_VALUE = kind("RBX2003")
+TWICE = kind("RBX2004")
+_SIZES = {"sphere": ("radius",), "cylinder": ("radius", "length"), "capsule": ("radius", "length")}
+_GEOMETRIES = ("box", *_SIZES, "mesh")
+_INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+LARGEST = 1e100  # so that sums and squares of numbers stay finite
 
 
 def tree_mistakes(body: model.Body, whole: Span) -> Iterator[Finding]:
@@ -103,12 +109,6 @@ def _circle(body: model.Body) -> Iterator[Finding]:
         yield NO_TREE.at(joint.span, message)
 
 
-WRONG_VALUE = kind("RBX2003")
-TWICE = kind("RBX2004")
-_SIZES = {"sphere": ("radius",), "cylinder": ("radius", "length"), "capsule": ("radius", "length")}
-_GEOMETRIES = ("box", *_SIZES, "mesh")
-_INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-LARGEST = 1e100  # so that sums and squares of numbers stay finite
 Colour = tuple[float, float, float, float]
 T = TypeVar("T")
 N = TypeVar("N", model.BodyLink, model.BodyJoint)

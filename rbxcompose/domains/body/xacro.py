@@ -30,6 +30,24 @@ from rbxcompose.manifest.files import library_root, shown_name
 
 MOST_FILES = 256
 _LARGEST = 24_000_000  # [bytes]
+NO_PREFIX = kind("RBX2014", Severity.WARNING, is_fixable=True)
+BINDING = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
+_SHOWN = 60  # characters of a name in a message
+DEADLINE = 12.0  # [s] of real time, on a busy machine; the processes limit their processor time themselves
+KEPT = 64  # answers
+_LARGEST_READ = 8_000_000  # [bytes] of a file that xacro reads
+_RUN = "import sys; sys.path.insert(0, sys.argv[1]); from rbxcompose.domains.body.xacro_child import main; main()"
+NOT_EXPANDED = kind("RBX2007")
+_NAMESPACE = "http://www.ros.org/wiki/xacro"
+_UNKNOWN = (
+    (re.compile(r"unknown macro name: (?:xacro:)?(\w+)"), "macro", "macros"),
+    (re.compile(r"name '(\w+)' is not defined"), "property", "properties"),
+    (re.compile(r"Undefined substitution argument (\w+)"), "arg", "arguments"),
+)
+"""What an error of xacro says of a name, the element that declares such names, and what they are called."""
+_XACRO_LARGEST = 1_000_000  # [B] of a file whose names are proposed
+_PLACES = re.compile(rf' {PLACE}="[^"]*"')
+NO_ARGUMENT = kind("RBX2020", Severity.WARNING, is_fixable=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,13 +89,8 @@ def _path(request: str) -> Path:
     return home / "rbxcompose/xacro" / f"{xxh3_128_hexdigest(f'{rbxcompose.__version__} {request}'.encode())}.json"
 
 
-NO_PREFIX = kind("RBX2014", Severity.WARNING, is_fixable=True)
-BINDING = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
-_SHOWN = 60  # characters of a name in a message
-
-
 def missing_prefixes(files: Mapping[str, BareFile]) -> Iterator[Finding]:
-    """Yield one finding for each file with bare tags, as the fenced process tells them."""
+    """Yield one finding for each file with bare tags, as the fenced process reports them."""
     for path, found in files.items():
         file, first, count = shown_name(Path(path)), found.tags[0], len(found.tags)
         others = "" if count == 1 else f", like {count - 1} other {'tag' if count == 2 else 'tags'} of this file"
@@ -112,10 +125,6 @@ class XacroRequest(NamedTuple):
     roots: tuple[str, ...]
 
 
-DEADLINE = 12.0  # [s] of real time, on a busy machine; the processes limit their processor time themselves
-KEPT = 64  # answers
-_XACRO_ANSWERS_LARGEST = 8_000_000  # [bytes] of a file that xacro reads
-_RUN = "import sys; sys.path.insert(0, sys.argv[1]); from rbxcompose.domains.body.xacro_child import main; main()"
 _answers: OrderedDict[XacroRequest, KeptAnswer] = OrderedDict()
 
 
@@ -160,11 +169,7 @@ def _digest(path: str) -> str:
     """Return a digest of what a file or folder contains; none for what cannot be read."""
     try:
         is_folder = os.path.isdir(path)
-        data = (
-            "\0".join(sorted(os.listdir(path))).encode()
-            if is_folder
-            else read_regular(Path(path), _XACRO_ANSWERS_LARGEST)
-        )
+        data = "\0".join(sorted(os.listdir(path))).encode() if is_folder else read_regular(Path(path), _LARGEST_READ)
         return xxh3_128_hexdigest(data)
     except OSError:
         return ""
@@ -199,21 +204,6 @@ def _split(output: bytes) -> Iterator[bytes]:
         end = 8 + int.from_bytes(output[:8], "little")
         yield output[8:end]
         output = output[end:]
-
-
-NOT_EXPANDED = kind("RBX2007")
-_NAMESPACE = "http://www.ros.org/wiki/xacro"
-_UNKNOWN = (
-    (re.compile(r"unknown macro name: (?:xacro:)?(\w+)"), "macro", "macros"),
-    (re.compile(r"name '(\w+)' is not defined"), "property", "properties"),
-    (re.compile(r"Undefined substitution argument (\w+)"), "arg", "arguments"),
-)
-"""What an error of xacro says of a name, the element that declares such names, and what they are called."""
-_XACRO_LARGEST = 1_000_000  # [B] of a file whose names are proposed
-_PLACES = re.compile(rf' {PLACE}="[^"]*"')
-
-
-NO_ARGUMENT = kind("RBX2020", Severity.WARNING, is_fixable=True)
 
 
 @dataclass(frozen=True, slots=True)

@@ -35,6 +35,12 @@ _CLOSED = {"origin", "mass", "inertia", "box", "cylinder", "capsule", "sphere", 
            "collision_checking", "contact_coefficients", "robot", "gazebo", "transmission", "sensor", "ros2_control",
            "model_state", "group", "gripper_state"}  # fmt: skip
 """Tags that are no calls whatever macros there are; what is in them belongs to others, such as a simulator."""
+ELEMENTS = 50_000  # of one file
+OUTPUT = 8_000_000  # [bytes] of expanded text
+FILE = 2_000_000  # [bytes] of one file
+XACRO_CHILD_DEPTH = 16  # of files that include each other
+TOO_MUCH = "it needs more memory or deeper macros than a description may"
+_CLASS = re.compile(r"^<class '[^']*'>: ")  # what xacro writes before some messages
 
 
 class BareTags:
@@ -95,9 +101,6 @@ def _tag(element: Any) -> BareTag:
     return BareTag(int(line), int(column), element.tagName, element.closed)
 
 
-ELEMENTS = 50_000  # of one file
-
-
 class RefusedXmlError(ValueError):
     """Raised at what a description may not have, with line and column as the parser's own errors have them."""
 
@@ -144,13 +147,6 @@ class LocatedXml(expatbuilder.ExpatBuilderNS):
     def _refuse(self, message: str) -> NoReturn:
         parser = self.getParser()
         raise RefusedXmlError(message, parser.CurrentLineNumber, parser.CurrentColumnNumber)
-
-
-OUTPUT = 8_000_000  # [bytes] of expanded text
-FILE = 2_000_000  # [bytes] of one file
-XACRO_CHILD_DEPTH = 16  # of files that include each other
-TOO_MUCH = "it needs more memory or deeper macros than a description may"
-_CLASS = re.compile(r"^<class '[^']*'>: ")  # what xacro writes before some messages
 
 
 class _Expansion:

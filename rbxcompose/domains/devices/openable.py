@@ -1,4 +1,4 @@
-"""Whether the serial ports that a robot will open can be opened on this machine, told before anything starts."""
+"""Whether the serial ports that a robot will open can be opened on this machine, checked before anything starts."""
 
 from __future__ import annotations
 

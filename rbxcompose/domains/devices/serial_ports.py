@@ -25,6 +25,13 @@ LOST = kind("RBX2205")
 NO_USB_DEVICE = kind("RBX2251")
 TWO_USB_DEVICES = kind("RBX2252")
 SLOW_ADAPTER = kind("RBX2206", Severity.WARNING)
+ROOT = Path("/")
+_TTYS = ("*:*/tty/tty*", "*:*/*/tty/tty*")  # below a device: of a modem (ttyACM), of a converter (ttyUSB)
+_LONGEST = 300  # characters of a port as it is shown
+_ONBOARD = ("ttyAMA", "ttyTHS", "ttymxc")
+_LINKS = ("dev/serial/by-id", "dev/serial/by-path", "dev")
+_MOST = 4096  # entries of a folder that are looked at
+_ATTRIBUTE = 4096  # [B], the longest that the kernel shows
 
 
 class PortError(Exception):
@@ -39,7 +46,7 @@ class PortError(Exception):
         self.help = help or self.help
 
     def finding(self, span: Span | None = None) -> Finding:
-        """Return what to tell a person."""
+        """Return the message for people."""
         return self.kind.at(span, f"{plain(self.path)} {plain(self.problem)}", help=self.help)
 
 
@@ -100,15 +107,6 @@ def slow_adapter(path: str, latency: float | None, span: Span | None = None) -> 
     return SLOW_ADAPTER.at(span, words, help=f"{now}; to keep it, in /etc/udev/rules.d/99-servos.rules: {_RULE}")
 
 
-ROOT = Path("/")
-_TTYS = ("*:*/tty/tty*", "*:*/*/tty/tty*")  # below a device: of a modem (ttyACM), of a converter (ttyUSB)
-_LONGEST = 300  # characters of a port as it is shown
-_ONBOARD = ("ttyAMA", "ttyTHS", "ttymxc")
-_LINKS = ("dev/serial/by-id", "dev/serial/by-path", "dev")
-_MOST = 4096  # entries of a folder that are looked at
-_ATTRIBUTE = 4096  # [B], the longest that the kernel shows
-
-
 @dataclass(frozen=True, slots=True)
 class SerialPort:
     """A serial port: its file, such as `/dev/ttyUSB0`, its names that stay, its USB device, if it is one.
@@ -151,7 +149,7 @@ def serial_ports(root: Path = ROOT) -> list[SerialPort]:
 
 
 def _names(root: Path) -> Mapping[str, Sequence[str]]:
-    """Return the links to serial ports by the paths where they lead; those that tell the device come first."""
+    """Return the links to serial ports by the paths where they lead; those that name the device come first."""
     found: dict[str, list[str]] = {}
     for folder in _LINKS:
         for link in _entries(root / folder):
@@ -226,20 +224,20 @@ def port_path(name: str, root: Path = ROOT) -> str:
 def port_of(wanted: UsbDevice, ports: Iterable[SerialPort]) -> SerialPort:
     """Return the port of a device among those that are connected; raise as `port_path` does.
 
-    What the kernel tells of devices decides. A link with the name of the device (that of a udev rule) decides among
-    several that are meant, and where the kernel tells nothing, as in containers.
+    What the kernel reports decides. A link with the name of the device (that of a udev rule) decides among
+    several that are meant, and where the kernel reports nothing, as in containers.
     """
     ports = list(ports)
     usb = [port for port in ports if port.device]
-    meant = [port for port in usb if port.device and port.device.is_meant_by(wanted)]
+    matching = [port for port in usb if port.device and port.device.matches(wanted)]
     linked = [port for port in ports if wanted.name and port.is_linked(wanted.name)]
-    if len(meant) != 1:
-        meant = [port for port in linked if port in meant or not (meant or port.device)] or meant
-    if not meant:
+    if len(matching) != 1:
+        matching = [port for port in linked if port in matching or not (matching or port.device)] or matching
+    if not matching:
         raise NoDeviceError(wanted.called, "is not connected", connected(usb, "USB serial port"))
-    if len(meant) > 1:
-        raise DeviceNotUniqueError(wanted.called, f"has {len(meant)} ports", connected(meant, "USB serial port"))
-    return meant[0]
+    if len(matching) > 1:
+        raise DeviceNotUniqueError(wanted.called, f"has {len(matching)} ports", connected(matching, "USB serial port"))
+    return matching[0]
 
 
 def connected(ports: Sequence[SerialPort], what: str) -> str:

@@ -17,12 +17,29 @@ from rbxcompose.domains.devices.openable import LookAt
 from rbxcompose.domains.devices.serial_ports import FORBIDDEN, PortError, SerialPort, port_of
 from rbxcompose.domains.devices.usb import UsbDevice
 
+RULES = Path("etc/udev/rules.d")
+"""The folder of rules, below the root."""
+GROUP, MODE = "dialout", "0660"
+RELOAD = (
+    "sudo udevadm control --reload && "
+    "sudo udevadm trigger --action=add --subsystem-match=tty --subsystem-match=usb-serial"
+)
+"""The commands by which rules take effect for what is plugged in already."""
+_FTDI = "0403"
+_SPECIAL = "*?["  # in patterns
+_UNSURE = re.compile(r'[_"\\|]|[^\x20-\x7e]')  # udev writes `_` for others; no rule can have the rest
+NO_LINK = kind("RBX9413", Severity.WARNING)
+OTHER_RULES = kind("RBX9414", Severity.WARNING)
+SAME_SERIAL = kind("RBX9415", Severity.WARNING)
+NOT_IN_GROUP = kind("RBX9416", Severity.WARNING)
+OTHER_LINK = kind("RBX9417")
+
 
 def names_of(port: SerialPort, named: Iterable[UsbDevice]) -> list[str]:
-    """Return the names that mean a port: by its device, or by a link if the kernel tells no device."""
+    """Return the names that mean a port: by its device, or by a link if the kernel reports no device."""
     if port.device is None:
         return [device.name for device in named if port.is_linked(device.name)]
-    return [device.name for device in named if port.device.is_meant_by(device)]
+    return [device.name for device in named if port.device.matches(device)]
 
 
 def proposed(port: SerialPort, ports: Sequence[SerialPort]) -> Mapping[str, str]:
@@ -43,30 +60,17 @@ def proposed(port: SerialPort, ports: Sequence[SerialPort]) -> Mapping[str, str]
 
 def _alike(keys: Mapping[str, str], others: Iterable[UsbDevice]) -> list[UsbDevice]:
     wanted = UsbDevice(keys["vendor"], keys["product"], keys.get("serial", ""), keys.get("usb_port", ""))
-    return [other for other in others if other.is_meant_by(wanted)]
+    return [other for other in others if other.matches(wanted)]
 
 
 def same_serials(ports: Iterable[SerialPort]) -> list[list[SerialPort]]:
-    """Return groups of ports of different devices that tell the same serial number, as cheap copies do."""
+    """Return groups of ports of different devices that report the same serial number, as cheap copies do."""
     groups: dict[UsbDevice, dict[str, SerialPort]] = defaultdict(dict)
     for port in ports:
         if port.device is not None and port.device.serial:
             kind = UsbDevice(port.device.vendor, port.device.product, port.device.serial)
             groups[kind].setdefault(port.device.usb_port, port)
     return [list(group.values()) for group in groups.values() if len(group) > 1]
-
-
-RULES = Path("etc/udev/rules.d")
-"""The folder of rules, below the root."""
-GROUP, MODE = "dialout", "0660"
-RELOAD = (
-    "sudo udevadm control --reload && "
-    "sudo udevadm trigger --action=add --subsystem-match=tty --subsystem-match=usb-serial"
-)
-"""The commands by which rules take effect for what is plugged in already."""
-_FTDI = "0403"
-_SPECIAL = "*?["  # in patterns
-_UNSURE = re.compile(r'[_"\\|]|[^\x20-\x7e]')  # udev writes `_` for others; no rule can have the rest
 
 
 def rules_file(robot: str) -> Path:
@@ -106,13 +110,6 @@ def _parent(device: UsbDevice) -> Iterator[str]:
 def _escaped(text: str) -> str:
     """Return a text as a pattern that fits it alone, with `?` for any one sign that is not sure."""
     return "".join("?" if _UNSURE.match(sign) else f"[{sign}]" if sign in _SPECIAL else sign for sign in text)
-
-
-NO_LINK = kind("RBX9413", Severity.WARNING)
-OTHER_RULES = kind("RBX9414", Severity.WARNING)
-SAME_SERIAL = kind("RBX9415", Severity.WARNING)
-NOT_IN_GROUP = kind("RBX9416", Severity.WARNING)
-OTHER_LINK = kind("RBX9417")
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,7 +160,7 @@ def device_answers(
     for group in same_serials(ports):
         places = ", ".join(serial_port.path for serial_port in group)
         serial = group[0].device.serial if group[0].device else ""
-        words = f"{len(group)} adapters tell the same serial number '{plain(serial)}': {places}"
+        words = f"{len(group)} adapters report the same serial number '{plain(serial)}': {places}"
         yield SAME_SERIAL.at(None, words, help="name them by 'usb_port' instead of 'serial'")
     if not named:
         yield "the robot has no devices"

@@ -69,7 +69,7 @@ class UsbDevice:
         """Return what an error calls it."""
         return f"the device '{self.name}' ({self.shown})" if self.name else f"the USB device {self.shown}"
 
-    def is_meant_by(self, wanted: UsbDevice) -> bool:
+    def matches(self, wanted: UsbDevice) -> bool:
         """Tell whether it is the wanted device, of which something may be left open."""
         return (
             wanted.vendor.casefold() in ("", self.vendor.casefold())

@@ -31,6 +31,16 @@ from rbxcompose.sdk.component import Component
 from rbxcompose.sdk.ports import Out
 
 REPORTS = 1.0  # [s] between two reports of a component's status
+_OF_ITEMS = ("match", "expected", "strip_prefix", "discard_stale", "count")
+_OF_LEVELS = ("debounce", "latch", "suppressed_by")
+_WITHOUT_EFFECT = {
+    "generic": ("analyzers",),
+    "group": (*_OF_ITEMS, "timeout"),
+    "other": ("match", "expected", "strip_prefix", "discard_stale", "analyzers"),
+    "ignore": ("timeout", "discard_stale", "count", "path", "analyzers", *_OF_LEVELS),
+    "discard": ("timeout", "discard_stale", "count", "path", "analyzers", *_OF_LEVELS),
+}
+_MOST_COMPARED = 200_000  # of patterns with names
 
 
 @check("RBX5005")
@@ -113,17 +123,6 @@ def expected_rate(robot: Robot) -> Iterator[Finding]:
             )
 
 
-_OF_ITEMS = ("match", "expected", "strip_prefix", "discard_stale", "count")
-_OF_LEVELS = ("debounce", "latch", "suppressed_by")
-_WITHOUT_EFFECT = {
-    "generic": ("analyzers",),
-    "group": (*_OF_ITEMS, "timeout"),
-    "other": ("match", "expected", "strip_prefix", "discard_stale", "analyzers"),
-    "ignore": ("timeout", "discard_stale", "count", "path", "analyzers", *_OF_LEVELS),
-    "discard": ("timeout", "discard_stale", "count", "path", "analyzers", *_OF_LEVELS),
-}
-
-
 @check("RBX5010")
 def idle_analyzer_key(robot: Robot) -> Iterator[Finding]:
     """A key of an analyzer has no effect."""
@@ -197,12 +196,12 @@ def suppression(robot: Robot) -> Iterator[Finding]:
         if name is None:
             continue
         place = robot.value("diagnostics", "analyzers", *_keys(path), "suppressed_by")
-        meant = _meant(groups, path, name)
-        if meant is None:
+        target = _target(groups, path, name)
+        if target is None:
             known = {one[-1] for one in groups if one[:-1] == path[: len(one) - 1] and one != path[: len(one)]}
             message = f"there is no group '{name}' beside '{path[-1]}' or above it"
             yield suppression.misspelt(place, message, name, known, "groups there")
-        elif circle := _circle(groups, path, meant):
+        elif circle := _circle(groups, path, target):
             names = " -> ".join(f"'{group_path[-1]}'" for group_path in (path, *circle))
             yield suppression.at(place, f"the level of '{path[-1]}' would depend on itself: {names}", help="omit it")
 
@@ -218,7 +217,7 @@ def _keys(path: GroupPath) -> list[str]:
     return [key for name in path[:-1] for key in (name, "analyzers")] + [path[-1]]
 
 
-def _meant(groups: Mapping[GroupPath, AnalyzerModel], path: GroupPath, name: str) -> GroupPath | None:
+def _target(groups: Mapping[GroupPath, AnalyzerModel], path: GroupPath, name: str) -> GroupPath | None:
     """Return the group that a name means for another one: the nearest one beside it or beside what is above it."""
     places = ((*path[:length], name) for length in range(len(path) - 1, -1, -1))
     return next((place for place in places if place in groups), None)
@@ -239,8 +238,8 @@ def _circle(groups: Mapping[GroupPath, AnalyzerModel], start: GroupPath, first: 
             return found
         below = [candidate for candidate in groups if candidate[:-1] == path]
         by = groups[path].suppressed_by
-        meant = _meant(groups, path, by) if by is not None else None
-        for group_path in (*below, *([meant] if meant is not None else [])):
+        target = _target(groups, path, by) if by is not None else None
+        for group_path in (*below, *([target] if target is not None else [])):
             if group_path not in way:
                 way[group_path] = path
                 waiting.append(group_path)
@@ -280,17 +279,14 @@ def _may_watch(component: RobotComponent) -> bool:
     return any(code is not None and "watch" in code.co_names for code in codes)
 
 
-_MOST_COMPARED = 200_000  # of patterns with names
-
-
 @check("RBX5001", is_fixable=True, closed=(NAMES,))
 def unmatched_analyzer(robot: Robot) -> Iterator[Finding]:
     """A pattern of an analyzer matches no component."""
     there = {*robot.components, *robot.written, *robot.brought}
     known = {name for name in there if name.isidentifier()}
-    meant = {
+    named_elsewhere = {
         re.sub(r"\W+", by, name) for name in there - known for by in ("", "_")
-    }  # names that are told where they stand
+    }  # names that are reported where they stand
     compared = 0
     for path, analyzer in each_analyzer(robot.manifest.contents.of(diagnostics).analyzers):
         patterns = [
@@ -305,7 +301,7 @@ def unmatched_analyzer(robot: Robot) -> Iterator[Finding]:
             wanted = component_of(pattern)  # which details it has shows only while it runs
             tried = () if wanted in known or not is_glob(wanted) else known
             compared += len(tried)
-            if wanted not in known | meant and not any(fits(wanted, component) for component in tried):
+            if wanted not in known | named_elsewhere and not any(fits(wanted, component) for component in tried):
                 yield unmatched_analyzer.misspelt(
                     place,
                     f"analyzer '{path[-1]}' matches no component with '{pattern}'",
@@ -323,8 +319,14 @@ def unseen_component(robot: Robot) -> Iterator[Finding]:
     groups = [model for _, model in each_analyzer(settings.analyzers)]
     named_conditions = [condition for group in groups for condition in (*group.conditions, *group.expected)]
     lost = taken_out(robot)
-    meant = (name for name, step in lost.items() if isinstance(step.node, SequenceNode) and step.node.tag == REPLACE)
-    named = {*dropped(robot), *meant, *(condition for condition in named_conditions if isinstance(condition, str))}
+    named_elsewhere = (
+        name for name, step in lost.items() if isinstance(step.node, SequenceNode) and step.node.tag == REPLACE
+    )
+    named = {
+        *dropped(robot),
+        *named_elsewhere,
+        *(condition for condition in named_conditions if isinstance(condition, str)),
+    }
     for name in robot.written - named if groups else ():
         is_left = not any(fits(condition, name) for condition in settings.ignore) and not any(
             matches(g, name) for g in groups

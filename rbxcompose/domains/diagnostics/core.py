@@ -27,6 +27,11 @@ from rbxcompose.msgs.diagnostic_msgs import DiagnosticStatus, KeyValue
 MOST_ITEMS = 10_000
 LONGEST_NAME = 256  # characters
 MOST_TEXT = 8_192  # characters of a status; ten thousand of these are 80 MB
+OK, WARN, ERROR, STALE = Level
+FAILED = (ERROR, STALE)
+MOST_CHANGES = 1000
+_LONGEST = 200  # characters of a cause
+_FLOORS = {"warn": Level.WARN, "error": Level.ERROR}
 
 
 class Admission:
@@ -72,17 +77,13 @@ def _reason(name: str, known: int) -> str:
     return f"there are {MOST_ITEMS:,} statuses: further names are left out" if known >= MOST_ITEMS else ""
 
 
-OK, WARN, ERROR, STALE = Level
-FAILED = (ERROR, STALE)
-
-
 class Item:
     """The latest status under a name; `status` is None until one has been received."""
 
-    __slots__ = ("cause", "heard", "is_own", "is_plain", "level", "members", "name", "status")
+    __slots__ = ("cause", "is_own", "is_plain", "level", "members", "name", "received_at", "status")
 
-    def __init__(self, name: str, heard: float, *, is_own: bool) -> None:
-        self.name, self.heard, self.is_own = name, heard, is_own
+    def __init__(self, name: str, received_at: float, *, is_own: bool) -> None:
+        self.name, self.received_at, self.is_own = name, received_at, is_own
         self.status: DiagnosticStatus | None = None
         self.level = 0  # that of the status, as it came
         self.cause = ""  # why the part is lost; empty if it is not
@@ -104,12 +105,12 @@ class GroupItem:
     def level_at(self, now: float) -> Level:
         """Return the level of the item in the tree at `now` [s]."""
         item, timeout = self.item, self.group.analyzer.timeout
-        if item.cause or (timeout and now - item.heard > timeout):
+        if item.cause or (timeout and now - item.received_at > timeout):
             return STALE
         return Level(item.level) if OK <= item.level <= STALE else ERROR
 
     def message(self) -> str:
-        """Return what the item tells, or why it is STALE."""
+        """Return what the item reports, or why it is STALE."""
         item, status = self.item, self.item.status
         if item.cause:
             return item.cause
@@ -118,7 +119,7 @@ class GroupItem:
                 return "has not reported yet"
             return status.message if OK <= item.level <= STALE else f"level {item.level} is unknown: {status.message}"
         last = f", last: {status.message}" if status and status.message else ""
-        return f"silent since {item.heard:.1f} s{last}" if status else "never reported"
+        return f"silent since {item.received_at:.1f} s{last}" if status else "never reported"
 
     def shown(self) -> DiagnosticStatus:
         """Return the item as it is in the tree."""
@@ -148,14 +149,14 @@ class Group:
         self.counts = [0, 0, 0, 0]
         self.index = 0
         self.level = OK
-        self.message = "OK"  # of the header, as of the last `tell`
+        self.message = "OK"  # of the header, as of the last `update_message`
         self.is_visible = True
         self.counted: Level | None = None  # as what its parent counts it
         self.is_classic = False
         self.floor = OK  # the least level with items that are not the robot's own
         self._now = OK  # the level of the last update without delay or latch
         self.latched_at = math.inf
-        self._latched = ""  # what there was to tell when the level was latched
+        self._latched = ""  # the message when the level was latched
         self.check_at = math.inf  # [s], after which time alone may change it
         self.is_urgent = False  # a level counts at once, whatever `debounce` says
         self.had_items = False
@@ -176,7 +177,7 @@ class Group:
         self.counts[OK] += 1
         self.had_items = True
         self._order = None
-        self.check_at = min(self.check_at, item.heard + (self.analyzer.timeout or math.inf))
+        self.check_at = min(self.check_at, item.received_at + (self.analyzer.timeout or math.inf))
         return member
 
     def drop(self, member: GroupItem, now: float) -> None:
@@ -288,11 +289,11 @@ class Group:
             self.check_at = min(self.check_at, self._leaving + hold)
         self.is_urgent = False
         if self.level is not before:
-            self.tell(now)
+            self.update_message(now)
         return self.level is not before
 
-    def tell(self, now: float) -> None:
-        """Put what there is to tell at `now` into `message`."""
+    def update_message(self, now: float) -> None:
+        """Put what there is to report at `now` into `message`."""
         present, cause = self.present(now), self.cause(now)
         is_better = self.rank(present) < self.rank(self.level)
         if present is self.level:
@@ -330,16 +331,12 @@ class Group:
             self.latched_at = math.inf
 
     def shown(self) -> DiagnosticStatus:
-        """Return the header, with what each item and group below it tells."""
+        """Return the header, with what each item and group below it reports."""
         items = tuple(KeyValue(member.item.name, member.message()) for member in self.sorted_members)
         groups = tuple(
             KeyValue(child.analyzer.path or child.key[-1], child.message) for child in self.children if child.is_visible
         )
         return DiagnosticStatus(int(self.level), self.path, self.message, values=items + groups)
-
-
-MOST_CHANGES = 1000
-_LONGEST = 200  # characters of a cause
 
 
 @dataclass(frozen=True, slots=True)
@@ -368,9 +365,6 @@ class LevelHistory:
         """Return the changes with greater numbers that are still known, oldest first; all if there never was one."""
         known = min(self.count - (number if number <= self.count else 0), len(self._changes))
         return list(self._changes)[len(self._changes) - known :] if known > 0 else []
-
-
-_FLOORS = {"warn": Level.WARN, "error": Level.ERROR}
 
 
 class GroupLayout:
@@ -485,7 +479,7 @@ class Aggregator:
             item = items.get(status.name)
             if item is None and (item := self._new(status, now)) is None:
                 continue
-            item.status, item.heard = self.admission.fitted(status), now
+            item.status, item.received_at = self.admission.fitted(status), now
             if status.level != item.level or not item.is_plain:
                 item.level, item.cause = status.level, ""
                 self._follow(item, now)
@@ -533,7 +527,7 @@ class Aggregator:
     def report(self, now: float) -> tuple[TreeRow, ...]:
         """Return the tree: the header of each group, followed by its items by name and the groups below it."""
         for group in self._layout.groups:
-            group.tell(now)
+            group.update_message(now)
         return tuple(row for top in self._layout.tops() for row in _rows(top, 0))
 
     def take_over(self, old: Aggregator, now: float) -> None:
@@ -542,8 +536,13 @@ class Aggregator:
         for name, before in old._items.items():
             if before.status is None and not before.cause:
                 continue
-            item = self._items.get(name) or self._entered(name, before.heard)
-            item.status, item.heard, item.level, item.cause = before.status, before.heard, before.level, before.cause
+            item = self._items.get(name) or self._entered(name, before.received_at)
+            item.status, item.received_at, item.level, item.cause = (
+                before.status,
+                before.received_at,
+                before.level,
+                before.cause,
+            )
             self._follow(item, now)
         self.history = old.history  # in which what is known already is no change
         there = {group.key: group for group in old._layout.groups}
@@ -590,7 +589,7 @@ class Aggregator:
                 self._move(member, level, now)
             item.is_plain = item.is_plain and level == item.level
             if (timeout := member.group.analyzer.timeout) and not item.cause:
-                member.group.check_at = min(member.group.check_at, item.heard + timeout)
+                member.group.check_at = min(member.group.check_at, item.received_at + timeout)
                 self._check_at = min(self._check_at, member.group.check_at)
             if member.group.is_urgent:
                 self._touch(member.group)
@@ -627,8 +626,8 @@ class Aggregator:
             if level is not member.level:
                 self._move(member, level, now)
                 item.is_plain = False
-            if now - item.heard <= timeout:
-                group.check_at = min(group.check_at, item.heard + timeout)
+            if now - item.received_at <= timeout:
+                group.check_at = min(group.check_at, item.received_at + timeout)
             elif shall_go and not (item.is_own or item.name in group.analyzer.expected):
                 self._leave(member, now)
         self._touch(group)

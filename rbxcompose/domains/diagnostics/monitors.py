@@ -17,6 +17,17 @@ from rbxcompose.sdk import Capability, Component, Config, Live, NeedsExtra, Rati
 
 C = TypeVar("C", bound=Config)
 NEEDS_PSUTIL = NeedsExtra(Setting("psutil"), Setting("monitors"))
+FOLDER = Path("/sys/class/power_supply")
+MICRO = 1e-6
+PORT = 123
+SIZE = 48  # [bytes] of a packet
+ERA = 2_208_988_800  # [s] from the beginning of NTP's time, 1900, to that of Unix
+_HEADER = struct.Struct("!BBbb11I")
+_CLIENT = 0x23  # version 4, mode 3
+_SERVER = 4  # mode
+_UNSYNCHRONISED = 3  # leap indicator
+_FRACTION = 2**32
+HYSTERESIS = 0.02  # of the share
 
 
 class HostMonitor(Component[C]):
@@ -34,10 +45,6 @@ class HostMonitor(Component[C]):
             self.measure(dt)
         else:
             self.status(Level.OK, "not measured: time is simulated")
-
-
-FOLDER = Path("/sys/class/power_supply")
-MICRO = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,18 +109,8 @@ def _text(folder: Path, name: str) -> str:
     try:
         with (folder / name).open(encoding="utf-8", errors="replace") as file:
             return file.read(64).strip()
-    except OSError:  # Linux shows only what the battery tells, and a battery may be taken out while it is read
+    except OSError:  # Linux shows only what the battery reports, and a battery may be taken out while it is read
         return ""
-
-
-PORT = 123
-SIZE = 48  # [bytes] of a packet
-ERA = 2_208_988_800  # [s] from the beginning of NTP's time, 1900, to that of Unix
-_HEADER = struct.Struct("!BBbb11I")
-_CLIENT = 0x23  # version 4, mode 3
-_SERVER = 4  # mode
-_UNSYNCHRONISED = 3  # leap indicator
-_FRACTION = 2**32
 
 
 class NoTimeError(Exception):
@@ -171,9 +168,6 @@ def _unix(seconds: int, fraction: int) -> float:
     # The first era ends in 2036; numbers of the next one are small.
     era = _FRACTION if seconds < _FRACTION // 2 else 0
     return era + seconds + fraction / _FRACTION - ERA
-
-
-HYSTERESIS = 0.02  # of the share
 
 
 @dataclass(frozen=True, slots=True)

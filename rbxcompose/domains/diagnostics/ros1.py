@@ -32,10 +32,10 @@ _FOREIGN = 'Unanalyzed items found in "Other"'
 
 @dataclass(frozen=True, slots=True)
 class HeardItem:
-    """The latest status of a name, with a known level; `heard` is robot time [s]."""
+    """The latest status of a name, with a known level; `received_at` is robot time [s]."""
 
     status: DiagnosticStatus
-    heard: float
+    received_at: float
 
     def shown(self, path: str, *, is_stale: bool) -> TreeRow:
         """Return it as an item below `path`."""
@@ -126,7 +126,7 @@ class Generic:
         timeout, rows, levels, values = self.analyzer.timeout, list[TreeRow](), list[int](), list[KeyValue]()
         for name in sorted(self.items):
             item = self.items[name]
-            is_stale = timeout > 0 and now - item.heard > timeout
+            is_stale = timeout > 0 and now - item.received_at > timeout
             if is_stale and self._discards:
                 del self.items[name]
                 continue
@@ -238,7 +238,7 @@ class AnalyzerGroup:
                 analyzer.take(item)
 
     def report(self, now: float) -> list[TreeRow]:
-        """Return what the analyzers tell, followed by the header, followed by the analyzers that are broken."""
+        """Return what the analyzers report, followed by the header, followed by the analyzers that are broken."""
         if not self.analyzers:
             status = DiagnosticStatus(int(ERROR), "/AnalyzerGroup" if self.path == "/" else self.path, "No analyzers")
             return [TreeRow(self.name or "AnalyzerGroup", _depth(self.path), is_group=True, status=status)]

@@ -16,6 +16,11 @@ LONGEST = 300  # characters of an expression
 MOST_REPEATS = 3
 _COUNTED = re.compile(r"\{\d*+(?:,\d*+)?+\}")
 _CLASS = re.compile(r"\[\^?+\]?+(?:\\.|[^\]\\])*+\]")
+DEFAULT_TIMEOUT = 5.0  # [s]
+OTHER = "Other"  # the group of statuses that no analyzer matches
+SHOWN = ("generic", "group", "other")  # types of analyzers that have a header in the tree
+_GLOB = re.compile(r"\*+([\w /-]+)\**")  # of a shell: `*camera*`
+_CONDITIONS_GLOB = frozenset("*?[")
 
 
 def fits_regex(text: str, name: str) -> bool:
@@ -70,14 +75,7 @@ def _slow(text: str) -> str:
     return f"it has more than {MOST_REPEATS} repeats, which could take long" if repeats > MOST_REPEATS else ""
 
 
-DEFAULT_TIMEOUT = 5.0  # [s]
-OTHER = "Other"  # the group of statuses that no analyzer matches
-SHOWN = ("generic", "group", "other")  # types of analyzers that have a header in the tree
-
 Pattern = Annotated[str, Refers(RUNNING, is_reported=True)]
-
-
-_GLOB = re.compile(r"\*+([\w /-]+)\**")  # of a shell: `*camera*`
 
 
 def _shape(value: object) -> str:
@@ -252,9 +250,6 @@ def each_analyzer(
     for name, analyzer in analyzers.items():
         yield (*above, name), analyzer
         yield from each_analyzer(analyzer.analyzers, (*above, name, "analyzers"))
-
-
-_CONDITIONS_GLOB = frozenset("*?[")
 
 
 def component_of(name: str) -> str:

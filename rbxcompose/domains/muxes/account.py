@@ -1,4 +1,4 @@
-"""What a mux tells about itself: who holds the output, who waits, and why."""
+"""What a mux reports about itself: who holds the output, who waits, and why."""
 
 from __future__ import annotations
 
@@ -87,9 +87,9 @@ def _are(names: Sequence[str]) -> str:
 
 
 def states_of(
-    core: Core, topics: Mapping[str, str], heard: Mapping[str, float], now: float, *, has_priorities: bool
+    core: Core, topics: Mapping[str, str], received_at: Mapping[str, float], now: float, *, has_priorities: bool
 ) -> tuple[MuxInputState, ...]:
-    """Return all inputs; `heard` tells when each was last heard."""
+    """Return all inputs; `received_at` has the time of the last message of each."""
     return tuple(
         MuxInputState(
             name,
@@ -97,7 +97,7 @@ def states_of(
             input_.priority if has_priorities else None,
             *state_of(core, name, now),
             _finite(core.live_until(name)) if core.is_live(name, now) else None,
-            now - heard[name] if name in heard else None,
+            now - received_at[name] if name in received_at else None,
         )
         for name, input_ in core.inputs.items()
     )

@@ -22,6 +22,11 @@ from rbxcompose.missions.analysis.effects import published
 from rbxcompose.sdk.capabilities import Drives, Forwards, Setting
 from rbxcompose.sdk.ports import In, Looks, Out, Qos
 
+_MOST_SHOWN = 8  # inputs that are pointed at
+ENDINGS = ("on_idle", "on_lock")
+LONGEST = 60.0  # [s]: commands come many times a second
+TYPE = "message"  # the setting of those whose type is chosen
+
 
 @check("RBX3130")
 def mux_heartbeat(robot: Robot) -> Iterator[Finding]:
@@ -267,9 +272,6 @@ def mux_type(robot: Robot) -> Iterator[Finding]:
                     )
 
 
-_MOST_SHOWN = 8  # inputs that are pointed at
-
-
 @check("RBX3133", Severity.WARNING)
 def mux_unreached(robot: Robot) -> Iterator[Finding]:
     """An input of a mux never gets through."""
@@ -317,9 +319,6 @@ def _meaningless(entry: MuxModel) -> Iterator[tuple[str, ...]]:
             ("inputs", name, "priority") for name, mux_input in entry.inputs.items() if mux_input.priority is not None
         )
         yield from (("locks", name, "priority") for name, lock in entry.locks.items() if lock.priority is not None)
-
-
-ENDINGS = ("on_idle", "on_lock")
 
 
 @check("RBX3514", Severity.WARNING, closed=(WIRING,))
@@ -388,9 +387,6 @@ def lock_timeout(robot: Robot) -> Iterator[Finding]:
                     )
 
 
-LONGEST = 60.0  # [s]: commands come many times a second
-
-
 @check("RBX3108", Severity.WARNING, closed=(WIRING, NAMES))
 def long_timeout(robot: Robot) -> Iterator[Finding]:
     """An input of a mux stays live long after its source fell silent."""
@@ -415,7 +411,7 @@ def no_take_over(robot: Robot) -> Iterator[Finding]:
         driving = {name: rank for name, rank in ranks.items() if entry.inputs[name].source}
         open_ones = [name for name in ranks if name not in driving]
         if any(rank <= max(driving.values(), default=0) for rank in entry.lock_ranks.values()):
-            continue  # told as RBX3110
+            continue  # reported as RBX3110
         if open_ones and driving and max(ranks[name] for name in open_ones) < min(driving.values()):
             best = max(open_ones, key=lambda name: ranks[name])
             first = min(driving, key=lambda name: driving[name])
@@ -457,7 +453,7 @@ def past_the_mux(robot: Robot) -> Iterator[Finding]:
             if muxes and end.instance not in muxes and isinstance(end.port, In) and end.port.qos is Qos.COMMAND:
                 mux, own = robot.components[inputs[0].instance], inputs[0]
                 if own.topic in {port_end.topic for port_end in mux.ends if isinstance(port_end.port, Out)}:
-                    continue  # the mux takes what it writes itself, which is told there
+                    continue  # the mux takes what it writes itself, which is reported there
                 yield past_the_mux.at(
                     robot.end_span(end),
                     f"'{end.instance}' subscribes to '{topic}', bypassing the mux '{mux.name}'",
@@ -491,9 +487,6 @@ def taken_twice(robot: Robot) -> Iterator[Finding]:
                     help="remove one of the two",
                     related=[Related(robot.value("muxes", other[0], "inputs", other[1], "from"), "taken here")],
                 )
-
-
-TYPE = "message"  # the setting of those whose type is chosen
 
 
 @check("RBX3002", closed=(WIRING,))

@@ -20,6 +20,9 @@ M = TypeVar("M")
 
 QUIET = 0.5  # [s] of silence after which an input without a timeout counts as come to rest
 NEVER = math.inf
+VELOCITIES = (Twist.TYPE, TwistStamped.TYPE)
+"""Types whose zero is rest by their definition. A zero position, pose or flag is a command like any other."""
+AXES = ("x", "y", "z")
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,10 +83,6 @@ class MuxEndings:
     """When its source has fallen silent and no other is live."""
     on_lock: float = 0.0
     """When its source was locked out."""
-
-
-VELOCITIES = (Twist.TYPE, TwistStamped.TYPE)
-"""Types whose zero is rest by their definition. A zero position, pose or flag is a command like any other."""
 
 
 def zeroed(message: Message) -> Message:
@@ -156,7 +155,7 @@ class MuxLocks:
         self._is_on |= {name: is_on for name, is_on in old._is_on.items() if name in self.declared}
         self.by_hand |= {name: until for name, until in old.by_hand.items() if name in inputs}
 
-    def heard(self, name: str, now: float, *, is_on: bool) -> None:
+    def received(self, name: str, now: float, *, is_on: bool) -> None:
         """Receive a heartbeat, or a flag.
 
         Raises:
@@ -220,7 +219,7 @@ class Arbiter(ABC):
     def holder(self, free: Sequence[str], sources: Sources) -> str | None:
         """Return which of the free inputs, in their written order, is let through."""
 
-    def heard(self, name: str, free: Sequence[str], sources: Sources) -> None:  # noqa: B027 - most do not care
+    def received(self, name: str, free: Sequence[str], sources: Sources) -> None:  # noqa: B027 - most do not care
         """Note that an input has sent a message, and is now among the free ones or not."""
 
     @abstractmethod
@@ -268,7 +267,7 @@ class AsYocs(Arbiter):
     def __init__(self) -> None:
         self._allowed: str | None = None
 
-    def heard(self, name: str, free: Sequence[str], sources: Sources) -> None:
+    def received(self, name: str, free: Sequence[str], sources: Sources) -> None:
         """Let a sender take the output if it is vacant, or held by one of a lower priority."""
         holder = self.holder(free, sources)
         if name in free and (holder is None or sources[name].priority > sources[holder].priority):
@@ -316,7 +315,7 @@ class ByLatest(Arbiter):
     def __init__(self) -> None:
         self._order: list[str] = []  # of the last messages; the newest is at the end
 
-    def heard(self, name: str, free: Sequence[str], sources: Sources) -> None:
+    def received(self, name: str, free: Sequence[str], sources: Sources) -> None:
         """Note the newest sender."""
         if name in self._order:
             self._order.remove(name)
@@ -334,9 +333,6 @@ class ByLatest(Arbiter):
         """Continue with the same order."""
         if isinstance(old, ByLatest):
             self._order = [name for name in old._order if name in names]
-
-
-AXES = ("x", "y", "z")
 
 
 def grown(last: float, wanted: float, most: float) -> float:
@@ -495,7 +491,7 @@ class MuxCore(Generic[M]):
         if is_zero and source.zero_releases:
             return self._let_go(name, message, now)
         self._live_until[name] = now + source.timeout
-        self.arbiter.heard(name, self._free(now), self.inputs)
+        self.arbiter.received(name, self._free(now), self.inputs)
         self._settle(now)
         return self._passed(name, message, now) if self._active == name else None
 
@@ -523,12 +519,12 @@ class MuxCore(Generic[M]):
 
     def heartbeat(self, lock: str, now: float) -> None:
         """Receive a heartbeat of `lock`: it blocks nothing until it has been silent for its timeout."""
-        self.locks.heard(lock, now, is_on=False)
+        self.locks.received(lock, now, is_on=False)
         self._settle(now)
 
     def flag(self, lock: str, is_on: bool, now: float) -> None:
         """Receive a flag of `lock`: it blocks while it is true."""
-        self.locks.heard(lock, now, is_on=is_on)
+        self.locks.received(lock, now, is_on=is_on)
         self._settle(now)
 
     # Time

@@ -23,6 +23,9 @@ from rbxcompose.missions.program.answers import NodeFlow
 from rbxcompose.missions.program.program import Interrupt, MissionNode, Program
 from rbxcompose.sdk.capabilities import Charges, Drains, Navigates, Setting, Warns
 
+_ABSURD = 1.0  # [m] of a tolerance, which is then what is wrong
+_LASTS = "how long a full battery lasts"
+
 
 @check("RBX4121")
 def charge_and_call(robot: Robot) -> Iterator[Finding]:
@@ -152,9 +155,6 @@ def _ends_of_loops(program: Program, call: ChargeInterrupt) -> Iterator[Asked]:
             yield from (asked for asked in node.asked[: node.own] if asked.is_watched)
 
 
-_ABSURD = 1.0  # [m] of a tolerance, which is then what is wrong
-
-
 @check("RBX3505", Severity.WARNING, closed=())
 def charger_reach(robot: Robot) -> Iterator[Finding]:
     """The robot may stop too far from its dock to be charged."""
@@ -216,9 +216,6 @@ def _is_dock(robot: Robot, mission: RobotMission, node: MissionNode) -> bool:
     return there is not None and there.name in docks
 
 
-_LASTS = "how long a full battery lasts"
-
-
 @check("RBX4124", Severity.WARNING)
 def empty_on_the_way(robot: Robot) -> Iterator[Finding]:
     """The battery may be empty before the robot reaches its dock."""
@@ -226,7 +223,7 @@ def empty_on_the_way(robot: Robot) -> Iterator[Finding]:
         ways, known = ways_of(robot, mission), constants(mission)
         if ways is None:
             continue
-        lost = {place.name for place in far_places(robot)}  # told as RBX3512
+        lost = {place.name for place in far_places(robot)}  # reported as RBX3512
         list(too_short(ways, known))  # consumed for its side effect: it walks the whole mission
         for call in calls(robot, mission):
             goals = (

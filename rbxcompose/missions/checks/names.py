@@ -171,7 +171,8 @@ def unknown_skill(mission: Examined) -> Iterator[findings.Finding]:
                     yield unknown_skill.at(node.span, message, help=help_text, about=[node.skill])
                     continue
                 if ours in kinds():
-                    fix = findings.replacement(node.span, node.skill, ours, is_safe=False)  # what is below may differ
+                    # what is below it may differ
+                    fix = findings.replacement(node.span, node.skill, ours, is_safe=False)
                     help_text = f"{findings.DID_YOU_MEAN} '{ours}'?"
                     yield unknown_skill.at(node.span, message, help=help_text, fix=fix, about=[node.skill])
                     continue

@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 
 from rbxcompose.commands.guest import Guest, add_server_verbs, visit, write_names
-from rbxcompose.commands.options import BUS
+from rbxcompose.commands.options import BUS, deferred
 
 ON_SYSTEM = BUS
 _VERB = ("send", "send a goal, print feedback and result")
@@ -17,7 +17,7 @@ _VERB = ("send", "send a goal, print feedback and result")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    add_server_verbs(parser, "action", _VERB, "goal", "/go_to", (_ls, _send))
+    add_server_verbs(parser, "action", _VERB, "goal", "/go_to", (_ls, deferred("rbxcompose.commands.messages", "send")))
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -27,9 +27,3 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _ls(guest: Guest, arguments: argparse.Namespace) -> int:
     return write_names(guest.graph().actions, ("servers", "clients"), arguments)
-
-
-def _send(guest: Guest, arguments: argparse.Namespace) -> int:
-    from rbxcompose.commands.messages import send  # the imports for messages would slow down the list
-
-    return send(guest, arguments)

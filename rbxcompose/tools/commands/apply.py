@@ -41,7 +41,7 @@ def run(arguments: argparse.Namespace) -> int:
     if path is None:
         return FINDINGS
     if is_system(path):
-        from rbxcompose.tools.apply_system import apply_system  # only needed for systems
+        from rbxcompose.tools.system_runs import apply_system  # only needed for systems
 
         return apply_system(path, arguments)
     if arguments.undo is not None:

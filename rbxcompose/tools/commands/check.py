@@ -31,6 +31,9 @@ from rbxcompose.manifest.tree import FILE_BYTES
 
 TEXT = "text"
 FOR_PEOPLE = (TEXT, "github")  # formats that may contain lines without a finding
+_KIND = re.compile(r"^[ \t]*+(?:[{,]\s*+|\{[^\n]*?,\s*+)?+['\"]?kind['\"]?\s*+:\s*+['\"]?(\w++)", re.MULTILINE)
+ROUNDS = 20  # one fix may reveal the next mistake
+_WORDS = 200  # characters of a title
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -132,9 +135,6 @@ def _whisper(text: str) -> None:
     sys.stderr.write(f"{text}\n")
 
 
-_KIND = re.compile(r"^[ \t]*+(?:[{,]\s*+|\{[^\n]*?,\s*+)?+['\"]?kind['\"]?\s*+:\s*+['\"]?(\w++)", re.MULTILINE)
-ROUNDS = 20  # one fix may reveal the next mistake
-_WORDS = 200  # characters of a title
 PrintLine = Callable[[str], None]
 
 

@@ -56,6 +56,12 @@ _FISH = r"""function __rbxcompose_complete
 end
 complete -c rbxcompose -f -a '(__rbxcompose_complete)'"""
 SCRIPTS = {"bash": _BASH, "zsh": _ZSH, "fish": _FISH}
+_GENERAL = ("--help", "--version")
+_BREAKS = re.compile(r".*[:=]", re.DOTALL)  # bash treats these as ends of words and replaces only what follows
+_SEVERAL = ("*", "+")
+PATIENCE = 0.3  # [s] in which the bus must answer; a person at the keyboard does not wait longer
+_MANIFESTS = (".yaml", ".yml")
+_BUS = {"TOPIC": "topics", "PATTERN": "topics", "SERVICE": "services", "ACTION": "actions"}  # attributes of the graph
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -67,11 +73,6 @@ def run(arguments: argparse.Namespace) -> int:
     """Print the script."""
     emit(SCRIPTS[arguments.shell])
     return 0
-
-
-_GENERAL = ("--help", "--version")
-_BREAKS = re.compile(r".*[:=]", re.DOTALL)  # bash treats these as ends of words and replaces only what follows
-_SEVERAL = ("*", "+")
 
 
 class CandidateValues(Protocol):
@@ -173,9 +174,6 @@ def _split(line: str) -> list[str]:
     return [""]
 
 
-PATIENCE = 0.3  # [s] in which the bus must answer; a person at the keyboard does not wait longer
-_MANIFESTS = (".yaml", ".yml")
-_BUS = {"TOPIC": "topics", "PATTERN": "topics", "SERVICE": "services", "ACTION": "actions"}  # attributes of the graph
 Tell = Callable[[BusPlace], Graph]
 
 

@@ -15,7 +15,7 @@ import time
 from rbxcompose.base.findings import Finding, Report
 from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, has_colour, refuse, write_report
 from rbxcompose.commands.formats.text import render_text
-from rbxcompose.commands.guest import Guest, HeardMessage
+from rbxcompose.commands.guest import Guest, ReceivedMessage
 from rbxcompose.commands.lookup import add_robot_option, find_robot, place_of, robots_up
 from rbxcompose.commands.messages import to_json
 from rbxcompose.commands.options import add_json_option
@@ -42,7 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Collect the facts, examine them, and report the results."""
     watch = machine.ClockWatch()
     try:
-        folders, path = _meant(arguments.robot or arguments.path)
+        folders, path = _addressed(arguments.robot or arguments.path)
     except NotDoneError as error:
         return refuse(error.finding)
     file = None if path is None else _described(path)
@@ -67,7 +67,7 @@ def run(arguments: argparse.Namespace) -> int:
     return FINDINGS if has_errors(answers) else 0
 
 
-def _meant(wanted: str | None) -> tuple[list[RobotFolder], str | None]:
+def _addressed(wanted: str | None) -> tuple[list[RobotFolder], str | None]:
     """Return the running robots, or the given file, whose robot need not run.
 
     Raises:
@@ -110,7 +110,7 @@ def _bus(folder: RobotFolder) -> BusFacts | None:
             nodes = {end.gid: end.node for topic in graph.topics for end in topic.givers}
             ages: dict[str, float] = {}
 
-            def heard(message: HeardMessage) -> None:
+            def receive(message: ReceivedMessage) -> None:
                 age = time.time() - (guest.clock.now() - message.time) - message.stamp / _NANOSECONDS
                 node = nodes.get(message.sender)
                 if node is not None and message.stamp:
@@ -118,7 +118,7 @@ def _bus(folder: RobotFolder) -> BusFacts | None:
 
             for topic in graph.topics:
                 if all(end.qos is not None and not end.qos.is_transient_local for end in topic.givers):
-                    guest.listen(topic, heard)
+                    guest.listen(topic, receive)
             guest.run(lambda: False, _LISTENING)
             return BusFacts(graph, ages)
     except NotDoneError:

@@ -23,7 +23,10 @@ from rbxcompose.missions.execution.requests import MISSION
 
 NO_LABEL = kind("RBX6130")
 _COLUMNS = ("robot", "host", "state", "mission", "battery")
-ShareFacts = tuple[str, str, dict[str, Any]]  # robot, host, and what `top` tells of the share, or its `state` alone
+ShareFacts = tuple[
+    str, str, dict[str, Any]
+]  # robot, host, and what `top` reports about the share, or its `state` alone
+_UP = "up"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -128,9 +131,6 @@ class Fleet:
     def follow(self, options: Sequence[str]) -> int:
         """Show the logs of all."""
         return hosts.follow_all(self.shares, lambda robot: ["logs", robot, *options])
-
-
-_UP = "up"
 
 
 def _facts(one: hosts.Running) -> dict[str, Any]:

@@ -43,7 +43,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.names and is_system(arguments.names[0]):
         return _of_system(arguments)
     try:
-        folder, names = _meant(arguments.robot, arguments.names)
+        folder, names = _addressed(arguments.robot, arguments.names)
         follower = Follower(folder.path / NAME)
         records = follower.read()
         sources = {record.source for record in records}
@@ -81,7 +81,7 @@ def _of_system(arguments: argparse.Namespace) -> int:
     return follow_all(shares, lambda robot: ["logs", robot, *names, *options])
 
 
-def _meant(robot: str | None, names: Sequence[str]) -> tuple[RobotFolder, Sequence[str]]:
+def _addressed(robot: str | None, names: Sequence[str]) -> tuple[RobotFolder, Sequence[str]]:
     """Return the folder of the robot and the names of components; the first name may be that of the robot.
 
     Raises:

@@ -14,7 +14,7 @@ from typing import TypeVar
 from rbxcompose.base.requests import Command, Query, Refused, to_data
 from rbxcompose.commands.console import NotDoneError, emit, refuse
 from rbxcompose.commands.lookup import REFUSED, WHICH, add_asking_options, answer_of, find_robot, pass_on
-from rbxcompose.commands.options import Declare, Subcommand, add_actions, argument, run_action
+from rbxcompose.commands.options import Declare, Subcommand, add_actions, argument, deferred, run_action
 from rbxcompose.missions.execution import requests
 
 A = TypeVar("A")
@@ -58,6 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         argument("--depth", type=int, default=30, metavar="N", help="most events on a path"),
         json_,
     )
+    files = "rbxcompose.tools.mission_files"
     table: tuple[tuple[str, str, Callable[[argparse.Namespace], int], tuple[Declare, ...]], ...] = (
         ("ls", "list the robot's missions with their states", _list, (add_asking_options,)),
         ("run", "start a mission beside those that run", _run, started),
@@ -67,10 +68,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ("status", "show where a mission is, with its data", _status, named),
         ("watch", "show a mission live", _watch, named),
         ("log", "print what missions did, as JSON, one line each", _log, logged),
-        ("replay", "run missions again from their log, and report the first difference", _replay, again),
-        ("show", "draw a mission; a running one with the states of its nodes", _show, drawn),
-        ("skills", "list the skills that missions may use on a robot", _skills, (robot, json_)),
-        ("explore", "look for dead ends by trying everything that may happen", _explore, explored),
+        (
+            "replay",
+            "run missions again from their log, and report the first difference",
+            deferred(files, "replay_log"),
+            again,
+        ),
+        ("show", "draw a mission; a running one with the states of its nodes", deferred(files, "show"), drawn),
+        ("skills", "list the skills that missions may use on a robot", deferred(files, "skills"), (robot, json_)),
+        ("explore", "look for dead ends by trying everything that may happen", deferred(files, "explore"), explored),
     )
     add_actions(parser, (Subcommand(name, words, do, own, words) for name, words, do, own in table), metavar="ACTION")
 
@@ -161,35 +167,11 @@ def _log(arguments: argparse.Namespace) -> int:
             news = ask(arguments.robot, requests.ReadLog(number))
             number = news.next
             for record in news.records:
-                is_meant = not arguments.name or record["mission"] == arguments.name
-                if is_meant and (arguments.all or record["event"] not in INPUTS):
+                is_wanted = not arguments.name or record["mission"] == arguments.name
+                if is_wanted and (arguments.all or record["event"] not in INPUTS):
                     emit(json.dumps(record))
             if not arguments.follow:
                 return 0
             time.sleep(_PERIOD)
     except KeyboardInterrupt:
         return 0
-
-
-def _replay(arguments: argparse.Namespace) -> int:
-    from rbxcompose.tools.mission_files import replay_log
-
-    return replay_log(arguments)
-
-
-def _show(arguments: argparse.Namespace) -> int:
-    from rbxcompose.tools.mission_files import show
-
-    return show(arguments)
-
-
-def _skills(arguments: argparse.Namespace) -> int:
-    from rbxcompose.tools.mission_files import skills
-
-    return skills(arguments)
-
-
-def _explore(arguments: argparse.Namespace) -> int:
-    from rbxcompose.tools.mission_files import explore
-
-    return explore(arguments)

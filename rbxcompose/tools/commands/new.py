@@ -31,11 +31,8 @@ from rbxcompose.compiler.model.mission_facts import navigator_of, top_speed
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.manifest.files import PREFIX, find, project_of, shown_name
 from rbxcompose.manifest.tree import FILE_BYTES
-from rbxcompose.tools.scaffold import robot
-from rbxcompose.tools.scaffold import robot as component
-from rbxcompose.tools.scaffold import robot as mission
-from rbxcompose.tools.scaffold import robot as part
-from rbxcompose.tools.scaffold.robot import MissionAnswers, with_entry
+from rbxcompose.tools import scaffold
+from rbxcompose.tools.scaffold import MissionAnswers, with_entry
 
 INTERRUPTED = 130
 _WIDEST = 4096  # characters per line, enough for any path
@@ -73,7 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         if what != "component":
             subparser.add_argument("--about", metavar="TEXT", help="what it is for, in a sentence")
     new_robot, new_mission = kinds.choices["robot"], kinds.choices["mission"]
-    new_robot.add_argument("--base", metavar="TYPE", help=f"the component that drives ({robot.BASE})")
+    new_robot.add_argument("--base", metavar="TYPE", help=f"the component that drives ({scaffold.BASE})")
     new_robot.add_argument(
         "--place", metavar="NAME=X,Y", action="append", help="a place to go to, besides the dock at 0,0"
     )
@@ -108,14 +105,14 @@ def _write(new: New) -> int:
 
 def _robot(arguments: argparse.Namespace, asker: Asker) -> New:
     name = read_name(arguments.name, "the robot")
-    about = asker.ask(ABOUT, read_text, robot.ABOUT, given=arguments.about)
-    base = asker.ask("Which component drives it?", robot.read_base, robot.BASE, given=arguments.base)
+    about = asker.ask(ABOUT, read_text, scaffold.ROBOT_ABOUT, given=arguments.about)
+    base = asker.ask("Which component drives it?", scaffold.read_base, scaffold.BASE, given=arguments.base)
     if arguments.place is None:
         question = "Where can it go? Write one place, such as 'table=2,0' in metres from the dock, or nothing to go on"
-        places = tuple(asker.ask_several(question, robot.read_next_place)) or robot.PLACES
+        places = tuple(asker.ask_several(question, scaffold.read_next_place)) or scaffold.PLACES
     else:
-        places = robot.read_places(arguments.place)
-    files = robot.robot_files(robot.RobotAnswers(name, about, base, places))
+        places = scaffold.read_places(arguments.place)
+    files = scaffold.robot_files(scaffold.RobotAnswers(name, about, base, places))
     path = shown_name(arguments.into / f"robots/{name}")
     then = (
         f"rbxcompose check {path}",
@@ -131,16 +128,16 @@ def _test(arguments: argparse.Namespace, name: str) -> str:
 
 def _part(arguments: argparse.Namespace, asker: Asker) -> New:
     name = read_name(arguments.name, "the part")
-    about = asker.ask(ABOUT, read_text, part.ABOUT, given=arguments.about)
+    about = asker.ask(ABOUT, read_text, scaffold.PART_ABOUT, given=arguments.about)
     then = (f"include it in a robot, as parts/{name}.yaml shows", f"python -m pytest {_test(arguments, name)}")
-    return New(arguments.into, part.part_files(name, about), then)
+    return New(arguments.into, scaffold.part_files(name, about), then)
 
 
 def _component(arguments: argparse.Namespace, asker: Asker) -> New:
-    name = component.read_component_name(arguments.name)
+    name = scaffold.read_component_name(arguments.name)
     folder = shown_name(arguments.into / name)
     then = (f"python -m pip install -e {folder}", f"python -m pytest {folder}", f"use it in a robot: type: {name}")
-    return New(arguments.into, component.component_files(name), then)
+    return New(arguments.into, scaffold.component_files(name), then)
 
 
 def _mission(arguments: argparse.Namespace, asker: Asker) -> New:
@@ -160,7 +157,7 @@ def _mission(arguments: argparse.Namespace, asker: Asker) -> New:
         why = f"it could not be added to {file} safely; " if is_wanted else ""
         return [f"{why}write into {file}:", "  missions:", f"    {answers.name}: {answers.entry}"]
 
-    return New(home.project, mission.mission_files(answers), then, entry)
+    return New(home.project, scaffold.mission_files(answers), then, entry)
 
 
 _MAKERS: dict[str, Callable[[argparse.Namespace, Asker], New]] = {

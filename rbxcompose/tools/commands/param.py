@@ -9,9 +9,7 @@ Exit codes: 0 done, 1 refused (`diff`: there is a difference), 2 wrong usage.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
 from functools import partial
-from importlib import import_module
 from pathlib import Path
 
 from rbxcompose.commands import options
@@ -22,16 +20,6 @@ from rbxcompose.tools.parameters.nodes import ParameterNodes
 
 ON_SYSTEM = options.BUS
 _WITH_FILES = ("load", "save", "diff", "reset")
-
-
-def _home(module: str, action: str) -> Callable[[ParameterNodes, argparse.Namespace], int]:
-    """Return what carries an action out; it imports its module, since some need the compiler and others do not."""
-
-    def do(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
-        found = import_module(f"rbxcompose.tools.parameters.{module}")
-        return int(getattr(found, f"param_{action}")(nodes, arguments))
-
-    return do
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -65,7 +53,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ("dump", "files", "write the live parameters as YAML, for `load`", (only,)),
         ("save", "files", "write changed values into the manifest, each at its place", (names, dry)),
     )
-    actions = (options.Subcommand(verb, words, _home(module, verb), own) for verb, module, words, own in table)
+    actions = (
+        options.Subcommand(verb, words, options.deferred(f"rbxcompose.tools.parameters.{module}", f"param_{verb}"), own)
+        for verb, module, words, own in table  # some modules need the compiler, and others do not
+    )
     timeout = partial(options.add_timeout_option, default="5s")
     options.add_actions(parser, actions, timeout, options.add_json_option, add_bus_options, options.add_system_options)
 

@@ -84,23 +84,13 @@ def _data(state: RobotState, supervisor: int | None) -> dict[str, Any]:
     }
 
 
-def _component(component_state: ComponentState) -> dict[str, object]:
+def _component(state: ComponentState) -> dict[str, object]:
     """Return one component; a blocked one with what blocks it."""
-    fields = {
-        "name": component_state.name,
-        "type": component_state.type,
-        "process": component_state.process,
-        "pid": component_state.pid,
-        "restarts": component_state.restarts,
-    }
-    fields |= {"note": component_state.note} if component_state.note else {}
-    if component_state.waits_for is None:
-        return {**fields, "state": component_state.state}
-    return {
-        **fields,
-        "state": _BLOCKED if component_state.state == "active" else component_state.state,
-        "waits_for": component_state.waits_for,
-    }
+    fields = {key: getattr(state, key) for key in ("name", "type", "process", "pid", "restarts")}
+    fields |= {"note": state.note} if state.note else {}
+    if state.waits_for is None:
+        return {**fields, "state": state.state}
+    return {**fields, "state": _BLOCKED if state.state == "active" else state.state, "waits_for": state.waits_for}
 
 
 def _last_known(state: RobotState) -> dict[str, Any]:

@@ -34,6 +34,8 @@ from rbxcompose.sdk.ports import Qos
 _PAUSE = 0.02  # [s] between checks for messages
 _SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*([kMG])B")
 _TIMES = {"k": 1e3, "M": 1e6, "G": 1e9}
+MOST_WAITING = 20_000  # messages that arrived and are not yet written
+MOST_TOPICS = 2_000
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -184,10 +186,6 @@ def count_table(counts: Mapping[RecordedTopic, int]) -> str:
     topics = sorted(together, key=lambda topic: (topic.name, topic.type))
     rows += [(topic.name, topic.type or "-", topic.qos.value, f"{together[topic]:,}") for topic in topics]
     return table(rows)
-
-
-MOST_WAITING = 20_000  # messages that arrived and are not yet written
-MOST_TOPICS = 2_000
 
 
 class Tap:

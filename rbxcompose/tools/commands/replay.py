@@ -25,6 +25,7 @@ from rbxcompose.base.config import HIDDEN
 from rbxcompose.base.files import NotRegularError, open_regular
 from rbxcompose.base.findings import MOST_NAMES, Finding, Severity, suggest
 from rbxcompose.base.printable import plain
+from rbxcompose.base.requests import to_data
 from rbxcompose.bus.endpoints import tcp_endpoint
 from rbxcompose.bus.names import Attachment, data_key, dds_type, resolve
 from rbxcompose.bus.tokens import EntityKind, NodeToken, gid
@@ -55,6 +56,9 @@ from rbxcompose.tools.commands.record import add_selection_options, count_table,
 
 _MATCHING = 1.0  # [s] maximum wait until subscribers have found a new publisher
 _MATCH_PAUSE = 0.01  # [s] between two checks for them
+_PAUSE = 0.05  # [s] before a recording restarts
+_PORT, _TRIES = 7447, 20  # the port at which ROS 2 looks for a router, and those behind it
+HOW = "'rbxcompose up PATH --rate max --record FILE' records everything that is needed"
 
 
 class Player:
@@ -88,9 +92,6 @@ class Player:
         """Publish a message again."""
         publisher, sender = self._publishers[message.topic]
         publisher.put(message.payload, Attachment(next(self._sequence), self._guest.clock.stamp(), sender).encode())
-
-
-_PAUSE = 0.05  # [s] before a recording restarts
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -301,9 +302,6 @@ def _rate(text: str) -> float:
     return rate
 
 
-_PORT, _TRIES = 7447, 20  # the port at which ROS 2 looks for a router, and those behind it
-
-
 @contextmanager
 def replay_bus(arguments: argparse.Namespace) -> Iterator[BusPlace]:
     """Yield the bus that the options name; with `--alone`, or if no robot is up, one with a router of its own.
@@ -334,9 +332,6 @@ def _own_router() -> Iterator[str]:
             session.close()  # type: ignore[no-untyped-call]
         return
     raise NotDoneError(NO_ROUTER.at(None, f"no port from {_PORT} to {_PORT + _TRIES - 1} is free for a router"))
-
-
-HOW = "'rbxcompose up PATH --rate max --record FILE' records everything that is needed"
 
 
 def run_again(arguments: argparse.Namespace, path: Path, reader: RecordingReader) -> int:
@@ -424,7 +419,7 @@ def _report(arguments: argparse.Namespace, name: str, found: ReplayResult) -> in
     for text in found.errors:
         emit(plain(text))
     if arguments.json:
-        emit(json.dumps({"component": name, "equal": found.equal, "difference": _difference_fields(found.difference)}))
+        emit(json.dumps({"component": name, "equal": found.equal, "difference": to_data(found.difference)}))
     elif found.difference is None:
         emit(f"'{name}' sends the same as recorded: {found.equal:,} messages")
     else:
@@ -436,15 +431,3 @@ def _difference_text(name: str, one: RunDifference, equal: int) -> str:
     where = f", field '{plain(one.field)}'" if one.field else ""
     values = f"recorded {plain(one.recorded)}, now {plain(one.now)}"
     return f"'{name}' differs at {one.time:.3f} s on {plain(one.topic)}{where}: {values}; {equal:,} messages were equal"
-
-
-def _difference_fields(difference: RunDifference | None) -> dict[str, object] | None:
-    if difference is None:
-        return None
-    return {
-        "time": difference.time,
-        "topic": difference.topic,
-        "field": difference.field,
-        "recorded": difference.recorded,
-        "now": difference.now,
-    }

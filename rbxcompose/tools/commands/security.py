@@ -32,6 +32,10 @@ _RECEIVE = """set -e; umask 077
 d="${XDG_CONFIG_HOME:-$HOME/.config}/rbxcompose/systems/NAME/HOST"
 mkdir -p "$d"; tar -xf - -C "$d"
 """
+SOON = 30.0  # [days] before a certificate expires
+NO_CERTIFICATE = kind("RBX6117")
+REFUSED_CERTIFICATE = kind("RBX6143")
+SOON_EXPIRED = kind("RBX6144", Severity.WARNING)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -93,7 +97,7 @@ def _bring(system: System, host: str, folder: Path, arguments: argparse.Namespac
     done = subprocess.run(remote.ssh(script), input=archive_of(files, mode=0o600), capture_output=True, check=False)
     if done.returncode == 0:
         return None
-    reason = done.stderr.decode(errors="replace").strip().splitlines()[-1:] or ["no reason is told"]
+    reason = done.stderr.decode(errors="replace").strip().splitlines()[-1:] or ["no reason given"]
     return NOT_MADE.at(None, f"'{host}' cannot be given its certificate: {reason[0]}")
 
 
@@ -126,12 +130,6 @@ def _certificates(system: System, path: str) -> Iterator[Finding]:
             yield from certificate_findings(
                 certificates.tls_of(folder, host, system.security), certificates.common_name(system.name, host), path
             )
-
-
-SOON = 30.0  # [days] before a certificate expires
-NO_CERTIFICATE = kind("RBX6117")
-REFUSED_CERTIFICATE = kind("RBX6143")
-SOON_EXPIRED = kind("RBX6144", Severity.WARNING)
 
 
 def certificate_findings(tls: LinkTls, name: str, path: str) -> Iterator[Finding]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 
 from rbxcompose.commands.guest import Guest, add_server_verbs, visit, write_names
-from rbxcompose.commands.options import BUS
+from rbxcompose.commands.options import BUS, deferred
 
 ON_SYSTEM = BUS
 _VERB = ("call", "send a request and print the response")
@@ -16,7 +16,14 @@ _VERB = ("call", "send a request and print the response")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    add_server_verbs(parser, "service", _VERB, "request", "/battery/set_level", (_ls, _call))
+    add_server_verbs(
+        parser,
+        "service",
+        _VERB,
+        "request",
+        "/battery/set_level",
+        (_ls, deferred("rbxcompose.commands.messages", "call")),
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -26,9 +33,3 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _ls(guest: Guest, arguments: argparse.Namespace) -> int:
     return write_names(guest.graph().services, ("servers", "clients"), arguments)
-
-
-def _call(guest: Guest, arguments: argparse.Namespace) -> int:
-    from rbxcompose.commands.messages import call  # the imports for messages would slow down the list
-
-    return call(guest, arguments)

@@ -15,6 +15,8 @@ from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.runtime.requests import StopRobot
 
 ON_SYSTEM = EACH
+_ANSWER = 1.0  # [s] for all processes together
+_OTHERS = ("parent", "router")  # processes in which nothing moves
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -42,10 +44,6 @@ def _stopped(folder: RobotFolder) -> str:
             if error.finding.code != lookup.NO_ANSWER.code:
                 raise
     return stop_by_bus(folder)
-
-
-_ANSWER = 1.0  # [s] for all processes together
-_OTHERS = ("parent", "router")  # processes in which nothing moves
 
 
 def stop_by_bus(folder: RobotFolder) -> str:

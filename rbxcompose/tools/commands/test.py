@@ -21,7 +21,7 @@ from rbxcompose.manifest.files import shown_name
 from rbxcompose.tools.mission_tests.coverage import Coverage
 from rbxcompose.tools.mission_tests.finding_files import tests_of
 from rbxcompose.tools.mission_tests.reader import TrialReader, WrittenTrial
-from rbxcompose.tools.mission_tests.report import FileOutcome, Teller, as_json, coverage_text, junit
+from rbxcompose.tools.mission_tests.report import FileOutcome, TrialWriter, as_json, coverage_text, junit
 from rbxcompose.tools.mission_tests.runner import run_trial
 
 HERE = Path("missions")
@@ -47,7 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
     files = tests_of(arguments.paths)
     if not files:
         return misused("test", f"no tests ('kind: Test') in {plain(', '.join(map(str, arguments.paths)))}")
-    reading, coverage, teller = TrialReader(os.environ), Coverage(), Teller(has_colour(sys.stdout))
+    reading, coverage, writer = TrialReader(os.environ), Coverage(), TrialWriter(has_colour(sys.stdout))
     outcomes: list[FileOutcome] = []
     unreadable = Report()
     for written in (trial for file in files for trial in reading.every(file)):
@@ -60,11 +60,11 @@ def run(arguments: argparse.Namespace) -> int:
         if outcome.verdict:
             coverage.add(outcome.verdict.trial.linked, outcome.verdict.trial.names, outcome.verdict.seen.keys)
         if not arguments.json:
-            _tell(outcome, teller, arguments.verbose)
+            _tell(outcome, writer, arguments.verbose)
     write_report(_findings(reading, outcomes) if outcomes else unreadable, reading.sources)
     if not outcomes:
         return misused("test", f"no test has '{plain(arguments.filter)}' in its name")
-    _finish(outcomes, coverage, teller, arguments)
+    _finish(outcomes, coverage, writer, arguments)
     return 0 if all(file_outcome.passed for file_outcome in outcomes) else FINDINGS
 
 
@@ -77,10 +77,10 @@ def _outcome(written: WrittenTrial, reading: TrialReader, began: float) -> FileO
     return FileOutcome(shown, written.name, findings, run_trial(trial), time.perf_counter() - compiled)
 
 
-def _tell(outcome: FileOutcome, teller: Teller, verbose: bool) -> None:
-    emit(teller.line(outcome))
+def _tell(outcome: FileOutcome, writer: TrialWriter, verbose: bool) -> None:
+    emit(writer.line(outcome))
     if outcome.verdict and (verbose or not outcome.passed):
-        emit(teller.trace(outcome.verdict))
+        emit(writer.trace(outcome.verdict))
 
 
 def _findings(reading: TrialReader, outcomes: Sequence[FileOutcome]) -> Report:
@@ -89,7 +89,9 @@ def _findings(reading: TrialReader, outcomes: Sequence[FileOutcome]) -> Report:
     )
 
 
-def _finish(outcomes: Sequence[FileOutcome], coverage: Coverage, teller: Teller, arguments: argparse.Namespace) -> None:
+def _finish(
+    outcomes: Sequence[FileOutcome], coverage: Coverage, writer: TrialWriter, arguments: argparse.Namespace
+) -> None:
     if arguments.junit:
         arguments.junit.write_text(junit(outcomes), encoding="utf-8")
     if arguments.json:
@@ -97,4 +99,4 @@ def _finish(outcomes: Sequence[FileOutcome], coverage: Coverage, teller: Teller,
         return
     if arguments.coverage and coverage.ways:
         emit(coverage_text(coverage))
-    emit(teller.summary(outcomes, coverage))
+    emit(writer.summary(outcomes, coverage))

@@ -24,12 +24,13 @@ from rbxcompose.commands.lookup import NOT_UP, add_robot_option, find_robot, pla
 from rbxcompose.commands.messages import to_json
 from rbxcompose.commands.options import EACH, add_json_option, add_system_options
 from rbxcompose.commands.terminal import LiveScreen, is_terminal
-from rbxcompose.tools.robot_picture import RobotPicture, ShareView, lines_of, system_lines
-from rbxcompose.tools.sampler import Sampler
+from rbxcompose.tools.top import RobotPicture, Sampler, ShareView, lines_of, system_lines
 
 ON_SYSTEM = EACH
 _PERIOD = 1.0  # [s] between two samples
 _WIDTH, _HEIGHT = 100, 1000  # columns and lines of a picture without a terminal
+_SYSTEM_PERIOD = 0.5  # [s] between two pictures
+_AGAIN = 3.0  # [s] after a command has ended until it is started again
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -105,12 +106,8 @@ def _sampled(sampler: Sampler) -> RobotPicture:
     return picture
 
 
-_SYSTEM_PERIOD = 0.5  # [s] between two pictures
-_AGAIN = 3.0  # [s] after a command has ended until it is started again
-
-
 class LiveShare:
-    """Follows what a host tells of a share; a command that ends is started again."""
+    """Follows what a host reports about a share; a command that ends is started again."""
 
     def __init__(self, host: str, robot: str, remote: Remote) -> None:
         self._host, self._robot = host, robot

@@ -24,6 +24,7 @@ from rbxcompose.commands.lookup import add_bus_options
 ON_SYSTEM = options.BUS
 _ENDS = ("publishers", "subscriptions")
 _WINDOW = 100  # messages
+_LINE_PERIOD = 1.0  # [s] between two lines
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -43,16 +44,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     most = options.argument("-n", "--count", type=options.count, metavar="N", help="end after this many")
     timeout = partial(options.add_timeout_option, default="2s")
     sent = (topic, type_, message, rate, most, timeout, options.add_json_option)
+    # Only the functions that use messages import what those need: a list takes half the time without it.
+    echo, publish = (options.deferred("rbxcompose.commands.messages", name) for name in ("echo", "publish"))
     actions = (
         options.Subcommand("ls", "list the topics with their types", _ls, (options.add_ls_options,)),
         options.Subcommand("show", "show publishers and subscribers", _show, (options.add_json_option, topic)),
         options.Subcommand(
-            "echo", "print the messages", _echo, (options.add_count_options, options.add_json_option, topic)
+            "echo", "print the messages", echo, (options.add_count_options, options.add_json_option, topic)
         ),
         options.Subcommand(
             "hz", "measure how often messages arrive", measure, (window, duration, options.add_json_option, topic)
         ),
-        options.Subcommand("pub", "publish a message, by default once", _pub, sent),
+        options.Subcommand("pub", "publish a message, by default once", publish, sent),
     )
     options.add_actions(parser, actions, add_bus_options, options.add_system_options)
 
@@ -85,21 +88,6 @@ def _qos(end: GraphEnd) -> str:
     reliability = "reliable" if end.qos.is_reliable else "best effort"
     durability = ", kept for late subscribers" if end.qos.is_transient_local else ""
     return f"{reliability}{durability}, {'all' if end.qos.keeps_all else f'newest {end.qos.depth}'}"
-
-
-# Only the functions that use messages import what those need: a list takes half the time without it.
-
-
-def _echo(guest: Guest, arguments: argparse.Namespace) -> int:
-    from rbxcompose.commands.messages import echo
-
-    return echo(guest, arguments)
-
-
-def _pub(guest: Guest, arguments: argparse.Namespace) -> int:
-    from rbxcompose.commands.messages import publish
-
-    return publish(guest, arguments)
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,14 +129,11 @@ def measured(times: Sequence[float]) -> Pace | None:
     return Pace(1 / mean, min(intervals), max(intervals), jitter, len(times))
 
 
-_LINE_PERIOD = 1.0  # [s] between two lines
-
-
 def measure(guest: Guest, arguments: argparse.Namespace) -> int:
     """Print every second how often messages arrive."""
     topic = wanted(guest.graph().topics, arguments.topic, "topic")
     meter = PaceMeter(arguments.window)
-    guest.listen(topic, lambda heard: meter.arrived(heard.time))
+    guest.listen(topic, lambda message: meter.arrived(message.time))
     left = math.inf if arguments.duration is None else arguments.duration
     while left > 0:
         guest.run(lambda: False, min(_LINE_PERIOD, left))

@@ -98,7 +98,7 @@ def _options(arguments: argparse.Namespace) -> RunOptions:
 
 
 def _run_share(path: str, arguments: argparse.Namespace) -> int:
-    from rbxcompose.tools.up_system import run_share  # only needed for systems
+    from rbxcompose.tools.system_runs import run_share  # only needed for systems
 
     return run_share(path, arguments, _options(arguments))
 

@@ -14,6 +14,15 @@ from rbxcompose.tools.doctor import HostFacts, Listener, RunningRobot, examinati
 
 PORT_TAKEN = kind("RBX9402", Severity.WARNING)
 NO_LISTENER = kind("RBX9403")
+CLASH = kind("RBX9408")
+MOST_STEP = 0.05  # [s] by which the wall clock may move against the monotonic one while we look
+MOST_AHEAD, MOST_BEHIND = 0.05, 1.0  # [s] of a sender's stamps; those behind also include the transport time
+WRONG_CLOCK = kind("RBX9404", Severity.WARNING)
+OTHER_CLOCK = kind("RBX9405", Severity.WARNING)
+HOSTS_DIFFER = kind("RBX6129", Severity.WARNING)
+_HELP = "let a time server set it: timedatectl set-ntp true"
+NOBODY_PUBLISHES = kind("RBX9407", Severity.WARNING)
+_MOST_NAMES = 8  # names
 
 
 @examination
@@ -43,7 +52,7 @@ def _router(robot: RunningRobot, facts: HostFacts) -> Iterator[str | Finding]:
     if robot.state is None or robot.state.router is None or "router" not in robot.state.processes:
         return  # it uses a router from elsewhere, or none is known
     if not robot.state.is_supervised:
-        return  # that the robot has ended is told by `leftovers`
+        return  # `leftovers` reports that the robot has ended
     if is_private(robot.state.router):
         yield f"the bus of {robot.name} takes programs of this user only"
         return
@@ -64,9 +73,6 @@ def _who(taken: Listener) -> str:
     return "a process of another user" if taken.pid is None else f"'{plain(taken.title)}' (process {taken.pid})"
 
 
-CLASH = kind("RBX9408")
-
-
 @examination
 def clashes(facts: HostFacts) -> Iterator[str | Finding]:
     """Compare types and hashes of all ends of each name."""
@@ -78,15 +84,6 @@ def clashes(facts: HostFacts) -> Iterator[str | Finding]:
             yield CLASH.at(None, words, help=f"'rbxcompose topic show {plain(name.name)}' shows which end has which")
         if not any(name.clash for name in names):
             yield f"{robot.name}: all ends of {len(names)} names agree in their types"
-
-
-MOST_STEP = 0.05  # [s] by which the wall clock may move against the monotonic one while we look
-MOST_AHEAD, MOST_BEHIND = 0.05, 1.0  # [s] of a sender's stamps; those behind also include the transport time
-
-WRONG_CLOCK = kind("RBX9404", Severity.WARNING)
-OTHER_CLOCK = kind("RBX9405", Severity.WARNING)
-HOSTS_DIFFER = kind("RBX6129", Severity.WARNING)
-_HELP = "let a time server set it: timedatectl set-ntp true"
 
 
 @examination
@@ -124,10 +121,6 @@ def _server(is_synchronised: bool | None) -> str:
     )
 
 
-NOBODY_PUBLISHES = kind("RBX9407", Severity.WARNING)
-_MOST_NAMES = 8  # names
-
-
 @examination
 def wires(facts: HostFacts) -> Iterator[str | Finding]:
     """Report the ends of wires that have no partner on the bus of each robot."""
@@ -144,7 +137,7 @@ def _wires_of(running_robot: RunningRobot, topics: list[GraphName]) -> Iterator[
         nodes = ", ".join(sorted({end.node for end in topic.takers}))
         words = f"{plain(nodes)} of '{running_robot.name}' subscribes to {plain(topic.name)}, which has no publisher"
         yield NOBODY_PUBLISHES.at(None, words, help="'rbxcompose topic ls' shows what is published")
-    unheard = [plain(topic.name) for topic in topics if topic.givers and not topic.takers]
-    more = f" and {len(unheard) - _MOST_NAMES} more" if len(unheard) > _MOST_NAMES else ""
-    heard = f"; published without a subscriber: {', '.join(unheard[:_MOST_NAMES])}{more}" if unheard else ""
-    yield f"{running_robot.name}: {len(topics) - len(alone)} topics are published or open to the outside{heard}"
+    unread = [plain(topic.name) for topic in topics if topic.givers and not topic.takers]
+    more = f" and {len(unread) - _MOST_NAMES} more" if len(unread) > _MOST_NAMES else ""
+    rest = f"; published without a subscriber: {', '.join(unread[:_MOST_NAMES])}{more}" if unread else ""
+    yield f"{running_robot.name}: {len(topics) - len(alone)} topics are published or open to the outside{rest}"

@@ -20,6 +20,7 @@ from rbxcompose.tools.doctor import HostFacts, examination
 _PREFIXES = "/dev/", "usb:", "usb@", "dev:"
 
 NO_DEVICE = kind("RBX9411")
+UNKNOWN = kind("RBX9412", Severity.WARNING)
 
 
 @examination
@@ -73,9 +74,6 @@ def _group(path: Path) -> str:
         return grp.getgrgid(number).gr_name
     except KeyError:
         return str(number)
-
-
-UNKNOWN = kind("RBX9412", Severity.WARNING)
 
 
 @examination

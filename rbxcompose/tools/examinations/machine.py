@@ -17,6 +17,11 @@ from rbxcompose.tools.doctor import HostFacts, RunningRobot, Version, examinatio
 LEFT = kind("RBX9409", Severity.WARNING)
 _TITLE = re.compile(r"rbxcompose (?P<robot>[^:]+): (?P<process>.+)")
 _SUPERVISOR = "supervisor"
+FEWEST_FILES = 1024
+SMALLEST_SHARED = 16_000_000  # [B]
+LOW_LIMIT = kind("RBX9406", Severity.WARNING)
+OPEN_TO_OTHERS = kind("RBX9410")
+OTHER_VERSION = kind("RBX9401", Severity.WARNING)
 
 
 @examination
@@ -54,12 +59,6 @@ def _left_by(robot: RunningRobot) -> Iterator[str | Finding]:
         yield f"{robot.name}: its supervisor runs"
 
 
-FEWEST_FILES = 1024
-SMALLEST_SHARED = 16_000_000  # [B]
-
-LOW_LIMIT = kind("RBX9406", Severity.WARNING)
-
-
 @examination
 def limits(facts: HostFacts) -> Iterator[str | Finding]:
     """Report the limits and which of them are too low."""
@@ -83,9 +82,6 @@ def _number(value: int | None) -> str:
 
 def _size(value: int | None) -> str:
     return "without limit" if value is None else f"{value / 1e6:.0f} MB"
-
-
-OPEN_TO_OTHERS = kind("RBX9410")
 
 
 @examination
@@ -116,9 +112,6 @@ def _open_to_others(paths: list[Path], mode: str) -> Iterator[Finding]:
         elif stat.S_IMODE(found.st_mode) & 0o077:
             words = f"others may open '{name}' (mode {stat.S_IMODE(found.st_mode):04o})"
             yield OPEN_TO_OTHERS.at(None, words, help=f"chmod {mode} {name}")
-
-
-OTHER_VERSION = kind("RBX9401", Severity.WARNING)
 
 
 @examination

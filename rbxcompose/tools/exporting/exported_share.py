@@ -20,6 +20,7 @@ MISSION_FAILED = 3
 MEMORY, PROCESSES = "1G", 500  # of a share at most; a robot with an arm needs a fifth of it
 CERTIFICATES = (AUTHORITY, CERTIFICATE, KEY)
 CONFIGURATION = "/run/config"  # in a container: where `CERTIFICATES` are, as in `~/.config`
+FILE = "{file}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,9 +45,6 @@ class ExportedShare:
     def certificates(self) -> str:
         """Return the folder of its certificates below that of configurations."""
         return f"rbxcompose/systems/{self.system}/{self.host}"
-
-
-FILE = "{file}"
 
 
 def shares(system: System, host: str | None = None) -> Iterator[ExportedShare]:

@@ -32,6 +32,12 @@ from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode
 from rbxcompose.sdk.registry import component_type, usable_names
 
 GUESSED_TYPE = kind("RBX2293", Severity.WARNING)
+# What programs of ROS have by themselves, and what decides here.
+_OF_ROS = {
+    "use_sim_time": "'bus: {clock: external}' makes robot time follow '/clock'",
+    "qos_overrides": "the class of a port decides",
+    "start_type_description_service": "there is no such service",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,13 +115,6 @@ def _written(value: ParameterData, dimension: Dimension | None) -> str:
 ParameterPath = tuple[str, ...]
 GivenValues = dict[ParameterPath, Given[ParameterData]]
 
-# What programs of ROS have by themselves, and what decides here.
-_OF_ROS = {
-    "use_sim_time": "'bus: {clock: external}' makes robot time follow '/clock'",
-    "qos_overrides": "the class of a port decides",
-    "start_type_description_service": "there is no such service",
-}
-
 
 @importer("params", "files of ROS 2 parameters, and dumps of dynamic_reconfigure")
 def params(files: Sequence[ForeignFile], name: str, report: Report) -> str:
@@ -141,16 +140,16 @@ def params(files: Sequence[ForeignFile], name: str, report: Report) -> str:
 def _is_one(file: ForeignFile, report: Report) -> bool:
     words = ""
     if not isinstance(file.root, MappingNode):
-        words = "it is no map of keys"
+        words = "it is not a map of keys"
     elif {"rbx", "kind"} <= file.root.entries.keys():
         words = "it is a manifest"
     if words:
-        report.add(OTHER_PROGRAM.at(file.root.span, f"'{plain(file.name)}' is no file of parameters: {words}"))
+        report.add(OTHER_PROGRAM.at(file.root.span, f"'{plain(file.name)}' is not a file of parameters: {words}"))
     return not words
 
 
 def _add(known: GivenValues, node: NodeParameters, report: Report) -> None:
-    """Add the parameters of a node; tell those that cannot be carried over, and those that disagree."""
+    """Add the parameters of a node; report those that cannot be carried over, and those that disagree."""
     for path, entry in scalars_of(node.root):
         shown = f"'{plain(shown_name(path), 60)}' of '{plain(node.node, 60)}'"
         if path[0] in _OF_ROS and not _is_false(entry.value):

@@ -23,6 +23,10 @@ from rbxcompose.sdk.capabilities import Forwards
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Looks, Out, Port, Serves, ServesAction, ServesTopic
 
 Keys = tuple[tuple[str, str], ...]  # its purpose, and the key
+MISSION = "mission"  # the component that runs missions
+TRANSFORMS = ("/tf", "/tf_static")  # what a look-up subscribes to
+STATUSES = "/diagnostics"  # where every component publishes without declaring it
+_MERMAID_STYLES = ("classDef wire fill:none,stroke-dasharray:2 2", "classDef mux stroke-width:2px")
 
 
 def keys_of(port: Port[Any], topic: str, bus: BusPlan) -> Keys:
@@ -69,11 +73,6 @@ def does(port: Port[Any]) -> str:
         case Calls():
             return "calls"
     return "looks up"
-
-
-MISSION = "mission"  # the component that runs missions
-TRANSFORMS = ("/tf", "/tf_static")  # what a look-up subscribes to
-STATUSES = "/diagnostics"  # where every component publishes without declaring it
 
 
 class BoxShape(StrEnum):
@@ -260,7 +259,7 @@ def _add_mission(robot: Robot, mission: RobotMission, key: str, found: dict[tupl
     def lead(kind: WireContent, topic: str, type_name: str) -> None:
         found.setdefault((kind, topic), _Open(kind, type_name)).sources.append(Tip(key))
 
-    def hear(topic: str, type_name: str, note: str) -> None:
+    def receive(topic: str, type_name: str, note: str) -> None:
         found.setdefault((WireContent.TOPIC, topic), _Open(WireContent.TOPIC, type_name)).targets.append(Tip(key, note))
 
     for skill in sorted({node.skill for node in mission.program.nodes} & robot.skills.keys()):
@@ -270,7 +269,7 @@ def _add_mission(robot: Robot, mission: RobotMission, key: str, found: dict[tupl
         if (halts := source.orders.halts) is not None:
             lead(WireContent.TOPIC, halts.topic, halts.message)
         if (ends := source.orders.ends) is not None:
-            hear(ends.topic, ends.message, skill)
+            receive(ends.topic, ends.message, skill)
     published, called = sent_by([mission.program])
     space = robot.manifest.bus.namespace or ""
     for name in sorted(published & robot.topics.keys()):
@@ -279,7 +278,7 @@ def _add_mission(robot: Robot, mission: RobotMission, key: str, found: dict[tupl
         lead(WireContent.SERVICE, resolve(name, space), robot.services[name])
     for name in sorted(mission.program.reads & robot.values.keys()):
         value = robot.values[name]
-        hear(value.topic, value.message, f"${name}")
+        receive(value.topic, value.message, f"${name}")
 
 
 def _add_look_ups(robot: Robot, found: dict[tuple[WireContent, str], _Open]) -> None:
@@ -297,21 +296,21 @@ def _add_look_ups(robot: Robot, found: dict[tuple[WireContent, str], _Open]) -> 
             found[WireContent.LOOK_UP, topic] = wire
 
 
-_STYLES = {
+_DOT_STYLES = {
     WireContent.TOPIC: 'style=solid color="#1f6feb"',
     WireContent.SERVICE: 'style=dashed color="#1a7f37"',
     WireContent.ACTION: 'style=bold penwidth=2.2 color="#8250df"',
     WireContent.LOOK_UP: 'style=dotted color="#6e7781" arrowhead=odot',
 }
-_SHAPES = {BoxShape.COMPONENT: "box", BoxShape.MUX: "hexagon", BoxShape.PROGRAM: "note"}
+_DOT_SHAPES = {BoxShape.COMPONENT: "box", BoxShape.MUX: "hexagon", BoxShape.PROGRAM: "note"}
 
 
 def dot(diagram: Diagram) -> str:
     """Return a directed graph in DOT, with processes as clusters."""
-    return "".join(f"{line}\n" for line in _lines(diagram))
+    return "".join(f"{line}\n" for line in _dot_lines(diagram))
 
 
-def _lines(diagram: Diagram) -> Iterator[str]:
+def _dot_lines(diagram: Diagram) -> Iterator[str]:
     yield f"digraph {_quoted(diagram.robot)} {{"
     yield "  // topics solid, services dashed, actions bold, look-ups of transforms dotted"
     yield '  graph [rankdir=LR fontname="sans-serif" nodesep=0.35 ranksep=0.7]'
@@ -320,39 +319,39 @@ def _lines(diagram: Diagram) -> Iterator[str]:
     for index, group in enumerate(diagram.groups):
         yield f"  subgraph cluster_{index} {{"
         yield f"    label={_quoted(f'process {group}')} style=rounded"
-        yield from (f"    {_box(box, diagram.start)}" for box in diagram.of_group(group))
+        yield from (f"    {_dot_box(box, diagram.start)}" for box in diagram.of_group(group))
         yield "  }"
     for executive, program in diagram.runs:
         yield f"  {_quoted(executive)} -> {_quoted(program)} [dir=none]"
     for wire in diagram.wires:
-        yield from (f"  {line}" for line in _wire(wire))
+        yield from (f"  {line}" for line in _dot_wire(wire))
     yield "}"
 
 
-def _box(box: Box, start: str) -> str:
+def _dot_box(box: Box, start: str) -> str:
     kind = "start mission" if box.key == start else box.type
-    label = _label(*dict.fromkeys((box.name, kind)))
-    return f"{_quoted(box.key)} [label={label} shape={_SHAPES[box.shape]}]"
+    label = _dot_label(*dict.fromkeys((box.name, kind)))
+    return f"{_quoted(box.key)} [label={label} shape={_DOT_SHAPES[box.shape]}]"
 
 
-def _wire(wire: DiagramWire) -> Iterator[str]:
+def _dot_wire(wire: DiagramWire) -> Iterator[str]:
     """Yield an edge with a label; a wire with several ends, or none at one side, has a node of its own."""
-    style = _STYLES[wire.kind]
+    style = _DOT_STYLES[wire.kind]
     if wire.is_pair:
         [source], [target] = wire.sources, wire.targets
-        label = _label(wire.name, wire.short_type, target.note)
+        label = _dot_label(wire.name, wire.short_type, target.note)
         yield f"{_quoted(source.box)} -> {_quoted(target.box)} [label={label} {style}]"
         return
     key = _quoted(f"{wire.kind} {wire.name}")
-    yield f"{key} [label={_label(wire.name, wire.short_type)} shape=plaintext style=solid fontsize=9]"
+    yield f"{key} [label={_dot_label(wire.name, wire.short_type)} shape=plaintext style=solid fontsize=9]"
     tail = " dir=none" if wire.targets else ""
     for source in wire.sources:
         yield f"{_quoted(source.box)} -> {key} [{style}{tail}]"
     for target in wire.targets:
-        yield f"{key} -> {_quoted(target.box)} [label={_label(target.note)} {style}]"
+        yield f"{key} -> {_quoted(target.box)} [label={_dot_label(target.note)} {style}]"
 
 
-def _label(*lines: str) -> str:
+def _dot_label(*lines: str) -> str:
     return _quoted("\n".join(line for line in lines if line))
 
 
@@ -360,46 +359,45 @@ def _quoted(text: str) -> str:
     return json.dumps(text, ensure_ascii=False)
 
 
-_ARROWS = {
+_MERMAID_ARROWS = {
     WireContent.TOPIC: "-->",
     WireContent.SERVICE: "-.->",
     WireContent.ACTION: "==>",
     WireContent.LOOK_UP: "-.-o",
 }
-_GRAPH_MERMAID_SHAPES = {BoxShape.COMPONENT: ("[", "]"), BoxShape.MUX: ("{{", "}}"), BoxShape.PROGRAM: ("([", "])")}
-_GRAPH_MERMAID_STYLES = ("classDef wire fill:none,stroke-dasharray:2 2", "classDef mux stroke-width:2px")
+_MERMAID_SHAPES = {BoxShape.COMPONENT: ("[", "]"), BoxShape.MUX: ("{{", "}}"), BoxShape.PROGRAM: ("([", "])")}
 
 
 def mermaid(diagram: Diagram) -> str:
     """Return the text of a flowchart: processes are boxes around their components."""
-    return "".join(f"{line}\n" for line in _graph_mermaid_lines(diagram))
+    return "".join(f"{line}\n" for line in _mermaid_lines(diagram))
 
 
-def _graph_mermaid_lines(diagram: Diagram) -> Iterator[str]:
+def _mermaid_lines(diagram: Diagram) -> Iterator[str]:
     ids = {box.key: f"b{index}" for index, box in enumerate(diagram.boxes)}
     yield "flowchart LR"
     yield "  %% topics -->, services -.->, actions ==>, look-ups of transforms -.-o"
     for index, group in enumerate(diagram.groups):
         yield f'  subgraph p{index}["process {group}"]'
-        yield from (f"    {_graph_mermaid_box(box, ids, diagram.start)}" for box in diagram.of_group(group))
+        yield from (f"    {_mermaid_box(box, ids, diagram.start)}" for box in diagram.of_group(group))
         yield "  end"
     yield from (f"  {ids[executive]} --- {ids[program]}" for executive, program in diagram.runs)
     for index, wire in enumerate(diagram.wires):
-        yield from (f"  {line}" for line in _graph_mermaid_wire(wire, f"w{index}", ids))
-    yield from (f"  {style}" for style in _GRAPH_MERMAID_STYLES)
+        yield from (f"  {line}" for line in _mermaid_wire(wire, f"w{index}", ids))
+    yield from (f"  {style}" for style in _MERMAID_STYLES)
 
 
-def _graph_mermaid_box(box: Box, ids: dict[str, str], start: str) -> str:
-    begin, end = _GRAPH_MERMAID_SHAPES[box.shape]
+def _mermaid_box(box: Box, ids: dict[str, str], start: str) -> str:
+    begin, end = _MERMAID_SHAPES[box.shape]
     kind = "start mission" if box.key == start else box.type
     style = ":::mux" if box.shape is BoxShape.MUX else ""
     below = f"<br/><i>{kind}</i>" if kind != box.name else ""
     return f'{ids[box.key]}{begin}"{box.name}{below}"{end}{style}'
 
 
-def _graph_mermaid_wire(wire: DiagramWire, key: str, ids: dict[str, str]) -> Iterator[str]:
+def _mermaid_wire(wire: DiagramWire, key: str, ids: dict[str, str]) -> Iterator[str]:
     """Yield an arrow with a label; a wire with several ends, or none at one side, has a node of its own."""
-    arrow, label = _ARROWS[wire.kind], f"{wire.name}<br/>{wire.short_type}"
+    arrow, label = _MERMAID_ARROWS[wire.kind], f"{wire.name}<br/>{wire.short_type}"
     if wire.is_pair:
         [source], [target] = wire.sources, wire.targets
         note = f"<br/>{target.note}" if target.note else ""

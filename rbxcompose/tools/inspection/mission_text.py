@@ -14,6 +14,8 @@ MARKS = {IDLE: "·", RUNNING: "▶", SUCCESS: "✓", FAILURE: "✗", SKIPPED: "-
 _RESET, _FAINT = "\x1b[0m", "\x1b[2m"
 _COLOURS = {IDLE: _FAINT, RUNNING: "\x1b[1;36m", SUCCESS: "\x1b[32m", FAILURE: "\x1b[31m", SKIPPED: _FAINT}
 _STEP = "  "
+COLOURS = {"running": "#0969da", "success": "#1a7f37", "failure": "#cf222e", "skipped": "#818b98"}
+_SAFE = str.maketrans({'"': "'", "<": "&lt;", ">": "&gt;", "#": "&num;"})
 
 
 def mission_text(picture: MissionPicture, statuses: Sequence[int] = ()) -> str:
@@ -69,10 +71,6 @@ def _words(drawn: Drawn) -> str:
     notes = f"  ({', '.join(drawn.notes)})" if drawn.notes else ""
     start = "  (start)" if drawn.is_start else ""
     return plain(f"{role}{name}{title}{notes}{start}")
-
-
-COLOURS = {"running": "#0969da", "success": "#1a7f37", "failure": "#cf222e", "skipped": "#818b98"}
-_SAFE = str.maketrans({'"': "'", "<": "&lt;", ">": "&gt;", "#": "&num;"})
 
 
 def mission_mermaid(picture: MissionPicture, statuses: Sequence[int] = ()) -> str:

@@ -70,8 +70,8 @@ def no_such_path(robot: Robot, path: KeyPath, guide: Guide) -> Finding:
     if isinstance(node, SequenceNode):
         valid = {str(index) for index in range(len(node.items))}
     message = f"{place} has no '{plain(name, 60)}'"
-    if above == ("components",) and (meant := in_section([str(key) for key in path[1:]], robot.manifest.root)):
-        return NO_SUCH_PATH.at(None, message, help=meant)
+    if above == ("components",) and (hint := in_section([str(key) for key in path[1:]], robot.manifest.root)):
+        return NO_SUCH_PATH.at(None, message, help=hint)
     return NO_SUCH_PATH.misspelt(None, message, name, sorted(valid), "what it has")
 
 

@@ -27,6 +27,14 @@ from rbxcompose.sdk.registry import component_type
 from rbxcompose.tools.inspection.diagram import does, keys_of, qos_of
 
 _NUMBER = 4  # width of a position in the start order
+LONGEST = 6  # reasons shown for one component
+_TOPIC = "topic of "  # prefix of the key of a wire
+_TEXT = 200  # characters of a reason
+_OPEN_TO = {
+    "none": "open to every machine of the network",
+    "tls": "encrypted, open to every machine of the network",
+    "mtls": "for hosts of the system",
+}
 
 
 def plan_text(plan: Plan, *, with_keys: bool = False) -> str:
@@ -87,11 +95,6 @@ def _wire(wire: Wire, port: Port[Any]) -> str:
     return f"{does(port)} {wire.topic} ({wire.type}){qos}"
 
 
-LONGEST = 6  # reasons shown for one component
-_TOPIC = "topic of "  # prefix of the key of a wire
-_TEXT = 200  # characters of a reason
-
-
 def with_places(found: Mapping[str, Any], robot: Robot) -> dict[str, Any]:
     """Return the difference, with the place of each new value that is written in the robot's files."""
     components = [
@@ -106,10 +109,10 @@ def with_places(found: Mapping[str, Any], robot: Robot) -> dict[str, Any]:
 
 def changes_text(found: Mapping[str, Any]) -> str:
     """Return the result of `with_places` for people: component by component, with the reasons."""
-    return "\n".join(_changes_text_lines(found))
+    return "\n".join(_change_lines(found))
 
 
-def _changes_text_lines(found: Mapping[str, Any]) -> Iterator[str]:
+def _change_lines(found: Mapping[str, Any]) -> Iterator[str]:
     components = found["components"]
     fates = dict.fromkeys(entry["fate"] for entry in components)
     counts = (f"{sum(entry['fate'] == fate for entry in components)} {fate}" for fate in fates)
@@ -167,13 +170,6 @@ def _indexed(root: TreeNode, path: KeyPath) -> KeyPath:
     return found
 
 
-_OPEN_TO = {
-    "none": "open to every machine of the network",
-    "tls": "encrypted, open to every machine of the network",
-    "mtls": "for hosts of the system",
-}
-
-
 def system_extent(system: System) -> str:
     """Return the size of a system in words: `1 robot on 2 hosts`."""
     robots, hosts = len(system.robots), len(system.hosts)
@@ -182,10 +178,10 @@ def system_extent(system: System) -> str:
 
 def system_text(system: System, *, with_keys: bool = False) -> str:
     """Return what `up` would run on each host, why, and what would cross between hosts."""
-    return "\n".join(_system_text_lines(system, with_keys))
+    return "\n".join(_system_lines(system, with_keys))
 
 
-def _system_text_lines(system: System, with_keys: bool) -> Iterator[str]:
+def _system_lines(system: System, with_keys: bool) -> Iterator[str]:
     yield f"{system.name}: {system_extent(system)}"
     for host, facts in system.hosts.items():
         optional = ", the others start without it" if facts.optional else ""

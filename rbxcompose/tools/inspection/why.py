@@ -28,6 +28,17 @@ from rbxcompose.tools.inspection.origin import Origin, as_data, origin_of, shown
 from rbxcompose.tools.inspection.paths import found_at, is_known, no_such_path, path_of, short, tree_of
 
 LABEL = 15  # width of the labels
+_OTHER = {  # the first one that matches a port counts
+    ServesTopic: (Out, "ordered by"),
+    Out: (In, "read by"),
+    In: (Out, "sent by"),
+    Serves: (Calls, "called by"),
+    Calls: (Serves, "served by"),
+    ServesAction: (CallsAction, "asked by"),
+    CallsAction: (ServesAction, "served by"),
+}
+_ARGUMENT = re.compile(r"\bargs\.([a-z][a-z0-9_]*)")
+_MEASURED = ("args", "missions", "include")  # sections in which only the value itself shows its dimension
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,17 +161,6 @@ def si_unit(dimension: Dimension) -> str:
     return next(units, "")
 
 
-_OTHER = {  # the first one that matches a port counts
-    ServesTopic: (Out, "ordered by"),
-    Out: (In, "read by"),
-    In: (Out, "sent by"),
-    Serves: (Calls, "called by"),
-    Calls: (Serves, "served by"),
-    ServesAction: (CallsAction, "asked by"),
-    CallsAction: (ServesAction, "served by"),
-}
-
-
 def why_port(robot: Robot, path: KeyPath) -> PathAnswer | None:
     """Return what is known about a component (`transforms`) or its port (`go_to.cmd_vel`), None if there is none."""
     name, *rest = [str(key) for key in (path[1:] if path[0] in ("components", "muxes") else path)] or [""]
@@ -213,10 +213,6 @@ def _others(robot: Robot, end: PortEnd) -> tuple[str, str]:
     ]
     outside = "anything outside" if isinstance(end.port, In) and end.port.is_open else "nothing here"
     return words, ", ".join(names) or outside
-
-
-_ARGUMENT = re.compile(r"\bargs\.([a-z][a-z0-9_]*)")
-_MEASURED = ("args", "missions", "include")  # sections in which only the value itself shows its dimension
 
 
 def why(robot: Robot, text: str) -> PathAnswer | Finding:

@@ -29,6 +29,12 @@ from rbxcompose.tools.lsp.project import MISSION, kind_of
 
 _FILLS = {"robot.name": "name of the robot", "sim": "true in simulation", "env.": "an environment variable"}
 _FILLS |= {"secret.": "a secret, from a file of its own or the environment; it is never shown"}
+DEEPEST = 12  # levels of steps that an editor shows
+_DETAIL = 60  # characters of a value
+_BODIES = ("do", "machine", "interrupts")
+_FRONT = re.compile(r"[A-Za-z0-9_.]*+(\s*+\{?\$)?+")  # read backwards from the position
+_BACK = re.compile(r"[A-Za-z0-9_.]*")
+_SERVING = ("serves_action", "serves", "serves_topic")  # kinds of ports that are skills
 
 
 def fills(spot: Spot) -> dict[str, str]:
@@ -91,11 +97,6 @@ def _items(spot: Spot) -> Iterator[tuple[str, str]]:
         word = tree.at(spot.cursor.root, (*spot.cursor.path[:length], "for"))
         if isinstance(word, tree.ScalarNode):
             yield word.text, types.get(word.text, UNKNOWN.phrase)
-
-
-DEEPEST = 12  # levels of steps that an editor shows
-_DETAIL = 60  # characters of a value
-_BODIES = ("do", "machine", "interrupts")
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,11 +197,6 @@ def _detail(node: tree.TreeNode) -> str:
         node = word
     text = " ".join(node.text.split()) if isinstance(node, tree.ScalarNode) else ""
     return text if len(text) <= _DETAIL else f"{text[: _DETAIL - 3]}..."
-
-
-_FRONT = re.compile(r"[A-Za-z0-9_.]*+(\s*+\{?\$)?+")  # read backwards from the position
-_BACK = re.compile(r"[A-Za-z0-9_.]*")
-_SERVING = ("serves_action", "serves", "serves_topic")  # kinds of ports that are skills
 
 
 def define(document: Document, line: int, column: int) -> Span | None:

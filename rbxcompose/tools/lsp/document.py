@@ -26,6 +26,13 @@ SMALL = 100  # lines; a section up to this size is always read
 _MERGE = "<<"
 _SECTION = re.compile(r"[A-Za-z_\"']")
 _ENTRY = re.compile(r"( +)[^\s#]")
+MARK = "\ue000"  # a private-use character, so that no manifest contains it
+_TOKEN_BEHIND = re.compile(r"[^\s:,\[\]{}#]*")
+_BEGINS_NODE = re.compile(r"(\s|- )*[^\s:]*")
+_COMMENT = re.compile(r"(^|\s)#")
+_COLON = re.compile(r"['\"]?\s*:(\s|$)")
+_BRACKETS = {"[": "]", "{": "}"}
+DEFAULT_KIND = "Robot"  # unless the text names another
 
 
 def quick_tree(text: str) -> TreeNode | None:
@@ -89,14 +96,6 @@ def _entry(lines: list[str], start: int, end: int, line: int) -> Iterator[int]:
     for begin, after in pairwise([start + 1, *entries, end]):
         if begin <= line < after:
             yield from range(begin, after)
-
-
-MARK = "\ue000"  # a private-use character, so that no manifest contains it
-_TOKEN_BEHIND = re.compile(r"[^\s:,\[\]{}#]*")
-_BEGINS_NODE = re.compile(r"(\s|- )*[^\s:]*")
-_COMMENT = re.compile(r"(^|\s)#")
-_COLON = re.compile(r"['\"]?\s*:(\s|$)")
-_BRACKETS = {"[": "]", "{": "}"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -257,9 +256,6 @@ def _marked(node: TreeNode, path: KeyPath, seen: set[int]) -> tuple[KeyPath, Sca
         if below := _marked(entry.value, (*path, name), seen):
             return below
     return None
-
-
-DEFAULT_KIND = "Robot"  # unless the text names another
 
 
 @dataclass(frozen=True, slots=True)

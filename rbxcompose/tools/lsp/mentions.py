@@ -36,7 +36,7 @@ from rbxcompose.missions.program.answers import DEEDS
 from rbxcompose.missions.program.machines import MACHINE_KEYS
 from rbxcompose.missions.program.program import Program, Skill
 from rbxcompose.missions.program.registry import kinds
-from rbxcompose.tools.lsp.project_files import MISSION as SYMBOL_INDEX_MISSION
+from rbxcompose.tools.lsp.project_files import MISSION as MISSION_DOCUMENT
 from rbxcompose.tools.lsp.project_files import NO_MEANING, OVERLAY, PART, ROBOT, TEST, Meanings, ProjectFiles
 from rbxcompose.tools.lsp.symbols import BRANCH, INTERRUPT, ITEM, NODE, STATE, VARIABLE, Mention, NamePiece, Symbol
 
@@ -44,6 +44,12 @@ _FILL = re.compile(r"\$\$|\$\{(?P<body>[^}]*)\}")
 _ARGUMENT = "args."
 _UNNAMED = (ANYTHING, FILE, TOPIC, INPUT, PART_ARGUMENT)  # kinds that are looked up elsewhere, or have no names
 PLACED = ("place", "pose")  # types whose values are names of places
+_NAMED = (Takes.BRANCHES, Takes.CASES, Takes.STATES, Takes.INTERRUPTS)  # maps whose keys people choose
+_PLAIN = ("message", "set", "with", "publish", "call", "inputs")  # keys whose values are no steps
+_WORDS = (TypeKind.CHOICE, TypeKind.TEXT)  # types whose bare words are no places
+TARGETS = (ITEM, STATE, NODE)  # sorts of names that an interrupt may restart
+_SORTS = {"for": ITEM, "save": VARIABLE, "name": NODE}
+_STEPS = (STATE, NODE, ITEM)
 
 
 class ManifestMentions:
@@ -227,9 +233,6 @@ def _entries(node: TreeNode | None) -> list[tuple[str, Entry]]:
 
 
 Skills = Mapping[str, Skill]
-_NAMED = (Takes.BRANCHES, Takes.CASES, Takes.STATES, Takes.INTERRUPTS)  # maps whose keys people choose
-_PLAIN = ("message", "set", "with", "publish", "call", "inputs")  # keys whose values are no steps
-_WORDS = (TypeKind.CHOICE, TypeKind.TEXT)  # types whose bare words are no places
 
 
 @dataclass(frozen=True, slots=True)
@@ -454,9 +457,6 @@ class MissionMentions:
                     yield from mentions(self.files, self.path, scalar, 0, meanings)
 
 
-TARGETS = (ITEM, STATE, NODE)  # sorts of names that an interrupt may restart
-
-
 def mission_names(files: ProjectFiles, path: Path) -> dict[str, list[Symbol]]:
     """Return the symbols that a mission's file defines, by name."""
     found: dict[str, dict[Symbol, None]] = {}
@@ -486,9 +486,6 @@ def mission_names(files: ProjectFiles, path: Path) -> dict[str, list[Symbol]]:
             add(VARIABLE, name)
     walk(root, ())
     return {name: list(symbols) for name, symbols in found.items()}
-
-
-_SORTS = {"for": ITEM, "save": VARIABLE, "name": NODE}
 
 
 def mission_files(files: ProjectFiles, robot: Path, mission: str) -> set[Path]:
@@ -527,9 +524,6 @@ def _step_words() -> frozenset[str]:
     return frozenset((*options, *modifier_keys(), *own))
 
 
-_STEPS = (STATE, NODE, ITEM)
-
-
 class TrialMentions:
     """Finds the names in one test; `skills` are those of its robot, as far as they are known."""
 
@@ -548,10 +542,10 @@ class TrialMentions:
         if self.robot is None or self.mission is None:
             return
         yield from self._of_robot(MISSION, self.mission)
-        for entry in _trial_mentions_entries(self.root.get("with")):
+        for entry in _trial_entries(self.root.get("with")):
             yield from self._own(entry.key, (VARIABLE,))
             yield from self._values(entry.value)
-        for entry in _trial_mentions_entries(self.root.get("mocks")):
+        for entry in _trial_entries(self.root.get("mocks")):
             yield from self._of_robot(CONTROLLER, entry.key)
             yield from self._set(at(entry.value, ("sets",)))
             if self._takes_places(entry.key.text, ""):
@@ -570,10 +564,10 @@ class TrialMentions:
             listed = at(self.root, ("expect", key))
             for item in listed.items if isinstance(listed, SequenceNode) else ():
                 yield from self._step(item)
-        for entry in _trial_mentions_entries(at(self.root, ("expect", "count"))):
+        for entry in _trial_entries(at(self.root, ("expect", "count"))):
             yield from self._own(entry.key, _STEPS)
             yield from self._of_robot(CONTROLLER, entry.key)
-        for entry in _trial_mentions_entries(at(self.root, ("expect", "data"))):
+        for entry in _trial_entries(at(self.root, ("expect", "data"))):
             yield from self._own(entry.key, (VARIABLE,))
             yield from self._values(entry.value)
 
@@ -581,14 +575,14 @@ class TrialMentions:
         if isinstance(item, ScalarNode):
             yield from self._own(item, _STEPS)
             yield from self._of_robot(CONTROLLER, item)
-        for entry in _trial_mentions_entries(item):
+        for entry in _trial_entries(item):
             name = entry.key.text
             if name in STEP_KEYS:
                 continue
             yield from self._own(entry.key, _STEPS)
             is_controller = list(self._of_robot(CONTROLLER, entry.key))
             yield from is_controller
-            for argument in _trial_mentions_entries(entry.value):
+            for argument in _trial_entries(entry.value):
                 yield from self._of_robot(JOINT, argument.key) if is_controller else ()
                 if self._takes_places(name, argument.key.text):
                     yield from self._values(argument.value)
@@ -601,7 +595,7 @@ class TrialMentions:
         return wanted is None or wanted.kind not in (TypeKind.TEXT, TypeKind.CHOICE)
 
     def _set(self, node: TreeNode | None) -> Iterator[Mention]:
-        for entry in _trial_mentions_entries(node):
+        for entry in _trial_entries(node):
             yield from self._of_robot(VALUE, entry.key)
             yield from self._values(entry.value)
 
@@ -628,7 +622,7 @@ class TrialMentions:
             yield from mentions(self.files, self.path, scalar, start, meanings)
 
 
-def _trial_mentions_entries(node: TreeNode | None) -> list[Entry]:
+def _trial_entries(node: TreeNode | None) -> list[Entry]:
     return list(node.entries.values()) if isinstance(node, MappingNode) else []
 
 
@@ -657,7 +651,7 @@ class SymbolIndex:
         kind = self.files.kind(path)
         if kind in (ROBOT, PART, OVERLAY):
             yield from ManifestMentions(self.files, path).all()
-        elif kind == SYMBOL_INDEX_MISSION:
+        elif kind == MISSION_DOCUMENT:
             yield from MissionMentions(self.files, path, self._skills(self.files.robots_of(path))).all()
         elif kind == TEST and (robot := self.files.file_named(path, "robot")) is not None:
             yield from TrialMentions(self.files, path, self._skills([robot])).all()

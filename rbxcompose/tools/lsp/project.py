@@ -26,6 +26,7 @@ _MOST_ROBOTS = 200  # examined per project
 _BEGINNING = 4_000  # characters that contain the header of a manifest
 
 FoundByFile = dict[Path, list[Finding]]
+PAUSE = 0.1  # [s] without a keystroke before robots are compiled again
 
 
 class OutdatedError(Exception):
@@ -173,14 +174,11 @@ def _robot_files(path: Path) -> list[Path]:
     return [robot.resolve() for robot in found]
 
 
-PAUSE = 0.1  # [s] without a keystroke before robots are compiled again
-
-
 class Newest:
     """The project as last compiled, and the texts that have changed since.
 
     A thread works on a copy of the project, which replaces the project when it is done. A text that arrives meanwhile
-    makes the copy outdated: it stops at the next robot, and the work starts again with all texts. So what is `told`
+    makes the copy outdated: it stops at the next robot, and the work starts again with all texts. So what is published
     always comes from the newest texts. All methods belong to the thread of the event loop.
     """
 

@@ -58,7 +58,7 @@ class SeenWays:
         if status == SKIPPED:
             self.keys.add(skipped(number))
 
-    def hear(self, event: MissionEvent, /) -> None:
+    def receive(self, event: MissionEvent, /) -> None:
         """Handle an event of the mission."""
         match event:
             case SkillEnded(leaf=leaf, result=result):

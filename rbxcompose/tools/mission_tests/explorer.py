@@ -40,6 +40,7 @@ MOST_PLACES = 3  # where the robot may be
 BESIDE = 0.1  # distance of the outermost values from a limit, as a fraction of it
 OTHER = "something else"  # a text that no comparison contains
 WAITS_FOR_EVER = "the mission waits for ever: nothing runs, nothing is due, and no value can end the wait"
+_DONE = {SUCCEEDS: "succeeds", FAILS: "fails"}
 
 
 def representatives(linked: Program, robot: RobotNames, inputs: Mapping[str, Value]) -> dict[str, tuple[Value, ...]]:
@@ -99,9 +100,6 @@ def _constant(tree: ExpressionNode, constants: Mapping[str, Value]) -> Value:
             number = number_in(operand, constants)
             return None if number is None else -number
     return number_in(tree, constants)
-
-
-_DONE = {SUCCEEDS: "succeeds", FAILS: "fails"}
 
 
 @dataclass(frozen=True, slots=True)

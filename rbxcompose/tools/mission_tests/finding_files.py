@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import re
 import stat
 from collections.abc import Iterable
 from pathlib import Path
 
-from rbxcompose.base.files import open_regular
+from rbxcompose.commands.options import kind_of
 from rbxcompose.manifest.section import TEST
 
-_KIND = re.compile(rb"^kind:[ \t]*['\"]?(\w+)", re.MULTILINE)
-_HEAD = 4096  # [B] at the start of a file that contain its kind
 _TESTS = (".test.yaml", ".test.yml")
 _SUFFIXES = (".yaml", ".yml")
 
@@ -44,8 +41,4 @@ def _is_odd(path: Path) -> bool:
 
 def is_test(path: Path) -> bool:
     """Return whether a file says that it is a test."""
-    if path.suffix not in _SUFFIXES or not path.is_file():
-        return False
-    with open_regular(path) as file:
-        kind = _KIND.search(file.read(_HEAD))
-    return kind is not None and kind[1].decode() == TEST
+    return path.suffix in _SUFFIXES and path.is_file() and kind_of(path) == TEST

@@ -18,7 +18,7 @@ from rbxcompose.tools.mission_tests.record import Done, TrialRecord
 from rbxcompose.tools.mission_tests.scope import agrees
 
 ON_TIME = 0.01  # [s] by which the start of a step may differ from its `at`
-MOST_MISSING = 50  # steps that are told
+MOST_MISSING = 50  # steps that are reported
 MOST_COMPARED = 500_000  # pairs of something expected and something that happened
 
 C = TypeVar("C")

@@ -22,7 +22,7 @@ from rbxcompose.domains.servos.twins.servo_faults import FAULTS, UNPLUG
 from rbxcompose.manifest import test_file as trials
 from rbxcompose.manifest.documents import Documents, ManifestHeader
 from rbxcompose.manifest.files import PREFIX, PROFILE, shown_name
-from rbxcompose.manifest.files import resolve as resolve_of_reader
+from rbxcompose.manifest.files import resolve as resolve_file
 from rbxcompose.manifest.section import TEST
 from rbxcompose.manifest.test_file import SECTIONS, STEP_KEYS, TrialFile
 from rbxcompose.manifest.tree import (
@@ -65,6 +65,13 @@ from rbxcompose.tools.mission_tests.model import (
 )
 from rbxcompose.tools.mission_tests.scope import agrees, check_setting, names_of, read_value, setting_of
 
+_REMOVE = "remove one of them"
+FAULT = "fault"
+STEP_HELP = "write the name of a skill, a node or a state, such as '- go_to: corner_1'"
+ENDS = {one: one for one in (SUCCEEDS, FAILS, HALTED, SKIPPED)}
+AT, SET, PUBLISH = "at", "set", "publish"
+ROBOT_FILE = "robot.yaml"
+
 
 @dataclass(frozen=True, slots=True)
 class TrialContext:
@@ -103,9 +110,6 @@ def entries_of(node: TreeNode | None) -> Iterator[tuple[str, Entry]]:
     """Yield the entries of a map; nothing for any other node, which has its finding already."""
     if isinstance(node, MappingNode):
         yield from node.entries.items()
-
-
-_REMOVE = "remove one of them"
 
 
 def contradictions(expect: Expectations) -> Iterator[Finding]:
@@ -233,9 +237,6 @@ def _values(context: TrialContext, skill: Skill, node: TreeNode | None) -> list[
     return found
 
 
-FAULT = "fault"
-
-
 def read_fault(context: TrialContext, node: TreeNode, model: trials.InjectedModel) -> EventDeed | None:
     """Return the fault as a request to the driver of a bus, None after a finding."""
     driven, report = buses_of_joints(context.robot.manifest.contents), context.report
@@ -259,14 +260,10 @@ def read_fault(context: TrialContext, node: TreeNode, model: trials.InjectedMode
     return EventDeed(FAULT, request=request, component=model.bus or driven[name])
 
 
-STEP_HELP = "write the name of a skill, a node or a state, such as '- go_to: corner_1'"
-ENDS = {one: one for one in (SUCCEEDS, FAILS, HALTED, SKIPPED)}
-
-
 def read_expect(context: TrialContext, node: TreeNode | None, model: trials.ExpectModel) -> Expectations:
     """Return the expectations."""
     root = node or MappingNode()
-    _look_at_outcome(context, root, model)
+    _check_outcome(context, root, model)
     expect = Expectations(
         model.outcome or "",
         value_span(root, ("outcome",)),
@@ -285,7 +282,7 @@ def read_expect(context: TrialContext, node: TreeNode | None, model: trials.Expe
     return expect
 
 
-def _look_at_outcome(context: TrialContext, root: TreeNode, model: trials.ExpectModel) -> None:
+def _check_outcome(context: TrialContext, root: TreeNode, model: trials.ExpectModel) -> None:
     report, ends = context.report, {**context.facts.ends, RUNS: RUNS}
     if model.outcome is not None and model.outcome not in ends:
         message = f"the mission '{context.program.name}' has no outcome '{model.outcome}'"
@@ -419,9 +416,6 @@ def _fields(context: TrialContext, topic: str, node: TreeNode | None) -> dict[st
     return written
 
 
-AT, SET, PUBLISH = "at", "set", "publish"
-
-
 def read_events(
     context: TrialContext, node: TreeNode | None, models: Sequence[trials.EventModel]
 ) -> tuple[TrialEvent, ...]:
@@ -442,13 +436,13 @@ def _deed(context: TrialContext, word: str, node: TreeNode, model: trials.EventM
     if word == SET:
         return EventDeed(SET, context.settings(at(node, (SET,)), {}))
     if word == PUBLISH and model.publish:
-        return _event_reader_published(context, node, model.publish)
+        return _published_by_event(context, node, model.publish)
     if word == FAULT and model.fault:
         return read_fault(context, node, model.fault)
     return EventDeed(word)
 
 
-def _event_reader_published(context: TrialContext, node: TreeNode, sent: trials.SentModel) -> EventDeed | None:
+def _published_by_event(context: TrialContext, node: TreeNode, sent: trials.SentModel) -> EventDeed | None:
     """Return a message for a topic that has a publisher or subscriber."""
     topics, topic = _topics(context), resolve(sent.topic, context.robot.manifest.bus.namespace or "")
     if topic not in topics:
@@ -489,9 +483,6 @@ class MessagePlaces:
         return value_span(self.node, (*self.below, *path))
 
 
-ROBOT_FILE = "robot.yaml"
-
-
 @dataclass(frozen=True, slots=True)
 class WrittenTrial:
     """The file of a test before it is interpreted; without `root`, it could not be read."""
@@ -523,7 +514,7 @@ class TrialReader:
         return trials[0], Report([*findings])
 
     def every(self, path: Path) -> list[WrittenTrial]:
-        """Return the contents of a file for each robot with which it runs; the names of further ones are told."""
+        """Return the contents of a file for each robot with which it runs; the names of further ones name the robot."""
         first = self.open(path)
         node = first.root.get("also") if first.root is not None else None
         if first.root is None or node is None:
@@ -574,7 +565,7 @@ class TrialReader:
         written = _text(root, "robot", "the robot's file", report)
         if written is None:
             return None
-        file = written.text if written.text.startswith(PREFIX) else resolve_of_reader(written.text, path, written.span)
+        file = written.text if written.text.startswith(PREFIX) else resolve_file(written.text, path, written.span)
         if isinstance(file, Finding):
             report.add(file)
             return None
@@ -658,10 +649,10 @@ def _read(root: MappingNode, robot: Robot, plan: Plan, report: Report) -> Trial 
             report.add(MISSING_KEY.at(root.span, "a test needs 'expect': what must have happened"))
         return None
     expect = read_expect(context, root.get("expect"), model)
-    _look_at_times(events, expect.until, report)
+    _check_times(events, expect.until, report)
     is_complete = _is_complete(context.facts, mocks, events)
     if is_complete:
-        report.extend(_faults_of_nothing(events))
+        report.extend(_faults_without_servos(events))
     header = {key: value.text for key in ("name", "about") if isinstance(value := root.get(key), ScalarNode)}
     return Trial(
         header.get("name", ""),
@@ -681,7 +672,7 @@ def _read(root: MappingNode, robot: Robot, plan: Plan, report: Report) -> Trial 
     )
 
 
-def _faults_of_nothing(events: tuple[TrialEvent, ...]) -> Iterator[Finding]:
+def _faults_without_servos(events: tuple[TrialEvent, ...]) -> Iterator[Finding]:
     """Yield a finding for each fault of a test that needs no robot."""
     for event in events:
         if any(deed.word == FAULT for deed in event.deeds):
@@ -724,7 +715,7 @@ def _inputs(
     return bound
 
 
-def _look_at_times(events: tuple[TrialEvent, ...], until: float | None, report: Report) -> None:
+def _check_times(events: tuple[TrialEvent, ...], until: float | None, report: Report) -> None:
     """Add findings on what can never happen: an event after the end, an order that the robot refuses."""
     is_stopped = is_paused = False
     latest = 0.0

@@ -65,7 +65,7 @@ class TrialRecord:
         """Add a line on an action of the test."""
         self.lines.append(TraceLine(self.now, f"* {text}"))
 
-    def hear(self, event: events.MissionEvent) -> None:
+    def receive(self, event: events.MissionEvent) -> None:
         """Record an event."""
         level, text = self._story.line(event)
         if text:

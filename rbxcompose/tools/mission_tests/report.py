@@ -42,7 +42,7 @@ class FileOutcome:
         return self.verdict.record.now if self.verdict else 0.0
 
 
-class Teller:
+class TrialWriter:
     """Writes for people; with `colour`, for a terminal."""
 
     def __init__(self, colour: bool = False) -> None:
@@ -175,7 +175,7 @@ def junit(outcomes: Sequence[FileOutcome]) -> str:
         )
         if outcome.verdict and not outcome.passed:
             messages = [problem.message for problem in outcome.verdict.problems]
-            _add(case, "failure", messages[0], Teller().trace(outcome.verdict))
+            _add(case, "failure", messages[0], TrialWriter().trace(outcome.verdict))
         elif not outcome.verdict:
             _add(
                 case, "error", "the test has errors", "\n".join(f"{f.span or ''} {f.message}" for f in outcome.findings)

@@ -33,6 +33,13 @@ from rbxcompose.tools.mission_tests.record import TrialRecord
 from rbxcompose.tools.mission_tests.scope import TrialScope, agrees
 
 ROUNDING = 1e-9  # [s]
+MOST_INSTANTS = 100_000  # instants at which something happens
+MOST_STEPS = 5000
+MOST_LINES = 50_000  # of the trace
+MOST_WORK = 600_000  # nodes that are started or continued
+OWNER = "test"
+BEGINS_WITHIN = 60.0  # [s] after the last event of the test; after that, something never comes
+_COMMANDS = {"pause": PauseMission, "resume": ResumeMission, "cancel": CancelMission}
 
 
 @dataclass(slots=True)
@@ -159,7 +166,7 @@ class Now:
 class Watcher(Observer, Protocol):
     """An observer of the paths that a mission takes."""
 
-    def hear(self, event: MissionEvent, /) -> None:
+    def receive(self, event: MissionEvent, /) -> None:
         """Handle an event of the mission."""
         ...
 
@@ -182,12 +189,6 @@ class Setter:
         for name, value in computed.items():
             self.record.note(f"{name} is {show_briefly(self.trial.names.values.get(name), value)}")
         return set(computed)
-
-
-MOST_INSTANTS = 100_000  # instants at which something happens
-MOST_STEPS = 5000
-MOST_LINES = 50_000  # of the trace
-MOST_WORK = 600_000  # nodes that are started or continued
 
 
 class TrialStage:
@@ -244,8 +245,8 @@ class TrialStage:
 
     def say(self, event: MissionEvent, /) -> None:
         """Record an event."""
-        self.record.hear(event)
-        self.watcher.hear(event)
+        self.record.receive(event)
+        self.watcher.receive(event)
 
     # The run.
 
@@ -322,10 +323,7 @@ class TrialStage:
         return min((time for time in times if time is not None), default=None)
 
 
-OWNER = "test"
 WhenEnded = Callable[[int, Result], None]
-BEGINS_WITHIN = 60.0  # [s] after the last event of the test; after that, something never comes
-_COMMANDS = {"pause": PauseMission, "resume": ResumeMission, "cancel": CancelMission}
 
 
 class RobotRun:
@@ -496,8 +494,8 @@ class TrialWorld:
     def say(self, event: MissionEvent, /) -> None:
         """Keep an event, and pass it on."""
         self._run.record.now = self._run.now
-        self._run.record.hear(event)
-        self._run.watcher.hear(event)
+        self._run.record.receive(event)
+        self._run.watcher.receive(event)
         self._robot.say(event)
 
 

@@ -29,6 +29,9 @@ from rbxcompose.tools.parameters.nodes import ParameterNodes, described, require
 NO_VALUES = kind("RBX9048")
 PIPED = "-"
 _ROS = "ros__parameters"
+HALF_DONE = kind("RBX9047")
+BREAKS_RULE = kind("RBX9030")
+_WORDS = 3  # of a single change: component, parameter, value
 
 
 def value_of(text: str) -> rcl_interfaces.ParameterValue:
@@ -87,8 +90,6 @@ def _no_map(span: Span, what: str) -> Finding:
     return NO_VALUES.at(span, f"{what} must be a map", help="'rbxcompose param dump' shows the form")
 
 
-HALF_DONE = kind("RBX9047")
-BREAKS_RULE = kind("RBX9030")
 Wanted = Mapping[str, Sequence[rcl_interfaces.Parameter]]  # by node
 
 
@@ -130,7 +131,7 @@ def _change_foreign(nodes: ParameterNodes, wanted: Wanted, ours: Sequence[str]) 
     """Set the parameters of one node that knows nothing of changes together with others."""
     node = next(name for name in wanted if name not in ours)
     if len(wanted) > 1:
-        message = f"'{node}' cannot change together with others: it is no component with live settings"
+        message = f"'{node}' cannot change together with others: it is not a component with live settings"
         raise NotDoneError(SAID_NO.at(None, message, help="set its parameters alone"))
     atomically = rcl_interfaces.SetParametersAtomically.Request(parameters=tuple(wanted[node]))
     (answer,) = nodes.ask([node], "set_parameters_atomically", rcl_interfaces.SetParametersAtomically, [atomically])
@@ -143,7 +144,7 @@ def _require_names(nodes: ParameterNodes, wanted: Wanted) -> None:
     answers = nodes.ask(list(wanted), "get_parameters", rcl_interfaces.GetParameters, requests)
     for (node, each), answer in zip(wanted.items(), answers, strict=True):
         if len(answer.values) != len(each):
-            raise NotDoneError(SAID_NO.at(None, f"'{node}' does not tell its parameters"))
+            raise NotDoneError(SAID_NO.at(None, f"'{node}' does not report its parameters"))
         for parameter, value in zip(each, answer.values, strict=True):
             if value.type == rcl_interfaces.ParameterType.PARAMETER_NOT_SET:
                 require_name(nodes, node, parameter.name)
@@ -154,9 +155,6 @@ def _user() -> str:
         return getpass.getuser()
     except (KeyError, OSError):  # an account without a name
         return f"user {os.getuid()}"
-
-
-_WORDS = 3  # of a single change: component, parameter, value
 
 
 def param_set(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
@@ -196,7 +194,7 @@ def param_undo(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
     except NothingToUndoError as error:
         return refuse(NO_NAME.at(None, str(error), help="'rbxcompose param history' lists the changes"))
     wanted: dict[str, list[rcl_interfaces.Parameter]] = {}
-    for change in sorted(found, key=lambda each: each.component):  # processes tell of a change in any order
+    for change in sorted(found, key=lambda each: each.component):  # processes report a change in any order
         wanted.setdefault(homes[change.component], []).append(rcl_interfaces.Parameter(change.name, change.before))
     expected: dict[str, list[rcl_interfaces.Parameter]] = {}
     for change in found:

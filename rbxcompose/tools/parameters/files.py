@@ -44,7 +44,13 @@ from rbxcompose.tools.live_rules import compiled_with
 from rbxcompose.tools.parameters.changes import PIPED, change_values, message_of, write_values
 from rbxcompose.tools.parameters.history import changes_of
 from rbxcompose.tools.parameters.nodes import ParameterNodes, listed
-from rbxcompose.tools.up_system import layers_of
+from rbxcompose.tools.system_runs import layers_of
+
+NOT_SAVED = kind("RBX9044")
+CHANGED_SINCE = kind("RBX9045")
+_COMPARE = 10.0  # [s] for the supervisor to read a plan
+NO_FILES = kind("RBX9046")
+_LARGEST = 10_000_000  # [bytes] of a file of parameters
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,10 +139,7 @@ def nodes_of(robot: Robot) -> dict[str, str]:
     return {resolve(name, robot.manifest.bus.namespace or ""): name for name in robot.components}
 
 
-NOT_SAVED = kind("RBX9044")
-CHANGED_SINCE = kind("RBX9045")
 Compiled = Callable[[Mapping[Path, str]], Compilation]
-_COMPARE = 10.0  # [s] for the supervisor to read a plan
 
 
 @dataclass(frozen=True, slots=True)
@@ -284,9 +287,6 @@ def _keys_of(found: Difference) -> str:
     return ", ".join(f"'{key}'" for key in keys) or "the robot"
 
 
-NO_FILES = kind("RBX9046")
-
-
 def manifest_of(nodes: ParameterNodes, arguments: argparse.Namespace) -> tuple[LiveSettings, RobotFolder, RobotState]:
     """Return the settings of the chosen robot beside its manifest.
 
@@ -301,7 +301,7 @@ def manifest_of(nodes: ParameterNodes, arguments: argparse.Namespace) -> tuple[L
         raise NotDoneError(NO_ANSWER.at(None, f"'{folder.path.name}' does not answer"))
     live = live_settings(nodes, state)
     if live is None:
-        help_text = f"'rbxcompose check {state.file}' tells them"
+        help_text = f"'rbxcompose check {state.file}' shows them"
         raise NotDoneError(NO_FILES.at(None, f"the files of '{state.robot}' have errors now", help=help_text))
     return live, folder, state
 
@@ -378,7 +378,7 @@ def param_save(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
 
 
 def save(live: LiveSettings, changes: Sequence[LiveChange], compiled: Compiled, arguments: argparse.Namespace) -> int:
-    """Write changes into the files of the robot, and tell them.
+    """Write changes into the files of the robot, and report them.
 
     Raises:
         NotDoneError: if one cannot be written, or something else would change by it.
@@ -433,9 +433,6 @@ def _change_text(change: LiveChange) -> str:
 def _data(change: LiveChange) -> dict[str, object]:
     old, new = (json.loads(to_json(one)) for one in (change.written, change.live))
     return {"component": change.component, "name": change.name, "old": old, "new": new}
-
-
-_LARGEST = 10_000_000  # [bytes] of a file of parameters
 
 
 @dataclass(frozen=True, slots=True)
@@ -516,7 +513,7 @@ class RemoteParameters:
         """Return the settings that the robot has now, beside those of the files here.
 
         Raises:
-            NotDoneError: if the robot does not tell them.
+            NotDoneError: if the robot does not report them.
         """
         found, dumped = self._compiled({}), self._ask("param", "dump")
         if found.robot is None or found.plan is None:
@@ -537,7 +534,7 @@ class RemoteParameters:
         done = on_all({"": self._there(*words, "--json")})[""]
         if done.wait() or done.answer is None:
             why = plain(done.lines[0]) if done.lines else "it says nothing"
-            raise NotDoneError(UNREACHED.at(None, f"'{self.remote.name}' does not tell the parameters: {why}"))
+            raise NotDoneError(UNREACHED.at(None, f"'{self.remote.name}' does not report the parameters: {why}"))
         return done.answer
 
     def _there(self, *words: str) -> list[str]:
@@ -545,7 +542,7 @@ class RemoteParameters:
 
 
 def _configs(robot: Robot, dumped: Mapping[str, Mapping[str, object]]) -> Iterator[tuple[str, Config]]:
-    """Yield the components that were told of, with the live values of each."""
+    """Yield the components in a dump, with the live values of each."""
     for node, name in nodes_of(robot).items():
         values = dumped.get(node.removeprefix("/"))
         if values is None:

@@ -9,7 +9,7 @@ from datetime import datetime
 from rbxcompose.base.units import Dimension
 from rbxcompose.bus.graph import find
 from rbxcompose.commands.console import emit, table
-from rbxcompose.commands.guest import HeardMessage
+from rbxcompose.commands.guest import ReceivedMessage
 from rbxcompose.commands.messages import to_json
 from rbxcompose.msgs.cdr import CdrError, decode
 from rbxcompose.msgs.rbxcompose_parameters import ChangeParameters, ParameterChange
@@ -56,7 +56,7 @@ def param_watch(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
     seen = {node: _last_number(changes_of(nodes, [node])) for node in asked}
     events: list[ParameterEvent] = []
 
-    def heard(message: HeardMessage) -> None:
+    def received(message: ReceivedMessage) -> None:
         try:
             event = decode(ParameterEvent, message.arrival.payload)
         except CdrError:
@@ -68,7 +68,7 @@ def param_watch(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
     topic = find(guest.graph().topics, _EVENTS)
     if topic is None:
         return 0
-    guest.listen(topic, heard)
+    guest.listen(topic, received)
     while arguments.count is None or printed < arguments.count:
         guest.run(lambda: bool(events))
         event = events.pop(0)
@@ -81,7 +81,7 @@ def param_watch(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
 
 
 def _of_event(nodes: ParameterNodes, event: ParameterEvent, seen: dict[str, int]) -> list[ParameterChange]:
-    """Return the changes that an event reports; a foreign node does not tell who did it, nor what was before."""
+    """Return the changes that an event reports; a foreign node reports neither who did it nor what was before."""
     if not nodes.serves(event.node, CHANGE):
         name = event.node.removeprefix("/")
         each = (*event.new_parameters, *event.changed_parameters)

@@ -1,4 +1,4 @@
-"""The nodes on a bus that have parameters, and what they tell: `param ls`, `get` and `describe`."""
+"""The nodes on a bus that have parameters, and their values: `param ls`, `get` and `describe`."""
 
 from __future__ import annotations
 
@@ -22,6 +22,8 @@ from rbxcompose.sdk.parameters import TYPE_WORDS, dimension_in, from_message, sh
 Q = TypeVar("Q", bound=Message)
 R = TypeVar("R", bound=Message)
 _GET = "/get_parameters"
+_WIDEST = 40  # characters of a value in a table
+_KEYS = ("node", "name", "value", "read_only", "about")
 
 
 class ParameterNodes:
@@ -81,13 +83,9 @@ def _response(node: str, reply: Reply[R]) -> R:
     return reply.response
 
 
-_WIDEST = 40  # characters of a value in a table
-_KEYS = ("node", "name", "value", "read_only", "about")
-
-
 @dataclass(frozen=True, slots=True)
 class ListedParameter:
-    """A parameter as its node tells it."""
+    """A parameter as its node reports it."""
 
     node: str
     value: object

@@ -25,6 +25,13 @@ from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.sdk.ports import Qos
 
 _HELP = "ready: arrows or w a s d: drive   space: stop   q: quit"
+HOLD = 0.3  # [s] that a key counts as pressed; terminals report only presses, and repeat them while a key is held
+PERIOD = 0.1  # [s] between two commands
+_ENDS = ("q", "\x04", "\0")  # Ctrl-D arrives as a zero byte if it was typed before the terminal was raw
+_FORWARD, _BACK, _LEFT, _RIGHT = (1, 0), (-1, 0), (0, 1), (0, -1)
+_STILL = (0, 0)
+_USUAL = "/cmd_vel/teleop"  # where several inputs are free, and nothing is known of their priorities
+_OPEN_ONE = "give the mux an input without 'from', such as 'teleop: {priority: 100, timeout: 0.5 s}'"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -100,11 +107,6 @@ class _Wheel:
             self._publisher(Twist(linear=Vector3(x=velocity.speed), angular=Vector3(z=velocity.turn)))
 
 
-HOLD = 0.3  # [s] that a key counts as pressed; terminals report only presses, and repeat them while a key is held
-PERIOD = 0.1  # [s] between two commands
-_ENDS = ("q", "\x04", "\0")  # Ctrl-D arrives as a zero byte if it was typed before the terminal was raw
-_FORWARD, _BACK, _LEFT, _RIGHT = (1, 0), (-1, 0), (0, 1), (0, -1)
-_STILL = (0, 0)
 _KEYS = {
     "w": _FORWARD,
     "s": _BACK,
@@ -182,10 +184,6 @@ class DeadMan:
         """Return the final command before silence; None if already silent."""
         was_moving, self._is_moving = self._is_moving, False
         return Velocity() if was_moving else None
-
-
-_USUAL = "/cmd_vel/teleop"  # where several inputs are free, and nothing is known of their priorities
-_OPEN_ONE = "give the mux an input without 'from', such as 'teleop: {priority: 100, timeout: 0.5 s}'"
 
 
 def command_topic(topics: Sequence[GraphName], wanted: str | None, inputs: Mapping[str, str] | None) -> str:

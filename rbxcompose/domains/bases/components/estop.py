@@ -18,7 +18,7 @@ class EstopConfig(Config):
     """An emergency stop."""
 
     topic: str = "estop"
-    """Where it tells whether it is pressed."""
+    """The topic that says whether it is pressed."""
     deadline: Time = Field(0.5, gt=0)
     """Silence after which the robot is stopped, counted from the start."""
     relaxes: list[str] = []
@@ -46,18 +46,18 @@ class Estop(Component[EstopConfig]):
 
     def configure(self) -> None:
         """Know nothing yet."""
-        self.heard_at, self.is_pressed, self.has_input = math.inf, False, False
-        self.reported: str | None = None  # the last reason, None if nothing was told
+        self.received_at, self.is_pressed, self.has_input = math.inf, False, False
+        self.reported: str | None = None  # the last reason, None if nothing was reported
 
     def start(self) -> None:
         """Wait for the first message."""
-        if math.isinf(self.heard_at):
-            self.heard_at = self.now
+        if math.isinf(self.received_at):
+            self.received_at = self.now
         self.look()
 
     def on_pressed(self, message: Bool) -> None:
         """Take a message of the button."""
-        self.heard_at, self.is_pressed, self.has_input = self.now, message.data, True
+        self.received_at, self.is_pressed, self.has_input = self.now, message.data, True
         self.look()
 
     def wake(self) -> None:
@@ -66,7 +66,7 @@ class Estop(Component[EstopConfig]):
 
     def go_on(self) -> None:
         """Count the silence anew: robot time stood still."""
-        self.heard_at = self.now
+        self.received_at = self.now
         self.look()
 
     def release(self) -> None:
@@ -80,14 +80,14 @@ class Estop(Component[EstopConfig]):
         """Return why the robot must stand still, or nothing."""
         if self.is_pressed:
             return f"'{self.config.topic}' is pressed"
-        is_late = self.now - self.heard_at >= self.config.deadline - 1e-9
+        is_late = self.now - self.received_at >= self.config.deadline - 1e-9
         return f"nothing came on '{self.config.topic}' for {self.config.deadline:g} s" if is_late else ""
 
     def look(self) -> None:
         """Tell the supervisor whether the robot must stand still, if that has changed."""
         reason = self.reason
         if not reason:
-            self.context.wake_at(self.heard_at + self.config.deadline)
+            self.context.wake_at(self.received_at + self.config.deadline)
         if reason == self.reported or not (reason or self.has_input):
             return
         is_news = reason and not self.reported

@@ -37,10 +37,10 @@ from rbxcompose.sdk import (
     WritesFrame,
 )
 
-AVERAGED = 0.1  # [s], over which velocities are told
+AVERAGED = 0.1  # [s], over which velocities are averaged
 JUMP = 2.0  # times the largest speed of a wheel: a servo that has started again counts from elsewhere
 STALE = 3.0  # cycles after which nobody knows where a wheel is
-UNKNOWN = 1e6  # variance of what wheels cannot tell: height, roll, pitch
+UNKNOWN = 1e6  # variance of what wheels cannot measure: height, roll, pitch
 PLANAR = (0, 1, 5)  # x, y, and the turn about z, of the six that a covariance has
 
 
@@ -116,7 +116,7 @@ class DiffDriveController(Controller[DiffDriveConfig]):
 
     @classmethod
     def ports(cls, name: str, config: DiffDriveConfig) -> dict[str, Port[Any]]:
-        """Return its commands, and what it tells."""
+        """Return its commands, and what it publishes."""
         odometry = config.odometry
         ports: dict[str, Port[Any]] = {
             "commands": In(geometry.Twist, config.commands, qos="command"),
@@ -203,7 +203,7 @@ class DiffDriveController(Controller[DiffDriveConfig]):
 
     @property
     def note(self) -> str:
-        """Return why it does not do as it is told."""
+        """Return why it does not follow its commands."""
         return self.trouble or self.refused
 
     def received(self, port: str, message: geometry.Twist) -> None:
@@ -243,7 +243,7 @@ class DiffDriveController(Controller[DiffDriveConfig]):
             if wheel.blocked:
                 return f"wheel '{name}': {wheel.blocked}"
             if now - wheel.measured_at > STALE * dt:
-                return f"wheel '{name}' does not tell where it is"
+                return f"wheel '{name}' does not report its position"
             if not self.drive.at_rest and not wheel.has_torque:
                 return f"wheel '{name}' was relaxed"
         return ""

@@ -53,6 +53,25 @@ from rbxcompose.domains.body.text import (
 )
 from rbxcompose.manifest.files import find, shown_name
 
+TEXT, PDF = "text", "pdf"
+_FAMILY = "RBX20"  # codes of findings about bodies
+WOULD_REPLACE = kind("RBX2017")
+_HEAD = ("mesh", "triangles", "bytes", "largest error", "mean error", "file")
+_SIMPLIFY = "write meshes with fewer triangles, as binary STL files, and report how far they are from the originals"
+_SIMPLIFY_MORE = """\
+The error is the distance from points of the original surface to the nearest point of the simplified one:
+10,000 points, spread evenly with a fixed seed, for the mean, and also up to 10,000 of its corners for the largest. It
+is in millimetres by the scale in the URDF; lengths of a bare STL or OBJ file count as metres. A mesh with many
+borders may keep more triangles than are wanted; the table says so."""
+_RATIO = 0.2
+UNSCALED: Scale = (1.0, 1.0, 1.0)
+_POSE = "move the joints of a running robot, by sliders in the terminal or with --joint"
+_POSE_MORE = """\
+It reads `robot_description` from the bus; it publishes `joint_states` ten times a second and at each change.
+
+Sliders: up and down select a joint. Left and right move it by 1 deg or 1 cm, with shift, or page up and down, by ten
+of these. 0, c and r move it to zero, to the centre of its range, or anywhere; Z, C and R do so with all. q quits."""
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
@@ -102,9 +121,6 @@ def _show(arguments: argparse.Namespace, description: Description) -> int:
     return 0
 
 
-TEXT, PDF = "text", "pdf"
-
-
 def _tree(arguments: argparse.Namespace, description: Description) -> int:
     try:
         content = _drawn(arguments.format, description)
@@ -122,9 +138,6 @@ def _drawn(form: str, description: Description) -> bytes:
     if form == TEXT:
         return "".join(f"{line}\n" for line in tree_of(description.body)).encode()
     return draw_graph(description.body, form)
-
-
-_FAMILY = "RBX20"  # codes of findings about bodies
 
 
 def _check(arguments: argparse.Namespace, found: DescribedBody) -> int:
@@ -213,17 +226,6 @@ def _position(body: Body, written: str) -> tuple[str, float]:
     if slider is None:
         raise ValueError(f"there is no moving joint '{name}': {', '.join(joint.name for joint in body.moving)}")
     return name, slider.read(value)
-
-
-WOULD_REPLACE = kind("RBX2017")
-_HEAD = ("mesh", "triangles", "bytes", "largest error", "mean error", "file")
-_SIMPLIFY = "write meshes with fewer triangles, as binary STL files, and report how far they are from the originals"
-_SIMPLIFY_MORE = """\
-The error is the distance from points of the original surface to the nearest point of the simplified one:
-10,000 points, spread evenly with a fixed seed, for the mean, and also up to 10,000 of its corners for the largest. It
-is in millimetres by the scale in the URDF; lengths of a bare STL or OBJ file count as metres. A mesh with many
-borders may keep more triangles than are wanted; the table says so."""
-_RATIO = 0.2
 
 
 def _add_simplify_options(parser: argparse.ArgumentParser) -> None:
@@ -323,7 +325,6 @@ def _millimetres(metres: float) -> str:
     return f"{metres * 1000:.3g} mm"
 
 
-UNSCALED: Scale = (1.0, 1.0, 1.0)
 _WAYS: Sequence[Callable[[Path], str]] = (
     lambda path: path.stem,
     lambda path: f"{path.parent.name}_{path.stem}",
@@ -350,14 +351,6 @@ def scales_of(body: Body, names: Collection[str]) -> dict[str, set[Scale]]:
             if shape.geometry.file in found:
                 found[shape.geometry.file].add(shape.geometry.size)
     return {name: scales or {UNSCALED} for name, scales in found.items()}
-
-
-_POSE = "move the joints of a running robot, by sliders in the terminal or with --joint"
-_POSE_MORE = """\
-It reads `robot_description` from the bus; it publishes `joint_states` ten times a second and at each change.
-
-Sliders: up and down select a joint. Left and right move it by 1 deg or 1 cm, with shift, or page up and down, by ten
-of these. 0, c and r move it to zero, to the centre of its range, or anywhere; Z, C and R do so with all. q quits."""
 
 
 def _add_pose_options(parser: argparse.ArgumentParser) -> None:

@@ -22,7 +22,7 @@ from rbxcompose.commands.console import NotDoneError, emit, refuse
 from rbxcompose.commands.guest import NAME, NO_NAME, NOBODY, Guest, visit
 from rbxcompose.commands.lookup import BusPlace, add_bus_options, find_place
 from rbxcompose.commands.messages import shown, to_json
-from rbxcompose.domains.body.command_body import HeardFrames
+from rbxcompose.domains.body.command_body import ReceivedFrames
 from rbxcompose.msgs.geometry_msgs import Quaternion, Transform, TransformStamped, Vector3
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header
@@ -31,6 +31,9 @@ from rbxcompose.sdk.ports import Qos
 
 ON_SYSTEM = options.BUS
 _DIGITS = 4  # decimal places of metres and degrees
+_TOPIC = "/tf_static"
+_LONGEST = 1000  # characters of a note
+NO_PLACE = kind("RBX9043")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -65,7 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _tree(guest: Guest, arguments: argparse.Namespace) -> int:
-    frames = HeardFrames(guest)
+    frames = ReceivedFrames(guest)
     guest.run(lambda: frames.is_whole, arguments.timeout)
     tree = frames.tree
     children: dict[str | None, list[str]] = {}
@@ -129,7 +132,7 @@ def _pose(tree: TransformTree, parent: str, frame: str, at: int | None) -> Trans
 
 
 def _echo(guest: Guest, arguments: argparse.Namespace) -> int:
-    frames, parent, frame, at = HeardFrames(guest), arguments.parent, arguments.frame, arguments.at
+    frames, parent, frame, at = ReceivedFrames(guest), arguments.parent, arguments.frame, arguments.at
     tree, past = frames.tree, -(at or 0)
     waits = arguments.timeout + (past / NANOSECONDS if past <= SPAN else 0.0)  # more is never remembered
     guest.run(lambda: _is_known(tree, parent, frame, at), waits)
@@ -171,11 +174,6 @@ def _past(text: str) -> int:
     return round(time * NANOSECONDS)
 
 
-_TOPIC = "/tf_static"
-_LONGEST = 1000  # characters of a note
-NO_PLACE = kind("RBX9043")
-
-
 def add_static_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the frames and the pose."""
     parser.add_argument("parent", metavar="PARENT", help="the frame in which it is placed, such as base_link")
@@ -197,7 +195,7 @@ def publish_static(arguments: argparse.Namespace) -> int:
     try:
         place = find_place(arguments)
         with Guest(place) as looking:  # through the router, which knows everyone
-            frames = HeardFrames(looking)
+            frames = ReceivedFrames(looking)
             looking.run(lambda: frames.is_whole, arguments.timeout)
         if refusal := _refusal(frames, parent, child, pose):
             return refuse(NO_PLACE.at(None, refusal))
@@ -206,7 +204,7 @@ def publish_static(arguments: argparse.Namespace) -> int:
         return refuse(error.finding)
 
 
-def _refusal(frames: HeardFrames, parent: str, child: str, pose: Transform3) -> str:
+def _refusal(frames: ReceivedFrames, parent: str, child: str, pose: Transform3) -> str:
     """Return why a frame cannot be placed; if it can, place it in the tree that was heard."""
     if child.startswith("/") or parent.startswith("/"):
         return "names of frames do not begin with '/'"
@@ -220,7 +218,7 @@ def _refusal(frames: HeardFrames, parent: str, child: str, pose: Transform3) -> 
     return "" if answer.accepted else answer.message
 
 
-def _hold(place: BusPlace, frames: HeardFrames, parent: str, child: str, pose: Transform3) -> int:
+def _hold(place: BusPlace, frames: ReceivedFrames, parent: str, child: str, pose: Transform3) -> int:
     with Guest(place, stays=True) as guest, guest.interruptible():
         publisher = guest.bus(frames.kind).publisher(NAME, _TOPIC, TFMessage, Qos.LATCHED)
         link = TransformStamped(

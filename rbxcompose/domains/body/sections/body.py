@@ -110,7 +110,7 @@ def _brought(instance: str, own: TreeNode | None, entry: TreeNode) -> TreeNode |
     """Return the body of a part as a piece of the body of the file that includes it."""
     attach = entry.entries.get("attach") if isinstance(entry, MappingNode) else None
     if own is None and attach is not None:
-        own = MappingNode({}, attach.key.span)  # a piece without a file, which is told there
+        own = MappingNode({}, attach.key.span)  # a piece without a file, which is reported there
     if not isinstance(own, MappingNode):
         return own
     piece = {key: one for key, one in own.entries.items() if key != PIECES} | ({"attach": attach} if attach else {})
@@ -161,7 +161,7 @@ def body(reading: Reading[BodyModel]) -> Description | None:
     if read is None or reading.node is None:
         return None
     if any(value is BROKEN for one in (read, *read.pieces.values()) for value in one.with_.values()):
-        return None  # what is wrong with an argument is told where it was given
+        return None  # what is wrong with an argument is reported where it was given
     parts = [_part(reading, reading.node, (), "", read, None)] if read.urdf or read.xacro else []
     for name, piece in read.pieces.items():
         parts.append(_part(reading, reading.node, (PIECES, name), name, piece, piece.attach))

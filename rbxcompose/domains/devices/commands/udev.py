@@ -33,6 +33,15 @@ from rbxcompose.domains.devices.serial_ports import ROOT, SerialPort, serial_por
 from rbxcompose.domains.devices.usb import UsbDevice
 from rbxcompose.manifest.tree import key_span
 
+_GROUP_NAME = re.compile(r"[a-z_][a-z0-9_-]{0,31}")
+_HEAD = ("port", "vendor", "product", "serial", "USB port", "driver", "what it is", "device")
+_NUMBERS = ("vendor", "product", "interface", "usb_port")  # as they are; a serial number may need quotes
+_MOST = 1 << 20  # [B] of rules
+NOT_INSTALLED = kind("RBX9418")
+NO_DEVICES = kind("RBX9419")
+_MODE = 0o644
+_YES = ("y", "yes")
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
@@ -69,7 +78,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 Do = Callable[[argparse.Namespace], int]
-_GROUP_NAME = re.compile(r"[a-z_][a-z0-9_-]{0,31}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +119,7 @@ def devices_of(arguments: argparse.Namespace) -> RobotDevices | None:
 
 
 def read_devices(path: str, arguments: argparse.Namespace) -> RobotDevices | None:
-    """Return the devices of a robot, and tell its findings; None if it cannot be read."""
+    """Return the devices of a robot, and report its findings; None if it cannot be read."""
     found = compiled(path, arguments)
     if found.report.has_errors:
         console.write_report(found.report, found.sources)
@@ -123,10 +131,6 @@ def read_devices(path: str, arguments: argparse.Namespace) -> RobotDevices | Non
         for name, device in contents.of(devices).items()
     }
     return RobotDevices(found.robot.manifest.name, named, found.sources, not found.report.has_errors)
-
-
-_HEAD = ("port", "vendor", "product", "serial", "USB port", "driver", "what it is", "device")
-_NUMBERS = ("vendor", "product", "interface", "usb_port")  # as they are; a serial number may need quotes
 
 
 def _scan(arguments: argparse.Namespace) -> int:
@@ -223,9 +227,6 @@ def _generate(arguments: argparse.Namespace) -> int:
     return 0
 
 
-_MOST = 1 << 20  # [B] of rules
-
-
 def _check(arguments: argparse.Namespace) -> int:
     found = devices_of(arguments)
     if found is None or not found.is_right:
@@ -254,12 +255,6 @@ def installed(file: Path) -> str | None:
         return None
 
 
-NOT_INSTALLED = kind("RBX9418")
-NO_DEVICES = kind("RBX9419")
-_MODE = 0o644
-_YES = ("y", "yes")
-
-
 def _install(arguments: argparse.Namespace) -> int:
     found = devices_of(arguments)
     if found is None or not found.is_right:
@@ -274,7 +269,7 @@ def _install(arguments: argparse.Namespace) -> int:
         return _done(arguments, path, written=False)
     if not arguments.yes:
         if arguments.json or not sys.stdin.isatty():
-            return console.misused("udev install", "there is nobody to ask: give '--yes'")
+            return console.misused("udev install", "there is no terminal to ask: give '--yes'")
         console.emit(_change(path, before, rules))
         if not _agreed():
             console.emit("nothing was written")

@@ -22,7 +22,7 @@ KERNEL_NAME = kind("RBX2263")
 
 _DIGITS = re.compile(r"[0-9a-f]{4}")
 _USB_PORT = re.compile(USB_PORT)
-_LONGEST = 126  # characters of a text that a USB device tells
+_LONGEST = 126  # characters of a text that a USB device reports
 # Of Linux's list of devices (admin-guide/devices.txt), and what udev and systemd add.
 _OF_THE_KERNEL = re.compile(
     r"tty([a-z]*\d+)?|console|null|zero|full|random|urandom|mem|port|kmsg|core|fd|std(in|out|err)|log|initctl|fuse|ptmx|pts|shm|"
@@ -47,7 +47,7 @@ def _usb_port(text: str) -> str:
 
 
 def _serial(text: str) -> str:
-    """Refuse what no device tells; an empty one would fit all of its kind."""
+    """Refuse what no device reports; an empty one would fit all of its kind."""
     if not text.strip() or len(text) > _LONGEST or not text.isprintable():
         raise ValueError("must be a serial number; leave the key out if the device has none")
     return text
@@ -123,12 +123,12 @@ def _shared(name: str, other: str, wanted: Mapping[str, UsbDevice], spans: Mappi
     if not (first.usb_port or first.vendor):
         return
     related = [Related(spans[other], "the other one")]
-    help_text = "tell them apart by 'serial', 'usb_port' or 'interface'"
+    help_text = "distinguish them by 'serial', 'usb_port' or 'interface'"
     if device == first:
         words = f"the devices '{other}' and '{name}' are described alike"
         yield SAME_DEVICE.at(spans[name], words, help=help_text, related=related)
-    elif device.is_meant_by(first) or first.is_meant_by(device):
-        narrow, wide = (name, other) if device.is_meant_by(first) else (other, name)
+    elif device.matches(first) or first.matches(device):
+        narrow, wide = (name, other) if device.matches(first) else (other, name)
         words = f"the device '{narrow}' is also one that '{wide}' describes"
         yield INCLUDED_DEVICE.at(spans[name], words, help=help_text, related=related)
 

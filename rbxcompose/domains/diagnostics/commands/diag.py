@@ -26,6 +26,11 @@ from rbxcompose.runtime.folder import RobotFolder
 
 ON_SYSTEM = requests.TYPE
 _PERIOD = 0.2  # [s] between two requests to a robot that is followed
+_RESET, _FAINT = "\x1b[0m", "\x1b[2m"
+_COLOURS = {Level.OK: "\x1b[32m", Level.WARN: "\x1b[33m", Level.ERROR: "\x1b[1;31m", Level.STALE: "\x1b[35m"}
+_STEP = "  "
+_WIDEST = 40  # columns of a name; longer ones move their message to the right
+_LONGEST = 1000  # characters of a message
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -140,13 +145,6 @@ def _history(arguments: argparse.Namespace) -> int:
 
 def _acknowledge(arguments: argparse.Namespace) -> int:
     return pass_on(arguments, requests.Acknowledge(arguments.path))
-
-
-_RESET, _FAINT = "\x1b[0m", "\x1b[2m"
-_COLOURS = {Level.OK: "\x1b[32m", Level.WARN: "\x1b[33m", Level.ERROR: "\x1b[1;31m", Level.STALE: "\x1b[35m"}
-_STEP = "  "
-_WIDEST = 40  # columns of a name; longer ones move their message to the right
-_LONGEST = 1000  # characters of a message
 
 
 def tree_lines(

@@ -60,7 +60,7 @@ class HostBattery(HostMonitor[HostBatteryConfig]):
         supply = next((battery for battery in found if name in ("", battery.name)), None)
         if supply is None or supply.charge is None:
             there = f"there is {', '.join(battery.name for battery in found)}" if found else "there is none"
-            self.status(Level.ERROR, f"no battery{' ' + name if name else ''} tells its charge: {there}")
+            self.status(Level.ERROR, f"no battery{' ' + name if name else ''} reports its charge: {there}")
             return
         self.battery_level(Float32(data=supply.charge * PERCENT))
         level = self.core.feed(self.now, supply.charge)

@@ -83,7 +83,7 @@ class Threshold(Component[ThresholdConfig]):
         """Know nothing yet."""
         self.core = LimitCore(limits_of(self.config))
         self.read = attrgetter(self.config.field)
-        self.heard_at = math.inf
+        self.received_at = math.inf
 
     def reconfigure(self, old: ThresholdConfig) -> None:
         """Compare with the new limits from the next message on."""
@@ -91,12 +91,12 @@ class Threshold(Component[ThresholdConfig]):
 
     def start(self) -> None:
         """Count silence from now on."""
-        self.heard_at = min(self.heard_at, self.now)
+        self.received_at = min(self.received_at, self.now)
 
     def on_number(self, message: Any) -> None:
         """Take a message."""
         number = float(self.read(message))
-        self.heard_at = self.now
+        self.received_at = self.now
         self.status(self.core.feed(self.now, number), self.text(number), value=f"{number:.6g}")
 
     def text(self, number: float) -> str:
@@ -105,7 +105,7 @@ class Threshold(Component[ThresholdConfig]):
 
     def step(self, dt: float) -> None:
         """Look whether messages stay away."""
-        if self.now - self.heard_at > self.config.timeout:
+        if self.now - self.received_at > self.config.timeout:
             self.status(Level.STALE, f"nothing comes on '{self.config.topic}'")
 
 

@@ -45,6 +45,7 @@ _ELSEWHERE = {
     "history_depth": "'rbxcompose record' keeps changes of levels",
     "bond_id": "analyzers are tied to no other program",
 }
+_EVERYTHING = "{regex: '.*'}"  # what an empty beginning matches
 
 
 @dataclass(slots=True)
@@ -76,10 +77,12 @@ class ForeignAggregator:
 
 
 def read_aggregators(file: ForeignFile, report: Report) -> list[ForeignAggregator]:
-    """Return the aggregators of a file; other nodes in it are told, and so is a file without any."""
+    """Return the aggregators of a file; other nodes in it are reported, and so is a file without any."""
     found, others = parameters_with(file, lambda root: bool(_analyzers(root)))
     if not found:
-        words = f"'{plain(file.name)}' is no file of diagnostic_aggregator: nothing in it has the type of an analyzer"
+        words = (
+            f"'{plain(file.name)}' is not a file of diagnostic_aggregator: nothing in it has the type of an analyzer"
+        )
         report.add(OTHER_PROGRAM.at(file.root.span, words))
         return []
     for node in others:
@@ -199,8 +202,6 @@ def _is_regex(given: Given[str], entries: ForeignMap) -> bool:
 
 
 T = TypeVar("T")
-
-_EVERYTHING = "{regex: '.*'}"  # what an empty beginning matches
 
 
 @importer("diagnostics", "analyzers of diagnostic_aggregator, for ROS 1 and ROS 2")

@@ -104,7 +104,7 @@ def _why(arguments: argparse.Namespace) -> int:
 
 
 def _account(state: requests.MuxState) -> Iterator[str]:
-    """Yield the lines that tell who holds an output, who waits for what, and which locks are engaged."""
+    """Yield the lines that say who holds an output, who waits for what, and which locks are engaged."""
     until = f", for another {state.until - state.time:.2f} s unless it sends again" if state.until else ""
     yield f"{state.name}: {state.why}{until}"
     rows = [("input", "priority", "state", "last heard", "why")]

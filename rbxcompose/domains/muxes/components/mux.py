@@ -23,7 +23,7 @@ from rbxcompose.sdk import Capability, Component, ComponentNoted, Forwards, In, 
 from rbxcompose.sdk.capabilities import LocksInSilence, Setting
 
 LOCK = "lock_"  # prefix of the ports of locks
-ANNOUNCED = "announced"  # the port at which it tells who holds the output
+ANNOUNCED = "announced"  # the port at which it publishes who holds the output
 KEPT = 200  # changes that can be read later
 
 
@@ -78,7 +78,7 @@ class Mux(Component[MuxConfig]):
         self.wakes_at = math.inf  # [s], the first of the wakes to come
         self.refused: list[str] = []
         self.broken: set[str] = set()  # inputs whose last message had a number that is none
-        self.heard_at: dict[str, float] = {}  # when an input last sent
+        self.received_at: dict[str, float] = {}  # when an input last sent
         self.changes: deque[requests.MuxChange] = deque(maxlen=KEPT)
         self.orders = MuxOrders()
         self.listening = set(self.config.inputs)
@@ -102,7 +102,7 @@ class Mux(Component[MuxConfig]):
                 self.add_input(order)
                 self.orders.keep(order)
         self.core.take_over(old.core)
-        self.heard_at = old.heard_at
+        self.received_at = old.received_at
         self.orders.take_over(old.orders, self.core.inputs)
         self.changed()
 
@@ -127,7 +127,7 @@ class Mux(Component[MuxConfig]):
                 self.warn(f"input '{name}' sends numbers that are not finite: they are dropped")
             return
         self.broken.discard(name)
-        self.heard_at[name] = self.now
+        self.received_at[name] = self.now
         self.send(self.core.receive(name, message, self.now))
 
     def wake(self) -> None:
@@ -184,7 +184,7 @@ class Mux(Component[MuxConfig]):
             core.active,
             until if until < math.inf else None,
             core.arbiter.selected,
-            states_of(core, self.topics, self.heard_at, now, has_priorities=config.has_priorities),
+            states_of(core, self.topics, self.received_at, now, has_priorities=config.has_priorities),
             lock_states(core, {name: config.topic_of(name) for name in config.locks}, now),
         )
 
@@ -202,7 +202,7 @@ class Mux(Component[MuxConfig]):
         self.core.select(name, self.now)
         self.orders.keep(requests.SelectMuxInput(self.name, name or requests.NONE))
         self.changed()
-        return self.tell(f"'{name}' is selected" if name else "no input is selected")
+        return self.log(f"'{name}' is selected" if name else "no input is selected")
 
     @answers(requests.AddMuxInput)
     def add(self, request: requests.AddMuxInput) -> str:
@@ -216,7 +216,7 @@ class Mux(Component[MuxConfig]):
         self.add_input(request)
         self.orders.keep(request)
         self.changed()
-        return self.tell(f"input '{request.input}' takes '{self.topics[request.input]}'")
+        return self.log(f"input '{request.input}' takes '{self.topics[request.input]}'")
 
     @answers(requests.DeleteMuxInput)
     def delete(self, request: requests.DeleteMuxInput) -> str:
@@ -228,7 +228,7 @@ class Mux(Component[MuxConfig]):
         del self.topics[name]
         self.orders.keep(requests.DeleteMuxInput(self.name, name))
         self.changed()
-        return self.tell(f"input '{name}' is gone")
+        return self.log(f"input '{name}' is gone")
 
     @answers(requests.LockMuxInputs)
     def lock(self, request: requests.LockMuxInputs) -> str:
@@ -239,7 +239,7 @@ class Mux(Component[MuxConfig]):
         self.send(self.core.tick(self.now))
         self.changed()
         limit = "until they are unlocked" if request.seconds is None else f"for {request.seconds:g} s"
-        return self.tell(f"locked by hand {limit}: {', '.join(names)}")
+        return self.log(f"locked by hand {limit}: {', '.join(names)}")
 
     @answers(requests.UnlockMuxInputs)
     def unlock(self, request: requests.UnlockMuxInputs) -> str:
@@ -251,7 +251,7 @@ class Mux(Component[MuxConfig]):
         self.settle()
         resting = [name for name in locked if name in self.core.waiting]
         rest = f"; {' and '.join(resting)} must come to rest once before it moves anything" if resting else ""
-        return self.tell(f"unlocked: {', '.join(locked)}{rest}")
+        return self.log(f"unlocked: {', '.join(locked)}{rest}")
 
     def on_select(self, request: MuxSelect.Request) -> MuxSelect.Response:
         """Select an input by its name or topic, as `topic_tools` does."""
@@ -314,7 +314,7 @@ class Mux(Component[MuxConfig]):
             self.context.listen(_input(name, self.topics[name], self.config, input_.max_rate if input_ else None))
         self.listening = wanted
 
-    # What it tells
+    # What it reports
 
     def changed(self) -> None:
         """Follow an order of a person, now and after a restart."""
@@ -322,7 +322,7 @@ class Mux(Component[MuxConfig]):
         self.listen()
         self.settle()
 
-    def tell(self, text: str) -> str:
+    def log(self, text: str) -> str:
         """Log what somebody ordered, and return it as the answer."""
         self.info(text)
         return text

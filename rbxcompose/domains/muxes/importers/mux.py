@@ -21,6 +21,11 @@ TWIST_MUX, YOCS = "twist_mux", "yocs"
 _INPUTS = {TWIST_MUX: "topics", YOCS: "subscribers"}
 _LOCKS = "locks"
 _MOST = 1 << 31  # of a priority
+RENAMED_TOPIC = kind("RBX2294", Severity.WARNING)
+GUESSED_OUTPUT = kind("RBX2295", Severity.WARNING)
+_TOPIC = re.compile(r"/?[a-z][a-z0-9_]*(/[a-z][a-z0-9_]*)*")
+_USUAL, _OTHERWISE = "cmd_vel", "cmd_vel_out"
+_LOCK_PORT = "lock_"
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,14 +53,14 @@ class ForeignMux:
 
 
 def read_muxes(file: ForeignFile, report: Report) -> list[ForeignMux]:
-    """Return the muxes of a file; other nodes in it are told, and so is a file without any."""
+    """Return the muxes of a file; other nodes in it are reported, and so is a file without any."""
     found, others = parameters_with(file, lambda root: bool(_program(root)))
     if not found:
-        words = f"'{plain(file.name)}' is no file of a mux: it has neither 'topics' nor 'locks' nor 'subscribers'"
+        words = f"'{plain(file.name)}' is not a file of a mux: it has neither 'topics' nor 'locks' nor 'subscribers'"
         report.add(OTHER_PROGRAM.at(file.root.span, words))
         return []
     for node in others:
-        report.add(NOT_CARRIED_OVER.at(node.span, f"'{plain(node.node, 60)}' is not carried over: it is no mux"))
+        report.add(NOT_CARRIED_OVER.at(node.span, f"'{plain(node.node, 60)}' is not carried over: it is not a mux"))
     named = (replace(node, node="") if node.root.span == file.root.span else node for node in found)
     return [_mux(node, _program(node.root), report) for node in named]
 
@@ -155,14 +160,6 @@ def joined(muxes: list[ForeignMux], report: Report) -> list[ForeignMux]:
                     words = f"the {what} '{plain(name, 60)}' was something else before; the first one counts"
                     report.add(DISAGREES.at(source.span, words, related=[Related(other.span, "the first one")]))
     return [one for one in found.values() if one.inputs]
-
-
-RENAMED_TOPIC = kind("RBX2294", Severity.WARNING)
-GUESSED_OUTPUT = kind("RBX2295", Severity.WARNING)
-
-_TOPIC = re.compile(r"/?[a-z][a-z0-9_]*(/[a-z][a-z0-9_]*)*")
-_USUAL, _OTHERWISE = "cmd_vel", "cmd_vel_out"
-_LOCK_PORT = "lock_"
 
 
 @importer("mux", "files of twist_mux and of yocs_cmd_vel_mux, for ROS 1 and ROS 2")

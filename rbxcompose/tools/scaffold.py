@@ -27,27 +27,28 @@ from rbxcompose.sdk.capabilities import Drives
 from rbxcompose.sdk.component import Component
 from rbxcompose.sdk.registry import component_names, component_type, declared
 
-ABOUT = "A simulated battery, and the group of its status."
-
-
-def part_files(name: str, about: str = ABOUT) -> dict[str, str]:
-    """Return the texts of the part's file and its test, by path."""
-    return {
-        f"parts/{name}.yaml": render("part.yaml.j2", name=name, about=about),
-        f"tests/test_{name}.py": render("part_test.py.j2", name=name),
-    }
-
-
+PART_ABOUT = "A simulated battery, and the group of its status."
 ROBOT_ABOUT = "Goes to its places, and home to charge when the battery is low."
 BASE = "diff_drive_sim"
 COMMANDS = "cmd_vel"  # the mux of the template
 DOCK = Place("dock", 0.0, 0.0, 0.0)
 PLACES = (Place("table", 2.0, 0.0, 0.0), Place("window", 2.0, 1.5, math.pi / 2))
 MOST_PLACES = 20
-
 _SPEED = 0.3  # [m/s] of the template
 _USED = ("battery", "place", "pose", "low", "go_to", "recharge")  # names used by the robot and its mission
 _WORDS = ("and", "or", "not", "in", "is", "lambda", "do", "else", "then")
+MISSION_MOST_PLACES = 2  # places that it visits
+_SECTION = re.compile(r"^missions:[ \t]*(#[^\n]*)?\r?\n", re.MULTILINE)
+_INDENT = re.compile(r"(?:[ \t]*(?:#[^\n]*)?\r?\n)*( +)\S")
+_CLASSES = frozenset({"Component", "Config", "Field", "Float32", "In", "Level", "Out", "Path", "Ratio"})
+
+
+def part_files(name: str, about: str = PART_ABOUT) -> dict[str, str]:
+    """Return the texts of the part's file and its test, by path."""
+    return {
+        f"parts/{name}.yaml": render("part.yaml.j2", name=name, about=about),
+        f"tests/test_{name}.py": render("part_test.py.j2", name=name),
+    }
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,12 +161,6 @@ def _base_settings(base: str) -> dict[str, str]:
     return {setting.field: text for setting, text in usual if setting and setting.field}
 
 
-MISSION_MOST_PLACES = 2  # places that it visits
-
-_SECTION = re.compile(r"^missions:[ \t]*(#[^\n]*)?\r?\n", re.MULTILINE)
-_INDENT = re.compile(r"(?:[ \t]*(?:#[^\n]*)?\r?\n)*( +)\S")
-
-
 @dataclass(frozen=True, slots=True)
 class MissionAnswers:
     """What must be known about a new mission.
@@ -236,9 +231,6 @@ def with_entry(text: str, answers: MissionAnswers) -> str | None:
     if indent is None:
         return None
     return f"{text[:at]}{indent[1]}{answers.name}: {answers.entry}{newline}{text[at:]}"
-
-
-_CLASSES = frozenset({"Component", "Config", "Field", "Float32", "In", "Level", "Out", "Path", "Ratio"})
 
 
 def read_component_name(text: str) -> str:

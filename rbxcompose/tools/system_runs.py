@@ -1,0 +1,324 @@
+"""`up SYSTEM` and `apply SYSTEM`: all hosts, or the share of one, `--host NAME`."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import socket
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from rbxcompose.base.findings import Finding, Report, kind
+from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, misused, refuse, write_report
+from rbxcompose.commands.hosts import (
+    Running,
+    Shares,
+    follow_commands,
+    is_reachable,
+    label_of,
+    on_all,
+    reached,
+    shares_of,
+)
+from rbxcompose.compiler.model.robot import Robot
+from rbxcompose.compiler.plan.model import Plan
+from rbxcompose.compiler.systems.bundle import bundle_of
+from rbxcompose.compiler.systems.certificates import NO_SECURITY, common_name, folder_of, tls_of
+from rbxcompose.compiler.systems.exchange import exchange_of
+from rbxcompose.compiler.systems.model import PlacedRobot, System
+from rbxcompose.compiler.systems.reader import compile_system
+from rbxcompose.compiler.systems.share import robots_on, share_of
+from rbxcompose.runtime.folder import ChosenLayers, RunOptions
+from rbxcompose.runtime.supervision.changes import Fate
+from rbxcompose.tools.commands.security import certificate_findings
+from rbxcompose.tools.inspection.plan_text import changes_text
+from rbxcompose.tools.live_rules import LiveRules
+from rbxcompose.tools.robot_changes import Proposal, carry_out, unsure
+from rbxcompose.tools.run_view import is_fit, run_plan
+
+USAGE = 2
+WHICH_HOST = kind("RBX6110")
+OTHER_MACHINE = kind("RBX6111")
+WHICH_ROBOT = kind("RBX6112")
+REFUSED_THERE = kind("RBX6128")
+
+
+def up_everywhere(path: str, system: System, arguments: argparse.Namespace) -> int:
+    """Bring the files to all hosts, start all shares, and show what they write until the robots are down."""
+    if not is_reachable(system):
+        return FINDINGS
+    shares = shares_of(system, arguments.ssh_config)
+    bundle = bundle_of(system)
+    folders = reached(shares, bundle)
+    if folders is None:
+        return FINDINGS
+    shares = {key: share for key, share in shares.items() if share.is_here or share.name in folders}
+    options = [*(["-d"] if arguments.detach else []), *(["--real"] if arguments.real else [])]
+    options += [word for name in system.profiles for word in ("--profile", name)]
+    options += ["--for", f"{arguments.duration} s"] if arguments.duration else []
+    commands: dict[str, Sequence[str]] = {}
+    for (host, robot), remote in shares.items():
+        file = path if remote.is_here else bundle.system
+        words = ["up", file, "--host", host, "--robot", robot, *options]
+        folder = folders.get(host, "")
+        commands[label_of(shares, host, robot)] = remote.rbxcompose(
+            words, folder=folder, has_terminal=not arguments.detach
+        )
+    return follow_commands(commands, [label_of(shares, *key) for key, share in shares.items() if share.model.optional])
+
+
+def run_share(path: str, arguments: argparse.Namespace, options: RunOptions) -> int:
+    """Compile a system and run what one host of it runs; return the exit code."""
+    if options.is_stepped or arguments.watch:
+        sys.stderr.write("rbxcompose up: a system runs in real time, without --rate and --watch\n")
+        return USAGE
+    system = compiled_for(path, arguments, "up")
+    if isinstance(system, int):
+        return system
+    if arguments.host is None and any(host.ssh for host in system.hosts.values()):
+        return up_everywhere(path, system, arguments)
+    chosen = chosen_robots(system, arguments)
+    if isinstance(chosen, Finding):
+        return refuse(chosen)
+    if len(chosen) > 1 and not arguments.detach:
+        names = ", ".join(one.name for one in chosen)
+        message = f"'{arguments.host}' runs several robots: {names}"
+        return refuse(WHICH_ROBOT.at(None, message, help="add -d, or --robot NAME"))
+    for robot in chosen:
+        plan = planned(system, robot, arguments.host)
+        if not is_fit(_here(robot, arguments.host), system.sources):
+            return FINDINGS
+        write_report(found := _certificate_findings(plan, system, arguments.host, path), {})
+        if found.has_errors:
+            return FINDINGS
+        if (problem := _address_problem(plan, arguments.host)) is not None:
+            return refuse(problem)
+        own = replace(options, layers=layers_of(system, robot, real=arguments.real))
+        if (exit_code := run_plan(plan, own, LiveRules(robot.robot))) or not options.is_detached:
+            return exit_code
+    return 0
+
+
+def compiled_for(path: str, arguments: argparse.Namespace, verb: str) -> System | int:
+    """Return a system without errors, with the layers of a `verb`; the exit code after telling what is wrong."""
+    for word, given in (("-f", arguments.overlays), ("--set", arguments.sets)):
+        if given:
+            return misused(verb, f"{word} is for a robot; a system says itself what its robots are")
+    system = compile_system(path, environment=os.environ, real=arguments.real, profiles=arguments.profile)
+    write_report(system.report, system.sources)
+    return FINDINGS if system.report.has_errors else system
+
+
+def layers_of(system: System, robot: PlacedRobot, *, real: bool) -> ChosenLayers:
+    """Return the layers that a robot of a system is compiled with, for its supervisor to remember."""
+    layers = ChosenLayers(profiles=(robot.model.profile,) if robot.model.profile else (), real=real)
+    if system.path is None or not robot.robot.outside.skills:
+        return layers
+    return replace(layers, system=str(system.path.resolve()), system_profiles=system.profiles, member=robot.name)
+
+
+def chosen_robots(system: System, arguments: argparse.Namespace) -> list[PlacedRobot] | Finding:
+    """Return the robots to run on this host."""
+    host = arguments.host
+    if host is None:
+        message = "no host is named, and none of the system has 'ssh', by which all could be started from here"
+        return WHICH_HOST.at(None, message, help=f"--host {' or --host '.join(system.hosts)}")
+    if host not in system.hosts:
+        return WHICH_HOST.misspelt(None, f"the system has no host '{host}'", host, system.hosts, "hosts")
+    there = [robot for robot in robots_on(system, host) if arguments.robot in (None, robot.name)]
+    if not there:
+        what = f"'{arguments.robot}'" if arguments.robot else "any robot"
+        return WHICH_HOST.at(None, f"'{host}' does not run anything of {what}")
+    return there
+
+
+def _here(robot: PlacedRobot, host: str) -> Robot:
+    """Return the robot with what runs on a host only."""
+    here = {name: component for name, component in robot.robot.components.items() if robot.hosts.get(name) == host}
+    return replace(robot.robot, components=here)
+
+
+def planned(system: System, robot: PlacedRobot, host: str) -> Plan:
+    """Return what a host runs of a robot, with what it carries between robots, and with its certificates."""
+    plan, exchange = share_of(system, robot, host), exchange_of(system, robot, host)
+    tls = None
+    if system.security != NO_SECURITY:
+        tls = tls_of(folder_of(system.name, os.environ), host, system.security)
+    share = replace(plan.share, tls=tls) if plan.share else None
+    return replace(plan, share=share, exchange=replace(exchange, tls=tls) if exchange else None)
+
+
+def _certificate_findings(plan: Plan, system: System, host: str, path: str) -> Report:
+    report = Report()
+    if tls := (plan.share and plan.share.tls) or (plan.exchange and plan.exchange.tls):
+        report.extend(certificate_findings(tls, common_name(system.name, host), path))
+    return report
+
+
+def _address_problem(plan: Plan, host: str) -> Finding | None:
+    """Return the finding if this machine cannot listen where the other hosts dial it."""
+    for endpoint in (*(plan.share.listen if plan.share else ()), *(plan.exchange.listen if plan.exchange else ())):
+        address, _, port = endpoint.partition("/")[2].rpartition(":")
+        try:
+            found = socket.getaddrinfo(address.strip("[]"), int(port), type=socket.SOCK_STREAM)
+            with socket.socket(found[0][0], socket.SOCK_STREAM) as probe:
+                probe.bind((found[0][4][0], 0))
+        except OSError as error:
+            reason = error.strerror or "it is not known"
+            message = f"this machine cannot listen at {address}, the address of '{host}': {reason}"
+            return OTHER_MACHINE.at(None, message, help="check 'hosts' of the system, and --host")
+    return None
+
+
+Key = tuple[str, str]  # host and robot
+
+
+def apply_system(path: str, arguments: argparse.Namespace) -> int:
+    """Change the robots of a system, or what one host runs of them; return the exit code."""
+    if arguments.undo is not None:
+        return misused("apply", "--undo is for a robot that runs on this machine, by its name")
+    system = compiled_for(path, arguments, "apply")
+    if isinstance(system, int):
+        return system
+    if arguments.host is not None:
+        return _apply_here(system, arguments)
+    if not is_reachable(system):
+        return FINDINGS
+    shares = shares_of(system, arguments.ssh_config)
+    shares = {key: share for key, share in shares.items() if arguments.robot in (None, key[1])}
+    change = _SystemChange(path, system, shares, arguments)
+    return change.run()
+
+
+def _apply_here(system: System, arguments: argparse.Namespace) -> int:
+    """Change what this machine runs as a host of the system."""
+    chosen = chosen_robots(system, arguments)
+    if isinstance(chosen, Finding):
+        return refuse(chosen)
+    try:
+        for robot in chosen:
+            plan, layers = planned(system, robot, arguments.host), layers_of(system, robot, real=arguments.real)
+            proposal = Proposal.of(plan, robot.robot, layers)
+            emit(json.dumps(proposal.data) if arguments.json else proposal.text())
+            if exit_code := carry_out(proposal, arguments):
+                return exit_code
+    except NotDoneError as error:
+        return refuse(error.finding)
+    return 0
+
+
+class _SystemChange:
+    """A change of several hosts: all of them, or none."""
+
+    def __init__(self, path: str, system: System, shares: Shares, arguments: argparse.Namespace) -> None:
+        self._path, self._system, self._shares, self._arguments = path, system, shares, arguments
+
+    def run(self) -> int:
+        """Ask all hosts, then a person, then change one host after another."""
+        bundle, arguments = bundle_of(self._system), self._arguments
+        folders = reached(self._shares, bundle, needs_all=not arguments.partial)
+        if folders is None:
+            return FINDINGS
+        self._folders, self._file = folders, bundle.system
+        usable = {key: share for key, share in self._shares.items() if share.is_here or share.name in self._folders}
+        asked = on_all({" ".join(key): self._command(key, "--dry-run") for key in usable})
+        found = {key: _answer(asked[" ".join(key)]) for key in usable}
+        lacks = any(key not in usable and not share.model.optional for key, share in self._shares.items())
+        problems = [_refusal(key, entry) for key, entry in found.items() if isinstance(entry, str)]
+        if arguments.json:
+            emit(
+                json.dumps(
+                    {"hosts": [{"host": key[0], "robot": key[1], "answer": entry} for key, entry in found.items()]}
+                )
+            )
+        else:
+            self._show(found)
+        for problem in problems:
+            refuse(problem)
+        wanted = [key for key, entry in found.items() if not isinstance(entry, str) and _changes(entry)]
+        if problems and not arguments.partial:
+            return FINDINGS
+        if arguments.dry_run or not wanted:
+            return FINDINGS if problems or lacks else 0
+        if (exit_code := unsure(self._system.name, arguments)) is not None:
+            return exit_code
+        order = sorted(wanted, key=lambda key: not _removes(found[key]))
+        return self._carry_out({key: found[key]["generation"] for key in order}) or (
+            FINDINGS if problems or lacks else 0
+        )
+
+    def _show(self, found: Mapping[Key, Any]) -> None:
+        for (host, _), one in found.items():
+            if not isinstance(one, str):
+                lines = changes_text(one).splitlines()
+                emit("\n".join(f"{host} | {line}" for line in (lines if _touches(one) else lines[:1])))
+
+    def _carry_out(self, generations: Mapping[Key, int]) -> int:
+        """Change these shares, which are in these generations, in this order."""
+        done: list[Key] = []
+        for key, generation in generations.items():
+            label = " ".join(key)
+            problem = _answer(on_all({label: self._command(key, "--yes")})[label])
+            if isinstance(problem, str):
+                refuse(_refusal(key, problem))
+                if not self._arguments.partial:
+                    self._undo(key, generation, may_be_unchanged=True)
+                    for one in reversed(done):
+                        self._undo(one, generations[one])
+                    return FINDINGS
+                continue
+            done.append(key)
+            self._tell(f"{label}: changed")
+        return 0 if len(done) == len(generations) else FINDINGS
+
+    def _undo(self, key: Key, generation: int, *, may_be_unchanged: bool = False) -> None:
+        """Take the change of a share in this generation back, and report it."""
+        words = ["apply", key[1], "--undo", str(generation), "--yes", "--json"]
+        label = " ".join(key)
+        answer = _answer(on_all({label: self._shares[key].rbxcompose(words)})[label])
+        if not isinstance(answer, str):
+            self._tell(f"{label}: as before")
+        elif not may_be_unchanged:
+            refuse(_refusal(key, answer))
+
+    def _tell(self, text: str) -> None:
+        if not self._arguments.json:
+            emit(text)
+
+    def _command(self, key: Key, how: str) -> list[str]:
+        (host, robot), remote = key, self._shares[key]
+        file = self._path if remote.is_here else self._file
+        words = ["apply", file, "--host", host, "--robot", robot, how, "--json"]
+        words += ["--real"] if self._arguments.real else []
+        words += [word for name in self._system.profiles for word in ("--profile", name)]
+        return remote.rbxcompose(words, folder=self._folders.get(host, ""))
+
+
+def _refusal(key: Key, why: str) -> Finding:
+    return REFUSED_THERE.at(None, f"'{key[0]}' does not change '{key[1]}': {why}")
+
+
+def _answer(running: Running) -> Any:
+    """Return the answer of a host as data, or a text: why it did not do it."""
+    exit_code, answer = running.wait(), running.answer
+    if exit_code == 0 and isinstance(answer, dict):
+        return answer
+    if isinstance(answer, dict) and (answer.get("error") or answer.get("why_not")):
+        return str(answer.get("error") or answer["why_not"])
+    errors = [line for line in running.lines if line.startswith("error")] or running.lines
+    return errors[-1] if errors else f"exit code {exit_code}"
+
+
+def _changes(answer: Mapping[str, Any]) -> bool:
+    return bool(answer["shares_change"]) or _touches(answer)
+
+
+def _touches(answer: Mapping[str, Any]) -> bool:
+    return any(component["fate"] != Fate.KEPT for component in answer["components"])
+
+
+def _removes(answer: Mapping[str, Any]) -> bool:
+    return any(component["fate"] == Fate.REMOVED for component in answer["components"])

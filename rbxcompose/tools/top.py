@@ -1,0 +1,585 @@
+"""What `top` shows of a robot and of a whole system: sampled from state file, processes, log and bus; and its lines."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter, deque
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict
+from functools import partial
+from typing import Any
+
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.levels import Level, level_of
+from rbxcompose.base.printable import columns, fitted, plain
+from rbxcompose.base.units import UNITS
+from rbxcompose.bus.graph import Graph, GraphEnd, GraphName
+from rbxcompose.bus.local import Inbox
+from rbxcompose.bus.names import admin_key
+from rbxcompose.bus.transport import TransportReply
+from rbxcompose.bus.window import SCHEMA
+from rbxcompose.commands.guest import LONGEST_QUEUE, Guest, ReceivedMessage
+from rbxcompose.commands.guest import NAME as VISITOR
+from rbxcompose.commands.lookup import known_state
+from rbxcompose.missions.program.outcomes import IDLE, NAMES
+from rbxcompose.missions.view.picture import picture_from_data
+from rbxcompose.missions.view.replica import ACTIVE, Replica, status_list
+from rbxcompose.msgs import registry
+from rbxcompose.msgs.cdr import CdrError, decode
+from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray, DiagnosticStatus
+from rbxcompose.runtime.folder import ComponentState, Gauge, RobotFolder, RobotState
+from rbxcompose.runtime.log import NAME, Follower, Record
+from rbxcompose.runtime.processes import Process
+from rbxcompose.sdk.ports import Qos
+from rbxcompose.tools.inspection.mission_text import running_lines
+
+MOST_WARNINGS = 5
+_GAP = "  "
+_RESET = "\x1b[0m"
+BOLD, FAINT, YELLOW, RED, _MAGENTA = "\x1b[1m", "\x1b[2m", "\x1b[33m", "\x1b[31m", "\x1b[35m"
+COLOURS = {Level.OK: "", Level.WARN: YELLOW, Level.ERROR: RED, Level.STALE: _MAGENTA}
+ALARMS = {level.name: text for level, text in COLOURS.items()}
+_FAILED = frozenset({"failed", "dead", "lost"})
+_MOST_OF_NAMES = 24  # columns
+SILENT = 3.0  # [s] after which a host does not answer
+_HEALTH = "/diagnostics_agg"
+_SUPERVISOR = "supervisor"
+_WIDEST = 200  # columns per line of a mission
+_PATH = "missions"
+
+
+@dataclass(frozen=True, slots=True)
+class ComponentPicture:
+    """A component: the rate of its outgoing messages [1/s] and its diagnostics; None where unknown."""
+
+    name: str
+    type: str
+    state: str
+    process: str
+    restarts: int
+    rate: float | None = None
+    level: Level | None = None
+    message: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Load:
+    """A process: its share of one processor, None if not known yet, and its memory [B]."""
+
+    process: str
+    pid: int
+    cpu: float | None
+    memory: int
+
+
+@dataclass(frozen=True, slots=True)
+class Tree:
+    """A running mission: its name, its state, and its running nodes as lines, from the outside in."""
+
+    mission: str
+    state: str
+    running: Sequence[str]
+
+
+@dataclass(frozen=True, slots=True)
+class RobotPicture:
+    """Everything shown: `health` has the level and text of each group of the diagnostics."""
+
+    robot: str
+    is_supervised: bool
+    router: str | None
+    mission: str
+    batteries: Sequence[tuple[str, str]]
+    components: Sequence[ComponentPicture]
+    loads: Sequence[Load]
+    health: Sequence[tuple[str, Level, str]]
+    warnings: Sequence[Record]
+    trees: Sequence[Tree] = ()
+
+    def to_data(self) -> dict[str, Any]:
+        """Return the picture for JSON, with levels by name."""
+        return {
+            "robot": self.robot,
+            "is_supervised": self.is_supervised,
+            "router": self.router,
+            "mission": self.mission,
+            "missions": [asdict(tree) for tree in self.trees],
+            "batteries": dict(self.batteries),
+            "components": [
+                {**asdict(component), "level": None if component.level is None else component.level.name}
+                for component in self.components
+            ],
+            "processes": [asdict(load) for load in self.loads],
+            "diagnostics": [{"group": name, "level": level.name, "message": text} for name, level, text in self.health],
+            "warnings": [
+                {"time": warning.time, "level": warning.level.name, "source": warning.source, "text": warning.text}
+                for warning in self.warnings
+            ],
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class PictureLine:
+    """A line, and the colour that it has on a terminal."""
+
+    text: str
+    colour: str = ""
+
+
+def lines_of(picture: RobotPicture, width: int, height: int, *, colour: bool = False) -> list[str]:
+    """Return at most `height` lines of at most `width` columns; count what does not fit.
+
+    Missions get the room that all else leaves; components go last.
+    """
+    head = _head(picture)
+    loads = [PictureLine(""), *_loads(picture.loads)]
+    tail = [*_health(picture.health), *_warnings(picture.warnings)]
+    room = max(2, height - len(head) - len(loads) - len(tail))
+    components = shortened(_components(picture.components), room)
+    left = height - len(head) - len(components) - len(loads) - len(tail)
+    shown = [*head, *components, *loads, *_trees(picture.trees, left), *tail][:height]
+    return [painted(line, width, colour) for line in shown]
+
+
+def _head(picture: RobotPicture) -> list[PictureLine]:
+    supervisor = "" if picture.is_supervised else "; its supervisor is dead, 'rbxcompose down' ends what is left"
+    lines = [PictureLine(f"{plain(picture.robot)}: router {plain(picture.router or 'none')}{supervisor}", BOLD)]
+    if picture.mission:
+        lines.append(PictureLine(f"mission: {plain(picture.mission)}"))
+    if picture.batteries:
+        lines.append(PictureLine(_GAP.join(f"{plain(name)}: {plain(text)}" for name, text in picture.batteries)))
+    return [*lines, PictureLine("")]
+
+
+def _components(components: Sequence[ComponentPicture]) -> list[PictureLine]:
+    rows = [
+        (
+            component.name,
+            component.type,
+            component.state,
+            component.process,
+            str(component.restarts),
+            "-" if component.rate is None else f"{component.rate:.1f}",
+            "" if component.level in (None, Level.OK) else f"{component.level.name}: {component.message}",
+        )
+        for component in components
+    ]
+    head, *lines = table_of([("component", "type", "state", "process", "restarts", "msg/s", ""), *rows])
+    return [
+        PictureLine(head, FAINT),
+        *(PictureLine(line, _alarm(component)) for line, component in zip(lines, components, strict=True)),
+    ]
+
+
+def _alarm(component: ComponentPicture) -> str:
+    if component.state in _FAILED:
+        return RED
+    return YELLOW if component.state != "active" else COLOURS[component.level or Level.OK]
+
+
+def _loads(loads: Sequence[Load]) -> list[PictureLine]:
+    rows = [
+        (load.process, str(load.pid), "-" if load.cpu is None else f"{load.cpu:.1%}", f"{load.memory / 1e6:.0f} MB")
+        for load in loads
+    ]
+    head, *lines = table_of([("process", "pid", "cpu", "memory"), *rows])
+    return [PictureLine(head, FAINT), *map(PictureLine, lines)]
+
+
+def _trees(trees: Sequence[Tree], room: int) -> list[PictureLine]:
+    lines = [line for tree in trees for line in _tree(tree)]
+    return [PictureLine(""), *shortened(lines, room - 1)] if lines and room > 1 else []
+
+
+def _tree(tree: Tree) -> list[PictureLine]:
+    head = PictureLine(f"mission {plain(tree.mission)}: {plain(tree.state)}", FAINT)
+    return [head, *(PictureLine(plain(line)) for line in tree.running)]
+
+
+def _health(health: Sequence[tuple[str, Level, str]]) -> list[PictureLine]:
+    fine = [plain(name) for name, level, _ in health if level is Level.OK]
+    lines = [
+        PictureLine(f"{level.name} {plain(name)}: {plain(text)}", COLOURS[level])
+        for name, level, text in health
+        if level is not Level.OK
+    ]
+    lines += [PictureLine(f"OK {', '.join(fine)}")] if fine else []
+    return [PictureLine(""), *lines] if lines else []
+
+
+def _warnings(warnings: Sequence[Record]) -> list[PictureLine]:
+    lines = [
+        PictureLine(f"{warning.time:8.1f}  {plain(warning.source)}: {plain(warning.text)}", COLOURS[warning.level])
+        for warning in warnings[-MOST_WARNINGS:]
+    ]
+    return [PictureLine(""), *lines] if lines else []
+
+
+def shortened(lines: Sequence[PictureLine], room: int) -> list[PictureLine]:
+    """Return at most `room` lines; the last one counts those that do not fit."""
+    if len(lines) <= room:
+        return list(lines)
+    return [*lines[: room - 1], PictureLine(f"... and {len(lines) - room + 1} more", FAINT)]
+
+
+def table_of(rows: Sequence[Iterable[str]]) -> list[str]:
+    """Return rows as lines whose columns stand below each other; the last cell of each may be long."""
+    cells = [[fitted(plain(cell), _MOST_OF_NAMES) for cell in row[:-1]] + [plain(row[-1])] for row in map(list, rows)]
+    widths = [max(map(columns, column)) for column in zip(*cells, strict=True)]
+    return [
+        _GAP.join(cell + " " * (width - columns(cell)) for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in cells
+    ]
+
+
+def painted(line: PictureLine, width: int, colour: bool) -> str:
+    """Return the text of a line that fits into `width` columns, in its `colour` if that is wanted."""
+    text = fitted(line.text, width)
+    return f"{line.colour}{text}{_RESET}" if colour and line.colour and text else text
+
+
+@dataclass(frozen=True, slots=True)
+class ShareView:
+    """A share: the last answer of its host, as `top --json` writes it, its age [s], and what is wrong."""
+
+    robot: str
+    host: str
+    answer: Mapping[str, Any] | None
+    age: float
+    problem: str = ""
+
+    @property
+    def state(self) -> str:
+        """Return how it is, in words."""
+        if self.problem:
+            return self.problem
+        if self.age > SILENT:
+            return f"does not answer for {self.age:.0f} s"
+        if self.answer is None:
+            return "asked"
+        off = [str(component["name"]) for component in self.answer["components"] if component["state"] != "active"]
+        dead = "" if self.answer["is_supervised"] else "its supervisor is dead"
+        return dead or (f"{', '.join(off)} not active" if off else "up")
+
+    @property
+    def is_silent(self) -> bool:
+        """Return whether nothing is known of it now."""
+        return self.answer is None or bool(self.problem) or self.age > SILENT
+
+
+def system_lines(name: str, shares: Sequence[ShareView], width: int, height: int, *, colour: bool = False) -> list[str]:
+    """Return at most `height` lines of at most `width` columns; what does not fit is counted."""
+    head = [PictureLine(f"{plain(name)}: {len(shares)} shares", BOLD), *_shares(shares), PictureLine("")]
+    tail = _share_warnings(shares)
+    components = shortened(_share_components(shares), max(2, height - len(head) - len(tail)))
+    return [painted(line, width, colour) for line in [*head, *components, *tail][:height]]
+
+
+def _shares(shares: Sequence[ShareView]) -> list[PictureLine]:
+    rows = []
+    for share in shares:
+        answer = share.answer if share.answer is not None and not share.is_silent else {}
+        loads = answer.get("processes", ())
+        cpu = sum(each["cpu"] or 0.0 for each in loads)
+        memory = sum(each["memory"] for each in loads) / 1e6
+        use = (f"{cpu:.0%}", f"{memory:.0f} MB") if loads else ("-", "-")
+        batteries = ", ".join(map(str, answer.get("batteries", {}).values()))
+        rows.append((share.robot, share.host, *use, batteries, str(answer.get("mission") or ""), share.state))
+    head, *lines = table_of([("robot", "host", "cpu", "memory", "battery", "mission", "state"), *rows])
+    colours = (RED if view.is_silent else "" if view.state == "up" else YELLOW for view in shares)
+    return [PictureLine(head, FAINT), *map(PictureLine, lines, colours)]
+
+
+def _share_components(shares: Sequence[ShareView]) -> list[PictureLine]:
+    rows, colours = [], []
+    for share in shares:
+        for component in share.answer["components"] if share.answer is not None and not share.is_silent else ():
+            level, rate = component["level"], component["rate"]
+            says = "" if level in (None, Level.OK.name) else f"{level}: {component['message']}"
+            times = "-" if rate is None else f"{rate:.1f}"
+            rows.append(
+                (
+                    share.robot,
+                    share.host,
+                    component["name"],
+                    component["state"],
+                    str(component["restarts"]),
+                    times,
+                    says,
+                )
+            )
+            colours.append(ALARMS.get(level, "") if component["state"] == "active" else YELLOW)
+    head, *lines = table_of([("robot", "host", "component", "state", "restarts", "msg/s", ""), *rows])
+    return [PictureLine(head, FAINT), *map(PictureLine, lines, colours)]
+
+
+def _share_warnings(shares: Sequence[ShareView]) -> list[PictureLine]:
+    """Return the last warnings of each share: their times count from its own start, so they are not mixed."""
+    found = [
+        (share, warning)
+        for share in shares
+        if share.answer and not share.is_silent
+        for warning in share.answer["warnings"][-MOST_WARNINGS:]
+    ]
+    lines = [
+        PictureLine(
+            plain(f"{share.robot} {share.host} {entry['time']:8.1f}  {entry['source']}: {entry['text']}"),
+            ALARMS.get(entry["level"], ""),
+        )
+        for share, entry in found
+    ]
+    return [PictureLine(""), *lines] if lines else []
+
+
+class Sampler:
+    """Makes pictures of a robot; rates and shares are those since the previous picture.
+
+    It counts messages by their senders. It subscribes only to topics that are neither latched nor best effort: those
+    of the class `bulk` may be large, and an observer must cost little.
+    """
+
+    def __init__(self, folder: RobotFolder, guest: Guest) -> None:
+        self._folder, self._guest = folder, guest
+        self._follower = Follower(folder.path / NAME)
+        self._warnings: deque[Record] = deque(maxlen=MOST_WARNINGS)
+        self._statuses: Mapping[str, DiagnosticStatus] = {}
+        self._gauges: Mapping[str, Gauge] = {}  # by topic
+        self._charges: dict[str, float] = {}  # ratios, by topic
+        self._listened: set[str] = set()
+        self._counts: Counter[bytes] = Counter()
+        self._times: dict[Process, float] = {}
+        self._then: float | None = None
+        self._missions: MissionsSeen | None = None
+
+    def close(self) -> None:
+        """Close the log."""
+        self._follower.close()
+
+    @property
+    def is_complete(self) -> bool:
+        """Return whether diagnostics, batteries and missions have been received, if there are any."""
+        is_healthy = _HEALTH not in self._listened or bool(self._statuses)
+        is_charged = self._charges.keys() >= self._gauges.keys() & self._listened
+        return is_healthy and is_charged and (self._missions is None or self._missions.is_complete)
+
+    def sample(self) -> RobotPicture | None:
+        """Return the current picture, or None if the robot is down."""
+        now, state = self._guest.clock.now(), known_state(self._folder)
+        if state is None:
+            return None
+        elapsed = None if self._then is None else now - self._then
+        self._then = now
+        graph = self._guest.graph()
+        self._gauges = {battery.topic: battery for battery in state.batteries.values()}
+        self._listen(graph)
+        self._warnings.extend(record for record in self._follower.read() if record.level is not Level.OK)
+        return self._picture(state, self._rates(graph, elapsed), self._loads(state, elapsed))
+
+    def _listen(self, graph: Graph) -> None:
+        for topic in graph.topics:
+            is_wanted = topic.name == _HEALTH or topic.name in self._gauges or _is_light(topic)
+            if topic.name not in self._listened and topic.givers and is_wanted:
+                self._listened.add(topic.name)
+                self._guest.listen(topic, partial(self._receive, topic.name))
+
+    def _trees(self, state: RobotState) -> list[Tree]:
+        """Follow the missions, if the robot has any, and return the running ones while their process lives."""
+        alive = state.alive()
+        if not any(component.name == state.executive and component.process in alive for component in state.components):
+            return []
+        if self._missions is None:
+            self._missions = MissionsSeen(self._guest, state.robot)
+        self._missions.look()
+        active = {name: seen for name, seen in self._missions.by_name.items() if seen["state"] in ACTIVE}
+        return [_running_tree(name, seen) for name, seen in sorted(active.items())]
+
+    def _receive(self, topic: str, received: ReceivedMessage) -> None:
+        self._counts[received.sender] += 1
+        if topic == _HEALTH:
+            self._keep_statuses(received)
+        elif gauge := self._gauges.get(topic):
+            charge = _charge(gauge, received)
+            self._charges |= {} if charge is None else {topic: charge}
+
+    def _keep_statuses(self, received: ReceivedMessage) -> None:
+        if received.kind.type != DiagnosticArray.TYPE:
+            return
+        try:
+            array = decode(DiagnosticArray, received.arrival.payload)
+        except CdrError:
+            return  # the next one comes within a second
+        self._statuses = {status.name: status for status in array.status}
+
+    def _rates(self, graph: Graph, elapsed: float | None) -> dict[str, float]:
+        """Return the message rate of each component [1/s], without those that publish nothing that is counted."""
+        if elapsed is None:
+            return {}
+        rates: dict[str, float] = {}
+        for end in (end for topic in graph.topics if topic.name in self._listened for end in topic.givers):
+            name = _component(end)
+            rates[name] = rates.get(name, 0.0) + self._counts[end.gid] / elapsed
+        self._counts.clear()
+        return rates
+
+    def _loads(self, state: RobotState, elapsed: float | None) -> list[Load]:
+        loads, times = [], {}
+        for name, process in {_SUPERVISOR: state.supervisor, **state.processes}.items():
+            usage = process.usage
+            if usage is not None:
+                times[process], memory = usage
+                before = self._times.get(process)
+                cpu = None if elapsed is None or before is None else (times[process] - before) / elapsed
+                loads.append(Load(name, process.pid, cpu, memory))
+        self._times = times
+        return loads
+
+    def _picture(self, state: RobotState, rates: Mapping[str, float], loads: list[Load]) -> RobotPicture:
+        leaves = {name.rpartition("/")[2]: status for name, status in self._statuses.items() if name.count("/") > 1}
+        alive = state.alive()
+        components = [
+            _picture_of(component, component.process in alive, rates, leaves.get(component.name))
+            for component in state.components
+        ]
+        missions = [
+            component.message for component in components if component.name == state.executive and component.message
+        ]
+        batteries = [
+            (name, f"{100 * self._charges[battery.topic]:.1f} %")
+            for name, battery in state.batteries.items()
+            if battery.topic in self._charges
+        ]
+        groups = [status for status in self._statuses.values() if status.name.count("/") == 1]
+        return RobotPicture(
+            robot=state.robot,
+            is_supervised=state.is_supervised,
+            router=state.router if "router" in alive or "router" not in state.processes else None,
+            mission=missions[0] if missions else "",
+            batteries=batteries,
+            components=components,
+            loads=loads,
+            health=[(group.name.lstrip("/"), level_of(group.level), group.message) for group in groups],
+            warnings=list(self._warnings),
+            trees=self._trees(state),
+        )
+
+
+def _is_light(topic: GraphName) -> bool:
+    return all(end.qos is not None and end.qos.is_reliable and not end.qos.is_transient_local for end in topic.givers)
+
+
+def _component(end: GraphEnd) -> str:
+    return end.node.rpartition("/")[2]
+
+
+def _charge(gauge: Gauge, received: ReceivedMessage) -> float | None:
+    """Return the charge that a message reports (a ratio); None if it reports none."""
+    try:
+        message = decode(registry.message(received.kind.type), received.arrival.payload)
+    except (CdrError, KeyError):  # broken, or of a package that is not installed
+        return None
+    values = [getattr(message, name) for name in message.FIELDS]
+    if received.kind.type != gauge.message or len(values) != 1 or not isinstance(values[0], int | float):
+        return None
+    unit = UNITS.get(gauge.unit)
+    return unit.to_si(values[0]) if unit else float(values[0])
+
+
+def _running_tree(name: str, seen: Mapping[str, Any]) -> Tree:
+    picture = picture_from_data(seen["picture"])
+    return Tree(name, seen["state"], running_lines(picture, status_list(seen, picture.count), _WIDEST))
+
+
+def _picture_of(
+    component_state: ComponentState, is_alive: bool, rates: Mapping[str, float], status: DiagnosticStatus | None
+) -> ComponentPicture:
+    return ComponentPicture(
+        component_state.name,
+        component_state.type,
+        component_state.state if is_alive else "dead",
+        component_state.process,
+        component_state.restarts,
+        rates.get(component_state.name) if is_alive else None,
+        None if status is None else level_of(status.level),
+        "" if status is None else status.message,
+    )
+
+
+class MissionsSeen:
+    """Follows all missions of a robot; `by_name` has the state of those that have been running."""
+
+    def __init__(self, guest: Guest, robot: str) -> None:
+        self._guest, self._robot = guest, robot
+        self._replicas: dict[str, Replica] = {}
+        self._asked: set[str] = set()  # paths with a pending answer
+        self._is_listed = False
+        news: Inbox[bytes] = Inbox(VISITOR, LONGEST_QUEUE, self._receive, guest.scheduler.post)
+        transport = guest.transport
+        pattern = f"{admin_key(robot, _PATH)}/*"
+        transport.subscribe(pattern, Qos.STATE, lambda arrival: news.put(arrival.payload, transport.wake))
+        self.look()
+
+    @property
+    def by_name(self) -> Mapping[str, Mapping[str, Any]]:
+        """Return the known state of each mission, with its picture."""
+        return {name: replica.seen for name, replica in self._replicas.items() if replica.seen}
+
+    @property
+    def is_complete(self) -> bool:
+        """Return whether all answers have arrived."""
+        return self._is_listed and not self._asked
+
+    def look(self) -> None:
+        """Query the list of missions, unless it is known; a robot that has just started may not answer yet."""
+        if not self._is_listed:
+            self._ask(_PATH)
+
+    def _ask(self, path: str) -> None:
+        if path in self._asked:
+            return
+        self._asked.add(path)
+        transport, answers = self._guest.transport, _Answers(self, path)
+        inbox: Inbox[TransportReply] = Inbox(VISITOR, None, answers.take, self._guest.scheduler.post)
+        transport.ask(admin_key(self._robot, path), b"", b"", lambda answer: inbox.put(answer, transport.wake))
+
+    def answered(self, path: str, answer: TransportReply) -> None:
+        """Apply the first answer to a query."""
+        self._asked.discard(path)
+        if answer.error:
+            return
+        if (message := _read(answer.payload)) is None:
+            return
+        if path == _PATH:
+            self._is_listed = True
+            for entry in message["value"]:
+                if entry["state"] != NAMES[IDLE]:
+                    self._ask(f"{_PATH}/{entry['name']}")
+            return
+        name = message["value"]["mission"]
+        if self._replicas.setdefault(name, Replica()).answered(message):
+            self._ask(path)
+
+    def _receive(self, payload: bytes) -> None:
+        if (message := _read(payload)) is None:
+            return
+        name = message["value"]["mission"]
+        if self._replicas.setdefault(name, Replica()).apply(message):
+            self._ask(f"{_PATH}/{name}")
+
+
+def _read(payload: bytes) -> dict[str, Any] | None:
+    """Return a message, or None if the robot runs another version with another format."""
+    message: dict[str, Any] = json.loads(payload)
+    return message if message.get("schema") == SCHEMA else None
+
+
+class _Answers:
+    """The answers to one query: it ends with an error even after an answer, so only the first counts."""
+
+    def __init__(self, asking: MissionsSeen, path: str) -> None:
+        self._asking, self._path = asking, path
+        self._is_over = False
+
+    def take(self, answer: TransportReply) -> None:
+        if not self._is_over:
+            self._is_over = True
+            self._asking.answered(self._path, answer)
