@@ -55,7 +55,7 @@ def pytest_collection_finish(session: pytest.Session) -> None:
 
     One worker does, and the others begin with tests that need none of it.
     """
-    if not session.config.option.collectonly and "rbxcompose.domains.arms.motion.arm_kinematics" in sys.modules:
+    if not session.config.option.collectonly and any(item.nodeid.startswith(WITH_ARMS) for item in session.items):
         with suppress(BlockingIOError):
             compile_for_arms(fcntl.LOCK_NB)
 

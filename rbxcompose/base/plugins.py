@@ -1,6 +1,6 @@
 """Finding plug-ins: one file is one plug-in, its name is the plug-in's name; none is imported before it is used.
 
-Our own are in one package per family (`component`, `check`, ...). Third parties register theirs under the entry-point
+Our own are in the folders of their families (see `rooms`). Third parties register theirs under the entry-point
 group `rbxcompose.plugins` as `FAMILY.NAME = "package.module"` and use the same decorators.
 """
 

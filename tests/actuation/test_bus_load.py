@@ -37,9 +37,9 @@ class TimedLine(FakeLine):
 
     taken = 0.0  # [s]
 
-    def hear(self, data: bytes, baud: int | None = None) -> list[FakeReply]:
+    def receive(self, data: bytes, baud: int | None = None) -> list[FakeReply]:
         """Answer, and count."""
-        replies = super().hear(data, baud)
+        replies = super().receive(data, baud)
         self.taken += 10 * len(data) / (baud or 1_000_000) + max((reply.after for reply in replies), default=0.0)
         return replies
 

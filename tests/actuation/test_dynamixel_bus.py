@@ -64,12 +64,12 @@ def test_servos_of_both_protocols_and_all_tables_are_read_and_written_together(
 
 def test_a_group_is_one_request_where_the_protocol_allows_it(connect: Connect) -> None:
     bus, port = connect({**SIX, 11: "AX-12", 12: "AX-12"})
-    del port.line.heard[:]
+    del port.line.received[:]
     bus.read(sorted(bus.servos), STATE)
-    assert [packet.instruction for packet in port.line.heard] == [SYNC_READ, READ, READ]
+    assert [packet.instruction for packet in port.line.received] == [SYNC_READ, READ, READ]
     bus.write({servo: {"goal_position": 300} for servo in bus.servos})
     bus.read([1], STATE)
-    assert [packet.instruction for packet in port.line.heard[3:5]] == [SYNC_WRITE] * 2
+    assert [packet.instruction for packet in port.line.received[3:5]] == [SYNC_WRITE] * 2
 
 
 def test_values_have_their_signs(connect: Connect) -> None:
@@ -143,14 +143,14 @@ def test_one_bad_reply_is_made_good_within_the_same_read(connect: Connect) -> No
 
     servo = port.line[3]
     servo.faults.corrupts = True
-    hear = port.line.hear
+    hear = port.line.receive
 
     def healed(data: bytes, baud: int | None = None) -> Any:
         replies = hear(data, baud)
         servo.faults.corrupts = False
         return replies
 
-    port.line.hear = healed  # type: ignore[method-assign]
+    port.line.receive = healed  # type: ignore[method-assign]
     assert bus.read(range(1, 7), STATE).keys() == SIX.keys()
     assert bus.statistics[3].errors == 0
 
@@ -158,9 +158,9 @@ def test_one_bad_reply_is_made_good_within_the_same_read(connect: Connect) -> No
 def test_no_retry_begins_when_the_budget_is_spent(connect: Connect) -> None:
     bus, port = connect(SIX, timeout=BRISK)
     port.line[2].faults.is_mute = True
-    del port.line.heard[:]
+    del port.line.received[:]
     bus.read(range(1, 7), STATE, budget=BRISK)
-    assert [packet.instruction for packet in port.line.heard] == [SYNC_READ]
+    assert [packet.instruction for packet in port.line.received] == [SYNC_READ]
 
 
 def test_an_alert_is_told_beside_the_values_and_named_by_the_hardware_error(connect: Connect) -> None:

@@ -173,22 +173,22 @@ def test_no_step_is_faster_than_the_fastest(name: str, goals: list[tuple[int, fl
 
 def test_both_protocols_are_heard_on_one_line() -> None:
     line = FakeLine([FakeServo("AX-12", 3), FakeServo("XL430-W250", 3)], SteppedClock().now)
-    [fake_reply] = line.hear(packet_one(3, 1))
-    [two] = line.hear(packet_two(3, 1))
+    [fake_reply] = line.receive(packet_one(3, 1))
+    [two] = line.receive(packet_two(3, 1))
     assert [packet.protocol for reply in (fake_reply, two) for packet in packets(bytearray(reply.data))] == [1, 2]
-    assert line.hear(packet_one(3, 1), baud=57_600) == []
+    assert line.receive(packet_one(3, 1), baud=57_600) == []
 
 
 @pytest.mark.parametrize("silences", [False, True])
 def test_a_mute_servo_is_passed_over_or_silences_those_after_it(silences: bool) -> None:
     line = FakeLine([FakeServo("XL430-W250", number) for number in (1, 2, 3)], SteppedClock().now)
     line[2].faults.is_mute, line[2].faults.silences_next = True, silences
-    replies = line.hear(packet_two(254, 0x82, bytes([132, 0, 4, 0, 1, 2, 3])))
+    replies = line.receive(packet_two(254, 0x82, bytes([132, 0, 4, 0, 1, 2, 3])))
     assert [reply.data[4] for reply in replies] == ([1] if silences else [1, 3])
 
 
 def test_replies_take_their_time_on_the_wire() -> None:
     line = FakeLine([FakeServo("XL430-W250", number) for number in (1, 2)], SteppedClock().now)
-    first, second = line.hear(packet_two(254, 0x82, bytes([132, 0, 4, 0, 1, 2])), 1_000_000)
+    first, second = line.receive(packet_two(254, 0x82, bytes([132, 0, 4, 0, 1, 2])), 1_000_000)
     assert first.after == pytest.approx(0.0005 + 15e-5)
     assert second.after == pytest.approx(2 * first.after)

@@ -12,7 +12,7 @@ from rbxcompose.domains.servos.joint_drive import JointServo, PositionDrive, Ser
 from rbxcompose.domains.servos.joint_states import JointPolicy
 from rbxcompose.domains.servos.limits import MotionLimits
 from rbxcompose.domains.servos.models import servo_models
-from rbxcompose.domains.servos.servo_cycle import TORQUE_LIMITS_LIMIT, ServoCycle
+from rbxcompose.domains.servos.servo_cycle import TORQUE_LIMIT, ServoCycle
 from rbxcompose.domains.servos.twins.servo_fake import FakeServo
 from rbxcompose.domains.servos.twins.servo_twin import TwinBus
 
@@ -51,4 +51,4 @@ def test_no_number_of_servos_keeps_one_of_them_from_its_turn(count: int) -> None
         cycle.run(number * CYCLE, CYCLE)
     for id_ in ids:
         assert bus.read_items[id_, "present_temperature"] == bus.read_items[id_, "hardware_error"] == SELDOM - 1
-        assert bus.read_items[id_, TORQUE_LIMITS_LIMIT] == 1
+        assert bus.read_items[id_, TORQUE_LIMIT] == 1

@@ -85,7 +85,7 @@ def test_the_tip_and_the_head_follow_until_the_point_is_lost(robot: str) -> None
     assert chased.ends == []
     chased.bench.advance(1.2)
     assert (chased.ends[0].outcome, chased.ends[0].result.outcome) == (Outcome.ABORTED, "lost")
-    assert "nothing has told on 'target'" in chased.ends[0].result.message
+    assert "no point has come on 'target'" in chased.ends[0].result.message
 
 
 @pytest.mark.parametrize("robot", AHEAD)

@@ -81,7 +81,7 @@ def test_it_ends_when_the_camera_looks_at_an_object(parts: dict[str, Instance]) 
             LookAtPoint.Goal(object="box1"),
             {"scene": None},
             "unknown_scene",
-            "nothing has told what is around the robot",
+            "no planning scene has been received",
         ),
         (LookAtPoint.Goal(object="box1"), {"sees_scene": False}, "unknown_scene", "this robot has no scene"),
         (

@@ -310,7 +310,7 @@ POINT = Constraints(position_constraints=(place(0.2, -0.1, 0.6),))
         (GOAL, {"max_cartesian_speed": 0.1}, MoveItErrorCodes.FAILURE, "'max_cartesian_speed'"),
         (GOAL, {"trajectory_constraints": TrajectoryConstraints((GOAL,))}, MoveItErrorCodes.FAILURE, "'trajectory_con"),
         (GOAL, {"goal_constraints": (GOAL, GOAL)}, MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS, "2 alternatives"),
-        (GOAL, {"max_velocity_scaling_factor": 1.5}, MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS, "a speed of 150%"),
+        (GOAL, {"max_velocity_scaling_factor": 1.5}, MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS, "not 150%"),
         (GOAL, {"start_state": state(knee=1.0)}, MoveItErrorCodes.INVALID_ROBOT_STATE, "there is no joint 'knee'"),
         (joints(knee=1.0), {}, MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS, "'knee' is no joint of the arm"),
         (joints(**{LIFT: 9.0}), {}, MoveItErrorCodes.GOAL_STATE_INVALID, "goal_outside_limits"),

@@ -96,7 +96,7 @@ def test_an_object_in_the_map_is_where_it_is_as_seen_from_the_body_which_drives(
     scene = Scene(objects={"ball": BALL}, frames=["map"])
     assert scene.told == []  # frames become known soon
     scene.bench.advance(2.0)
-    assert scene.told[-1].problem == "nothing tells where 'map' is, the frame of 'ball'"
+    assert scene.told[-1].problem == "no transform to 'map' is known, the frame of 'ball'"
     place_base(scene.bench, 0.4)
     assert scene.told[-1].problem == ""
     (object_,) = scene.told[-1].objects

@@ -55,5 +55,5 @@ def test_a_joint_that_is_stuck_fails_and_says_where() -> None:
 
 @pytest.mark.parametrize("policy", [(0.0, 0.01), (0.05, math.nan), (0.05, 0.0), (math.inf, 0.01)])
 def test_what_cannot_be_is_refused(policy: tuple[float, float]) -> None:
-    with pytest.raises(ValueError, match="is none"):
+    with pytest.raises(ValueError, match="must be positive and finite"):
         LinearPolicy(*policy)

@@ -36,8 +36,8 @@ def test_joints_that_are_to_hold_hold_while_their_driver_comes_back(tmp_path: Pa
     with Arm(tmp_path, "{on_shutdown: hold}") as arm:
         lifted(arm)
         killed(arm)
-        arm.line.heard.clear()
-        assert arm.wait_for(lambda: len(arm.line.heard) > 100)  # the new driver has run for a while
+        arm.line.received.clear()
+        assert arm.wait_for(lambda: len(arm.line.received) > 100)  # the new driver has run for a while
         assert arm.torque() == [1, 0]
         assert abs(arm.tick() - UP) <= 1
         arm.do("release")

@@ -70,7 +70,7 @@ class HandBench:
     def stop_following(self) -> None:
         self.pending = self.stopped
 
-    def told(self, stage: str) -> None:
+    def report_stage(self, stage: str) -> None:
         self.stages.append(stage)
 
     def info(self, text: str) -> None:

@@ -51,7 +51,7 @@ class Site:
     def stop_following(self) -> None:
         self.stops += 1
 
-    def told(self, stage: str) -> None:
+    def report_stage(self, stage: str) -> None:
         self.stages.append(stage)
 
     def info(self, text: str) -> None:
@@ -90,7 +90,7 @@ def test_positions_of_joints_take_precedence_over_the_pose() -> None:
         (ArmGoal("asid"), "there is no pose 'asid'; the poses of this arm: aside, up"),
         (ArmGoal(), "neither a pose nor positions"),
         (ArmGoal("up", {"nose": 1.0}), "'nose' is no joint of this arm"),
-        (ArmGoal("up", speed=1.5), "a speed of 150%"),
+        (ArmGoal("up", speed=1.5), "not 150%"),
         (ArmGoal("up", acceleration=float("nan")), "acceleration"),
         (ArmGoal(target=PoseTarget(Transform3(), True), prefer="asid"), "there is no pose 'asid'"),
         (ArmGoal(target=PoseTarget(Transform3(), True, any_position=True)), "neither the position nor"),

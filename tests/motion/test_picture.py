@@ -17,7 +17,7 @@ from tests.motion.scenes import FLOOR, MESH, OCTREE
 from tests.motion.toy_arm import kinematics
 
 BODY = kinematics().body
-SHOWN = ArmPicture(BODY, {}, {"turn": 0.8}, told="at rest to up")
+SHOWN = ArmPicture(BODY, {}, {"turn": 0.8}, caption="at rest to up")
 BALL = PlacedObject("ball", Geometry("sphere", (0.1,)), "ground", Transform3((0.3, -0.4, 0.3)))
 
 

@@ -85,7 +85,7 @@ def test_a_picture_shows_the_cells_in_the_colours_of_its_legend(monkeypatch: pyt
     from PIL import Image
 
     monkeypatch.setattr(picture, "SIZE", 200)
-    robot = ArmPicture(TOY.body, {}, {"turn": 0.8}, told="two cells")
+    robot = ArmPicture(TOY.body, {}, {"turn": 0.8}, caption="two cells")
     cells = {(4, 4, 14): 10.0, (4, -4, 14): 1.0}
     shown = [ReachPicture(robot, each, SIDE, 10.0, "directions", is_layer=True) for each in (cells, {})]
     pictures = [

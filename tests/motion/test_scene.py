@@ -132,7 +132,7 @@ def test_an_object_in_a_frame_outside_of_the_body_stays_there_while_the_body_mov
     scene = PlanningScene(BODY, [replace(BALL, link="map")], ["map"])
     (placed_object,) = scene.on_body({"map": Transform3((1.0, 0.0, 0.0))})
     assert (placed_object.link, placed_object.pose.translation) == ("ground", (1.2, 0.4, 0.3))
-    with pytest.raises(SceneError, match="nothing tells where 'map' is, the frame of 'ball'"):
+    with pytest.raises(SceneError, match="no transform to 'map' is known, the frame of 'ball'"):
         scene.on_body({})
     scene.attach("ball", "fore", (), {**frames(np.zeros(3)), "map": Transform3()})
     assert scene.objects["ball"].link == "fore"

@@ -1,4 +1,4 @@
-"""What an importer is, and how it is found: one file in `importing/importers/`, declared by one decorator."""
+"""What an importer is, and how it is found: one file in a folder `importers`, declared by one decorator."""
 
 from __future__ import annotations
 

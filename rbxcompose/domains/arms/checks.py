@@ -46,7 +46,7 @@ def frame_of_object(robot: Robot) -> Iterator[Finding]:
         if thing.link not in shape.links and thing.link in known:  # RBX2019 reports the others
             yield frame_of_object.at(
                 robot.value("scene", "objects", thing.name, "frame"),
-                f"nobody tells where '{shape.root}' is in '{thing.link}'",
+                f"no component publishes the transform from '{thing.link}' to '{shape.root}'",
                 help="leave 'frame' out: what stands beside the robot counts from its root",
                 related=[Related(shape.links[shape.root].span, "the root of the body")],
                 about=(shape.root, thing.link),
@@ -99,9 +99,9 @@ def idle_grasps(robot: Robot) -> Iterator[Finding]:
             continue  # what it picks is known only later
         for one in (each for each in arm.model.grasps if each not in (*objects, *picked)):
             others = [each for each in dict.fromkeys(picked) if each not in arm.model.grasps]
-            meant = f"{DID_YOU_MEAN} '{others[0]}'?" if len(others) == 1 else suggest(one, objects, "objects")
+            hint = f"{DID_YOU_MEAN} '{others[0]}'?" if len(others) == 1 else suggest(one, objects, "objects")
             yield idle_grasps.at(
-                robot.key("arms", name, "grasps", one), f"no object of the scene is named '{one}'", help=meant
+                robot.key("arms", name, "grasps", one), f"no object of the scene is named '{one}'", help=hint
             )
 
 
@@ -260,11 +260,11 @@ def optical_camera(robot: Robot) -> Iterator[Finding]:
         camera = head.model.camera
         if _OPTICAL in camera and camera in shape.joint_above:
             plain = camera.replace(_OPTICAL, "")
-            meant = plain if plain in shape.links else shape.joint_above[camera].parent
+            link = plain if plain in shape.links else shape.joint_above[camera].parent
             yield optical_camera.at(
                 robot.value("heads", name, "camera"),
                 f"'{camera}' looks along its z, and a head points the x of its camera",
-                help=f"write 'camera: {meant}'",
+                help=f"write 'camera: {link}'",
                 related=[Related(shape.links[camera].span, "the link")],
             )
 
@@ -278,7 +278,7 @@ def placeless_goal(robot: Robot) -> Iterator[Finding]:
     for reach in written_reaches(robot):
         any_position = "any_position" in reach.arguments and word_of(reach, "any_position")[0] != "false"
         if not any_position and not reach.arguments.keys() & set(_AXES):
-            message = f"'{reach.node.skill}' is not told where the tip should be"
+            message = f"'{reach.node.skill}' has no position for the tip"
             help_text = "give 'x', 'y' and 'z', or 'any_position: true' if only the orientation counts"
             yield placeless_goal.at(reach.node.span, message, help=help_text)
 
@@ -379,7 +379,7 @@ def spot_beside(robot: Robot) -> Iterator[Finding]:
         for name, spot in one.model.spots.items():
             if spot.on in things:
                 spans = {axis: robot.value("arms", arm, "spots", name, axis) for axis in ("x", "y")}
-                yield from _told(robot, f"the spot '{name}'", things[spot.on], (spot.x, spot.y), spans)
+                yield from _beyond_edge(robot, f"the spot '{name}'", things[spot.on], (spot.x, spot.y), spans)
     for place in written_reaches(robot, "place"):
         on, _ = word_of(place, "on")
         given = {axis: place.arguments[axis] for axis in ("x", "y") if axis in place.arguments}
@@ -387,10 +387,10 @@ def spot_beside(robot: Robot) -> Iterator[Finding]:
         x, y = numbers.get("x", 0.0), numbers.get("y", 0.0)
         if on in things and x is not None and y is not None and not place.may_fail:
             spans = {axis: written.value.span for axis, written in given.items()}
-            yield from _told(robot, "this", things[on], (x, y), spans)
+            yield from _beyond_edge(robot, "this", things[on], (x, y), spans)
 
 
-def _told(
+def _beyond_edge(
     robot: Robot, what: str, on: PlacedObject, at: tuple[float, float], spans: Mapping[str, Span]
 ) -> Iterator[Finding]:
     for axis, away, edge in _beyond(on, *at):
@@ -454,7 +454,7 @@ class _Reaches:
                 if shoulder is not None and not pick.may_fail:
                     away = math.dist(shoulder, thing.pose.translation) - _radius(thing)
                     related = [Related(self.robot.key("scene", "objects", name), "the thing")]
-                    yield from self.told((pick.name, pick.arm), f"'{name}'", away, span, related)
+                    yield from self.out_of_reach((pick.name, pick.arm), f"'{name}'", away, span, related)
         for place in self.places:
             if not place.may_fail:
                 yield from self.placed(place)
@@ -505,10 +505,10 @@ class _Reaches:
         """Yield that a spot is out of reach."""
         on, length = self.things.get(spot.on or ""), length_of(self.robot, self.body, arm[1])
         if on is not None and (self.is_brought(on.name, "") or max(on.shape.size) > _TIMES * length):
-            return  # elsewhere, or a support in a wrong unit, which RBX2246 tells
+            return  # elsewhere, or a support in a wrong unit, which RBX2246 reports
         if (from_it := _from_spot(self.body, arm[1], spot, on)) is not None:
             slack = spot.tolerance + self.held(arm[0])
-            yield from self.told(arm, what, from_it, span, related, slack)
+            yield from self.out_of_reach(arm, what, from_it, span, related, slack)
 
     def held(self, arm: str) -> float:
         """Return how far from the middle of a thing the hand may be that puts it down [m]."""
@@ -520,7 +520,7 @@ class _Reaches:
                 found = max(found, own, *(math.hypot(grasp.x, grasp.y, grasp.z) for grasp in grasps))
         return found or _HELD
 
-    def told(
+    def out_of_reach(
         self,
         arm: tuple[str, ArmOfRobot],
         what: str,

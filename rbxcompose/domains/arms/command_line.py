@@ -15,7 +15,7 @@ from rbxcompose.base.config import Angle, Config, Length, Ratio, Speed
 from rbxcompose.base.files import replace_file
 from rbxcompose.base.findings import Report, kind, suggest
 from rbxcompose.base.units import ANGLE, LENGTH, Dimension
-from rbxcompose.commands.console import NotDoneError, misused, refuse, tell_report
+from rbxcompose.commands.console import NotDoneError, misused, refuse, write_report
 from rbxcompose.commands.targets import compiled, missing_extras, robot_path
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.domains.arms.arm_config import ArmConfig, ArmWorks
@@ -163,7 +163,7 @@ def chosen_robot(arguments: argparse.Namespace) -> Robot | None:
     report.extend(finding for finding in compilation.report if finding.severity.value == "error")
     if compilation.robot is not None and not report.has_errors and arguments.action != "ls":
         report.extend(missing_extras(compilation.robot))
-    tell_report(report, compilation.sources)
+    write_report(report, compilation.sources)
     return None if report.has_errors else compilation.robot
 
 

@@ -13,7 +13,7 @@ from rbxcompose.bus.local import Inbox
 from rbxcompose.bus.names import admin_key
 from rbxcompose.bus.transport import Arrival, Transport, TransportReply
 from rbxcompose.bus.window import SCHEMA
-from rbxcompose.commands.console import NotDoneError, tell
+from rbxcompose.commands.console import NotDoneError, emit
 from rbxcompose.commands.guest import Guest
 from rbxcompose.commands.lookup import NO_ANSWER, known_state, place_of
 from rbxcompose.domains.arms.scene_view import ARM, ARM_WINDOW, SCENE_WINDOW
@@ -28,11 +28,11 @@ _LONGEST = 300  # letters of a goal or a reason
 def watch(folder: RobotFolder, *, as_json: bool) -> int:
     """Print a line for each change until Ctrl-C; as JSON all that is known then, with its `window`."""
     if (state := known_state(folder)) is None:
-        raise NotDoneError(NO_ANSWER.at(None, "the robot does not tell which arms it has"))
+        raise NotDoneError(NO_ANSWER.at(None, "the robot does not report its arms"))
     arms = [component.name for component in state.components if component.type == ARM]
 
     def changed(path: str, seen: Mapping[str, Any]) -> None:
-        tell(json.dumps({"window": path, **seen}) if as_json else line_of(seen))
+        emit(json.dumps({"window": path, **seen}) if as_json else line_of(seen))
 
     with Guest(place_of(folder)) as guest, guest.interruptible():
         paths = (SCENE_WINDOW, *(f"{ARM_WINDOW}/{name}" for name in arms))
@@ -77,7 +77,7 @@ class WindowViews:
         self._asked: set[str] = set()
         transport: Transport = guest.transport
         for path in self._replicas:
-            news: Inbox[bytes] = Inbox(NAME, LONGEST_QUEUE, partial(self._heard, path), guest.scheduler.post)
+            news: Inbox[bytes] = Inbox(NAME, LONGEST_QUEUE, partial(self._received, path), guest.scheduler.post)
             transport.subscribe(admin_key(robot, path), Qos.STATE, partial(self._arrived, news))
             self._ask(path)
 
@@ -109,7 +109,7 @@ class WindowViews:
             return
         self._follow(path, self._replicas[path].answered(message))
 
-    def _heard(self, path: str, payload: bytes) -> None:
+    def _received(self, path: str, payload: bytes) -> None:
         if (message := _window_message(payload)) is not None:
             self._follow(path, self._replicas[path].apply(message))
 

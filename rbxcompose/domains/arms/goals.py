@@ -60,7 +60,7 @@ def action_of(message: Any) -> Any:
 
 
 def feedback_of(message: Any, stage: str) -> Any:
-    """Return what the client of a goal is told of its stage."""
+    """Return what the client of a goal receives about its stage."""
     action = action_of(message)
     if action in (MoveGroup, ExecuteTrajectory):
         return action.Feedback(state=STATES.get(stage, stage))

@@ -44,7 +44,7 @@ def picture_of_failure(
         positions,
         works.objects,
         colliding=names,
-        told=f"{arm}: {failure.stage}",
+        caption=f"{arm}: {failure.stage}",
         problem=f"{failure.reason}: {failure.text}",
     )
     try:
@@ -114,7 +114,7 @@ class PicksAndPlaces:
     """Position and velocity of each joint."""
 
     def pictured(self, name: str, hand: HandConfig | None, failure: object, result: Any) -> Any:
-        """Return a result, whose message tells where the picture of the failure is, if it wants one."""
+        """Return a result, whose message names where the picture of the failure is, if it wants one."""
         if hand is None or not hand.pictures or not isinstance(failure, StageFailure):
             return result
         if failure.reason is MotionReason.INTERRUPTED:
@@ -128,14 +128,14 @@ class PicksAndPlaces:
     def grip(self, opening: float, ended: Callable[[hand_tasks.Gripped], None]) -> None:
         """Open or close the gripper [m]."""
 
-        def told(end: Ended[GripperCommand.Result]) -> None:
+        def on_end(end: Ended[GripperCommand.Result]) -> None:
             if end.result is not None and (end.outcome is Outcome.SUCCEEDED or end.result.stalled):
                 ended(hand_tasks.Gripped(end.result.position))
             else:
                 ended(hand_tasks.Gripped(math.nan, end.message or f"its goal was {end.outcome}"))
 
         goal = GripperCommand.Goal(command=GripperCommandMessage(position=opening))
-        self.gripping = self.bound[GRIP](goal, told)
+        self.gripping = self.bound[GRIP](goal, on_end)
 
     def stop_gripping(self) -> None:
         """Ask the gripper to end."""

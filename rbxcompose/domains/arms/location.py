@@ -17,7 +17,7 @@ MOST_REMEMBERED, LONGEST_NAME = 100, 100
 
 
 def location_ports(config: ArmConfig) -> dict[str, Port[Any]]:
-    """Return the port that tells where an arm is."""
+    """Return the service that reports where an arm is."""
     return {LOCATE: Serves(LocateArm, f"{config.name}/locate", skill=f"locate_{config.name}").named(LOCATE)}
 
 
@@ -61,7 +61,7 @@ class LocationService:
         return LocateArm.Response(success=True, message=words, x=x, y=y, z=z, roll=roll, pitch=pitch, yaw=yaw)
 
     def _unfit(self, request: LocateArm.Request) -> str:
-        """Return why that cannot be told or remembered, nothing if it can."""
+        """Return why that cannot be reported or remembered, nothing if it can."""
         name, frame = request.remember, request.frame
         if unknown := [joint for joint in self.works.space.names if joint not in self.measured]:
             return f"nothing has reported where '{unknown[0]}' is"

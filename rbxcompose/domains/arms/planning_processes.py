@@ -33,7 +33,7 @@ class PlanningProcess:
     """Another process that plans for an arm. Each job has one answer, that of an abandoned one may be None."""
 
     def __init__(self, config: ArmConfig, warn: Callable[[str], None], now: Callable[[], float]) -> None:
-        """Start it; `now` is the time [s] that it plans by, and `warn` tells why it is gone."""
+        """Start it; `now` is the time [s] that it plans by, and `warn` logs why it is gone."""
         self._job: PlanJob | None = None
         self._answer: Planned | None = None
         self._sent: Any = None  # the scene that it knows

@@ -12,7 +12,7 @@ class MotionReason(StrEnum):
 
     UNKNOWN_GOAL = "unknown_goal"  # no such pose or joint, or numbers that are none
     UNKNOWN_START = "unknown_start"  # not all joints have reported where they are
-    UNKNOWN_SCENE = "unknown_scene"  # nothing has told what is around the robot
+    UNKNOWN_SCENE = "unknown_scene"  # no planning scene has been received
     START_OUTSIDE_LIMITS = "start_outside_limits"
     START_IN_COLLISION = "start_in_collision"
     GOAL_OUTSIDE_LIMITS = "goal_outside_limits"
@@ -47,7 +47,7 @@ class GraspReason(StrEnum):
     UNKNOWN_OBJECT = "unknown_object"  # it is not in the scene
     ALREADY_HOLDS = "already_holds"  # the arm holds an object, so that it cannot pick
     NOTHING_HELD = "nothing_held"  # the arm holds none, so that it cannot place
-    NO_GRASPS = "no_grasps"  # its shape does not tell how to hold it, and nothing else does
+    NO_GRASPS = "no_grasps"  # its shape does not show how to hold it, and nothing else does
     TOO_WIDE = "too_wide"  # the gripper does not open that far
     LINE_OUT_OF_REACH = "line_out_of_reach"  # joints cannot follow a straight line of the tip
     GRIPPER_FAILED = "gripper_failed"  # its controller failed

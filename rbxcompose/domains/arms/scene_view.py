@@ -23,7 +23,7 @@ SCENE, ARM = "scene", "arm"
 class ArmView:
     """What an arm knows now: its body, positions of joints [rad or m], objects, and pairs, the nearest first.
 
-    `watched` are the links and objects that may belong to pairs, of which there may be more than are told.
+    `watched` are the links and objects that may belong to pairs, of which there may be more than are reported.
     `way` is what was last planned: positions of the tip in the frame of the body's root [m].
     """
 
@@ -51,14 +51,14 @@ class ViewOfArm(Query[ArmView]):
 
 @dataclass(frozen=True, slots=True)
 class LookAtArm(Query[Mapping[str, Any]]):
-    """Return all that viewers see of an arm, as the window `arms/NAME` tells it."""
+    """Return all that viewers see of an arm, as the window `arms/NAME` shows it."""
 
     about = ARM
 
 
 @dataclass(frozen=True, slots=True)
 class LookAtScene(Query[Mapping[str, Any]]):
-    """Return all that viewers see of the scene, as the window `scene` tells it."""
+    """Return all that viewers see of the scene, as the window `scene` shows it."""
 
     about = SCENE
 
@@ -152,7 +152,7 @@ class DetachInScene(Command):
 SCENE_WINDOW, ARM_WINDOW = "scene", "arms"  # paths; that of an arm has its name behind
 IDLE = "idle"
 _DIGITS = 4  # of a length
-_SMALL = 20  # fields of a goal that are told
+_SMALL = 20  # fields of a goal that are shown
 
 
 def scene_parts(objects: Iterable[PlacedObject], problem: str) -> dict[str, Any]:

@@ -15,7 +15,7 @@ import numpy as np
 from rbxcompose.base.files import replace_file
 from rbxcompose.base.findings import Finding, Report, Severity, Sources, kind
 from rbxcompose.base.printable import plain
-from rbxcompose.commands.console import FINDINGS, refuse, tell, tell_report
+from rbxcompose.commands.console import FINDINGS, emit, refuse, write_report
 from rbxcompose.commands.new_files import name_like, write_new
 from rbxcompose.commands.targets import compiled, missing_extras, robot_path
 from rbxcompose.compiler.compile import Compilation
@@ -62,7 +62,7 @@ def run_setup(arguments: argparse.Namespace) -> int:
         return _propose(path, arguments)
     compilation = compiled(path, arguments)
     report = Report([finding for finding in compilation.report if finding.severity is Severity.ERROR])
-    tell_report(report, compilation.sources)
+    write_report(report, compilation.sources)
     description = compilation.robot.manifest.contents.of(body) if compilation.robot is not None else None
     found = find(path)
     if report.has_errors or isinstance(found, Finding) or compilation.robot is None:
@@ -84,11 +84,11 @@ def run_setup(arguments: argparse.Namespace) -> int:
         replace_file(file.resolve(), matrix.text().encode())
     except OSError as error:
         return refuse(NO_SETUP.at(None, f"'{plain(str(file))}' cannot be written: {error.strerror}"))
-    _tell(file, matrix, compilation.sources, is_json=arguments.json)
+    _show(file, matrix, compilation.sources, is_json=arguments.json)
     if not arguments.json and shown_name(file) not in compilation.sources:
         if not compilation.robot.manifest.contents.of(arms):
-            tell("this robot has no arms: 'rbxcompose arm setup FILE.urdf --propose' proposes some for its body")
-        tell(f"for arms to use it, the robot says\nbody:\n  collisions: {os.path.relpath(file, found.parent)}")
+            emit("this robot has no arms: 'rbxcompose arm setup FILE.urdf --propose' proposes some for its body")
+        emit(f"for arms to use it, the robot says\nbody:\n  collisions: {os.path.relpath(file, found.parent)}")
     return 0
 
 
@@ -111,7 +111,7 @@ def _propose(path: str, arguments: argparse.Namespace) -> int:
     file = find(path)
     report = Report([finding for finding in described.report if finding.severity is Severity.ERROR])
     if described.description is None or isinstance(file, Finding):
-        tell_report(report, described.sources)
+        write_report(report, described.sources)
         return 1
     return run_proposal(arguments, described.description, file)
 
@@ -119,7 +119,7 @@ def _propose(path: str, arguments: argparse.Namespace) -> int:
 def _checked(robot: Robot, compilation: Compilation, *, is_json: bool) -> int:
     lacking = Report([*missing_extras(robot)])
     if lacking.has_errors:
-        tell_report(lacking, compilation.sources)
+        write_report(lacking, compilation.sources)
         return 1
 
     return run_check(robot, compilation, is_json=is_json)
@@ -166,20 +166,20 @@ def _with_users(file: Path, description: Description, made: CollisionMatrix) -> 
     return replace(made, pairs={**made.pairs, **{pair: kept[pair] for pair in there}})
 
 
-def _tell(file: Path, matrix: CollisionMatrix, sources: Sources, *, is_json: bool) -> None:
-    """Tell what was written."""
+def _show(file: Path, matrix: CollisionMatrix, sources: Sources, *, is_json: bool) -> None:
+    """Print what was written."""
     if is_json:
         pairs = [{"pair": list(pair), "reason": reason} for pair, reason in sorted(matrix.pairs.items())]
-        tell(json.dumps({"file": shown_name(file), "samples": matrix.samples, "seed": matrix.seed, "pairs": pairs}))
+        emit(json.dumps({"file": shown_name(file), "samples": matrix.samples, "seed": matrix.seed, "pairs": pairs}))
         return
     words = ", ".join(f"{count} {reason}" for reason, count in matrix.counts().items())
-    tell(f"wrote {shown_name(file)}: {words or 'no pairs'}")
+    emit(f"wrote {shown_name(file)}: {words or 'no pairs'}")
     for reason in ("always", "user"):
         if found := matrix.having(reason):
-            tell(f"not watched, {reason}: {told_pairs(found)}")
+            emit(f"not watched, {reason}: {pair_list(found)}")
     if resting := matrix.having("default"):
-        message = f"these collide at rest and stay watched: {told_pairs(resting)}"
-        tell_report(Report([TOUCH_AT_REST.at(None, message)]), sources)
+        message = f"these collide at rest and stay watched: {pair_list(resting)}"
+        write_report(Report([TOUCH_AT_REST.at(None, message)]), sources)
 
 
 COLLIDES = kind("RBX9423")
@@ -187,21 +187,21 @@ UNWATCHED = kind("RBX9424", Severity.WARNING)
 
 
 def run_check(robot: Robot, compilation: Compilation, *, is_json: bool) -> int:
-    """Examine all poses; tell what collides."""
+    """Examine all poses; print what collides."""
     found = list(_findings(robot))
     report = Report([finding for _, _, _, finding in found])
     if is_json:
         keys = ("arm", "pose", "pairs", "code")
-        tell(
+        emit(
             json.dumps(
                 [dict(zip(keys, (arm, pose, pairs, finding.code), strict=True)) for arm, pose, pairs, finding in found]
             )
         )
     else:
-        tell_report(report, compilation.sources)
+        write_report(report, compilation.sources)
     if not found and not is_json:
         count = sum(len(arm.model.poses) for arm in robot.manifest.contents.of(arms).values())
-        tell(f"{count} poses, none of them in collision")
+        emit(f"{count} poses, none of them in collision")
     return FINDINGS if report.has_errors else 0
 
 
@@ -222,12 +222,12 @@ def _findings(robot: Robot) -> Iterator[tuple[str, str, list[tuple[str, str]], F
             values = np.array([at.get(joint, still) for joint, still in zip(works.space.names, rest, strict=True)])
             span = robot.value("arms", name, "poses", pose)
             if pairs := works.planner.checker.colliding(values):
-                message = f"the pose '{pose}' of '{name}' is in collision: {told_pairs(pairs)}"
+                message = f"the pose '{pose}' of '{name}' is in collision: {pair_list(pairs)}"
                 yield name, pose, pairs, COLLIDES.at(span, message)
             if hidden := [pair for pair in every.colliding(values) if matrix.get(pair) in ("never", "user")]:
                 reasons = " and ".join(sorted({f"'{matrix[pair]}'" for pair in hidden}))
                 message = (
-                    f"links collide in the pose '{pose}' of '{name}' that are there as {reasons}: {told_pairs(hidden)}"
+                    f"links collide in the pose '{pose}' of '{name}' that are there as {reasons}: {pair_list(hidden)}"
                 )
                 yield name, pose, hidden, UNWATCHED.at(span, message)
 
@@ -244,16 +244,16 @@ def run_proposal(arguments: argparse.Namespace, description: Description, file: 
     top = f"# Proposed by `rbxcompose arm setup --propose` for {file.name}: correct what is a guess.\n"
     text = f"{top}rbx: 1\nkind: Robot\nname: {name}\n\n{manifest_of(description.body, drafts, file.name)}"
     if arguments.out is None:
-        tell(text.rstrip("\n"))
+        emit(text.rstrip("\n"))
         return 0
     out = Path(arguments.out)
     if (problem := write_new(out.parent, {out.name: text})) is not None:
         return refuse(problem)
-    tell(f"wrote {shown_name(out.absolute())}: {', '.join(draft.name for draft in drafts)}")
+    emit(f"wrote {shown_name(out.absolute())}: {', '.join(draft.name for draft in drafts)}")
     return 0
 
 
-def told_pairs(pairs: Sequence[LinkPair], most: int = 10) -> str:
+def pair_list(pairs: Sequence[LinkPair], most: int = 10) -> str:
     """Return pairs of links in words."""
     words = ", ".join(f"{text} - {other}" for text, other in pairs[:most])
     return words + (f" and {len(pairs) - most} more" if len(pairs) > most else "")

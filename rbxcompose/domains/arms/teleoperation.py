@@ -48,7 +48,7 @@ class ArmServo:
         self.core = TipServo(works.kinematics, works.planner)
         self._works, self._bound, self._names = works, bound, works.space.names
         self._wish: Wish | None = None
-        self._until, self._told = -math.inf, ""
+        self._until, self._status = -math.inf, ""
 
     @property
     def is_wanted(self) -> bool:
@@ -88,26 +88,26 @@ class ArmServo:
         found = self.core.next(now, measured, self._wish)
         if found is not None:
             self._bound[STREAM](_message(found, self._names, stamp + round((found.begin - now) * 1e9)))
-        self.tell()
+        self.publish_state()
         return self.is_wanted
 
     def refuse(self, reason: str) -> None:
-        """Tell why a command does not count; one that does goes on."""
+        """Report why a command does not count; one that does goes on."""
         self._say(f"refused: {reason}")
 
     def end(self, reason: str) -> None:
         """Forget the command, since something else leads or stops the arm."""
         self._wish = None
         self.core.end(reason)
-        self.tell()
+        self.publish_state()
 
-    def tell(self) -> None:
+    def publish_state(self) -> None:
         """Publish what it does, if that is new."""
         self._say(self.core.state)
 
     def _say(self, text: str) -> None:
-        if text != self._told:
-            self._told = text
+        if text != self._status:
+            self._status = text
             self._bound[STATUS](String(data=text))
 
 

@@ -64,7 +64,7 @@ def request_groups(models: Mapping[int, ServoModel]) -> Iterator[tuple[int, list
 
 @dataclass(frozen=True, slots=True)
 class ServoReading:
-    """What one servo told: raw values by item, and the time [s] at which they came.
+    """What one servo reported: raw values by item, and the time [s] at which they came.
 
     `alert` is the error byte of its reply. In protocol 1.0 its bits name faults; in 2.0 bit 7 tells that the item
     `hardware_error` does.
@@ -81,7 +81,7 @@ class ServoStatistics:
 
     reads: int = 0
     errors: int = 0
-    """Replies that were corrupt, too short, or told of an error of the request."""
+    """Replies that were corrupt, too short, or had an error of the request."""
     timeouts: int = 0
     misses: int = 0
     """Reads in a row without a reply."""

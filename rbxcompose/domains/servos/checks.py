@@ -41,9 +41,9 @@ def baud_of_servo(robot: Robot) -> Iterator[Finding]:
         contents = robot.manifest.contents
         own = {name: actuator for name, actuator in contents.of(actuators).items() if actuator.bus == bus.name}
         models = {name: model for name, entry in own.items() if (model := model_of(contents, entry))}
-        deaf = [name for name, model in models.items() if model.code_of(bus.baud) is None]
-        if deaf:
-            names = sorted({models[name].name for name in deaf})
+        unfit = [name for name, model in models.items() if model.code_of(bus.baud) is None]
+        if unfit:
+            names = sorted({models[name].name for name in unfit})
             common = [
                 baud for baud in COMMON_BAUDS if all(model.code_of(baud) is not None for model in models.values())
             ]
@@ -51,7 +51,7 @@ def baud_of_servo(robot: Robot) -> Iterator[Finding]:
                 robot.value(*bus.path, "baud"),
                 f"{' and '.join(names)} cannot listen at {format_quantity(bus.baud, BIT_RATE)}",
                 help=f"rates that all servos of the bus have: {', '.join(map(str, common))}",
-                related=[Related(robot.key("actuators", deaf[0]), f"'{deaf[0]}' is one of them")],
+                related=[Related(robot.key("actuators", unfit[0]), f"'{unfit[0]}' is one of them")],
             )
 
 
@@ -167,10 +167,10 @@ def out_of_reach(robot: Robot) -> Iterator[Finding]:
     """A joint may go where its servo cannot."""
     for driven in driven_joints(robot):
         if driven.joint.mode == "position":
-            yield from _told(driven)
+            yield from _beyond_reach(driven)
 
 
-def _told(driven: DrivenJoint) -> Iterator[Finding]:
+def _beyond_reach(driven: DrivenJoint) -> Iterator[Finding]:
     joint, limits = driven.joint, driven.joint.limits
     (first, last), slack = joint.reach, _TICK * joint.per_tick
     is_below = limits.least < first - slack and (limits.lower is not None or joint.is_continuous)
@@ -184,9 +184,11 @@ def _told(driven: DrivenJoint) -> Iterator[Finding]:
     body = driven.body.limits if driven.body else None
     message = f"'{driven.name}' {wanted}, but {servo} {driven.position(first)} to {driven.position(last)}"
     if body and not driven.slides and body.may_be_degrees:
-        return  # told as RBX2021
-    if body and not is_free and (meant := _in_degrees(driven)):
-        yield out_of_reach.at(body.span, message, help=f"limits in a URDF are in radians: for degrees, write {meant}")
+        return  # reported as RBX2021
+    if body and not is_free and (intended := _in_degrees(driven)):
+        yield out_of_reach.at(
+            body.span, message, help=f"limits in a URDF are in radians: for degrees, write {intended}"
+        )
         return
     yield out_of_reach.at(
         _place(driven, is_shifted=limits.least > last or limits.greatest < first),
@@ -245,15 +247,15 @@ def wider_limit(robot: Robot) -> Iterator[Finding]:
     """A limit of a joint is wider than that of the body."""
     for joint in driven_joints(robot):
         for name in limits_of(joint.written, joint.body).wider:
-            yield from _wider_limit_told(joint, name)
+            yield from _wider_than_body(joint, name)
 
 
-def _wider_limit_told(joint: DrivenJoint, name: str) -> Iterator[Finding]:
+def _wider_than_body(joint: DrivenJoint, name: str) -> Iterator[Finding]:
     limits, body = joint.written.limits, joint.body.limits if joint.body else None
     outer: float | None = getattr(body, name, None)
     wanted = limits.velocity if name == "velocity" else limits.position and limits.position[name == "upper"]
     if name == "velocity" and outer == 0.0:
-        return  # the body's zero is the mistake, which is told there
+        return  # the body's zero is the mistake, which is reported there
     if body is None or outer is None or not wanted or abs(wanted.value - outer) <= ROUNDED * abs(outer):
         return
     shown = joint.speed if name == "velocity" else joint.position
@@ -366,8 +368,8 @@ def parked_joint(robot: Robot) -> Iterator[Finding]:
             if name not in robot.manifest.contents.of(joints):
                 message = f"'{name}' cannot be parked: no servo drives it"
                 yield parked_joint.misspelt(key, message, name, driven, "joints with a servo")
-        elif told := _mistake(driven[name], position):
-            message, help_text = told
+        elif mistake := _mistake(driven[name], position):
+            message, help_text = mistake
             yield parked_joint.at(robot.value("safety", "park", name), message, help=help_text)
 
 
@@ -441,7 +443,7 @@ class GoalRange:
 @check("RBX4163", closed=(WIRING,))
 def goal_beyond_limits(robot: Robot) -> Iterator[Finding]:
     """A skill is asked for what is beyond the limits."""
-    bounded, told = _bounded(robot), set[Span | None]()
+    bounded, reported = _bounded(robot), set[Span | None]()
     for mission in robot.missions.values() if bounded else ():
         known = constants(mission)
         for node in mission.program.nodes:
@@ -451,9 +453,9 @@ def goal_beyond_limits(robot: Robot) -> Iterator[Finding]:
                 if skill and (allowed := ranges.get(name := argument.name or skill.main)):
                     wanted = skill.arguments[name]
                     for finding in _beyond(mission, node.skill, name, argument, allowed, wanted, known):
-                        if finding.span not in told:  # a name that is used twice
+                        if finding.span not in reported:  # a name that is used twice
                             yield finding
-                        told.add(finding.span)
+                        reported.add(finding.span)
 
 
 def _bounded(robot: Robot) -> dict[str, dict[str, GoalRange]]:
@@ -494,13 +496,13 @@ def _beyond(
         yield goal_beyond_limits.at(
             declared or argument.value.span,
             f"'{skill}' cannot bring '{name}' to {show(wanted, value)}: {allowed.whose} is from {least} to {greatest}",
-            help=_meant(argument.value.text, wanted, allowed)
+            help=_unit_hint(argument.value.text, wanted, allowed)
             or f"the nearest that it reaches is {show(wanted, nearest)}",
             related=[*used, Related(allowed.place, "its limits")],
         )
 
 
-def _meant(text: str, wanted: Type, allowed: GoalRange) -> str:
+def _unit_hint(text: str, wanted: Type, allowed: GoalRange) -> str:
     """Return the unit that a bare length probably lacks; nothing if none would help."""
     try:
         number = float(text)

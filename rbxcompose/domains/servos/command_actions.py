@@ -13,7 +13,7 @@ from rbxcompose.base import units
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, Report
 from rbxcompose.base.printable import plain
-from rbxcompose.commands.console import FINDINGS, NotDoneError, refuse, table, tell, tell_report
+from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, refuse, table, write_report
 from rbxcompose.commands.new_files import AnswerError, read_name, taken, write_new
 from rbxcompose.domains.devices.serial_ports import port_path, serial_ports, slow_adapter
 from rbxcompose.domains.servos.bus import ID_TAKEN, NO_ITEM, OTHER_RATE, REFUSED, SILENT, UNKNOWN_MODEL, FoundServo
@@ -30,7 +30,7 @@ def bus_at(arguments: argparse.Namespace, baud: int) -> Iterator[DynamixelBus]:
         report = Report()
         if warning := slow_adapter(bus.opened_at, bus.latency):
             report.add(warning)
-            tell_report(report, {})
+            write_report(report, {})
         yield bus
 
 
@@ -42,13 +42,13 @@ def protocols(arguments: argparse.Namespace) -> tuple[int, ...]:
 def written(
     bus: DynamixelBus, values: Mapping[int, Mapping[str, int]], arguments: argparse.Namespace, **more: object
 ) -> int:
-    """Write raw values by id; tell which servos have not taken them, in JSON with `more`; return the exit code."""
+    """Write raw values by id; report which servos have not taken them, in JSON with `more`; return the exit code."""
     failed = bus.write(values, is_confirmed=True)
     for one in sorted(failed):
         words = f"the servo at id {one} has not taken {', '.join(f'{name}={raw}' for name, raw in values[one].items())}"
         refuse(REFUSED.at(None, words, help="'rbxcompose servo info' shows its limits, and whether torque is on"))
     if arguments.json:
-        tell(json.dumps({"written": sorted(set(values) - failed), "failed": sorted(failed), **more}))
+        emit(json.dumps({"written": sorted(set(values) - failed), "failed": sorted(failed), **more}))
     return FINDINGS if failed else 0
 
 
@@ -73,7 +73,7 @@ def elsewhere(arguments: argparse.Namespace) -> str:
 
 
 def nobody(arguments: argparse.Namespace) -> int:
-    """Tell that no servo answers, and return the exit code."""
+    """Report that no servo answers, and return the exit code."""
     rates = " and ".join(map(str, arguments.baud))
     words = f"no servo answers on {plain(arguments.port)} at {rates} bit/s"
     return refuse(SILENT.at(None, words, help="check power and cable; try other rates with --baud"))
@@ -172,7 +172,7 @@ def _disabled(bus: DynamixelBus, ids: Sequence[int], arguments: argparse.Namespa
                 if number in limited
                 else "is relaxed: no goal switches its torque on, so there is nothing more to disable"
             )
-            tell(f"the {bus.servos[number].name} at id {number} {words}")
+            emit(f"the {bus.servos[number].name} at id {number} {words}")
     return code
 
 
@@ -297,7 +297,7 @@ def new_robot(arguments: argparse.Namespace) -> int:
     choice = choose({baud: _surveyed(arguments, baud) for baud in dict.fromkeys(arguments.baud)}, arguments.port)
     report = Report()
     report.extend(choice.findings)
-    tell_report(report, {})
+    write_report(report, {})
     if not choice.servos:
         return FINDINGS if report.has_errors else nobody(arguments)
     servos = [NewServo(servo.id, servo.model) for servo in choice.servos if servo.model]
@@ -305,7 +305,7 @@ def new_robot(arguments: argparse.Namespace) -> int:
     if finding := write_new(arguments.into, files):
         return refuse(finding)
     written = [shown_name(arguments.into / file) for file in files]
-    _tell(arguments, written, choice.servos, choice.baud)
+    _report_files(arguments, written, choice.servos, choice.baud)
     return FINDINGS if report.has_errors else 0
 
 
@@ -322,16 +322,18 @@ def _surveyed(arguments: argparse.Namespace, baud: int) -> Survey:
         return survey(bus, range(arguments.last + 1), protocols(arguments))
 
 
-def _tell(arguments: argparse.Namespace, written: Sequence[str], servos: Sequence[FoundServo], baud: int) -> None:
+def _report_files(
+    arguments: argparse.Namespace, written: Sequence[str], servos: Sequence[FoundServo], baud: int
+) -> None:
     if arguments.json:
         found = [{"id": servo.id, "protocol": servo.protocol, "model": servo.name} for servo in servos]
-        tell(json.dumps({"files": written, "baud": baud, "servos": found}))
+        emit(json.dumps({"files": written, "baud": baud, "servos": found}))
         return
     robot = os.path.dirname(written[0])
     lines = [f"wrote {file}" for file in written]
     lines += [f"with {servo.name} at id {servo.id}, as servo_{servo.id} and joint_{servo.id}" for servo in servos]
     lines += ["then:", f"  rbxcompose up {robot}", f"  rbxcompose up --real {robot}"]
-    tell("\n".join(plain(line, 4096) for line in lines))
+    emit("\n".join(plain(line, 4096) for line in lines))
 
 
 _BLINKS, _HALF = 3, 0.3  # times; [s] on and [s] off
@@ -342,7 +344,7 @@ def _scan(arguments: argparse.Namespace) -> int:
     for baud in dict.fromkeys(arguments.baud):
         with bus_at(arguments, baud) as bus:
             found += bus.scan(range(arguments.last + 1), protocols(arguments))
-    return _told(found, arguments)
+    return _listed(found, arguments)
 
 
 def _ping(arguments: argparse.Namespace) -> int:
@@ -352,26 +354,26 @@ def _ping(arguments: argparse.Namespace) -> int:
         refuse(SILENT.at(None, f"no servo answers at id {one}", help=elsewhere(arguments)))
     found = [servo for servo in answers.values() if servo]
     if found:
-        _told(found, arguments)
+        _listed(found, arguments)
     return 0 if len(found) == len(answers) else FINDINGS
 
 
-def _told(found: list[FoundServo], arguments: argparse.Namespace) -> int:
+def _listed(found: list[FoundServo], arguments: argparse.Namespace) -> int:
     """List servos; it is an error if there are none."""
     if not found:
         return nobody(arguments)
     if arguments.json:
-        tell(json.dumps([{"id": s.id, "protocol": s.protocol, "model": s.name, "baud": s.baud} for s in found]))
+        emit(json.dumps([{"id": s.id, "protocol": s.protocol, "model": s.name, "baud": s.baud} for s in found]))
     else:
         rows = [(str(s.id), f"{s.protocol}.0", s.name, str(s.baud)) for s in found]
-        tell(table([("id", "protocol", "model", "baud"), *rows]))
+        emit(table([("id", "protocol", "model", "baud"), *rows]))
     return 0
 
 
 def _info(arguments: argparse.Namespace) -> int:
     with bus_at(arguments, arguments.baud[0]) as bus:
         found = known(bus, arguments.id, arguments)
-        return _tell_values(bus, found, list(bus.servos[arguments.id].items), arguments)
+        return _show_values(bus, found, list(bus.servos[arguments.id].items), arguments)
 
 
 def _read(arguments: argparse.Namespace) -> int:
@@ -381,27 +383,29 @@ def _read(arguments: argparse.Namespace) -> int:
         wrong = [name for name in arguments.items if name not in model.items and name != "hardware_error"]
         if wrong:
             return refuse(unknown_item(model, wrong[0]))
-        return _tell_values(bus, found, arguments.items, arguments)
+        return _show_values(bus, found, arguments.items, arguments)
 
 
-def _tell_values(bus: DynamixelBus, found: FoundServo, items: list[str], arguments: argparse.Namespace) -> int:
+def _show_values(bus: DynamixelBus, found: FoundServo, items: list[str], arguments: argparse.Namespace) -> int:
     reading = bus.read([found.id], items).get(found.id)
     if reading is None:
         words = f"the servo at id {found.id} answers a ping, but no read: perhaps two servos have this id"
         return refuse(SILENT.at(None, words, help="connect one alone"))
     values = {name: shown(bus.servos[found.id], name, reading.values[name]) for name in items}
     if arguments.json:
-        told = {name: {"raw": reading.values[name], "value": value, "unit": u} for name, (value, u) in values.items()}
-        tell(json.dumps({"id": found.id, "model": found.name, "values": told}))
+        shown_values = {
+            name: {"raw": reading.values[name], "value": value, "unit": u} for name, (value, u) in values.items()
+        }
+        emit(json.dumps({"id": found.id, "model": found.name, "values": shown_values}))
         return 0
     rows = [
         (name, str(reading.values[name]), f"{value:.6g} {unit}" if unit else "")
         for name, (value, unit) in values.items()
     ]
-    tell(f"{found.name}, id {found.id}, protocol {found.protocol}.0")
-    tell(table([("item", "raw", "value"), *rows]))
+    emit(f"{found.name}, id {found.id}, protocol {found.protocol}.0")
+    emit(table([("item", "raw", "value"), *rows]))
     if faults := hardware_errors(reading.values.get("hardware_error", 0)):
-        tell(f"it reports: {', '.join(faults)}")
+        emit(f"it reports: {', '.join(faults)}")
     return 0
 
 
@@ -416,7 +420,7 @@ def _set_id(arguments: argparse.Namespace) -> int:
     with bus_at(arguments, arguments.baud[0]) as bus:
         if finding := change_id(bus, arguments.old, arguments.new):
             return refuse(finding)
-    tell(json.dumps({"id": arguments.new}) if arguments.json else f"the servo has the id {arguments.new}")
+    emit(json.dumps({"id": arguments.new}) if arguments.json else f"the servo has the id {arguments.new}")
     return 0
 
 

@@ -79,7 +79,7 @@ class ControlledJoint(Protocol):
 
     @property
     def commanded(self) -> JointSample:
-        """Return where it was told to be, within its limits."""
+        """Return where it was commanded to be, within its limits."""
 
     @property
     def blocked(self) -> str:
@@ -200,7 +200,7 @@ class Controller(ABC, Generic[C]):
 
     @classmethod
     def asks(cls, config: C) -> Mapping[str, tuple[float, float]]:
-        """Return the least and the greatest position that it may give its joints, as far as the configuration tells."""
+        """Return the least and the greatest position that it may give its joints, as far as the configuration says."""
         return {}
 
     def prepare(self) -> None:

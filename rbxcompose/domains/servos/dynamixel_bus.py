@@ -120,7 +120,7 @@ class GroupRead:
             del self.open[answer.id]
 
     def reading(self, id: int) -> servo_bus.ServoReading:
-        """Return what a servo told, once it is whole."""
+        """Return what a servo reported, once it is whole."""
         stamp, alert = self._last[id]
         return servo_bus.ServoReading(self.plans[id].values(self._parts[id], alert), stamp, alert)
 
@@ -135,7 +135,7 @@ class ServoReader:
     def attempt(
         self, port: BlockingPort, read: GroupRead, models: Mapping[int, ServoModel], *, is_fast: bool = False
     ) -> None:
-        """Ask servos once, by id, for all that they have not told yet; one that fails is not asked for the rest."""
+        """Ask servos once, by id, for all that they have not reported yet; one that fails is not asked for the rest."""
         for protocol, group in servo_bus.request_groups(models):
             wanted = read.next_of(group)
             while wanted:
@@ -309,7 +309,7 @@ class DynamixelBus:
                     yield found
 
     def count(self, id: int, protocol: int) -> int:
-        """Return how many servos answer at an id, so far as their replies can be told apart; 0 if it is silent."""
+        """Return how many servos answer at an id, so far as their replies can be distinguished; 0 if it is silent."""
         replies = 0
         with self._in_use() as port:
             packets = self._packets[protocol]
@@ -483,7 +483,7 @@ def _changed(bus: DynamixelBus, old: int, new: int) -> Finding | None:
         return UNKNOWN_MODEL.at(None, f"the servo at id {old} is of no known model", help="use its maker's tool")
     bus.servos[old] = found.model
     bus.write({old: {"torque_enable": 0}}, is_confirmed=True)
-    bus.write({old: {"id": new}}, is_confirmed=True)  # some confirm under the new id, so only a ping tells
+    bus.write({old: {"id": new}}, is_confirmed=True)  # some confirm under the new id, so only a ping shows it
     del bus.servos[old]
     if bus.ping(new, found.protocol) is None:
         locked = "; its memory may be locked until it is switched off and on" if found.protocol == 1 else ""

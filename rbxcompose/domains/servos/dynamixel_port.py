@@ -187,8 +187,8 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         return serial_ports.LostPortError(str(self.port_name), "has gone")
 
 
-_ALERT = 0x80  # bit of the error byte in 2.0 that tells of the servo, not of the request
-_ONE_REFUSED = 2 | 8 | 16 | 64  # bits in 1.0 that tell of the request: limits, range, checksum, instruction
+_ALERT = 0x80  # bit of the error byte in 2.0 that is about the servo, not of the request
+_ONE_REFUSED = 2 | 8 | 16 | 64  # bits in 1.0 that are about the request: limits, range, checksum, instruction
 _FAST_HEAD, _FAST_ID = 8, 254  # [B] before the first part of a fast reply; the id under which it comes
 
 

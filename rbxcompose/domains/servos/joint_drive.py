@@ -193,7 +193,7 @@ class JointDrive(ABC):
         return self.limiter is None or self.limiter.is_at_rest
 
     def take(self, id: int, reading: ServoReading) -> None:
-        """Take over what one of its servos told."""
+        """Take over what one of its servos reported."""
         servo = self.joint.servo(id)
         model, values = servo.model, reading.values
         if (raw := values.get("present_position")) is not None:
@@ -205,7 +205,7 @@ class JointDrive(ABC):
             self.temperature = self.warmest = max(self._warmth.values())
         if (raw := values.get("present_voltage")) is not None:
             self.voltage = model.to_si("present_voltage", raw)
-        if model.protocol == 1 or "hardware_error" in values:  # in 2.0, not each reading tells of errors
+        if model.protocol == 1 or "hardware_error" in values:  # in 2.0, not each reading has errors
             self._errors[id] = ", ".join(_faults(servo, reading))
 
     def _measure(self, servo: JointServo, raw: int, speed: int, stamp: float) -> None:
@@ -339,11 +339,11 @@ class PositionDrive(JointDrive):
         if request.velocity is None and self.speed is not None:
             limits = replace(limits, velocity=min(self.speed, limits.speed))
         limiter.limits = limits
-        self._tell_clamped(request)
+        self._note_clamped(request)
         return limiter.want(request.position, request.velocity or 0.0) or ""
 
-    def _tell_clamped(self, request: joint_states.MoveTo) -> None:
-        """Note that a single command is beyond the limits; controllers tell that of theirs."""
+    def _note_clamped(self, request: joint_states.MoveTo) -> None:
+        """Note that a single command is beyond the limits; controllers note that of theirs."""
         inside = self.joint.limits.clamped(request.position)
         is_beyond = request.velocity is None and abs(inside - request.position) > self.per_tick
         self.clamped = f"a command for {request.position:g} is clamped to its limit, {inside:g}" if is_beyond else ""

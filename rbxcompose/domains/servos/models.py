@@ -87,7 +87,7 @@ class ControlItem:
             if self.least <= raw <= self.most:
                 return (-raw | 1 << _DIRECTION if raw < 0 else raw).to_bytes(self.size, "little")
         except OverflowError:
-            pass  # told below, with the range
+            pass  # reported below, with the range
         raise ValueError(f"{self.name} must be {self.least} to {self.most}, not {raw}")
 
     def to_si(self, raw: int) -> float:
@@ -286,7 +286,7 @@ HARDWARE_ERRORS: Mapping[int, str] = MappingProxyType(
 )
 """Bits of `hardware_error` in protocol 2.0. In 1.0, those of voltage, heat and load have the same places."""
 EXTENDED = "extended_position"  # the mode without ends
-ONE_ERRORS = 1 | 4 | 32  # bits of the error byte in protocol 1.0 that tell of the servo, not of the request
+ONE_ERRORS = 1 | 4 | 32  # bits of the error byte in protocol 1.0 that is about the servo, not of the request
 _ONE_BAUDS: Mapping[int, int] = MappingProxyType({250: 2_250_000, 251: 2_500_000, 252: 3_000_000})  # MX only
 _TWO_BAUDS = (9_600, 57_600, 115_200, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 4_500_000)
 COMMON_BAUDS = (57_600, 115_200, 1_000_000, 2_000_000, 3_000_000, 4_000_000)
@@ -384,9 +384,7 @@ _AX = ServoFamily("AX", 1, 1024, math.radians(300), 512, has_bulk_read=False, en
 _RX = ServoFamily("RX", 1, 1024, math.radians(300), 512, has_bulk_read=False, enables_at_goal=True)
 _EX = ServoFamily("EX", 1, 4096, math.radians(250.92), 2048, has_bulk_read=False, enables_at_goal=True)
 _MX = ServoFamily("MX 1.0", 1, 4096, _TURN, 2048, enables_at_goal=True)
-_SERVO_MODELS_XL320 = ServoFamily(
-    "XL-320", 2, 1024, math.radians(300), 512, MappingProxyType({"velocity": 1, "position": 2})
-)
+_XL320_FAMILY = ServoFamily("XL-320", 2, 1024, math.radians(300), 512, MappingProxyType({"velocity": 1, "position": 2}))
 _X_LOAD = ServoFamily("X load", 2, 4096, _TURN, 2048, _MODES_X)
 _X_1MA = ServoFamily("X 1 mA", 2, 4096, _TURN, 2048, _MODES_CURRENT)
 _X_2MA = ServoFamily("X 2.69 mA", 2, 4096, _TURN, 2048, _MODES_CURRENT)
@@ -403,7 +401,7 @@ _MODELS: tuple[tuple[ServoFamily, Mapping[str, int]], ...] = (
     (_RX, {"RX-24": 24, "RX-28": 28, "RX-64": 64}),
     (_EX, {"EX-106+": 107}),
     (_MX, {"MX-12W": 360, "MX-28": 29, "MX-64": 310, "MX-106": 320}),
-    (_SERVO_MODELS_XL320, {"XL-320": 350}),
+    (_XL320_FAMILY, {"XL-320": 350}),
     (_X_LOAD, {"MX-28(2.0)": 30, "XL430-W250": 1060, "XC430-W150": 1070, "XC430-W240": 1080}),
     (_X_1MA, {"XL330-M077": 1190, "XL330-M288": 1200}),
     (_X_1MA, {"XC330-T181": 1210, "XC330-T288": 1220, "XC330-M181": 1230, "XC330-M288": 1240}),
@@ -447,7 +445,7 @@ def _by_number() -> Mapping[int, ServoModel]:
 
 
 def model_of_number(number: int) -> ServoModel | None:
-    """Return the model with the number that a servo has told, None if it is not known."""
+    """Return the model with the number that a servo has reported, None if it is not known."""
     return _by_number().get(number)
 
 
@@ -470,7 +468,7 @@ def _folded(name: str) -> str:
 
 
 def hardware_errors(bits: int) -> tuple[str, ...]:
-    """Return the names of the faults that `hardware_error` tells."""
+    """Return the names of the faults that `hardware_error` reports."""
     return tuple(name for bit, name in HARDWARE_ERRORS.items() if bits & bit)
 
 

@@ -70,9 +70,9 @@ def servo_robot_files(answers: ServoRobotAnswers) -> dict[str, str]:
     placed = [(servo, f"{index * _APART:.2f}") for index, servo in enumerate(answers.servos)]
     width = f"{len(placed) * _APART:.2f}"
     middle = f"{(len(placed) - 1) * _APART / 2:.2f}"
-    told = {"name": answers.name, "port": port, "baud": answers.baud, "rate": answers.rate, "servos": answers.servos}
+    values = {"name": answers.name, "port": port, "baud": answers.baud, "rate": answers.rate, "servos": answers.servos}
     return {
-        robot: render("servo_robot.yaml.j2", **told),
+        robot: render("servo_robot.yaml.j2", **values),
         body: render("servo_robot.urdf.j2", name=answers.name, placed=placed, width=width, middle=middle),
     }
 

@@ -85,8 +85,7 @@ def set_up(items: Sequence[ServoItem], bus: ServoBus) -> Iterator[str]:
         if changed:
             bus.write({item.id: {"torque_enable": 0}}, is_confirmed=True)
             failed = bus.write({item.id: changed}, is_confirmed=True)
-            told = ", ".join(f"{name} {raw}" for name, raw in changed.items())
-            yield f"servo {item.id} {'did not take' if failed else 'now has'} {told}"
+            yield f"servo {item.id} {'did not take' if failed else 'now has'} {_shown(changed)}"
 
 
 LIMIT = "velocity_limit"
@@ -108,7 +107,7 @@ def keep_speeds(bus: ServoBus, drive: JointDrive) -> Iterator[str]:
             yield f"servo {servo.id} of joint '{joint.name}' turns at most {most:.3g} rad/s"
 
 
-TORQUE_LIMITS_LIMIT, MOST = "torque_limit", "max_torque"
+TORQUE_LIMIT, MOST = "torque_limit", "max_torque"
 
 
 class TorqueLimits:
@@ -116,7 +115,7 @@ class TorqueLimits:
 
     def __init__(self) -> None:
         self._wanted: dict[int, int] = {}  # raw limits, by id
-        self._told: set[int] = set()
+        self._reported: set[int] = set()
 
     def write(self, bus: ServoBus, servo: JointServo) -> None:
         """Write the limit of a servo, if it answers.
@@ -124,13 +123,13 @@ class TorqueLimits:
         Raises:
             PortError: if the bus has gone.
         """
-        if (reading := bus.read([servo.id], [TORQUE_LIMITS_LIMIT, MOST]).get(servo.id)) is not None:
+        if (reading := bus.read([servo.id], [TORQUE_LIMIT, MOST]).get(servo.id)) is not None:
             wanted = self._wanted[servo.id] = raw_limit(servo, reading.values[MOST])
-            if reading.values[TORQUE_LIMITS_LIMIT] != wanted:
-                bus.write({servo.id: {TORQUE_LIMITS_LIMIT: wanted}}, is_confirmed=True)
+            if reading.values[TORQUE_LIMIT] != wanted:
+                bus.write({servo.id: {TORQUE_LIMIT: wanted}}, is_confirmed=True)
 
     def keep(self, bus: ServoBus, servo: JointServo, values: Mapping[str, int]) -> str:
-        """Write the limit again if values of a servo tell that it has another one; return what to tell, or nothing.
+        """Write the limit again if a servo reports another one; return a note for people, or nothing.
 
         Raises:
             PortError: if the bus has gone.
@@ -138,19 +137,19 @@ class TorqueLimits:
         wanted = self._wanted.get(servo.id)
         if wanted is None:
             self.write(bus, servo)
-        elif values.get(TORQUE_LIMITS_LIMIT, wanted) == wanted:
-            self._told.discard(servo.id)
+        elif values.get(TORQUE_LIMIT, wanted) == wanted:
+            self._reported.discard(servo.id)
         else:
-            bus.write({servo.id: {TORQUE_LIMITS_LIMIT: wanted}}, is_confirmed=True)
-            if servo.id not in self._told:
-                self._told.add(servo.id)
+            bus.write({servo.id: {TORQUE_LIMIT: wanted}}, is_confirmed=True)
+            if servo.id not in self._reported:
+                self._reported.add(servo.id)
                 return f"servo {servo.id} had lost its torque limit: it is written again"
         return ""
 
 
 def raw_limit(servo: JointServo, most: int) -> int:
     """Return the limit that leaves a servo its share of the torque; `most` is what its owner allows it."""
-    return most if servo.torque >= 1.0 else min(most, servo.model.to_raw(TORQUE_LIMITS_LIMIT, servo.torque))
+    return most if servo.torque >= 1.0 else min(most, servo.model.to_raw(TORQUE_LIMIT, servo.torque))
 
 
 WATCHDOG = "bus_watchdog"
@@ -179,7 +178,7 @@ def prepare(bus: ServoBus, joints: Iterable[ServoJoint], watchdog: float, delay:
             if changed:
                 bus.write({servo.id: {"torque_enable": 0}}, is_confirmed=True)
                 bus.write({servo.id: changed}, is_confirmed=True)
-                yield f"servo {servo.id} of joint '{joint.name}' now has {_told(changed)}"
+                yield f"servo {servo.id} of joint '{joint.name}' now has {_shown(changed)}"
             arm(bus, servo, watchdog)
 
 
@@ -223,7 +222,7 @@ def _changes(joint: ServoJoint, servo: JointServo, values: Mapping[str, int]) ->
     return {"min_position": 0, "max_position": servo.model.family.ticks - 1} if is_wheel else {}
 
 
-def _told(changed: Mapping[str, int]) -> str:
+def _shown(changed: Mapping[str, int]) -> str:
     return ", ".join(f"{name} {raw}" for name, raw in changed.items())
 
 
@@ -259,7 +258,7 @@ class ServoCycle:
     torques: TorqueLimits = field(default_factory=TorqueLimits)
     """The torque limits of the servos."""
     notes: list[str] = field(default_factory=list)
-    """What has happened to servos, for people; whoever tells it clears it."""
+    """What has happened to servos, for people; whoever shows it clears it."""
     _count: int = 0  # of cycles
     _turn: int = 0  # whose slow items are read next
     _keep: int = 0  # whose torque limit is read next
@@ -333,9 +332,9 @@ class ServoCycle:
     def _keep_torque(self, id: int, drives: Mapping[int, JointDrive]) -> None:
         """Write the torque limit of a servo again, if it has forgotten it without its supply."""
         drive, servo = drives[id], drives[id].joint.servo(id)
-        if TORQUE_LIMITS_LIMIT not in servo.model.items or drive.hindrance or drive.error:
+        if TORQUE_LIMIT not in servo.model.items or drive.hindrance or drive.error:
             return
-        reading = self.bus.read([id], [TORQUE_LIMITS_LIMIT]).get(id)
+        reading = self.bus.read([id], [TORQUE_LIMIT]).get(id)
         if reading is not None and (note := self.torques.keep(self.bus, servo, reading.values)):
             self.notes.append(note)
 

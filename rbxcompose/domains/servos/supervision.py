@@ -108,7 +108,7 @@ class Reboots:
         drive.relax()
         self._bus.write({id_: {"torque_enable": 0} for id_ in drive.joint.ids})
         if silent := [id_ for id_ in drive.joint.ids if not self._bus.reboot(id_)]:
-            done(f"{_told(silent)} did not confirm the reboot")
+            done(f"{_servo_names(silent)} did not confirm the reboot")
             return
         drive.hindrance = UNDER_WAY
         self._open.append(_Reboot(drive, now, done))
@@ -124,7 +124,9 @@ class Reboots:
                 self._prepare(reboot.drive)
                 self._end(reboot, self._enabled(reboot.drive))
             elif now - reboot.begun > PATIENCE:
-                self._end(reboot, f"{_told(reboot.drive.joint.ids)} did not answer for {PATIENCE:g} s after the reboot")
+                self._end(
+                    reboot, f"{_servo_names(reboot.drive.joint.ids)} did not answer for {PATIENCE:g} s after the reboot"
+                )
 
     def fail(self, reason: str) -> None:
         """End all of them."""
@@ -158,7 +160,7 @@ def objection(drive: JointDrive) -> str:
     )
 
 
-def _told(ids: Iterable[int]) -> str:
+def _servo_names(ids: Iterable[int]) -> str:
     found = [str(id_) for id_ in ids]
     return f"servo {found[0]}" if len(found) == 1 else f"servos {', '.join(found)}"
 
@@ -186,7 +188,7 @@ def joint_state(drives: Iterable[JointDrive], stamp: int) -> JointState | None:
     )
 
 
-def report(
+def joint_report(
     drives: Mapping[str, JointDrive], controllers: Mapping[str, str], periods: Periods, *, is_lost: bool
 ) -> ServoReport:
     """Return how the joints are, with the notes of controllers."""

@@ -330,7 +330,7 @@ class GoalServer(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class TrajectoryWay:
-    """An action that leads joints: its server, what its goals ask for, and how it tells an end."""
+    """An action that leads joints: its server, what its goals ask for, and how it reports an end."""
 
     server: GoalServer
     trajectory: Callable[[Any], TrajectoryGoal]

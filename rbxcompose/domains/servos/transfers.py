@@ -14,7 +14,7 @@ from rbxcompose.domains.servos.models import ONE_ERRORS, Coding, ControlItem, Se
 
 _GAP = 12  # [B] of other items that cost less than another reply
 _LETTERS = {1: "B", 2: "H", 4: "I"}  # of `struct`, by size
-HARDWARE_ERROR = "hardware_error"  # an item in protocol 2.0, told by each reply in 1.0
+HARDWARE_ERROR = "hardware_error"  # an item in protocol 2.0, in each reply in 1.0
 
 
 class Stretch(NamedTuple):
@@ -43,12 +43,12 @@ class ReadPlan(NamedTuple):
 
     stretches: tuple[Stretch, ...]
     parts: tuple[_Part, ...]
-    tells_faults: bool
-    """Whether `hardware_error` is asked for that the error byte tells."""
+    has_faults: bool
+    """Whether `hardware_error` is asked for that the error byte has."""
 
     def values(self, data: Sequence[bytes], alert: int) -> dict[str, int]:
         """Return the raw values in what was read of each stretch."""
-        found: dict[str, int] = {HARDWARE_ERROR: alert & ONE_ERRORS} if self.tells_faults else {}
+        found: dict[str, int] = {HARDWARE_ERROR: alert & ONE_ERRORS} if self.has_faults else {}
         for part in self.parts:
             found.update(zip(part.names, part.numbers.unpack(data[part.stretch]), strict=True))
             for item in part.directed:
@@ -63,12 +63,12 @@ def read_plan(model: ServoModel, names: Iterable[str]) -> ReadPlan:
         KeyError: if the model has no such item.
     """
     asked = set(names)
-    tells = HARDWARE_ERROR in asked and HARDWARE_ERROR not in model.items
-    wanted = [model.item(name) for name in sorted(asked) if not (tells and name == HARDWARE_ERROR)]
+    has_faults = HARDWARE_ERROR in asked and HARDWARE_ERROR not in model.items
+    wanted = [model.item(name) for name in sorted(asked) if not (has_faults and name == HARDWARE_ERROR)]
     wanted.sort(key=lambda item: item.address)
     stretches = _stretches(wanted or [model.item("moving")])
     parts = (part for number, stretch in enumerate(stretches) for part in _parts(number, stretch, wanted))
-    return ReadPlan(stretches, tuple(parts), tells)
+    return ReadPlan(stretches, tuple(parts), has_faults)
 
 
 def _parts(number: int, stretch: Stretch, items: Iterable[ControlItem]) -> Iterator[_Part]:

@@ -197,7 +197,7 @@ class ForStep(sdk.Loop):
     def text(self, node: sdk.MissionNode) -> str:
         """Return the item's name and the list."""
         items = ", ".join(asked.scalar.text for asked in node.asked[: node.own])
-        return f"{node.item} in {sdk.items}" if items else node.item
+        return f"{node.item} in {items}" if items else node.item
 
     @property
     def reads(self) -> frozenset[str]:

@@ -25,7 +25,7 @@ class RunTask(sdk.Task):
         if not (self.engine.places.kept and self.engine.places.take_up(self)):
             value = sdk.evaluate(self.expression, self.scope)
             if not isinstance(value, HeldNode) or value.key not in self.keys:
-                raise sdk.NodeFailed(f"'run' needs a node from the data, not {self.run.show('', sdk.value)}")
+                raise sdk.NodeFailed(f"'run' needs a node from the data, not {self.run.show('', value)}")
             self.index = self.keys[value.key]
         return self.proceed()
 

@@ -11,7 +11,7 @@ from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNod
 from rbxcompose.missions import codes
 from rbxcompose.missions.engine.value_text import show
 from rbxcompose.missions.language.literals import WrongValue, literal, typed
-from rbxcompose.missions.language.value_reader import NAME, no_name
+from rbxcompose.missions.language.value_reader import NAME, invalid_name
 from rbxcompose.missions.program.machines import Datum, Input
 from rbxcompose.missions.program.program import RATE
 from rbxcompose.missions.program.registry import kinds
@@ -51,7 +51,7 @@ def _named(node: TreeNode | None, section: str, report: Report) -> dict[str, Ent
         return {}
     for name, entry in node.entries.items():
         if not NAME.fullmatch(name):
-            report.add(no_name(entry.key))
+            report.add(invalid_name(entry.key))
         elif name in kinds():
             report.add(codes.NAME_CLASH.at(entry.key.span, f"'{name}' is a word of the language"))
     return node.entries

@@ -21,7 +21,7 @@ from rbxcompose.missions.language.keys import find_key
 from rbxcompose.missions.language.machine_reader import STATE_KEYS, as_state
 from rbxcompose.missions.language.node_reader import NodeReader
 from rbxcompose.missions.language.repair import Repairs
-from rbxcompose.missions.language.value_reader import NAME, NAME_HELP, no_name
+from rbxcompose.missions.language.value_reader import NAME, NAME_HELP, invalid_name
 from rbxcompose.missions.modifiers.registry import modifier_keys, modifiers
 from rbxcompose.missions.program import program
 from rbxcompose.missions.program.machines import STATE
@@ -309,7 +309,7 @@ class _Reader:
             self.add(codes.WRONG_SHAPE.at(value.span, "this is not a name", help=NAME_HELP))
             return ""
         if not NAME.fullmatch(value.text):
-            self.add(no_name(value))
+            self.add(invalid_name(value))
             return ""
         if value.text in kinds():
             self.add(
@@ -345,7 +345,7 @@ class _Reader:
         """Read `when`, `do` and `afterwards`."""
         value = entry.value
         if not NAME.fullmatch(name):
-            self.add(no_name(entry.key))
+            self.add(invalid_name(entry.key))
         if not isinstance(value, MappingNode):
             self.add(codes.WRONG_SHAPE.at(value.span, f"the interrupt '{name}' needs 'when' and 'do'"))
             return None

@@ -23,15 +23,15 @@ NAME_HELP = "names start with a lower-case letter; lower-case letters, digits an
 _BETWEEN = re.compile(r"[\s-]+")
 
 
-def cure(text: str) -> str:
+def valid_name(text: str) -> str:
     """Return the name that a text was meant to be, `go_home` for `Go home`; empty if that is not clear."""
     meant = _BETWEEN.sub("_", text.strip()).lower()
     return meant if NAME.fullmatch(meant) else ""
 
 
-def no_name(scalar: ScalarNode, fix: Fix | None = None) -> Finding:
+def invalid_name(scalar: ScalarNode, fix: Fix | None = None) -> Finding:
     """Return the finding on a text that is not a valid name."""
-    meant = cure(scalar.text)
+    meant = valid_name(scalar.text)
     help_text = f"write '{meant}': names have lower-case letters, digits and underscores" if meant else NAME_HELP
     return codes.WRONG_SHAPE.at(scalar.span, f"'{scalar.text}' is not a valid name", help=help_text, fix=fix)
 
@@ -199,7 +199,7 @@ class ValueReader:
     def check_name(self, scalar: ScalarNode) -> bool:
         """Return whether a word is a valid name; add a finding if not."""
         if not NAME.fullmatch(scalar.text):
-            self.add(no_name(scalar))
+            self.add(invalid_name(scalar))
             return False
         return True
 

@@ -11,7 +11,7 @@ from rbxcompose.base.slips import Repair
 from rbxcompose.manifest.tree import Entry, Key, MappingNode, ScalarNode, TreeNode, children, with_children
 from rbxcompose.missions import codes
 from rbxcompose.missions.language.grammar import GrammarPlace, Takes, placeholder
-from rbxcompose.missions.language.value_reader import NAME, cure, no_name
+from rbxcompose.missions.language.value_reader import NAME, invalid_name, valid_name
 from rbxcompose.missions.program.machines import ENDS, MACHINE_KEYS
 from rbxcompose.missions.slips import slip
 
@@ -75,7 +75,7 @@ def misnamed_states(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | N
     wrong = [name for name in states.entries if not NAME.fullmatch(name)] if isinstance(states, MappingNode) else []
     if not isinstance(states, MappingNode) or not isinstance(node, MappingNode) or not wrong:
         return None
-    cures = {name: cure(name) for name in wrong}
+    cures = {name: valid_name(name) for name in wrong}
     counts = Counter(cures.values())
     taken = {*states.entries, *ENDS}
     meant = {name: new for name, new in cures.items() if new and new not in taken and counts[new] == 1}
@@ -90,7 +90,7 @@ def misnamed_states(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode] | N
 
 def _no_name(name: str, places: list[ScalarNode], meant: str) -> Finding:
     edits = tuple(Edit(place.span, name, meant) for place in places)
-    return no_name(places[0], Fix(edits, True, f"'{name}' -> '{meant}'") if meant else None)
+    return invalid_name(places[0], Fix(edits, True, f"'{name}' -> '{meant}'") if meant else None)
 
 
 class _Meant:

@@ -13,7 +13,7 @@ from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNod
 from rbxcompose.missions import codes
 from rbxcompose.missions.language.asked import inner_span
 from rbxcompose.missions.language.grammar import GrammarPlace, Takes, placeholder
-from rbxcompose.missions.language.value_reader import NAME, no_name
+from rbxcompose.missions.language.value_reader import NAME, invalid_name
 from rbxcompose.missions.program.program import RESTART
 from rbxcompose.missions.slips import slip
 
@@ -94,7 +94,7 @@ def dollar_before_a_name(place: GrammarPlace, node: TreeNode) -> Repair[TreeNode
     if not NAME.fullmatch(bare) or not isinstance(node, ScalarNode):
         return None
     fix = replacement(node.span, node.text, bare)
-    finding = replace(no_name(node), help=f"write '{bare}' without '$'", fix=fix)
+    finding = replace(invalid_name(node), help=f"write '{bare}' without '$'", fix=fix)
     return Repair(replace(node, text=bare), (finding,))
 
 

@@ -92,7 +92,6 @@ def _finish(arguments: argparse.Namespace, made: Mapping[str, bytes]) -> int:
 
 
 def _export_robot(arguments: argparse.Namespace) -> int:
-    from rbxcompose.compiler.compile import compile_robot
     from rbxcompose.tools.exporting.srdf import exported  # imports the sections of robots
 
     compilation = compile_robot(arguments.path, environment=os.environ, real=arguments.real)
@@ -103,11 +102,7 @@ def _export_robot(arguments: argparse.Namespace) -> int:
     made = exported(manifest.contents, manifest.name)
     if not made:
         return refuse(NOT_EXPORTED.at(None, f"'{manifest.name}' has no body"))
-    if (problem := _write(Path(arguments.out), _encoded(made))) is not None:
-        return refuse(problem)
-    for name in made:
-        emit(str(Path(arguments.out, name)))
-    return 0
+    return _finish(arguments, _encoded(made))
 
 
 def _made(system: System, arguments: argparse.Namespace) -> dict[str, bytes]:

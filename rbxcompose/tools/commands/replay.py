@@ -242,15 +242,10 @@ def _play(path: Path, player: Player, topics: list[RecordedTopic], arguments: ar
         for due, message in playlist(reader.messages(), rate=arguments.rate, start=arguments.start):
             if not _wait(start + due, guest):
                 break
-            count += _put(player, message, chosen)
+            if message.topic in chosen:
+                player.put(message)
+                count += 1
     return count
-
-
-def _put(player: Player, message: Recorded, chosen: set[RecordedTopic]) -> int:
-    if message.topic not in chosen:
-        return 0
-    player.put(message)
-    return 1
 
 
 def _wait(until: float, guest: Guest) -> bool:

@@ -13,7 +13,7 @@ from rbxcompose.compiler.compile import Compilation, compile_robot
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.manifest.registry import section_named
 from rbxcompose.manifest.tree import NOWHERE, ScalarNode
-from rbxcompose.missions.language.value_reader import NAME, no_name
+from rbxcompose.missions.language.value_reader import NAME, invalid_name
 from rbxcompose.missions.program.registry import kinds
 from rbxcompose.tools.lsp.mentions import SymbolIndex
 from rbxcompose.tools.lsp.project import Project
@@ -198,7 +198,7 @@ def _where(index: SymbolIndex, symbols: list[Symbol]) -> str:
 
 def _refuse_name(new: str) -> None:
     if not NAME.fullmatch(new):
-        finding = no_name(ScalarNode(new, NOWHERE))
+        finding = invalid_name(ScalarNode(new, NOWHERE))
         raise CannotRenameError(f"{finding.message}: {finding.help}")
     if new in kinds() or new in ("true", "false", "null"):
         raise CannotRenameError(f"'{new}' is a word of the language")

@@ -26,7 +26,7 @@ from rbxcompose.base.config import Config, Length, Time
 from rbxcompose.base.findings import suggest
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.base.units import ANGLE, LENGTH
-from rbxcompose.commands.console import NotDoneError, misused, table, tell
+from rbxcompose.commands.console import NotDoneError, emit, misused, table
 from rbxcompose.commands.guest import Guest, visit, wanted
 from rbxcompose.commands.lookup import add_bus_options
 from rbxcompose.commands.options import (
@@ -82,7 +82,6 @@ from rbxcompose.manifest.fields import FramePose
 from rbxcompose.msgs.plain import from_plain
 from rbxcompose.msgs.rbxcompose_msgs import MoveArm, TraceArm
 
-T = TypeVar("T")
 M = TypeVar("M", MoveArm.Goal, TraceArm.Goal)
 
 
@@ -130,15 +129,15 @@ def _ls(arguments: argparse.Namespace) -> int:
         return 1
     found = robot.manifest.contents.of(arms)
     if arguments.json:
-        tell(json.dumps([{"name": name, **_described(arm)} for name, arm in found.items()]))
+        emit(json.dumps([{"name": name, **_described(arm)} for name, arm in found.items()]))
     elif not found:
-        tell("this robot has no arms")
+        emit("this robot has no arms")
     else:
         rows = [
             (name, arm.group.base, arm.group.tip, ", ".join(arm.group.joints), ", ".join(arm.model.poses))
             for name, arm in found.items()
         ]
-        tell(table([("name", "base", "tip", "joints", "poses"), *rows]))
+        emit(table([("name", "base", "tip", "joints", "poses"), *rows]))
     return 0
 
 
@@ -163,11 +162,11 @@ def _fk(arguments: argparse.Namespace) -> int:
     pose = works.kinematics.tip_pose(values)
     root = works.kinematics.body.root
     if arguments.json:
-        tell(json.dumps({"frame": root, "position": pose.translation, "rotation": pose.rotation}))
+        emit(json.dumps({"frame": root, "position": pose.translation, "rotation": pose.rotation}))
     else:
         x, y, z = (f"{value * 100:.2f} cm" for value in pose.translation)
         turn = ", ".join(f"{value:.4f}" for value in pose.rotation)
-        tell(f"'{robot.group.tip}' in '{root}': x {x}, y {y}, z {z}; rotation (x, y, z, w) {turn}")
+        emit(f"'{robot.group.tip}' in '{root}': x {x}, y {y}, z {z}; rotation (x, y, z, w) {turn}")
     return 0
 
 
@@ -182,7 +181,7 @@ def _plan(arguments: argparse.Namespace) -> int:
         raise NotDoneError(NO_MOTION.at(None, f"unknown_goal: {words}"))
     kept = KeptTip(works.kinematics, keep, start, works.planner.checker) if keep.is_about_tip else None
     request = MotionRequest(start, goal, space=keep.narrowed(works.space), kept=kept)
-    return _tell_plan(works, works.planner.plan(request), arguments, start, goal)
+    return _show_plan(works, works.planner.plan(request), arguments, start, goal)
 
 
 def _trace(arguments: argparse.Namespace) -> int:
@@ -197,7 +196,7 @@ def _trace(arguments: argparse.Namespace) -> int:
         raise NotDoneError(NO_MOTION.at(None, f"unknown_goal: {words}"))
     frame = links[goal.frame] if goal.frame else Transform3()
     planning = planned_trace(works.kinematics, works.planner, wish, start, frame)
-    return _tell_plan(works, planning, arguments, start)
+    return _show_plan(works, planning, arguments, start)
 
 
 def _picture(arguments: argparse.Namespace) -> int:
@@ -216,7 +215,7 @@ def _goal(message: type[M], data: Mapping[str, object]) -> M:
     return made
 
 
-def _tell_plan(
+def _show_plan(
     works: ArmWorks,
     planning: Planning,
     arguments: argparse.Namespace,
@@ -242,7 +241,7 @@ def _tell_plan(
     if arguments.json:
         data = {"duration": duration, "waypoints": points, "attempts": found.attempts, "examined": found.examined}
         origin = {"found_by": found.found_by, "fast_failed": found.fast_failed}
-        tell(json.dumps(data | {"planning_time": took, "fraction": found.share} | origin))
+        emit(json.dumps(data | {"planning_time": took, "fraction": found.share} | origin))
         return 0
     by = f"found by {found.found_by}, " if found.found_by else ""
     words = f"{by}{found.examined} positions examined, attempt {found.attempts}"
@@ -250,9 +249,9 @@ def _tell_plan(
         words += f"; fast: {found.fast_failed}"
     if found.share < 1.0:
         words = f"only {found.share:.1%} of the way; {words}"
-    tell(f"a motion of {duration:.2f} s over {len(points)} points, planned in {took * 1000:.0f} ms ({words})")
+    emit(f"a motion of {duration:.2f} s over {len(points)} points, planned in {took * 1000:.0f} ms ({words})")
     for point in points:
-        tell(f"  {shown(works, point)}")
+        emit(f"  {shown(works, point)}")
     return 0
 
 
@@ -287,11 +286,11 @@ def run_inverse(arguments: argparse.Namespace) -> int:
     if arguments.json:
         data = {"solutions": each, "colliding": len(found.colliding), "attempts": found.attempts}
         errors = [{"away": away, "angle": angle} for away, angle in missed]
-        tell(json.dumps(data | {"approximate": found.is_approximate, "errors": errors}))
+        emit(json.dumps(data | {"approximate": found.is_approximate, "errors": errors}))
         return 0 if each else 1
     for number, (solution, off) in enumerate(zip(each, missed, strict=True), 1):
         words = f" (approximate, {_far(*off)} from it)" if found.is_approximate else ""
-        tell(f"solution {number}{words}: {shown(works, solution)}")
+        emit(f"solution {number}{words}: {shown(works, solution)}")
     if each:
         return 0
     words = f"goal_out_of_reach: the tip got within {_far(*found.nearest)} of it"
@@ -374,7 +373,7 @@ def _move(guest: Guest, arguments: argparse.Namespace) -> dict[str, Any]:
     """Return a goal of `MoveArm`.
 
     Raises:
-        NotDoneError: if it is none, or nothing tells which joints turn and which slide.
+        NotDoneError: if it is none, or it is unknown which joints turn and which slide.
     """
     keep = read_written(KeepModel, arguments.keep or "{}").message()
     if not arguments.goal.startswith("{"):
@@ -428,15 +427,15 @@ def run_bench(arguments: argparse.Namespace, works: ArmWorks) -> int:
     is_fast = kinematics.compiled is not None
     if arguments.json:
         data = {name: _data(entry) for name, entry in tries.items()}
-        tell(json.dumps({"compiled": is_fast, "calls": calls, "tries": data}))
+        emit(json.dumps({"compiled": is_fast, "calls": calls, "tries": data}))
     else:
         how = "compiled by numba" if is_fast else "not compiled: pip install 'rbxcompose[fast]' makes it faster"
-        tell(f"{len(works.space.joints)} joints, inverse kinematics {how}; times are those of the processor")
+        emit(f"{len(works.space.joints)} joints, inverse kinematics {how}; times are those of the processor")
         rows = [(name, "", f"{1e6 * took:.1f} us", "", "", "") for name, took in calls.items()]
-        tell(table([HEAD, *rows, *(_row(name, entry) for name, entry in tries.items())]))
+        emit(table([HEAD, *rows, *(_row(name, entry) for name, entry in tries.items())]))
         for name, one in tries.items():
             for reason, count in Counter(one.failures).most_common(SHOWN):
-                tell(
+                emit(
                     f"not solved in {name}, {count} times: {reason}" if count > 1 else f"not solved in {name}: {reason}"
                 )
     return 1 if any(entry.colliding for entry in tries.values()) else 0
@@ -552,7 +551,7 @@ def add_reach_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run_reach(arguments: argparse.Namespace, works: ArmWorks, start: NDArray[np.float64]) -> int:
-    """Try positions, draw the picture, tell what is in it; return the exit code."""
+    """Try positions, draw the picture, print what is in it; return the exit code."""
     layer = "" if arguments.layer in ("", "all") else f", {arguments.layer}"
     wish = read_written(_ReachModel, f"{{cell: {arguments.cell}, time: {arguments.time}{layer}}}")
     if not (wish.cell >= LEAST_SIDE and 0.0 < wish.time <= MOST_TIME):
@@ -560,21 +559,21 @@ def run_reach(arguments: argparse.Namespace, works: ArmWorks, start: NDArray[np.
         raise NotDoneError(NO_MOTION.at(None, words))
     cut, began = _cut(arguments, works, wish, start), perf_counter()
     found = _tried(arguments, works, wish, cut)
-    text = _told(arguments, found, cut, perf_counter() - began)
+    text = _summary(arguments, found, cut, perf_counter() - began)
     if failed := write_picture(
         "arm", Path(arguments.out), lambda: _drawn(arguments.what, works, start, found, cut, text)
     ):
         return failed
     if arguments.json:
-        told = [
+        cells = [
             {"cell": list(cell), "directions": len(found_cell.directions), "manipulability": found_cell.manipulability}
             for cell, found_cell in sorted(found.cells.items())
         ]
-        data = {"side": found.side, "of": DIRECTIONS, "samples": found.tried, "seed": arguments.seed, "cells": told}
-        tell(json.dumps({**data, "colliding": found.colliding, "joints": list(works.space.names)}))
+        data = {"side": found.side, "of": DIRECTIONS, "samples": found.tried, "seed": arguments.seed, "cells": cells}
+        emit(json.dumps({**data, "colliding": found.colliding, "joints": list(works.space.names)}))
         return 0
-    tell(text)
-    tell(f"wrote {arguments.out}")
+    emit(text)
+    emit(f"wrote {arguments.out}")
     return 0
 
 
@@ -610,7 +609,7 @@ def _tried(arguments: argparse.Namespace, works: ArmWorks, wish: _ReachModel, cu
     return found
 
 
-def _told(arguments: argparse.Namespace, found: ReachMap, cut: Cut | None, took: float) -> str:
+def _summary(arguments: argparse.Namespace, found: ReachMap, cut: Cut | None, took: float) -> str:
     where = "" if cut is None else f" at {'xyz'[cut.axis]} {cut.at * 100:.1f} cm"
     tried = f"{found.tried:,} random positions, seed {arguments.seed}, {took:.1f} s"
     if not found.cells:
@@ -629,7 +628,7 @@ def _drawn(
     from rbxcompose.domains.arms.motion.reach import ReachPicture, draw_reach
 
     positions = dict(zip(works.space.names, start.tolist(), strict=True))
-    robot = ArmPicture(works.kinematics.body, works.meshes, positions, works.objects, told=text)
+    robot = ArmPicture(works.kinematics.body, works.meshes, positions, works.objects, caption=text)
     if what == REACH:
         values = {cell: float(len(found_cell.directions)) for cell, found_cell in found.cells.items()}
         legend = f"directions of the tip's x axis, of {DIRECTIONS}"

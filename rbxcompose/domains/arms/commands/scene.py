@@ -16,7 +16,7 @@ from rbxcompose.base.files import replace_file
 from rbxcompose.base.findings import Finding, Report, kind, suggest
 from rbxcompose.base.printable import plain
 from rbxcompose.base.requests import to_data
-from rbxcompose.commands.console import NotDoneError, misused, refuse, table, tell, tell_report
+from rbxcompose.commands.console import NotDoneError, emit, misused, refuse, table, write_report
 from rbxcompose.commands.lookup import add_asking_options, answer_of, find_robot, pass_on
 from rbxcompose.commands.options import Declare, Subcommand, add_actions, argument, run_action
 from rbxcompose.domains.arms import scene_view
@@ -88,11 +88,11 @@ def _objects(arguments: argparse.Namespace) -> tuple[PlacedObject, ...]:
 def _ls(arguments: argparse.Namespace) -> int:
     found = _objects(arguments)
     if arguments.json:
-        tell(json.dumps([to_data(thing) for thing in found]))
+        emit(json.dumps([to_data(thing) for thing in found]))
     elif not found:
-        tell("the scene is empty")
+        emit("the scene is empty")
     else:
-        tell(table([("name", "shape", "size", "link", "position", "may touch"), *map(_row, found)]))
+        emit(table([("name", "shape", "size", "link", "position", "may touch"), *map(_row, found)]))
     return 0
 
 
@@ -117,7 +117,7 @@ def _add(arguments: argparse.Namespace) -> int:
         report.add(NO_MESH.at(None, f"the mesh '{plain(read.file)}' {problem}"))
         read = None
     if read is None:
-        tell_report(report, {_SHOWN: arguments.object})
+        write_report(report, {_SHOWN: arguments.object})
         return 1
     return pass_on(arguments, scene_view.AddToScene(read.placed(arguments.name, "", file)))
 
@@ -144,7 +144,7 @@ def _load(arguments: argparse.Namespace) -> int:
 
 
 def _save(arguments: argparse.Namespace) -> int:
-    """Write what stands around the robot; what it holds, and octrees, are left out and told."""
+    """Write what stands around the robot; what it holds, and octrees, are left out and named."""
     folder = find_robot(arguments.robot)
     stands = answer_of(folder, scene_view.StandingObjects())
     kept = [thing for thing in stands if all(piece.shape.kind != "octree" for piece in thing.all_pieces)]
@@ -160,8 +160,8 @@ def _save(arguments: argparse.Namespace) -> int:
         return misused("scene", f"'{arguments.file}' cannot be written: {error.strerror}")
     left = [thing.name for thing in _objects(arguments) if thing.name not in names]
     words = f"wrote {arguments.file}: {len(kept)} object{'s' if len(kept) != 1 else ''}"
-    told = f"{words}; left out: {', '.join(left)}" if left else words
-    tell(json.dumps({"file": arguments.file, "objects": len(kept), "left_out": left}) if arguments.json else told)
+    text_line = f"{words}; left out: {', '.join(left)}" if left else words
+    emit(json.dumps({"file": arguments.file, "objects": len(kept), "left_out": left}) if arguments.json else text_line)
     return 0
 
 
@@ -199,11 +199,11 @@ def _watch(arguments: argparse.Namespace) -> int:
 def _check(arguments: argparse.Namespace) -> int:
     found = [pair for pair in _view(arguments).pairs if pair.collides]
     if arguments.json:
-        tell(json.dumps([to_data(pair) for pair in found]))
+        emit(json.dumps([to_data(pair) for pair in found]))
     elif not found:
-        tell("nothing collides")
+        emit("nothing collides")
     else:
-        tell(table([("first", "second", "distance"), *map(_distance_row, found)]))
+        emit(table([("first", "second", "distance"), *map(_distance_row, found)]))
     return 1 if found else 0
 
 
@@ -218,9 +218,9 @@ def _distance(arguments: argparse.Namespace) -> int:
         raise NotDoneError(NO_PAIR.at(None, why))
     nearest = min(view.pairs, key=lambda pair: pair.distance)
     if arguments.json:
-        tell(json.dumps(to_data(nearest)))
+        emit(json.dumps(to_data(nearest)))
     else:
-        tell(table([("first", "second", "distance"), _distance_row(nearest)]))
+        emit(table([("first", "second", "distance"), _distance_row(nearest)]))
     return 0
 
 
@@ -240,9 +240,9 @@ def _picture(arguments: argparse.Namespace) -> int:
     meshes = {name: Path(path) for name, path in view.meshes.items()}
     problem = "; ".join(f"{pair.first} and {pair.second} collide" for pair in hit)
     shown = ArmPicture(
-        body, meshes, view.positions, view.objects, way=view.way, colliding=names, told=view.arm, problem=problem
+        body, meshes, view.positions, view.objects, way=view.way, colliding=names, caption=view.arm, problem=problem
     )
     failed = write_picture("scene", Path(arguments.out), lambda: draw_arm(shown))
     if not failed:
-        tell(json.dumps({"file": arguments.out}) if arguments.json else f"wrote {arguments.out}")
+        emit(json.dumps({"file": arguments.out}) if arguments.json else f"wrote {arguments.out}")
     return failed

@@ -16,7 +16,7 @@ from rbxcompose.domains.arms.arm_config import ArmConfig, ArmWorks, dimensions_o
 from rbxcompose.domains.arms.hand import PICK, PLACE, PicksAndPlaces, hand_ports, hand_task, result_of
 from rbxcompose.domains.arms.location import LocationService, location_ports
 from rbxcompose.domains.arms.motion.arm_task import ArmTask
-from rbxcompose.domains.arms.motion.collisions import readers_of, told
+from rbxcompose.domains.arms.motion.collisions import pairs_shown, readers_of
 from rbxcompose.domains.arms.motion.hand_task import HandTask
 from rbxcompose.domains.arms.motion.moveit import MoveItTask
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory
@@ -47,7 +47,7 @@ from rbxcompose.sdk.key_feed import KeyFeed, whole
 MOVE, REACH, TRACE, FOLLOW = "move", "reach", "trace", "follow"  # its ports
 WAY, DISPLAY = "way", "display"
 LARGE = 4_000_000  # [bytes] of meshes, whose reading takes seconds
-MOST_PAIRS = 200  # that a view tells
+MOST_PAIRS = 200  # in a view
 AnyGoal = sdk.ServedGoal[Any, Any, Any]
 AnyTask = ArmTask | HandTask | MoveItTask
 
@@ -136,9 +136,9 @@ class Arm(PicksAndPlaces, LocationService, KinematicsServices, sdk.Component[Arm
         self.works = ArmWorks(self.config, lambda: self.now)
         self.works.helpers = self.helpers = planning_processes(self.config, self.context.clock, self.warn)
         if self.works.always:
-            words = told(self.works.always, len(self.works.always))
+            words = pairs_shown(self.works.always, len(self.works.always))
             self.info(f"links that always collide are not watched: {words}")
-        self.problem = "nothing has told what is around the robot"  # with the scene, or nothing
+        self.problem = "no planning scene has been received"  # with the scene, or nothing
         self.way: tuple[Vector3, ...] = ()  # of the tip, as last planned [m]
         self.measured: dict[str, tuple[float, float]] = {}  # position and velocity of all joints of the body
         self.uprights, self.remembered = {}, {}
@@ -211,7 +211,7 @@ class Arm(PicksAndPlaces, LocationService, KinematicsServices, sdk.Component[Arm
         unknown = [name for name in self.works.space.names if name not in self.measured]
         if unknown:
             return f"nothing has reported where '{unknown[0]}' is"
-        return "" if self.is_ready else "nothing has told what is around the robot"
+        return "" if self.is_ready else "no planning scene has been received"
 
     def wake(self) -> None:
         """Go on with what is commanded now."""
@@ -223,9 +223,9 @@ class Arm(PicksAndPlaces, LocationService, KinematicsServices, sdk.Component[Arm
             self.context.wake_at(self.due)
 
     def start(self) -> None:
-        """Tell that nobody leads the tip."""
+        """Publish that nobody leads the tip."""
         if self.servo is not None:
-            self.servo.tell()
+            self.servo.publish_state()
 
     def stop(self) -> None:
         """Command nothing any more: controllers bring their joints to rest by themselves."""
@@ -329,14 +329,14 @@ class Arm(PicksAndPlaces, LocationService, KinematicsServices, sdk.Component[Arm
         """Send a trajectory to the controller."""
         self.show(names, trajectory)
 
-        def told(end: sdk.Ended[FollowJointTrajectory.Result]) -> None:
+        def on_end(end: sdk.Ended[FollowJointTrajectory.Result]) -> None:
             ended(problem_of(end), end.outcome is sdk.Outcome.CANCELED)
             self.end()
 
-        self.sent: sdk.SentGoal = self.bound[FOLLOW](arm_goals.follow_goal(names, trajectory), told)
+        self.sent: sdk.SentGoal = self.bound[FOLLOW](arm_goals.follow_goal(names, trajectory), on_end)
 
     def show(self, names: tuple[str, ...], trajectory: Trajectory) -> None:
-        """Tell viewers the way."""
+        """Publish the way for viewers."""
         self.way, self.duration = self.works.way(trajectory.positions), trajectory.duration
         self.bound[WAY](path_of(self.way, self.works.kinematics.body.root))
         state = JointState(name=tuple(self.measured), position=np.array([at for at, _ in self.measured.values()]))
@@ -353,8 +353,8 @@ class Arm(PicksAndPlaces, LocationService, KinematicsServices, sdk.Component[Arm
         """Ask the controller to end the trajectory."""
         self.sent.cancel()
 
-    def told(self, stage: str) -> None:
-        """Tell the client in which stage its goal is."""
+    def report_stage(self, stage: str) -> None:
+        """Report the stage of the goal to its client."""
         if self.goal is not None:
             within = self.task.stage if isinstance(self.task, HandTask) else stage
             self.stage = words = stage if stage == within else f"{within}: {stage}"
@@ -366,5 +366,5 @@ def problem_of(end: sdk.Ended[FollowJointTrajectory.Result]) -> str:
     """Return why a controller failed, nothing if it did not."""
     if end.outcome is sdk.Outcome.SUCCEEDED:
         return ""
-    told = end.result.error_string if end.result is not None else ""
-    return told or end.message or f"its trajectory was {end.outcome}"
+    reason = end.result.error_string if end.result is not None else ""
+    return reason or end.message or f"its trajectory was {end.outcome}"

@@ -151,7 +151,7 @@ class ArmTracker(sdk.Component[ArmTrackerConfig]):
             goal.canceled()
         elif self.core.is_lost(self.now, patience):
             self.end()
-            text = self.problem or f"nothing has told on '{self.config.target}' where the point is for {patience:g} s"
+            text = self.problem or f"no point has come on '{self.config.target}' for {patience:g} s"
             goal.aborted(f"{LOST}: {text}", FollowPoint.Result(outcome=LOST, message=text))
         else:
             self.lead()
@@ -176,7 +176,7 @@ class ArmTracker(sdk.Component[ArmTrackerConfig]):
             self.bound[POSE](PoseStamped(header=Header(frame_id=self.config.base), pose=pose))
 
     def rested(self, end: sdk.Ended[MoveArm.Result]) -> None:
-        """Know that the arm moves no more, and tell why it did not go where it rests."""
+        """Know that the arm moves no more, and log why it did not go where it rests."""
         self.is_moving, self.resting = False, None
         if end.outcome not in (sdk.Outcome.SUCCEEDED, sdk.Outcome.CANCELED):
             self.warn(f"the arm does not go to '{self.config.rest}': {end.message}")

@@ -103,8 +103,8 @@ class CloudMapper(sdk.Component[CloudMapperConfig]):
         self.filter = SpaceFilter(self.body, {name: Path(path) for name, path in config.meshes.items()})
         self.seen = SeenCells(config.cell, config.forget)
         self.joints: deque[tuple[int, dict[str, float]]] = deque(maxlen=KNOWN)  # with stamps [ns]
-        self.used_at, self.heard_at = -np.inf, -np.inf
-        self.problem, self.told = "", "nothing has come yet"
+        self.used_at, self.received_at = -np.inf, -np.inf
+        self.problem, self.last_summary = "", "nothing has come yet"
         self.add_diagnostic("clouds", self.health)
 
     def on_joint_states(self, message: JointState) -> None:
@@ -130,35 +130,41 @@ class CloudMapper(sdk.Component[CloudMapperConfig]):
         try:
             count = self.use(message)
         except (CloudError, LookupError) as error:
-            self.tell(f"a cloud is not used: {error}")
+            self.note_problem(f"a cloud is not used: {error}")
             return
-        self.heard_at = self.now
-        self.told = f"{count:,} points, {len(self.seen):,} cells"
-        self.tell(f"{len(self.seen):,} cells, and {MOST_CELLS:,} may be: use larger ones" if self.is_crowded else "")
+        self.received_at = self.now
+        self.last_summary = f"{count:,} points, {len(self.seen):,} cells"
+        self.note_problem(
+            f"{len(self.seen):,} cells, and {MOST_CELLS:,} may be: use larger ones" if self.is_crowded else ""
+        )
 
     @property
     def is_crowded(self) -> bool:
         """Return whether there are too many cells."""
         return len(self.seen) > MOST_CELLS
 
-    def tell(self, problem: str) -> None:
+    def note_problem(self, problem: str) -> None:
         """Log a problem once, and its end."""
         if problem and not self.problem:
             self.warn(problem)
         elif self.problem and not problem:
-            self.info(f"clouds are used again: {self.told}")
+            self.info(f"clouds are used again: {self.last_summary}")
         self.problem = problem
 
     def health(self, now: float) -> TaskStatus:
         """Return how it stands."""
-        silence = now - self.heard_at
+        silence = now - self.received_at
         problem = self.problem
         if not problem and silence > max(2.0 / self.config.rate, OLDEST):
-            problem = f"no cloud for {silence:.0f} s: what was seen last stays" if self.heard_at >= 0 else self.told
-        return TaskStatus(sdk.Level.WARN if problem else sdk.Level.OK, problem or self.told)
+            problem = (
+                f"no cloud for {silence:.0f} s: what was seen last stays"
+                if self.received_at >= 0
+                else self.last_summary
+            )
+        return TaskStatus(sdk.Level.WARN if problem else sdk.Level.OK, problem or self.last_summary)
 
     def use(self, message: PointCloud2) -> int:
-        """See what a cloud shows, and tell the scene; return how many points counted.
+        """See what a cloud shows, and publish it to the scene; return how many points counted.
 
         Raises:
             CloudError: if it cannot be used.
@@ -198,7 +204,7 @@ class CloudMapper(sdk.Component[CloudMapperConfig]):
         return found
 
     def publish(self) -> None:
-        """Tell the scene all cells; those farthest from the frame are left out if there are too many."""
+        """Publish all cells to the scene; those farthest from the frame are left out if there are too many."""
         name, link = self.config.name, self.config.frame or self.body.root
         middles = self.seen.middles()
         if self.is_crowded:

@@ -176,7 +176,7 @@ class Head(sdk.Component[HeadConfig]):
             goal.feedback(LookAtPoint.Feedback(angle=self.past(goal.request)))
 
     def begin(self, goal: LookGoal) -> None:
-        """Send the head to where it looks at the point, or tell why it cannot."""
+        """Send the head to where it looks at the point, or report why it cannot."""
         found = self.aim(goal.request)
         if isinstance(found, Aiming) and found.angle > (most := goal.request.tolerance or CLOSE):
             words = ", ".join(f"'{name}'" for name in found.blocked) or "its joints"
@@ -232,7 +232,7 @@ class Head(sdk.Component[HeadConfig]):
         if not request.object:
             return (request.x, request.y, request.z), request.frame
         if self.objects is None:
-            why = "nothing has told what is around the robot" if self.config.sees_scene else "this robot has no scene"
+            why = "no planning scene has been received" if self.config.sees_scene else "this robot has no scene"
             return NoAim(MotionReason.UNKNOWN_SCENE, why)
         if request.object not in self.objects:
             there = ", ".join(sorted(self.objects)) or "none"

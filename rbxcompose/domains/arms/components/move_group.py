@@ -81,7 +81,7 @@ class MoveGroupServer(sdk.Component[MoveGroupConfig]):
                 self.pass_on(port, goal)
 
     def pass_on(self, port: str, goal: MotionGoal) -> None:
-        """Send a goal to its arm, or tell that there is none."""
+        """Send a goal to its arm, or report that there is none."""
         request = goal.request
         if isinstance(request, MoveGroup.Goal):
             result: Any = MoveGroup.Result
@@ -120,7 +120,7 @@ class MoveGroupServer(sdk.Component[MoveGroupConfig]):
         return "", not_done(MoveItErrorCodes.INVALID_MOTION_PLAN, words)
 
     def on_plan_kinematic_path(self, request: GetMotionPlan.Request) -> sdk.Later[GetMotionPlan.Response]:
-        """Have an arm plan, and tell the plan when it is there."""
+        """Have an arm plan, and send the plan when it is there."""
         later, wanted = sdk.Later[GetMotionPlan.Response](), request.motion_plan_request
         name, wrong = self.named(wanted.group_name)
 
@@ -162,7 +162,7 @@ class Passed:
     def send(self, arm: Any, ended: Callable[[Passed], None]) -> None:
         """Send it to the arm; `ended` is called at its end."""
 
-        def told(end: sdk.Ended[Any]) -> None:
+        def on_end(end: sdk.Ended[Any]) -> None:
             ended(self)
             result = end.result or self._result(error_code=_lost(end))
             if end.outcome is sdk.Outcome.SUCCEEDED:
@@ -172,7 +172,7 @@ class Passed:
             else:
                 self.goal.aborted(result.error_code.message or str(end.outcome), result)
 
-        self._sent = arm(self.goal.request, told, self.goal.feedback)
+        self._sent = arm(self.goal.request, on_end, self.goal.feedback)
 
     def cancel(self) -> None:
         """Ask the arm to end it, once."""

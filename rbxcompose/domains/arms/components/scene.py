@@ -33,7 +33,7 @@ ROUNDING = 1e-6  # of a period
 PERIOD = 0.1  # [s] after which it is looked where frames outside of the body are
 PATIENCE = 2.0  # [s] in which frames become known after the start
 MOMENT = 0.05  # [s] between messages of a scene that programs change
-MOVED, TURNED = 1e-3, 2e-3  # [m], [rad] by which a frame may be elsewhere than it was told
+MOVED, TURNED = 1e-3, 2e-3  # [m], [rad] by which a frame may be elsewhere than where it was published
 
 
 class ShapeConfig(Config):
@@ -131,7 +131,9 @@ class Scene(Component[SceneConfig]):
     def configure(self) -> None:
         """Read the body and put the objects into the scene."""
         self.positions: dict[str, float] = {}
-        self.outside: dict[str, Transform3] = {}  # frames outside of the body in that of its root, as they were told
+        self.outside: dict[
+            str, Transform3
+        ] = {}  # frames outside of the body in that of its root, as they were published
         objects = (_placed(name, object_) for name, object_ in self.config.objects.items())
         self.things = PlanningScene(body_of(self.config.urdf), objects, self.config.frames)
         self.moveit = MoveItScene(self.things, dict(self.config.paddings))
@@ -162,7 +164,7 @@ class Scene(Component[SceneConfig]):
         self.attempt("a planning scene", lambda: self.moveit.apply(message, self.poses))
 
     def on_apply_planning_scene(self, request: ApplyPlanningScene.Request) -> ApplyPlanningScene.Response:
-        """Change the scene and tell whether that could be."""
+        """Change the scene and report whether that could be."""
         is_done = self.attempt("a planning scene", lambda: self.moveit.apply(request.scene, self.poses))
         return ApplyPlanningScene.Response(success=is_done)
 
@@ -179,7 +181,7 @@ class Scene(Component[SceneConfig]):
                 self.attempt(f"the end of '{object_.name}'", partial(self.things.remove, object_.name))
 
     def attempt(self, what: str, how: Callable[[], None]) -> bool:
-        """Change the scene as a message asks; return whether that could be, and tell why not.
+        """Change the scene as a message asks; return whether that could be, and log why not.
 
         Programs send many objects one by one: all that come within a moment are published together.
         """
@@ -208,7 +210,7 @@ class Scene(Component[SceneConfig]):
             try:
                 found[frame] = self.bound[_look(frame)].transform()
             except LookupError:
-                continue  # who needs it tells
+                continue  # who needs it reports that
         return found
 
     @property
@@ -223,7 +225,7 @@ class Scene(Component[SceneConfig]):
 
     @answers(scene_view.ListScene)
     def listed(self, request: scene_view.ListScene) -> tuple[PlacedObject, ...]:
-        """Return all objects; points of meshes and octrees are too many to be told."""
+        """Return all objects; points of meshes and octrees are too many to be listed."""
         return tuple(_without_points(object_) for object_ in self.things.objects.values())
 
     @answers(scene_view.StandingObjects)

@@ -91,7 +91,7 @@ class SeenObjects(sdk.Component[SeenObjectsConfig]):
                 self.core.put(thing.name, pose_of(thing.pose) if thing.link == self.config.stands_in else None)
 
     def on_detections(self, message: Detection3DArray) -> None:
-        """Tell the scene what is new or has moved."""
+        """Publish to the scene what is new or has moved."""
         frame, sent = message.header.frame_id, to_nanoseconds(message.header.stamp)
         if frame not in ("", self.config.frame):
             self.complain(f"detections are in '{plain(frame)}', and expected in '{self.config.frame}'")
@@ -105,7 +105,7 @@ class SeenObjects(sdk.Component[SeenObjectsConfig]):
         found = [self.sighting(detection, at) for detection in message.detections]
         for each in self.core.take(self.now, [sighting for sighting in found if sighting is not None], self.held):
             self.objects(added(each, self.config.stands_in))
-        self.tell()
+        self.publish_names()
 
     def sighting(self, one: Detection3D, camera: Transform3) -> Sighting | None:
         """Return what was seen; None if it is no box, or not sure enough."""
@@ -131,11 +131,11 @@ class SeenObjects(sdk.Component[SeenObjectsConfig]):
         for name in self.core.forgotten(self.now, self.held):
             self.info(f"'{name}' was not seen for {self.config.forget:g} s")
             self.objects(CollisionObject(id=name, operation=CollisionObject.REMOVE))
-        self.tell()
+        self.publish_names()
         known = ", ".join(self.core.objects) or "nothing"
         self.status(Level.WARN if self.problem else Level.OK, self.problem or f"sees {known}")
 
-    def tell(self) -> None:
+    def publish_names(self) -> None:
         """Publish the names that missions want."""
         self.nearest(String(data=self.core.nearest(self.camera, self.held)))
         self.newest(String(data=self.core.newest(self.held)))

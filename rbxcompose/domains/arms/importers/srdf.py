@@ -26,7 +26,7 @@ _KINDS: tuple[str, ...] = get_args(VirtualKind)
 
 
 def virtual_joint(found: Sequence[OuterJoint], body: Body, report: Report) -> OuterJoint | None:
-    """Return the virtual joint of a body as a manifest has it, if there is one; the others are told."""
+    """Return the virtual joint of a body as a manifest has it, if there is one; the others are reported."""
     taken: OuterJoint | None = None
     for joint in found:
         message, cure = _mistake(joint, body)
@@ -36,7 +36,7 @@ def virtual_joint(found: Sequence[OuterJoint], body: Body, report: Report) -> Ou
             words = f"the virtual joint '{plain(joint.name, 60)}' is left out: {message}"
             report.add(UNUSED.at(joint.span, words, help=cure or "keep one of them"))
         else:
-            taken = _meant(joint, report)
+            taken = _readable(joint, report)
     return taken
 
 
@@ -57,7 +57,7 @@ def _mistake(joint: OuterJoint, body: Body) -> tuple[str, str]:
     return "", ""
 
 
-def _meant(joint: OuterJoint, report: Report) -> OuterJoint:
+def _readable(joint: OuterJoint, report: Report) -> OuterJoint:
     frame, kind = joint.frame.lstrip("/"), joint.kind.lower()
     if frame != joint.frame:
         words = (
@@ -109,7 +109,7 @@ def srdf(files: Sequence[ForeignFile], name: str, report: Report) -> ImportedFil
 def _described(path: Path, span: Span, report: Report) -> Description | None:
     part = BodyPart("", BodyFile(path, span, False, {}, {}), None, span, span)
     found, findings = describe("", path.parent, [part], {})
-    if found is None:  # else they are told by `check`
+    if found is None:  # else they are reported by `check`
         report.extend(finding for finding in findings if finding.severity is Severity.ERROR)
     return found
 
@@ -162,20 +162,20 @@ class _Drafts:
         for base, tip in group.chains:
             ends = chain(self.body, base, tip) if {base, tip} <= self.body.links.keys() else None
             if ends is None:
-                self._tell_unknown(group, f"{base} - {tip}")
+                self._report_unknown(group, f"{base} - {tip}")
             found.update(ends.joints if ends is not None else ())
         for link in group.links:
             if link not in self.body.links:
-                self._tell_unknown(group, link)
+                self._report_unknown(group, link)
             elif (above := self.body.joint_above.get(link)) is not None:
                 found.add(above.name)
         for joint in group.joints:
             if joint not in self.body.joints and all(outer.name != joint for outer in self.said.outer):
-                self._tell_unknown(group, joint)
+                self._report_unknown(group, joint)
             found.add(joint)
         for other in group.groups:
             if other not in self.said.groups:
-                self._tell_unknown(group, other)
+                self._report_unknown(group, other)
             elif other not in seen:
                 found.update(self.joints_of(self.said.groups[other], seen | {group.name}))
         return [
@@ -184,7 +184,7 @@ class _Drafts:
             if body_joint.name in found and body_joint.moves and body_joint.mimic is None
         ]
 
-    def _tell_unknown(self, group: SemanticGroup, what: str) -> None:
+    def _report_unknown(self, group: SemanticGroup, what: str) -> None:
         words = f"the group '{plain(group.name, 60)}' names '{plain(what, 60)}', which its URDF does not have"
         self.report.add(NO_SUCH.at(group.span, words))
 

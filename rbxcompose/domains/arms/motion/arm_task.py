@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
-from rbxcompose.domains.arms.motion.collisions import told
+from rbxcompose.domains.arms.motion.collisions import pairs_shown
 from rbxcompose.domains.arms.motion.groups import JointSpace
 from rbxcompose.domains.arms.motion.inverse_kinematics import ENOUGH, SOLVER, PoseSolutions, PoseTarget, SolverSettings
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory, speeds_of
@@ -59,7 +59,7 @@ class ArmGoal:
         """Return what is wrong with it for an arm that has poses of these names, or nothing."""
         for word, share in (("speed", self.speed), ("acceleration", self.acceleration)):
             if not (math.isfinite(share) and 0.0 < share <= 1.0):
-                return f"a {word} of {share:.0%} is none"
+                return f"the {word} must be above 0 % and at most 100 %, not {share:.0%}"
         if problem := self.keep.mistake(kinematics):
             return problem
         aim = self.trace or self.target
@@ -126,8 +126,8 @@ class ArmSite(Protocol):
     def stop_following(self) -> None:
         """Ask the controller to end the trajectory; `ended` still follows."""
 
-    def told(self, stage: str) -> None:
-        """Tell in which stage it is."""
+    def report_stage(self, stage: str) -> None:
+        """Report the stage."""
 
     def info(self, text: str) -> None:
         """Log an event."""
@@ -201,7 +201,7 @@ class ArmTask:
         here = int(np.argmin(np.max(np.abs(points - self._where()), axis=1)))
         bad = next((point for point in points[here:] if not self._planner.checker.is_free(point)), None)
         if bad is not None:
-            self._obstacle = told(self._planner.checker.colliding(bad))
+            self._obstacle = pairs_shown(self._planner.checker.colliding(bad))
             self._site.stop_following()
 
     def _settle(self) -> None:
@@ -235,7 +235,7 @@ class ArmTask:
         self._first = self._start if self._first is None else self._first
         self._obstacle = ""
         self._kinematics.place({name: one for name, (one, _) in measured.items() if name not in names})
-        self._site.told("planning")
+        self._site.report_stage("planning")
         if problem := self._goal.mistake(self._kinematics, self._site.poses):
             self._fail(MotionReason.UNKNOWN_GOAL, problem)
         elif self._goal.trace is not None:
@@ -307,7 +307,7 @@ class ArmTask:
         if self._aims:
             self._plan_next()
         elif colliding:
-            self._fail(MotionReason.GOAL_IN_COLLISION, told(checker.colliding(colliding[0])))
+            self._fail(MotionReason.GOAL_IN_COLLISION, pairs_shown(checker.colliding(colliding[0])))
         else:
             away, angle = found.nearest
             text = f"the tip got within {away * 100:.1f} cm and {math.degrees(angle):.1f} deg of it"
@@ -366,7 +366,7 @@ class ArmTask:
             return
         self._site.info(f"a motion of {trajectory.duration:.1f} s: {words}")
         self._stage, self._trajectory = self._move, trajectory
-        self._site.told("moving")
+        self._site.report_stage("moving")
         self._site.follow(self.space.names, trajectory, self._followed)
 
     def _move(self) -> None:
@@ -406,7 +406,7 @@ class GivenTask(ArmTask):
 
     def _begin_planning(self) -> None:
         self._start = self._where()
-        self._site.told("planning")
+        self._site.report_stage("planning")
         self._kinematics.place(
             {name: at for name, (at, _) in self._site.measured.items() if name not in self.space.names}
         )

@@ -124,7 +124,7 @@ class SeenCells:
 
 
 Flags = NDArray[np.bool_]
-_SPACE_FILTER_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+_UNIT_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,7 +186,7 @@ class SpaceFilter:
 
 
 def _within(space: FilledSpace, points: Array, pose: Transform3, padding: float) -> Flags:
-    turn = np.array([rotate(pose.rotation, axis) for axis in _SPACE_FILTER_AXES]).T
+    turn = np.array([rotate(pose.rotation, axis) for axis in _UNIT_AXES]).T
     own = (points - pose.translation) @ turn  # in the frame of the shape
     if space.shape.kind == PLANE:
         *normal, offset = space.shape.size

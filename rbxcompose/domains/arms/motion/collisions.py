@@ -111,7 +111,7 @@ def _from_file(path: Path, name: str, scale: Array) -> Coal:
 
 def _of_pieces(path: Path, name: str, scale: Array) -> Coal:
     for module in _READERS:
-        import_module(module)  # a missing one would be told as a broken file
+        import_module(module)  # a missing one would look like a broken file
     solid = read_mesh(path, name)
     _prove_finite(solid.vertices, name)
     return _triangles(solid.vertices * scale, solid.faces)
@@ -153,7 +153,7 @@ TOUCH = 1e-4
 """[m] by which shapes of the body may be within each other: those of a servo and its bracket touch, and whether faces
 that touch collide is decided by rounding."""
 FLAT = 1e-9  # [m], the thickness of the box around a mesh that is flat
-MOST_PAIRS = 5_000  # of shapes, whose distances are told
+MOST_PAIRS = 5_000  # of shapes, whose distances are listed
 _GEOM, _BVH = "OT_GEOM", "OT_BVH"  # coal's kinds of shapes
 
 
@@ -189,7 +189,7 @@ class SearchingChecker(Checker, Protocol):
         """Search a way; return its points, of shape (m, n), or why there is none. Yield how many were examined."""
 
 
-def told(pairs: Collection[LinkPair], most: int = 3) -> str:
+def pairs_shown(pairs: Collection[LinkPair], most: int = 3) -> str:
     """Return pairs in words."""
     words = [f"'{first}' and '{second}'" for first, second in list(pairs)[:most]]
     return "; ".join(words) + (f"; and {len(pairs) - most} more pairs" if len(pairs) > most else "")
@@ -311,7 +311,7 @@ class MeshChecker:
     def pairs(self, values: Array, between: Collection[str] = ()) -> tuple[PairDistance, ...]:
         """Return the distances of the pairs with all of `between`: what collides first, then the nearest.
 
-        Of very many pairs only those that collide are told. How deep meshes are within each other is an estimate of
+        Of very many pairs only those that collide are reported. How deep meshes are within each other is an estimate of
         coal's. One distance is computed at a time, so that other threads run: meshes take milliseconds.
         """
         colliding, found = set(self.colliding(values)), dict[LinkPair, float]()

@@ -194,7 +194,7 @@ def _compose(first: Array, second: Array, out: Array) -> None:
 TREE, BOX, CYLINDER, HALF_SPACE = 0, 1, 2, 3
 """What a shape is beside its spheres."""
 LITTLE = 1e-6  # [m], much more than rounding
-COMPILED_CONVEX_TURNS = 24  # planes that are tried
+MOST_PLANES = 24  # planes that are tried
 GOOD = 0.7  # of the distance: a plane that shows so much of it is good enough
 SAME, FLAT = 1e-9, 1e-12  # a plane is no better than another one; a simplex is as flat as rounding
 
@@ -248,7 +248,7 @@ def hull_gap(
     simplex, v, used = work.simplex, work.nearest, 0
     x, y, z = v[0], v[1], v[2]
     v[0], v[1], v[2] = axis[0], axis[1], axis[2]
-    for turn in range(COMPILED_CONVEX_TURNS):
+    for turn in range(MOST_PLANES):
         _support(points, between, kind, size, others, v, work.turned, simplex[used])
         square = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
         length, along = np.sqrt(square), _dot(simplex[used], v)

@@ -36,7 +36,7 @@ class Grasp:
 
 
 def solid_of(thing: PlacedObject) -> ScenePiece | None:
-    """Return the shape of an object and its pose in the object's frame; None unless it tells how to hold the object."""
+    """Return the shape of an object and its pose in the object's frame; None unless it shows how to hold the object."""
     return ScenePiece(thing.shape, thing.shape_pose) if not thing.pieces and thing.shape.kind in SOLIDS else None
 
 

@@ -27,7 +27,7 @@ from rbxcompose.base.geometry import (
 )
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.arm_task import LONGEST_CALL, SETTLING, ArmGoal, ArmSite, ArmTask
-from rbxcompose.domains.arms.motion.collisions import Checker, told
+from rbxcompose.domains.arms.motion.collisions import Checker, pairs_shown
 from rbxcompose.domains.arms.motion.grasps import Grasp, grasps_of, least_width, reach_of, solid_of
 from rbxcompose.domains.arms.motion.groups import JointSpace, interpolated
 from rbxcompose.domains.arms.motion.inverse_kinematics import TOLERANCE, PoseTarget, descended, solved
@@ -207,7 +207,7 @@ class ContactSearch:
         )
         if not solutions.free:
             if solutions.colliding:
-                pairs = told(coming.colliding(solutions.colliding[0]))
+                pairs = pairs_shown(coming.colliding(solutions.colliding[0]))
                 return 1, StageFailure(to, MotionReason.GOAL_IN_COLLISION, pairs)
             away, angle = solutions.nearest
             text = f"the tip got within {away * 100:.1f} cm and {math.degrees(angle):.1f} deg of it"
@@ -238,7 +238,7 @@ class ContactSearch:
             between = interpolated((free[-1], values), RESOLUTION)
             hit = next((item for item in between if not checker.is_free(item)), None)
             if hit is not None:
-                failure = StageFailure(stage, MotionReason.PATH_IN_COLLISION, told(checker.colliding(hit)))
+                failure = StageFailure(stage, MotionReason.PATH_IN_COLLISION, pairs_shown(checker.colliding(hit)))
                 break
             free.append(values)
         here, end = (self.kinematics.tip_pose(array).translation for array in (start, free[-1]))
@@ -254,7 +254,7 @@ def _farthest(failed: list[_Failed]) -> _Failed:
 ATTEMPTS = 5  # ways that are planned to, before it gives up
 ALONE = 6  # slices of the first motion before others are looked for: an easy one takes 2 to 6
 STEPS = 32  # of looking for others, for each slice: one takes a millisecond
-NOISE = 0.01  # [rad or m] by which joints may be elsewhere than where a helper was told: a servo has ticks
+NOISE = 0.01  # [rad or m] by which joints may be elsewhere than where a helper was sent: a servo has ticks
 
 FoundWay = ContactWay | StageFailure | None
 Planned = MotionPlan | MotionFailure
@@ -424,7 +424,9 @@ Work = Generator[None, None, StageFailure | None]
 
 SPARE = 0.005  # [rad or m] to the limits of joints: curves through the poses of a line swing a little beyond them
 TRIES = 256  # slices of a search in one call, unless it takes long: each is a few milliseconds, and there are hundreds
-SLACK = 0.005  # [m] by which an opening may be less than it was told, or than the width of what is between the fingers
+SLACK = (
+    0.005  # [m] by which an opening may be less than was commanded, or than the width of what is between the fingers
+)
 GAP = 0.005  # [m] below an object within which it stands on something
 
 
@@ -542,7 +544,7 @@ class HandTask:
     def _carry_out(self) -> Iterator[None]:
         for stage in self.stages:
             self.stage = stage
-            self.site.told(self.stage)
+            self.site.report_stage(self.stage)
             self.failure = yield from getattr(self, self.stage)()
             if self.is_canceled:
                 self.failure = StageFailure(self.stage, MotionReason.INTERRUPTED, "it was cancelled")
@@ -561,7 +563,7 @@ class HandTask:
         while not self.site.is_ready or any(name not in self.site.measured for name in self.space.names):
             if self.site.now - began >= SETTLING:
                 if not self.site.is_ready:
-                    return self.fail(MotionReason.UNKNOWN_SCENE, "nothing has told what is around the robot")
+                    return self.fail(MotionReason.UNKNOWN_SCENE, "no planning scene has been received")
                 return self.fail(MotionReason.UNKNOWN_START, "nothing has reported where all joints of the arm are")
             yield
         self.place_body()
@@ -682,10 +684,10 @@ class HandTask:
 
     def opened(self, opening: float) -> Work:
         """Open the gripper."""
-        told = yield from self.gripped(opening)
-        problem = told.problem
-        if not problem and told.opening < min(opening, self.hand.greatest) - SLACK:
-            problem = f"it opened to {told.opening * 1e3:.0f} of {opening * 1e3:.0f} mm"
+        grip = yield from self.gripped(opening)
+        problem = grip.problem
+        if not problem and grip.opening < min(opening, self.hand.greatest) - SLACK:
+            problem = f"it opened to {grip.opening * 1e3:.0f} of {opening * 1e3:.0f} mm"
         self.place_body()
         return self.fail(GraspReason.GRIPPER_FAILED, problem) if problem else None
 
@@ -696,7 +698,7 @@ class HandTask:
         began = self.site.now
         while not answers or not (answers[0] or is_done()):
             if self.site.now - began >= SETTLING:
-                return self.fail(GraspReason.NOT_ATTACHED, "the scene has not told of it")
+                return self.fail(GraspReason.NOT_ATTACHED, "the scene has not confirmed it")
             yield
         return self.fail(GraspReason.NOT_ATTACHED, answers[0]) if answers[0] else None
 
@@ -799,7 +801,7 @@ class PickTask(HandTask):
             self.site.info(f"'{self._one.name}' is elsewhere: it is approached again")
             for stage in self.stages[: self.stages.index("grasp")]:
                 self.stage = stage
-                self.site.told(stage)
+                self.site.report_stage(stage)
                 failure = yield from getattr(self, stage)()
                 if failure is not None or self.is_canceled:
                     return failure
@@ -827,11 +829,11 @@ class PickTask(HandTask):
     def close(self) -> Work:
         """Close the gripper on the object."""
         width = self._way.contact.width
-        told = yield from self.gripped(width - max(0.0, self._goal.squeeze))
-        if told.problem:
-            return self.fail(GraspReason.GRIPPER_FAILED, told.problem)
-        if told.opening < width - SLACK:
-            words = f"the gripper closed to {told.opening * 1e3:.0f} mm"
+        grip = yield from self.gripped(width - max(0.0, self._goal.squeeze))
+        if grip.problem:
+            return self.fail(GraspReason.GRIPPER_FAILED, grip.problem)
+        if grip.opening < width - SLACK:
+            words = f"the gripper closed to {grip.opening * 1e3:.0f} mm"
             text = f"{words}, and '{self._one.name}' is {width * 1e3:.0f} mm wide"
             yield from self.gripped(self._opening)  # so that the arm can leave
             return self.fail(GraspReason.NOTHING_GRASPED, text)

@@ -15,7 +15,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3, conjugate, multiply
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.arm_task import ArmGoal, ArmSite, ArmTask, GivenTask
-from rbxcompose.domains.arms.motion.collisions import Checker, told
+from rbxcompose.domains.arms.motion.collisions import Checker, pairs_shown
 from rbxcompose.domains.arms.motion.groups import JointSpace
 from rbxcompose.domains.arms.motion.inverse_kinematics import PoseSolutions, PoseTarget, SolverSettings
 from rbxcompose.domains.arms.motion.octree_files import cells_of_octomap
@@ -475,7 +475,7 @@ class KinematicsQuery:
             state = RobotState(joint_state=JointState(name=names, position=values))
             return GetPositionIK.Response(solution=state, error_code=_done())
         if found.colliding:
-            text = told(self.checker.colliding(found.colliding[0]))
+            text = pairs_shown(self.checker.colliding(found.colliding[0]))
             return GetPositionIK.Response(error_code=not_done(Codes.GOAL_IN_COLLISION, text))
         text = f"the tip got within {found.nearest[0] * 100:.1f} cm of it"
         return GetPositionIK.Response(error_code=not_done(Codes.NO_IK_SOLUTION, text))
@@ -853,7 +853,7 @@ class MoveItSite(ArmSite, Protocol):
 
 
 class MoveItTask:
-    """One goal. Call `advance` until `is_over`; then `result` tells how it ended.
+    """One goal. Call `advance` until `is_over`; then `result` is how it ended.
 
     It is the site of the task that does the work. With `plan_only`, that finds its joints at `start` and has its
     trajectory noted instead of followed.
@@ -998,10 +998,10 @@ class MoveItTask:
         """Ask the controller to end the trajectory."""
         self._site.stop_following()
 
-    def told(self, stage: str) -> None:
-        """Tell in which stage it is."""
+    def report_stage(self, stage: str) -> None:
+        """Report the stage."""
         self.stage = stage
-        self._site.told(stage)
+        self._site.report_stage(stage)
 
     def info(self, text: str) -> None:
         """Log an event."""

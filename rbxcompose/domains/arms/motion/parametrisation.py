@@ -191,7 +191,7 @@ def toppra() -> Any:
     finally:
         for name in later:
             del sys.modules[name]
-    logging.getLogger("toppra").setLevel(logging.CRITICAL)  # what it says is told in the result
+    logging.getLogger("toppra").setLevel(logging.CRITICAL)  # what it says is in the result
     return found
 
 

@@ -32,7 +32,7 @@ class ArmPicture:
     """What is to be seen: the body at positions of its joints, things, and what an arm is about to do.
 
     `goal` are positions of the joints there, which move `moved` links; `way` is that of the tip [m]. Links and things
-    that are `colliding` are red, those of the goal if there is one. `told` and `problem` are written above it.
+    that are `colliding` are red, those of the goal if there is one. `caption` and `problem` are written above it.
     """
 
     body: Body
@@ -43,7 +43,7 @@ class ArmPicture:
     moved: Collection[str] = ()
     way: Sequence[Vector3] = ()
     colliding: Collection[str] = ()
-    told: str = ""
+    caption: str = ""
     problem: str = ""
 
 
@@ -65,7 +65,7 @@ def draw_arm(shown: ArmPicture) -> bytes:
     pixels = body_picture.rendered(joined(solids), bounds)
     if ghost:
         pixels = 0.35 * pixels + 0.65 * body_picture.rendered(joined([*solids, *ghost]), bounds)
-    lines = [(line, "black") for line in wrap(shown.told, _LONGEST_LINE)]
+    lines = [(line, "black") for line in wrap(shown.caption, _LONGEST_LINE)]
     lines += [(line, "#c01010") for line in wrap(shown.problem, _LONGEST_LINE, max_lines=3, placeholder=" ...")]
     return body_picture.png_of(pixels, *lines)
 

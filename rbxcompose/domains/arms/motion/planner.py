@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.domains.arms.motion.collisions import Checker, SearchingChecker, told
+from rbxcompose.domains.arms.motion.collisions import Checker, SearchingChecker, pairs_shown
 from rbxcompose.domains.arms.motion.constrained_search import kept_path
 from rbxcompose.domains.arms.motion.groups import JointSpace, interpolated
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory, curve, jerks_of, speeds_of, timed
@@ -41,7 +41,7 @@ def examined(points: Array, space: JointSpace, checker: Checker) -> Generator[No
     for begin in range(0, len(inside), SLICE):
         bad = first_bad(checker, inside[begin : begin + SLICE])
         if bad is not None:
-            return Rejected(True, told(checker.colliding(inside[begin + bad])), (begin + bad) / len(points))
+            return Rejected(True, pairs_shown(checker.colliding(inside[begin + bad])), (begin + bad) / len(points))
         yield
     if len(inside) < len(points):
         return Rejected(False, space.outside(points[len(inside)], ROUNDING), len(inside) / len(points))
@@ -174,7 +174,7 @@ class _Run:
         return None
 
     def _fitness(self, attempt: int) -> Callable[[Array], bool]:
-        """Return what tells whether positions may be on a path; the first search leaves out unlikely pairs."""
+        """Return what decides whether positions may be on a path; the first search leaves out unlikely pairs."""
         planner, kept = self._planner, self._kept
         checker = planner.checker if attempt or not planner.unlikely else planner.checker.without(planner.unlikely)
         return checker.is_free if kept is None else lambda values: kept.is_kept(values) and checker.is_free(values)
@@ -275,7 +275,7 @@ class _Run:
         return None
 
     def _search(self, attempt: int, margin: float) -> Generator[int, None, Array]:
-        """Return the search: by OMPL, whose constrained spaces find less (`kept_search` tells how much), or by ours."""
+        """Return the search: by OMPL, whose constrained spaces find less (see `constrained_search`), or by ours."""
         space, kept, start, goal = self._space, self._kept, self.start, self.goal
         settings, is_fit = self._planner.settings, self._fitness(attempt)
         seed = settings.seed + attempt
@@ -343,7 +343,7 @@ def _unfit(
     if words := space.outside(values, tolerance):
         return MotionFailure(reasons[0], words)
     inside = space.clamped(values)
-    return None if checker.is_free(inside) else MotionFailure(reasons[1], told(checker.colliding(inside)))
+    return None if checker.is_free(inside) else MotionFailure(reasons[1], pairs_shown(checker.colliding(inside)))
 
 
 def _with_middles(path: Array) -> Array:

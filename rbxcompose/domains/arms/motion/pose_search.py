@@ -92,7 +92,7 @@ def _step(jacobian: Array, posture: Posture, space: JointSpace, values: Array, b
 
 
 FIRSTS = 20  # random positions to begin from, beside the present ones
-NEAREST_POSES_STEPS = 200  # of one approach, at most
+MOST_APPROACH_STEPS = 200  # of one approach, at most
 FIRST_DAMPING, MOST_DAMPING = 1e-3, 1e8  # of what the greatest joint weighs
 STILL = 1e-6  # of the square of the error, by which a step that is worth it makes that less
 WAYS, POINTS = 5, 40  # ways to positions that collide, and points on each, where the last free one is looked for
@@ -147,8 +147,8 @@ def _approached(
     wanted, values, damping = kinematics.placement(target.pose), np.clip(first, *bounds), FIRST_DAMPING
     error, jacobian = _weighed(kinematics, target, wanted, values)
     size = float(error @ error)
-    for _ in range(NEAREST_POSES_STEPS):
-        step = _nearest_poses_step(jacobian, error, damping, values, bounds)
+    for _ in range(MOST_APPROACH_STEPS):
+        step = _approach_step(jacobian, error, damping, values, bounds)
         moved = np.clip(
             values
             + step * min(1.0, inverse_kinematics.LONGEST / max(float(np.abs(step).max()), inverse_kinematics.LONGEST)),
@@ -182,9 +182,7 @@ def _weighed(
     return (weights * error)[top:end], (weights[:, None] * jacobian)[top:end]
 
 
-def _nearest_poses_step(
-    jacobian: Array, error: Array, damping: float, values: Array, bounds: tuple[Array, Array]
-) -> Array:
+def _approach_step(jacobian: Array, error: Array, damping: float, values: Array, bounds: tuple[Array, Array]) -> Array:
     """Return the damped step, of shape (n,); joints stay that would go beyond the limit at which they are."""
     slope = jacobian.T @ error
     blocked = np.where(slope < 0.0, values <= bounds[0], values >= bounds[1])

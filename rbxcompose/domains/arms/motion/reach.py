@@ -154,7 +154,7 @@ def draw_reach(shown: ReachPicture) -> bytes:
     if not solids:
         raise ValueError("there is nothing to draw")
     whole = joined(solids)
-    lines = [(line, "black") for line in wrap(shown.robot.told, _LONGEST_LINE)]
+    lines = [(line, "black") for line in wrap(shown.robot.caption, _LONGEST_LINE)]
     return _with_legend(png_of(rendered(whole, bounds_of(whole)), *lines), shown)
 
 

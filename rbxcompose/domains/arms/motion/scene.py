@@ -263,7 +263,7 @@ class PlanningScene:
 
     def _pose(self, thing: PlacedObject, poses: Mapping[str, Transform3]) -> Transform3:
         if thing.link not in poses:
-            raise SceneError(f"nothing tells where '{thing.link}' is, the frame of '{thing.name}'")
+            raise SceneError(f"no transform to '{thing.link}' is known, the frame of '{thing.name}'")
         return poses[thing.link].compose(thing.pose)
 
     def _there(self, name: str) -> PlacedObject:

@@ -27,7 +27,7 @@ _KINDS = tuple(size for size in scene.SIZES if size != scene.OCTREE)
 
 @dataclass(frozen=True, slots=True)
 class SceneFile:
-    """A scene: its name, and its objects; their link is not told, and stands for the frame of the scene."""
+    """A scene: its name, and its objects; their link is not in the text, and stands for the frame of the scene."""
 
     name: str
     objects: tuple[scene.PlacedObject, ...]

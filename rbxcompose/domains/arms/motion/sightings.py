@@ -14,7 +14,7 @@ from rbxcompose.base.geometry import Transform3, Vector3
 
 MOST_OBJECTS = 200
 """More are no table with things, but noise."""
-TURNED = math.radians(5)  # [rad] by which an object is turned if it is told anew
+TURNED = math.radians(5)  # [rad] by which an object is turned if it is published anew
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +29,7 @@ class Sighting:
 
 @dataclass(frozen=True, slots=True)
 class SeenObject:
-    """An object as it was told, and when it was last seen."""
+    """An object as it was published, and when it was last seen."""
 
     name: str
     sighting: Sighting
@@ -40,7 +40,7 @@ class Sightings:
     """Gives sightings the names of objects."""
 
     def __init__(self, near: float, still: float, forget: float) -> None:
-        """Take sightings up to `near` apart for the same thing, and tell one that is more than `still` elsewhere.
+        """Take sightings up to `near` apart for the same thing, and report one that is more than `still` elsewhere.
 
         What was not seen for `forget` is gone.
         """
@@ -48,8 +48,8 @@ class Sightings:
         self.objects: dict[str, SeenObject] = {}
 
     def take(self, now: float, found: Iterable[Sighting], held: Collection[str]) -> list[SeenObject]:
-        """Return the objects that are new, or no longer as they were told; those that are `held` stay as they are."""
-        told, free = list[SeenObject](), {name for name in self.objects if name not in held}
+        """Return the objects that are new, or no longer as published; those that are `held` stay as they are."""
+        changed, free = list[SeenObject](), {name for name in self.objects if name not in held}
         for sighting in found:
             name = sighting.id or self._nearest(sighting, free) or self._fresh(sighting.label or "object")
             before = self.objects.get(name)
@@ -59,8 +59,8 @@ class Sightings:
             is_same = before is not None and not self._differs(before.sighting, sighting)
             self.objects[name] = replace(before, at=now) if before and is_same else SeenObject(name, sighting, now)
             if not is_same:
-                told.append(self.objects[name])
-        return told
+                changed.append(self.objects[name])
+        return changed
 
     def forgotten(self, now: float, held: Collection[str]) -> list[str]:
         """Forget what was not seen for long, and return its names; what is held is known to be there."""

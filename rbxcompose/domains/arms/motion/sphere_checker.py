@@ -27,7 +27,7 @@ from rbxcompose.domains.body.model import Geometry
 Array = NDArray[np.float64]
 ROOM = 4_096  # near pairs of one call, at least
 SAMPLES, SEED = 64, 1
-"""Positions at which it is seen how well spheres tell pairs apart."""
+"""Positions at which it is seen how well spheres distinguish pairs."""
 BLURRED = 0.1
 """A pair whose spheres are near in a greater share of positions, most of them free, is left out of the fast search."""
 

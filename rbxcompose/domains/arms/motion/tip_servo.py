@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
-from rbxcompose.domains.arms.motion.collisions import Checker, told
+from rbxcompose.domains.arms.motion.collisions import Checker, pairs_shown
 from rbxcompose.domains.arms.motion.groups import interpolated
 from rbxcompose.domains.arms.motion.parametrisation import MARGIN, Trajectory, speeds_of
 from rbxcompose.domains.arms.motion.planner import MotionPlanner
@@ -147,7 +147,7 @@ class TipServo:
             if bad is None:
                 self._is_stopping = False
                 return found
-            self.state = f"halted: {told(self._planner.checker.colliding(bad)) or 'a joint is at its limit'}"
+            self.state = f"halted: {pairs_shown(self._planner.checker.colliding(bad)) or 'a joint is at its limit'}"
         return self._stopped(begin, position, velocity)
 
     def _stopped(self, begin: float, position: Array, velocity: Array) -> ServoMotion | None:
@@ -196,7 +196,7 @@ class TipServo:
         for number in range(1, count + 1):
             array, part = position + far * (number / count), (number - 1) / count
             if not self._planner.checker.is_free(array):
-                return share * part, f"slowed: {told(self._planner.checker.colliding(array))} are ahead"
+                return share * part, f"slowed: {pairs_shown(self._planner.checker.colliding(array))} are ahead"
             if self._ratio(array) < singular:
                 return share * part, "slowed: a singularity is ahead"
         return share, words

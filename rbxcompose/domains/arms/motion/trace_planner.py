@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Quaternion, Transform3, Vector3, conjugate, lerp, multiply, slerp
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
-from rbxcompose.domains.arms.motion.collisions import Checker, told
+from rbxcompose.domains.arms.motion.collisions import Checker, pairs_shown
 from rbxcompose.domains.arms.motion.groups import JointSpace
 from rbxcompose.domains.arms.motion.inverse_kinematics import ANGLE_TOLERANCE, TOLERANCE, PoseTarget, descended
 from rbxcompose.domains.arms.motion.parametrisation import MARGIN, Trajectory, jerks_of, speeds_of, timed
@@ -344,7 +344,7 @@ def _stepped(
         index = int(np.argmax(np.abs(values - last)))
         words = space.joints[index].shown(float(abs(values - last)[index]))
         return f"'{space.names[index]}' would jump by {words}"
-    return values if checker.is_free(values) else f"{told(checker.colliding(values))} collide"
+    return values if checker.is_free(values) else f"{pairs_shown(checker.colliding(values))} collide"
 
 
 def _limit(space: JointSpace, values: Array) -> str:

@@ -225,7 +225,7 @@ def arms(reading: Reading[ArmModel]) -> dict[str, ArmOfRobot]:
                 not_a_choice(value_span(reading.contents.root, path), "type", node, list(section_models.PLANNERS))
             )
         if description is None:
-            continue  # it is missing or has a mistake, which is told
+            continue  # it is missing or has a mistake, which is reported
         group = _group_of(reading, name, entries, groups, description.body)
         if group is None:
             continue
@@ -335,7 +335,7 @@ def _gripper_elsewhere(
     moved, last = moved_links(known, group.joints), group.joints[-1]
     for joint in there.claimed:
         if joint not in known.joints:
-            continue  # told where the controller is
+            continue  # reported where the controller is
         is_own = joint in group.joints
         if is_own or last not in moved[known.joints[joint].parent]:
             words = "is one of the arm's own" if is_own else f"is not carried by '{last}'"
@@ -350,7 +350,7 @@ def _unled(reading: Reading[ArmModel], name: str, model: ArmModel, group: ArmGro
     there = reading.contents.of(controllers).get(model.controller)
     span = value_span(reading.contents.root, ("arms", name, "controller"))
     if there is None:
-        return  # it has a mistake, which is told
+        return  # it has a mistake, which is reported
     if not served_topic(model.controller, there, FollowJointTrajectory):
         yield NOT_LED.at(span, f"the controller '{model.controller}' follows no trajectories")
     elif left := [joint for joint in group.joints if joint not in there.claimed]:

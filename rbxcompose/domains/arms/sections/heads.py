@@ -90,7 +90,7 @@ def heads(reading: Reading[HeadModel]) -> dict[str, HeadOfRobot]:
     for name, entry in reading.entries().items():
         there = reading.contents.of(controllers).get(entry.controller)
         if description is None or there is None or entry.camera not in description.body.links:
-            continue  # it is missing or has a mistake, which is told
+            continue  # it is missing or has a mistake, which is reported
         turning = chain(description.body, description.body.root, entry.camera)
         led = tuple(joint for joint in there.claimed if turning and joint in turning.joints)
         if led and follow_topic(reading.contents, entry.controller):

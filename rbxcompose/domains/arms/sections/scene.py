@@ -196,7 +196,7 @@ class SceneOfRobot:
 
 
 def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]:
-    """Yield the component that tells arms of the scene; objects may come later, also if there are none now."""
+    """Yield the component that publishes the scene to arms; objects may come later, also if there are none now."""
     description, found = contents.of(body), contents.of(scene)
     if description is None or not contents.of(arms):
         return

@@ -115,7 +115,7 @@ def trackers(reading: Reading[TrackerModel]) -> dict[str, TrackerOfRobot]:
     for name, entry in reading.entries().items():
         arm = reading.contents.of(arms).get(entry.arm)
         if description is None or arm is None:
-            continue  # it is missing or has a mistake, which is told
+            continue  # it is missing or has a mistake, which is reported
         root, poses = reading.contents.root, arm.model.poses
         if entry.rest is not None and entry.rest not in poses:
             message = f"the arm '{entry.arm}' has no pose '{entry.rest}'"

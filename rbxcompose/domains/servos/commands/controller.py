@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from rbxcompose.base.findings import suggest
 from rbxcompose.base.requests import to_data
 from rbxcompose.base.units import RATIO, UnitError, to_si
-from rbxcompose.commands.console import NotDoneError, table, tell
+from rbxcompose.commands.console import NotDoneError, emit, table
 from rbxcompose.commands.lookup import REFUSED, add_asking_options, answer_of, find_robot, known_state, show_answer
 from rbxcompose.commands.options import Subcommand, add_actions, argument, run_action
 from rbxcompose.domains.servos.controller_manager import (
@@ -62,14 +62,14 @@ def _listed(folder: RobotFolder) -> Iterator[tuple[str, ControllerState]]:
 def _ls(arguments: argparse.Namespace) -> int:
     found = list(_listed(find_robot(arguments.robot)))
     if arguments.json:
-        tell(json.dumps([{"bus": bus, **to_data(state)} for bus, state in found]))
+        emit(json.dumps([{"bus": bus, **to_data(state)} for bus, state in found]))
     elif not found:
-        tell("this robot has no controllers")
+        emit("this robot has no controllers")
     else:
         rows = [
             (state.name, state.type, _state(state), bus, ", ".join(state.joints), state.note) for bus, state in found
         ]
-        tell(table([("name", "type", "state", "bus", "joints", ""), *rows]))
+        emit(table([("name", "type", "state", "bus", "joints", ""), *rows]))
     return 0
 
 

@@ -20,7 +20,7 @@ from rbxcompose.domains.servos.controller import controller_type
 from rbxcompose.domains.servos.joint_drive import JointDrive, PositionDrive
 from rbxcompose.domains.servos.joint_states import Enable, Hold, JointMode, MoveTo
 from rbxcompose.domains.servos.servo_cycle import ServoCycle, ServoItem, prepare, set_up, with_torque
-from rbxcompose.domains.servos.supervision import Periods, Reboots, be_prompt, joint_state, report
+from rbxcompose.domains.servos.supervision import Periods, Reboots, be_prompt, joint_report, joint_state
 from rbxcompose.domains.servos.twins.fault_script import InjectFault
 from rbxcompose.msgs.rbxcompose_msgs import SetSpeed
 from rbxcompose.msgs.sensor_msgs import JointState
@@ -125,14 +125,14 @@ class ServoBusDriver(Component[ServoBusConfig]):
             }
         )
         self.is_stopped, self.lost_at = self.context.is_stopped, -math.inf
-        self.told_at, self.published_at = -math.inf, -math.inf
+        self.reported_at, self.published_at = -math.inf, -math.inf
         self.is_parking = False
 
     def prepare(self, *drives: JointDrive) -> None:
         """Set the modes of the servos of some joints, or of all, and of those that controllers use."""
         bus, config, drives = self.cycle.bus, self.config, drives or tuple(self.cycle.drives.values())
-        told = prepare(bus, [drive.joint for drive in drives], config.watchdog, config.return_delay)
-        for text in (*told, *self.cycle.limit(drives), *set_up(self.cycle.items, bus)):
+        changes = prepare(bus, [drive.joint for drive in drives], config.watchdog, config.return_delay)
+        for text in (*changes, *self.cycle.limit(drives), *set_up(self.cycle.items, bus)):
             self.info(text)
 
     def activate(self) -> None:
@@ -153,7 +153,7 @@ class ServoBusDriver(Component[ServoBusConfig]):
         self.wake()
 
     def keep_torque(self) -> None:
-        """Let joints hold that have torque, as soon as their servos have told whether they have."""
+        """Let joints hold that have torque, as soon as their servos have reported whether they have."""
         waiting = [drive.joint for drive in self.cycle.drives.values() if drive.policy.on_start == "wait"]
         for name, is_held in with_torque(self.cycle.bus, waiting).items() if waiting else ():
             self.start_by(name, "hold" if is_held else self.config.on_start)
@@ -172,9 +172,9 @@ class ServoBusDriver(Component[ServoBusConfig]):
             self.run_cycle()
         except PortError as error:
             self.lose(error)
-        if self.now - self.told_at >= REPORT:
-            self.told_at = self.now
-            self.tell()
+        if self.now - self.reported_at >= REPORT:
+            self.reported_at = self.now
+            self.report()
 
     def run_cycle(self) -> None:
         """Run the cycle with all active controllers, and publish."""
@@ -223,9 +223,9 @@ class ServoBusDriver(Component[ServoBusConfig]):
     @answers(controller_manager.SwitchControllers)
     def switch(self, request: controller_manager.SwitchControllers) -> str:
         """Switch controllers, all at once or not at all."""
-        for text in (told := list(self.controllers.switch(request.on, request.off, self.now))):
+        for text in (changes := list(self.controllers.switch(request.on, request.off, self.now))):
             self.info(text)
-        return "; ".join(told) or "nothing changes"
+        return "; ".join(changes) or "nothing changes"
 
     @answers(controller_manager.ScaleMotion)
     def scale(self, request: controller_manager.ScaleMotion) -> str:
@@ -310,7 +310,9 @@ class ServoBusDriver(Component[ServoBusConfig]):
         """Set how fast a joint moves by single commands, within its limits."""
         drive = self.cycle.drives[name]
         if not (math.isfinite(request.speed) and request.speed > 0.0):
-            return SetSpeed.Response(success=False, message=f"a speed of {request.speed} is none")
+            return SetSpeed.Response(
+                success=False, message=f"the speed must be positive and finite, not {request.speed}"
+            )
         if isinstance(drive, PositionDrive):
             drive.speed = request.speed
         fastest = drive.joint.limits.speed
@@ -324,7 +326,7 @@ class ServoBusDriver(Component[ServoBusConfig]):
             raise Refused("real servos have their own faults")
         return self.faults.inject(request, self.now)
 
-    # What is told
+    # What is published
 
     def publish(self) -> None:
         """Publish where the joints are, and what controllers know."""
@@ -333,10 +335,10 @@ class ServoBusDriver(Component[ServoBusConfig]):
         for controller in self.controllers.leading:
             controller.publish()
 
-    def tell(self) -> None:
+    def report(self) -> None:
         """Report to diagnostics."""
         notes = {name: controller.note for name, controller in self.controllers.controllers.items()}
-        found = report(self.cycle.drives, notes, self.periods, is_lost=self.lost_at > -math.inf)
+        found = joint_report(self.cycle.drives, notes, self.periods, is_lost=self.lost_at > -math.inf)
         self.status(found.level, found.message, **found.values)
 
     # Stopping

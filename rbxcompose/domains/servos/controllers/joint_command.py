@@ -65,7 +65,7 @@ class JointCommandController(Controller[JointCommandConfig]):
         """Wait for a command."""
         self.wanted: dict[str, float] = {}  # positions of joints that have not arrived together
         self.commanded_at = -math.inf
-        self.told = ""
+        self.problem = ""
         self.goal: ServedGoal[Any, Any, Any] | None = None  # which asked for what is wanted
 
     @property
@@ -76,13 +76,13 @@ class JointCommandController(Controller[JointCommandConfig]):
     @property
     def note(self) -> str:
         """Return what was wrong with the last command."""
-        return self.told
+        return self.problem
 
     def received(self, port: str, message: Float64MultiArray) -> None:
         """Take a command, or refuse it."""
         names, positions = self.config.joints, [float(item) for item in message.data]
-        self.told = self._objection(names, positions)
-        if not self.told:
+        self.problem = self._objection(names, positions)
+        if not self.problem:
             self._end("replaced by a command")
             self._want(dict(zip(names, positions, strict=True)))
 
@@ -97,8 +97,8 @@ class JointCommandController(Controller[JointCommandConfig]):
         self.wanted, self.commanded_at = {}, self.site.now
         for name, position in positions.items():
             self.wanted[name] = self.site.joints[name].rules.limits.clamped(position)
-            if self.wanted[name] != position and not self.told:
-                self.told = f"joint '{name}' does not go to {position:g}: its limit is {self.wanted[name]:g}"
+            if self.wanted[name] != position and not self.problem:
+                self.problem = f"joint '{name}' does not go to {position:g}: its limit is {self.wanted[name]:g}"
 
     def _objection(self, names: Sequence[str], positions: list[float]) -> str:
         if len(positions) != len(names):
@@ -132,7 +132,7 @@ class JointCommandController(Controller[JointCommandConfig]):
             self.halt(now, "canceled")
             goal.canceled(MoveJoints.Result(message="canceled"))
         elif goal is not None and goal is not self.goal:
-            self.goal, self.told = goal, ""
+            self.goal, self.problem = goal, ""
             self._want(dict(zip(goal.request.joints, map(float, goal.request.positions), strict=True)))
 
     def _end(self, reason: str) -> None:
@@ -141,7 +141,7 @@ class JointCommandController(Controller[JointCommandConfig]):
         if goal is not None and reason:
             goal.aborted(reason, MoveJoints.Result(message=reason))
         elif goal is not None:
-            goal.succeeded(MoveJoints.Result(message=self.told))
+            goal.succeeded(MoveJoints.Result(message=self.problem))
 
     def _has_arrived(self, name: str, dt: float) -> bool:
         joint = self.site.joints[name]
@@ -151,7 +151,7 @@ class JointCommandController(Controller[JointCommandConfig]):
     def halt(self, now: float, reason: str) -> None:
         """Bring its joints to rest."""
         if self.wanted:
-            self.wanted, self.told = {}, reason
+            self.wanted, self.problem = {}, reason
             self._end(reason)
             for joint in self.site.joints.values():
                 joint.hold()

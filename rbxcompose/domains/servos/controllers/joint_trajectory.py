@@ -97,7 +97,7 @@ class JointTrajectoryController(Controller[JointTrajectoryConfig]):
             tolerance=trajectory.TrajectoryTolerance(config.tolerance.path, config.tolerance.goal),
             goal_time=config.tolerance.goal_time,
         )
-        self.told = ""
+        self.problem = ""
         self.follower = trajectory_follower.TrajectoryFollower(
             {name: joint.rules for name, joint in site.joints.items()}, policy
         )
@@ -137,15 +137,15 @@ class JointTrajectoryController(Controller[JointTrajectoryConfig]):
         self._end(self.follower.lose(joint, now, reason))
 
     def received(self, port: str, message: JointTrajectory) -> None:
-        """Follow a trajectory that is no goal, or tell what is wrong with it."""
-        self.told = ""
+        """Follow a trajectory that is no goal, or note what is wrong with it."""
+        self.problem = ""
         if not message.points:
             self.halt(self.site.now, "a trajectory without points")
             return
         wanted = self._trajectory(Follow.Goal(trajectory=message))
         answer = self.follower.accept(wanted, self.site.now, self._measured(), self._commanded(), is_live=True)
         if isinstance(answer, trajectory.TrajectoryRefusal):
-            self.told = f"a trajectory was refused: {answer.message}"
+            self.problem = f"a trajectory was refused: {answer.message}"
         else:
             self.goals.replace(STREAM)
 
@@ -154,7 +154,7 @@ class JointTrajectoryController(Controller[JointTrajectoryConfig]):
         """Return at which speed goals are followed, and what was wrong with the last trajectory that was no goal."""
         share = self.follower.pace.share
         slow = [] if share == 1.0 else [f"at {share:.0%} of the speed" if share else "held: the speed is 0 %"]
-        return "; ".join([*slow, *([self.told] if self.told else [])])
+        return "; ".join([*slow, *([self.problem] if self.problem else [])])
 
     def set_pace(self, share: float) -> str:
         """Follow goals at a share of their speed, from now on."""

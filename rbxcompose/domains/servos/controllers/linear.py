@@ -96,7 +96,7 @@ class LinearController(Controller[LinearConfig]):
         if not math.isfinite(goal.position):
             return f"the position {goal.position} is not a finite number"
         if not (math.isfinite(goal.max_velocity) and goal.max_velocity >= 0.0):
-            return f"a velocity of {goal.max_velocity} m/s is none"
+            return f"the velocity must be finite and not negative, not {goal.max_velocity} m/s"
         if self.limits.clamped(goal.position) != goal.position:
             return f"{goal.position:g} m is outside of {self.limits.least:g} m to {self.limits.greatest:g} m"
         return ""
@@ -189,7 +189,7 @@ class LinearPolicy:
     def __post_init__(self) -> None:
         for what, value in (("speed", self.speed), ("dead band", self.dead_band), ("time", self.stall_after)):
             if not (math.isfinite(value) and value > 0.0):
-                raise ValueError(f"a {what} of {value} is none")
+                raise ValueError(f"the {what} must be positive and finite, not {value}")
 
 
 class LinearMove:

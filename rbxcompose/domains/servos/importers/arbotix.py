@@ -55,49 +55,49 @@ class DiffController:
     kept: Mapping[str, Given[float]]
 
 
-def read_controller(name: str, told: ForeignMap) -> FollowController | DiffController | None:
+def read_controller(name: str, entry: ForeignMap) -> FollowController | DiffController | None:
     """Return a controller, or None after the finding that says why it is left out."""
-    type_ = told.needs("type", told.choice("type", (FOLLOW, DIFF, *_LINEAR)))
+    type_ = entry.needs("type", entry.choice("type", (FOLLOW, DIFF, *_LINEAR)))
     if type_ is None:
         return None
     if type_.value in _LINEAR:
-        told.add(NOT_CARRIED_OVER.at(type_.span, f"{told.what} is not carried over: {_WHY_NOT_LINEAR}"))
+        entry.add(NOT_CARRIED_OVER.at(type_.span, f"{entry.what} is not carried over: {_WHY_NOT_LINEAR}"))
         return None
-    found = _follow(name, told) if type_.value == FOLLOW else _diff(name, told)
-    told.report_unknown_keys()
+    found = _follow(name, entry) if type_.value == FOLLOW else _diff(name, entry)
+    entry.report_unknown_keys()
     return found
 
 
-def _follow(name: str, told: ForeignMap) -> FollowController | None:
-    joints = told.needs("joints", told.texts("joints"))
-    told.places("rate", "index")  # that of the bus counts, and nothing has a number here
-    if told.is_set("onboard"):
-        words = f"'onboard' of {told.what} is not carried over: trajectories are interpolated here, not on a board"
-        told.add(NOT_CARRIED_OVER.at(told.places("onboard")["onboard"], words))
-    _tell_action(name, told)
-    return FollowController(name, told.span, tuple(joints)) if joints else None
+def _follow(name: str, entry: ForeignMap) -> FollowController | None:
+    joints = entry.needs("joints", entry.texts("joints"))
+    entry.places("rate", "index")  # that of the bus counts, and nothing has a number here
+    if entry.is_set("onboard"):
+        words = f"'onboard' of {entry.what} is not carried over: trajectories are interpolated here, not on a board"
+        entry.add(NOT_CARRIED_OVER.at(entry.places("onboard")["onboard"], words))
+    _report_action(name, entry)
+    return FollowController(name, entry.span, tuple(joints)) if joints else None
 
 
-def _tell_action(name: str, told: ForeignMap) -> None:
-    """Tell if clients know the action by another name than it has now."""
-    given, ours = told.text("action_name"), f"{name}/{ACTION}"
+def _report_action(name: str, entry: ForeignMap) -> None:
+    """Report if clients know the action by another name than it has now."""
+    given, ours = entry.text("action_name"), f"{name}/{ACTION}"
     old = given.value if given else ACTION
     if old.strip("/") != ours:
-        words = f"the name '{old}' of the action of {told.what} is not carried over: it is '{ours}' here"
-        span = given.span if given else told.span
-        told.add(NOT_CARRIED_OVER.at(span, words, help="send goals to that name"))
+        words = f"the name '{old}' of the action of {entry.what} is not carried over: it is '{ours}' here"
+        span = given.span if given else entry.span
+        entry.add(NOT_CARRIED_OVER.at(span, words, help="send goals to that name"))
 
 
-def _diff(name: str, told: ForeignMap) -> DiffController:
+def _diff(name: str, entry: ForeignMap) -> DiffController:
     for key, ours in _FRAMES.items():
-        frame = told.text(key)
+        frame = entry.text(key)
         if frame is not None and frame.value.strip("/") != ours:
-            words = f"'{key}' of {told.what} is not carried over: the frame is '{ours}' here"
-            told.add(NOT_CARRIED_OVER.at(frame.span, words))
-    kept = {key: found for key in _OF_THE_BOARD if (found := told.number(key)) is not None}
-    base = DiffController(name, told.span, told.above_zero("accel_limit"), told.above_zero("timeout"), kept)
-    words = f"{told.what} becomes a simulated base: the ArbotiX board drives the real one by its own firmware"
-    told.add(SIMULATED_BASE.at(told.span, words, help=_figures(base)))
+            words = f"'{key}' of {entry.what} is not carried over: the frame is '{ours}' here"
+            entry.add(NOT_CARRIED_OVER.at(frame.span, words))
+    kept = {key: found for key in _OF_THE_BOARD if (found := entry.number(key)) is not None}
+    base = DiffController(name, entry.span, entry.above_zero("accel_limit"), entry.above_zero("timeout"), kept)
+    words = f"{entry.what} becomes a simulated base: the ArbotiX board drives the real one by its own firmware"
+    entry.add(SIMULATED_BASE.at(entry.span, words, help=_figures(base)))
     return base
 
 
@@ -132,36 +132,36 @@ class ArbotixGripper:
     values: tuple[str, ...]
 
 
-def read_gripper(name: str, told: ForeignMap) -> ArbotixGripper | None:
+def read_gripper(name: str, entry: ForeignMap) -> ArbotixGripper | None:
     """Return a gripper, or None after the finding that says why it is left out."""
-    model = told.choice("model", MODELS)
+    model = entry.choice("model", MODELS)
     if model is None:
         return None
     kind_of = MODELS[model.value]
-    joints = tuple(told.text(key) or Given(usual, told.span) for key, usual in _JOINTS[kind_of].items())
+    joints = tuple(entry.text(key) or Given(usual, entry.span) for key, usual in _JOINTS[kind_of].items())
     lines: Lines = {"type": ("gripper", ""), "model": (kind_of, out.place(model.span))}
     keys = ("left", "right") if len(joints) > 1 else ("joint",)
     lines |= {key: (out.word(joint.value), out.place(joint.span)) for key, joint in zip(keys, joints, strict=True)}
-    lines |= _scale(told) if kind_of == "parallel" else _geometry(told)
-    lines |= _two_sides(told) if kind_of == "dual" else _one_side(told, kind_of)
-    told.report_unknown_keys()
-    return ArbotixGripper(name, told.span, joints, lines, tuple(value for value, _ in lines.values()))
+    lines |= _scale(entry) if kind_of == "parallel" else _geometry(entry)
+    lines |= _two_sides(entry) if kind_of == "dual" else _one_side(entry, kind_of)
+    entry.report_unknown_keys()
+    return ArbotixGripper(name, entry.span, joints, lines, tuple(value for value, _ in lines.values()))
 
 
-def _geometry(told: ForeignMap) -> Lines:
+def _geometry(entry: ForeignMap) -> Lines:
     """Return the lengths of the fingers and how far they open: opening = pad_width + 2 finger_length sin(angle)."""
-    pad, finger = told.number("pad_width"), told.above_zero("finger_length")
+    pad, finger = entry.number("pad_width"), entry.above_zero("finger_length")
     lines = {"pad_width": _length(pad, PAD_WIDTH), "finger_length": _length(finger, FINGER_LENGTH)}
     furthest = (pad.value if pad else PAD_WIDTH) + 2 * (finger.value if finger else FINGER_LENGTH)
-    return lines | _opening(told, furthest)
+    return lines | _opening(entry, furthest)
 
 
 def _length(found: Given[float] | None, usual: float) -> tuple[str, str]:
     return (out.length(found.value), out.place(found.span)) if found else (out.length(usual), _DRIVER)
 
 
-def _opening(told: ForeignMap, furthest: float) -> Lines:
-    least, greatest = told.number("min_opening"), told.number("max_opening")
+def _opening(entry: ForeignMap, furthest: float) -> Lines:
+    least, greatest = entry.number("min_opening"), entry.number("max_opening")
     low = least.value if least else MIN_OPENING
     high = greatest.value if greatest else min(MAX_OPENING, furthest)
     if 0 <= low < high <= furthest:
@@ -171,16 +171,16 @@ def _opening(told: ForeignMap, furthest: float) -> Lines:
         }
     given_at = least if least and low < 0 else greatest or least
     reason = "the least is below 0" if low < 0 else f"the fingers open from 0 m to {out.number(round(furthest, 6))} m"
-    words = f"{told.what} cannot open from {out.number(low)} m to {out.number(high)} m, so that is left out: {reason}"
+    words = f"{entry.what} cannot open from {out.number(low)} m to {out.number(high)} m, so that is left out: {reason}"
     help_text = "openings are distances between the pads in metres; these look like angles of the joint in radians"
-    told.add(NO_OPENING.at(given_at.span if given_at else told.span, words, help=help_text))
+    entry.add(NO_OPENING.at(given_at.span if given_at else entry.span, words, help=help_text))
     return {}
 
 
-def _scale(told: ForeignMap) -> Lines:
-    scale = told.number("scale")
+def _scale(entry: ForeignMap) -> Lines:
+    scale = entry.number("scale")
     if scale is not None and not scale.value:
-        told.add(OUT_OF_RANGE.at(scale.span, f"'scale' of {told.what} must not be 0", help="it is left out"))
+        entry.add(OUT_OF_RANGE.at(scale.span, f"'scale' of {entry.what} must not be 0", help="it is left out"))
         scale = None
     value = scale.value if scale else 1.0
     where = out.place(scale.span) if scale else _DRIVER
@@ -189,21 +189,21 @@ def _scale(told: ForeignMap) -> Lines:
     return lines if value > 0 else lines | {"invert": (out.flag(True), where)}
 
 
-def _one_side(told: ForeignMap, kind_of: str) -> Lines:
-    center = told.number("center")
+def _one_side(entry: ForeignMap, kind_of: str) -> Lines:
+    center = entry.number("center")
     lines = {"center": (out.angle(center.value), out.place(center.span))} if center else {}
-    if kind_of == "one_sided" and told.is_set("invert"):
-        lines["invert"] = (out.flag(True), out.place(told.places("invert")["invert"]))
+    if kind_of == "one_sided" and entry.is_set("invert"):
+        lines["invert"] = (out.flag(True), out.place(entry.places("invert")["invert"]))
     return lines
 
 
-def _two_sides(told: ForeignMap) -> Lines:
+def _two_sides(entry: ForeignMap) -> Lines:
     lines: Lines = {}
     for key in ("center_left", "center_right"):
-        if (center := told.number(key)) is not None:
+        if (center := entry.number(key)) is not None:
             lines[key] = (out.angle(center.value), out.place(center.span))
     for key in ("invert_left", "invert_right"):
-        if (invert := told.flag(key)) is not None and invert.value:
+        if (invert := entry.flag(key)) is not None and invert.value:
             lines[key] = (out.flag(True), out.place(invert.span))
     return lines
 
@@ -258,36 +258,36 @@ class ArbotixJoint:
         return self.least.value if self.least else -half, self.greatest.value if self.greatest else half
 
 
-def read_joint(name: str, told: ForeignMap) -> ArbotixJoint | None:
+def read_joint(name: str, entry: ForeignMap) -> ArbotixJoint | None:
     """Return a joint, or None after the finding that says why it is left out."""
-    type_ = told.choice("type", (DYNAMIXEL, *OTHER_TYPES))
+    type_ = entry.choice("type", (DYNAMIXEL, *OTHER_TYPES))
     if type_ is not None and type_.value in OTHER_TYPES:
-        told.add(NOT_CARRIED_OVER.at(type_.span, f"{told.what} is not carried over: {OTHER_TYPES[type_.value]}"))
+        entry.add(NOT_CARRIED_OVER.at(type_.span, f"{entry.what} is not carried over: {OTHER_TYPES[type_.value]}"))
         return None
-    id_ = told.needs("id", told.whole("id", 0, _LAST_ID))
-    found = _model(told)
-    neutral = told.whole("neutral", -_FAR, _FAR)
-    is_inverted = told.is_set("invert")
-    least, greatest = _limits(told, found[1] / 2 if found else math.inf)
-    speed = told.above_zero("max_speed")
-    readable = told.flag("readable")
+    id_ = entry.needs("id", entry.whole("id", 0, _LAST_ID))
+    found = _model(entry)
+    neutral = entry.whole("neutral", -_FAR, _FAR)
+    is_inverted = entry.is_set("invert")
+    least, greatest = _limits(entry, found[1] / 2 if found else math.inf)
+    speed = entry.above_zero("max_speed")
+    readable = entry.flag("readable")
     if readable is not None and not readable.value:
-        words = f"'readable' of {told.what} is not carried over: all servos of a bus are read"
-        told.add(NOT_CARRIED_OVER.at(readable.span, words))
-    told.report_unknown_keys()
-    if id_ is None or found is None or (type_ is None and "type" in told):
+        words = f"'readable' of {entry.what} is not carried over: all servos of a bus are read"
+        entry.add(NOT_CARRIED_OVER.at(readable.span, words))
+    entry.report_unknown_keys()
+    if id_ is None or found is None or (type_ is None and "type" in entry):
         return None
     model, turn = found
-    joint = ArbotixJoint(name, told.span, id_, model, turn, neutral, is_inverted, least, greatest, speed)
-    for finding in _unreachable(joint, told.what):
-        told.add(finding)
+    joint = ArbotixJoint(name, entry.span, id_, model, turn, neutral, is_inverted, least, greatest, speed)
+    for finding in _unreachable(joint, entry.what):
+        entry.add(finding)
     return joint
 
 
-def _model(told: ForeignMap) -> tuple[ServoModel, float] | None:
+def _model(entry: ForeignMap) -> tuple[ServoModel, float] | None:
     """Return the model that has the ticks and the range of a joint, and that range."""
-    ticks, given = told.whole("ticks", 1, _FAR), told.above_zero("range")
-    if ticks is None and "ticks" in told:
+    ticks, given = entry.whole("ticks", 1, _FAR), entry.above_zero("range")
+    if ticks is None and "ticks" in entry:
         return None
     count = ticks.value if ticks else 1024
     turn = given.value if given else _FULL_RANGE.get(count, _OTHER_RANGE)
@@ -295,10 +295,10 @@ def _model(told: ForeignMap) -> tuple[ServoModel, float] | None:
         family = servo_models()[name].family
         if family.ticks == count and abs(math.degrees(family.span) - turn) <= _CLOSE:
             return servo_models()[name], turn
-    span = given.span if given else ticks.span if ticks else told.span
+    span = given.span if given else ticks.span if ticks else entry.span
     known = ", ".join(f"{guess}: {_ticks(guess)}" for guess in GUESSES)
-    words = f"no servo has {count} ticks over {out.number(turn)} degrees, so {told.what} is left out"
-    told.add(NO_SUCH_SERVO.at(span, words, help=known))
+    words = f"no servo has {count} ticks over {out.number(turn)} degrees, so {entry.what} is left out"
+    entry.add(NO_SUCH_SERVO.at(span, words, help=known))
     return None
 
 
@@ -307,12 +307,12 @@ def _ticks(name: str) -> str:
     return f"{family.ticks} ticks over {round(math.degrees(family.span), 2):g} degrees"
 
 
-def _limits(told: ForeignMap, half: float) -> tuple[Given[float] | None, Given[float] | None]:
-    least, greatest = told.number("min_angle"), told.number("max_angle")
+def _limits(entry: ForeignMap, half: float) -> tuple[Given[float] | None, Given[float] | None]:
+    least, greatest = entry.number("min_angle"), entry.number("max_angle")
     given = greatest or least
     if given and (least.value if least else -half) >= (greatest.value if greatest else half):
-        words = f"'max_angle' of {told.what} must be greater than its 'min_angle'"
-        told.add(OUT_OF_RANGE.at(given.span, words, help="both are left out"))
+        words = f"'max_angle' of {entry.what} must be greater than its 'min_angle'"
+        entry.add(OUT_OF_RANGE.at(given.span, words, help="both are left out"))
         return None, None
     return least, greatest
 
@@ -337,7 +337,7 @@ def guesses(joints: Iterable[ArbotixJoint], span: Span) -> Iterable[Finding]:
     for name, count in sorted(Counter(joint.model.name for joint in joints).items()):
         which = "1 joint" if count == 1 else f"{count} joints"
         words = f"the file names no models; the servos of {which} are taken for {name}, by {_ticks(name)}"
-        yield GUESSED.at(span, words, help="'rbxcompose servo scan' tells the models of real servos")
+        yield GUESSED.at(span, words, help="'rbxcompose servo scan' shows the models of real servos")
 
 
 T = TypeVar("T")
@@ -375,10 +375,10 @@ class ArbotixFile:
 def read_arbotix(file: ForeignFile, report: Report) -> ArbotixFile:
     """Return what a file has, also below the names of programs, as ROS keeps parameters."""
     found = ArbotixFile()
-    for name, told, is_gripper in _parts(file, report):
+    for name, entry, is_gripper in _parts(file, report):
         if not is_gripper:
-            found.drivers.append(_driver(told))
-        elif (gripper := read_gripper(name, told)) is not None:
+            found.drivers.append(_driver(entry))
+        elif (gripper := read_gripper(name, entry)) is not None:
             found.grippers.append(gripper)
     return found
 
@@ -416,55 +416,55 @@ def _is_gripper(node: MappingNode) -> bool:
     return "model" in node and not _MAIN & node.entries.keys()
 
 
-def _driver(told: ForeignMap) -> ArbotixDriver:
-    joints, left_out = _joints(told)
+def _driver(entry: ForeignMap) -> ArbotixDriver:
+    joints, left_out = _joints(entry)
     driver = ArbotixDriver(
-        port=told.text("port"),
-        baud=told.whole("baud", 1, _MOST_BAUD),
-        rate=_rate(told),
-        idle=_idle(told),
+        port=entry.text("port"),
+        baud=entry.whole("baud", 1, _MOST_BAUD),
+        rate=_rate(entry),
+        idle=_idle(entry),
         joints=joints,
         left_out=left_out,
         controllers=[
             controller
-            for name, each in told.maps("controllers", "controller")
+            for name, each in entry.maps("controllers", "controller")
             if (controller := read_controller(name, each))
         ],
     )
-    for key, span in told.places(*_DRIVER_OF_THE_BOARD).items():
+    for key, span in entry.places(*_DRIVER_OF_THE_BOARD).items():
         words = f"'{key}' are not carried over: they are pins of the ArbotiX board, which is not spoken to here"
-        told.add(NOT_CARRIED_OVER.at(span, words))
-    told.report_unknown_keys()
+        entry.add(NOT_CARRIED_OVER.at(span, words))
+    entry.report_unknown_keys()
     return driver
 
 
-def _joints(told: ForeignMap) -> tuple[dict[str, ArbotixJoint], set[str]]:
-    read = {name: read_joint(name, entry) for name, entry in told.maps("joints", "joint")}
+def _joints(entry: ForeignMap) -> tuple[dict[str, ArbotixJoint], set[str]]:
+    read = {name: read_joint(name, entry) for name, entry in entry.maps("joints", "joint")}
     joints = {name: joint for name, joint in read.items() if joint is not None}
-    for span in told.places("joints").values():
-        told.report.extend(guesses(joints.values(), span))
+    for span in entry.places("joints").values():
+        entry.report.extend(guesses(joints.values(), span))
     return joints, read.keys() - joints.keys()
 
 
-def _rate(told: ForeignMap) -> Given[float] | None:
+def _rate(entry: ForeignMap) -> Given[float] | None:
     """Return the larger one of the rates of reading and writing if the file gives one: a bus has one for both."""
-    given = [one for key in ("read_rate", "write_rate") if (one := told.above_zero(key)) is not None]
+    given = [one for key in ("read_rate", "write_rate") if (one := entry.above_zero(key)) is not None]
     if not given:
         return None
     rate = max(given, key=lambda one: one.value)
     if rate.value > _FASTEST:
-        told.add(OUT_OF_RANGE.at(rate.span, f"a bus has at most {_FASTEST:g} Hz", help="the rate is left out"))
+        entry.add(OUT_OF_RANGE.at(rate.span, f"a bus has at most {_FASTEST:g} Hz", help="the rate is left out"))
         return None
     return rate if len(given) == 2 or rate.value >= USUAL_RATE else replace(rate, value=USUAL_RATE)
 
 
-def _idle(told: ForeignMap) -> dict[str, Span]:
+def _idle(entry: ForeignMap) -> dict[str, Span]:
     """Return the places of keys that need nothing here, after checking that they are what they should be."""
     for key in ("rate", "diagnostic_rate", "timeout"):
-        told.number(key)
+        entry.number(key)
     for key in ("sync_read", "sync_write", "sim"):
-        told.flag(key)
-    return told.places("rate", "timeout", "sync_write", "sync_read", "diagnostic_rate", "sim")
+        entry.flag(key)
+    return entry.places("rate", "timeout", "sync_write", "sync_read", "diagnostic_rate", "sim")
 
 
 NO_URDF = kind("RBX2239", Severity.WARNING)
@@ -565,7 +565,7 @@ def _add(line: ServoLine, joint: ArbotixJoint, report: Report) -> None:
 
 
 def _drop_lost(robot: ArbotixRobot, report: Report) -> None:
-    """Drop controllers whose joints are not there; joints that were left out have been told."""
+    """Drop controllers whose joints are not there; joints that were left out have been reported."""
     for name, controller in list(robot.controllers.items()):
         if isinstance(controller, DiffController):
             continue

@@ -63,7 +63,7 @@ def actuators(reading: Reading[ActuatorModel]) -> dict[str, ActuatorModel]:
 
 
 def type_of(contents: Contents, bus: str) -> BusType:
-    """Return the type of a bus as it is written; one that is not known is told where it stands."""
+    """Return the type of a bus as it is written; one that is not known is reported where it stands."""
     written = at(contents.root, ("buses", bus, "type"))
     name = written.text if isinstance(written, ScalarNode) else ""
     return bus_type(name if name in bus_type_names() else DYNAMIXEL)

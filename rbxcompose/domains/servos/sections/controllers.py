@@ -41,7 +41,7 @@ def _models(node: TreeNode) -> Iterator[type[Config]]:
     name = written.text if isinstance(written, ScalarNode) else ""
     try:
         yield controller_type(name).config_type() if name in controller_names() else ControllerConfig
-    except BrokenPluginError:  # told where the section is read
+    except BrokenPluginError:  # reported where the section is read
         yield ControllerConfig
 
 
@@ -144,13 +144,13 @@ def _mistakes(
 def _undriven(reading: Reading[ControllerConfig], name: str, config: ControllerConfig) -> Iterator[Finding]:
     driven, servos = reading.contents.of(joints), reading.contents.of(actuators)
     if not driven and "joints" in reading.contents.root:
-        return  # they have mistakes, which are told
+        return  # they have mistakes, which are reported
     wanted, buses = controller_type(config.type).interface, set[str]()
     for joint in config.claimed:
         span = _place(reading, name, joint)
         if joint not in driven:
             if may_be_driven(reading.contents, joint):
-                return  # it has a mistake, which is told
+                return  # it has a mistake, which is reported
             message = f"the controller '{name}' leads '{joint}', which no servo drives"
             if (description := reading.contents.of(body)) and joint in description.body.joints:
                 help_text = f"give it an actuator: '{joint}: {{actuator: ...}}' below 'joints', or leave it out here"
@@ -198,7 +198,7 @@ def _unfit(reading: Reading[ControllerConfig], name: str, config: ControllerConf
 
 
 def _blind(reading: Reading[ControllerConfig], name: str, config: ControllerConfig) -> Iterator[Finding]:
-    """Yield a finding for each servo that cannot tell how far its joint turns."""
+    """Yield a finding for each servo that cannot measure how far its joint turns."""
     driven, servos = reading.contents.of(joints), reading.contents.of(actuators)
     if controller_type(config.type).interface != "velocity":
         return
@@ -208,7 +208,9 @@ def _blind(reading: Reading[ControllerConfig], name: str, config: ControllerConf
         model = model_of(reading.contents, servos[servo])
         if model is not None and model.family.span < math.tau - model.per_tick:
             degrees = round(math.degrees(model.family.span))
-            message = f"'{name}' needs to know how far '{servo}' turns, and an {model.name} tells {degrees} of 360 deg"
+            message = (
+                f"'{name}' needs to know how far '{servo}' turns, and an {model.name} measures {degrees} of 360 deg"
+            )
             span = value_span(reading.contents.root, ("actuators", servo, "model"))
             help_text = "take a model that sees the whole turn, such as XL430-W250 or MX-28"
             here = Related(key_span(reading.contents.root, ("controllers", name)), "the controller")

@@ -93,7 +93,7 @@ def _mistake(reading: Reading[FaultModel], name: str, model: FaultModel) -> Find
         return OF_WHAT.at(span, f"'{model.joint}' cannot be unplugged", help="give 'bus' instead of 'joint'")
     in_doubt = may_be_driven(reading.contents, model.joint) if model.joint else bool(unread_joints(reading.contents))
     if in_doubt or (not driven and "joints" in root):
-        return None  # they have mistakes, which are told
+        return None  # they have mistakes, which are reported
     if model.joint is not None and model.joint not in driven:
         message, span = f"no servo drives '{model.joint}'", value_span(root, ("faults", name, "joint"))
         return NO_SERVO.misspelt(span, message, model.joint, driven, "joints with a servo")

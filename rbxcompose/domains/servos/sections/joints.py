@@ -221,7 +221,7 @@ def _follows(
     at = key_span(reading.contents.root, ("joints", name))
     if leader not in found:
         if _is_written(reading, leader):
-            return  # it has a mistake, which is told
+            return  # it has a mistake, which is reported
         yield NOT_TOGETHER.at(at, f"joint '{name}' mimics '{leader}' in the body, which no servo drives")
         return
     servos = [known[servo] for text in (name, leader) for servo in found[text].servos if servo in known]
@@ -276,7 +276,7 @@ def limits_of(model: JointModel, joint: BodyJoint | None) -> Tightened:
 
 
 def held_limits(model: JointModel, joint: BodyJoint | None) -> MotionLimits:
-    """Return the limits that hold; none for a joint whose limits are a mistake, which is told."""
+    """Return the limits that hold; none for a joint whose limits are a mistake, which is reported."""
     return limits_of(model, joint).limits or MotionLimits()
 
 

@@ -251,7 +251,7 @@ class FakeServo:
 
     @property
     def alert(self) -> int:
-        """Return what a status tells of its health: bits of errors in protocol 1.0, bit 7 in 2.0."""
+        """Return its health as a status reports it: bits of errors in protocol 1.0, bit 7 in 2.0."""
         if self.model.protocol == 1:
             return self._errors & ONE_ERRORS
         return 128 if self._errors else 0
@@ -382,15 +382,15 @@ class FakeServo:
         speed = motor.velocity * self.model.per_tick
         measured = motor.position + (self._random.gauss(0.0, self.noise) if self.noise else 0.0)
         is_going = orders.has_torque and not orders.is_wheel and abs(orders.goal - motor.position) > 1
-        self._tell("present_position", round(measured))
-        self._tell("present_speed", self.model.to_raw("present_speed", speed))
-        self._tell("present_load", round(1000 * self._load))
-        self._tell("present_voltage", round(10 * self._voltage))
-        self._tell("present_temperature", round(motor.temperature))
-        self._tell("hardware_error", self._errors if self.model.protocol == 2 else 0)
-        self._tell("moving", int(is_going or abs(speed) > 1e-3))
+        self._write_measured("present_position", round(measured))
+        self._write_measured("present_speed", self.model.to_raw("present_speed", speed))
+        self._write_measured("present_load", round(1000 * self._load))
+        self._write_measured("present_voltage", round(10 * self._voltage))
+        self._write_measured("present_temperature", round(motor.temperature))
+        self._write_measured("hardware_error", self._errors if self.model.protocol == 2 else 0)
+        self._write_measured("moving", int(is_going or abs(speed) > 1e-3))
 
-    def _tell(self, item: str, raw: int) -> None:
+    def _write_measured(self, item: str, raw: int) -> None:
         """Write a measured value, as far as its item can hold it."""
         if self._shown.get(item) == raw:
             return

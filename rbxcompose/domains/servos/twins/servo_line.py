@@ -122,7 +122,7 @@ class FakeLine:
 
     def __init__(self, servos: Iterable[FakeServo], clock: Callable[[], float]) -> None:
         self.servos = list(servos)
-        self.heard: list[ServoPacket] = []  # every instruction so far
+        self.received: list[ServoPacket] = []  # every instruction so far
         self._clock, self._now = clock, clock()
         self._buffer = bytearray()
         self._lock = threading.RLock()
@@ -143,14 +143,14 @@ class FakeLine:
                     servo.step(now - self._now, now)
                 self._now = now
 
-    def hear(self, data: bytes, baud: int | None = None) -> list[FakeReply]:
+    def receive(self, data: bytes, baud: int | None = None) -> list[FakeReply]:
         """Take bytes at a rate [bit/s]; servos that listen at another one hear nothing. Return the replies in order."""
         with self._lock:
             self.advance()
             self._buffer += data
             replies: list[FakeReply] = []
             for packet in packets(self._buffer):
-                self.heard.append(packet)
+                self.received.append(packet)
                 replies += self._timed(packet, baud or 1_000_000, self._listening(packet.protocol, baud))
             return replies
 
@@ -197,8 +197,8 @@ class FakeLine:
         wide = 2 if protocol == 2 else 1  # [B] of an address or a length
         match packet.instruction:
             case wire.PING:
-                told = bytes(servo.memory[:2]) + b"\x2d" if protocol == 2 else b""  # model number and firmware
-                return status(protocol, own, servo.alert, told)
+                found = bytes(servo.memory[:2]) + b"\x2d" if protocol == 2 else b""  # model number and firmware
+                return status(protocol, own, servo.alert, found)
             case wire.READ if len(given) >= 2 * wide:
                 return self._read(servo, _number(given[:wide]), _number(given[wide : 2 * wide]))
             case wire.WRITE if len(given) > wide:

@@ -81,7 +81,7 @@ class FakePort:
     def _take(self, data: bytes) -> None:
         """Pass a request to the servos, and note when their replies are due."""
         now, rate = time.monotonic(), self._rate()
-        replies = self.line.hear(data, rate)
+        replies = self.line.receive(data, rate)
         if self._has_echo:
             self._plan(now, data)
         sent = now + 10 * len(data) / rate
