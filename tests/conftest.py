@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import atexit
+import fcntl
 import os
 import shutil
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
+from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -16,24 +19,29 @@ from hypothesis import HealthCheck, settings
 from xdist.scheduler import LoadScopeScheduling
 
 from rbxcompose.testing.golden import Golden
-from tests.side_by_side import REAL_TIME, scope_of
+from tests.side_by_side import REAL_TIME, scope_of, turn_of
 from tests.soak import Soak
 
 ROOT = Path(__file__).parents[1]
 
 
 CACHES = "RBXCOMPOSE_TEST_CACHES"
+WITH_ARMS = tuple(
+    f"tests/{start}" for start in ("cli/test_arm", "components/", "interop/", "motion/", "robots/", "testing/")
+)
 
 
 def pytest_configure(config: pytest.Config) -> None:
     """Give all workers a folder of caches that goes with the run; say how many examples to try; keep bytecode."""
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     sys.dont_write_bytecode = False
+    config.addinivalue_line("markers", "soak: takes long, and runs under --soak alone")
     many = bool(config.getoption("--soak"))
     settings.register_profile(
         "rbxcompose",
-        max_examples=300 if many else 20,
-        suppress_health_check=[HealthCheck.too_slow],  # it is the machine that is slow
+        max_examples=300 if many else 12,
+        deadline=None,
+        suppress_health_check=[HealthCheck.too_slow],  # it is the machine that is slow, as with deadlines
     )
     settings.load_profile("rbxcompose")
     os.environ.setdefault("NUMBA_CACHE_DIR", str(ROOT / ".numba_cache"))  # compiling takes longer than most tests may
@@ -42,17 +50,42 @@ def pytest_configure(config: pytest.Config) -> None:
         atexit.register(shutil.rmtree, os.environ[CACHES], ignore_errors=True)
 
 
-def pytest_collection_finish() -> None:
-    """Compile what arms need before any test: on a busy machine, that takes longer than a test may."""
-    if "rbxcompose.domains.arms.motion.arm_kinematics" in sys.modules:
-        from tests.motion.toy_arm import fast_planner, kinematics
+def pytest_collection_finish(session: pytest.Session) -> None:
+    """Compile what arms need before any test: on a busy machine, that takes longer than a test may.
 
+    One worker does, and the others begin with tests that need none of it.
+    """
+    if not session.config.option.collectonly and "rbxcompose.domains.arms.motion.arm_kinematics" in sys.modules:
+        with suppress(BlockingIOError):
+            compile_for_arms(fcntl.LOCK_NB)
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
+    """Wait for what is compiled outside of the time that a test has."""
+    if item.nodeid.startswith(WITH_ARMS):
+        compile_for_arms()
+    return (yield)
+
+
+@cache
+def compile_for_arms(flags: int = 0) -> None:
+    """Compile what arms need, or take it from the worker that has."""
+    from tests.motion.toy_arm import fast_planner, kinematics
+
+    with open(Path(os.environ[CACHES], "compiling"), "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX | flags)
         kinematics().hasten()
         fast_planner()
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Let tests of real processes try again: a machine that stands still for a moment keeps none of their deadlines."""
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Begin with what takes longest; let tests of real processes try again, since a busy machine keeps no deadline."""
+    if not config.getoption("--soak"):
+        rare = [item for item in items if item.get_closest_marker("soak")]
+        config.hook.pytest_deselected(items=rare)
+        items[:] = [item for item in items if item not in set(rare)]
+    items.sort(key=lambda item: turn_of(item.nodeid))
     for item in items:
         if item.nodeid.startswith(REAL_TIME):
             item.add_marker(pytest.mark.flaky(reruns=2))
@@ -66,6 +99,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadScopeScheduling:
     """Say how tests are given to the workers of `pytest -n`."""
+    config.option.loadscopereorder = False
     scheduling = LoadScopeScheduling(config, log)
     scheduling._split_scope = scope_of
     return scheduling

@@ -5,6 +5,9 @@ from __future__ import annotations
 import json
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import Any
+
+import pytest
 
 RESULTS = Path(__file__).parents[1] / "docs" / "quality.json"
 
@@ -17,6 +20,11 @@ class Figure:
     examples: int
     failures: int
     note: str = ""
+
+
+def rare(*values: Any) -> list[Any]:
+    """Return values of a parameter that a test has under `--soak` alone."""
+    return [pytest.param(value, marks=pytest.mark.soak) for value in values]
 
 
 @dataclass(slots=True)

@@ -11,17 +11,7 @@ from itertools import pairwise
 from operator import attrgetter
 from typing import Annotated, Any, Literal, TypeVar, get_args
 
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    GetCoreSchemaHandler,
-    GetJsonSchemaHandler,
-    StringConstraints,
-    ValidationInfo,
-    WithJsonSchema,
-)
+import pydantic
 from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
@@ -110,7 +100,7 @@ class Refers:
     kind: str
     is_reported: bool = False
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+    def __get_pydantic_core_schema__(self, source: Any, handler: pydantic.GetCoreSchemaHandler) -> CoreSchema:
         if self.is_reported:
             return handler(source)
         if isinstance(source, type) and not issubclass(source, str):
@@ -120,11 +110,13 @@ class Refers:
             )
         return core_schema.with_info_after_validator_function(self._name, handler(source))
 
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: pydantic.GetJsonSchemaHandler
+    ) -> dict[str, Any]:
         made = handler(schema)
         return made if self.kind in _HIDDEN else {**made, NAMES: self.kind}
 
-    def _name(self, name: str, info: ValidationInfo) -> str:
+    def _name(self, name: str, info: pydantic.ValidationInfo) -> str:
         """Return the name if it exists."""
         known: Known = {} if info.context is None else info.context
         prefix, kind = PREFIXED.get(self.kind, ("", self.kind))
@@ -132,10 +124,10 @@ class Refers:
             raise self._unknown(name, {f"{prefix}{one}": one for one in known[kind]} if prefix else known[kind])
         return name
 
-    def _thing(self, wanted: type[T]) -> Callable[[object, ValidationInfo], object]:
+    def _thing(self, wanted: type[T]) -> Callable[[object, pydantic.ValidationInfo], object]:
         """Return the function that replaces a name with the thing it names."""
 
-        def find(value: object, info: ValidationInfo) -> object:
+        def find(value: object, info: pydantic.ValidationInfo) -> object:
             if isinstance(value, wanted):
                 return value
             if not isinstance(value, str):
@@ -164,13 +156,13 @@ def plural(kind: str) -> str:
     return f"{kind}{'es' if kind.endswith(('s', 'x', 'ch')) else 's'}"
 
 
-class Config(BaseModel):
+class Config(pydantic.BaseModel):
     """A closed, frozen set of fields; a key that it does not declare is a finding."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = pydantic.ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     @classmethod
-    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: pydantic.GetJsonSchemaHandler) -> dict[str, Any]:
         made = handler(schema)
         properties = handler.resolve_ref_schema(made).get("properties", {})
         for name, text in field_docs(cls).items():
@@ -249,12 +241,12 @@ def live_names(model: type[Config], above: str = "") -> Iterator[str]:
                 yield from live_names(hint, f"{above}{name}.")
 
 
-def _reads(dimension: Dimension) -> BeforeValidator:
+def _reads(dimension: Dimension) -> pydantic.BeforeValidator:
     def read(value: object) -> float:
         return to_si(value, dimension)
 
-    shape = Annotated[Any, WithJsonSchema({"x-dimension": dimension.name})]
-    return BeforeValidator(read, json_schema_input_type=shape)
+    shape = Annotated[Any, pydantic.WithJsonSchema({"x-dimension": dimension.name})]
+    return pydantic.BeforeValidator(read, json_schema_input_type=shape)
 
 
 Length = Annotated[float, _reads(units.LENGTH), Dimensioned(units.LENGTH)]
@@ -271,7 +263,7 @@ Temperature = Annotated[float, _reads(units.TEMPERATURE), Dimensioned(units.TEMP
 BitRate = Annotated[float, _reads(units.BIT_RATE), Dimensioned(units.BIT_RATE)]
 Ratio = Annotated[float, _reads(units.RATIO), Dimensioned(units.RATIO)]
 
-Name = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]*$", max_length=60)]
+Name = Annotated[str, pydantic.StringConstraints(pattern=r"^[a-z][a-z0-9_]*$", max_length=60)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -312,7 +304,7 @@ class Secret:
         return hash(self._text)
 
     @classmethod
-    def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+    def __get_pydantic_core_schema__(cls, source: Any, handler: pydantic.GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_plain_validator_function(
             _secret,
             serialization=core_schema.plain_serializer_function_ser_schema(str, when_used="json"),
@@ -346,11 +338,11 @@ class Restart(Config):
 
     when: When = "on_failure"
     """`on_failure` ends the robot after `max` failures, `always` keeps trying, `never` leaves it failed."""
-    max: int = Field(5, ge=1, le=100)
+    max: int = pydantic.Field(5, ge=1, le=100)
     """Number of failures within `within` after which it is not restarted again."""
-    within: Time = Field(60.0, gt=0)
+    within: Time = pydantic.Field(60.0, gt=0)
     """The time in which failures are counted."""
-    backoff: Time = Field(0.1, ge=0)
+    backoff: Time = pydantic.Field(0.1, ge=0)
     """The pause before the first try; each failure in a row doubles it."""
 
 

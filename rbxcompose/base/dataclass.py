@@ -2,7 +2,7 @@
 
 The standard library writes and compiles up to six methods for each class, which was a third of the time of `check`.
 Here classes share all methods but `__init__`. To type checkers and to `fields`, `replace` and the like they are
-dataclasses as any other; one with another option or with inherited fields is left to the standard library.
+dataclasses as any other; one with another option is left to the standard library.
 """
 
 from __future__ import annotations
@@ -27,10 +27,11 @@ _MISSING = dataclasses.MISSING
 
 
 def _made(cls: type, *, frozen: bool = False, slots: bool = False, eq: bool = True, **others: Any) -> type:
-    if others or hasattr(cls, "__dataclass_fields__"):
+    if others:
         return dataclasses.dataclass(frozen=frozen, slots=slots, eq=eq, **others)(cls)
     given = {name for name in ("__init__", "__repr__", "__eq__", "__hash__") if vars(cls).get(name) is not None}
-    made: Any = dataclasses.dataclass(init=False, repr=False, eq=False, slots=slots)(cls)
+    inherits = hasattr(cls, "__dataclass_fields__")  # what is frozen inherits only from what is frozen
+    made: Any = dataclasses.dataclass(init=False, repr=False, eq=False, slots=slots, frozen=frozen and inherits)(cls)
     fields = dataclasses.fields(made)
     methods = {
         "__init__": _init(made, fields, frozen and slots, frozen),

@@ -7,6 +7,7 @@ group `rbxcompose.plugins` as `FAMILY.NAME = "package.module"` and use the same 
 from __future__ import annotations
 
 import importlib
+import os
 import sys
 from functools import cache, cached_property
 from typing import TYPE_CHECKING
@@ -110,6 +111,31 @@ class Plugins:
 @cache
 def _entries(path: tuple[str, ...]) -> tuple[EntryPoint, ...]:
     """Return what the distributions on Python's path announce: their files are read once for all families."""
-    from importlib.metadata import entry_points  # slow to import, and most commands need no plug-in
+    if not any(map(_may_announce, path)):
+        return ()
+    from importlib.metadata import entry_points  # slow to import, and most users have no plug-in
 
     return tuple(entry_points(group=GROUP))
+
+
+def _may_announce(folder: str) -> bool:
+    """Return whether a distribution in a folder of Python's path may announce plug-ins."""
+    try:
+        names = os.listdir(folder or ".")
+    except NotADirectoryError:  # an archive
+        return True
+    except OSError:
+        return False
+    return any(
+        _announces(os.path.join(folder, name)) for name in names if name.endswith((".dist-info", ".egg-info", ".egg"))
+    )
+
+
+def _announces(distribution: str) -> bool:
+    if distribution.endswith(".egg"):
+        return True
+    try:
+        with open(os.path.join(distribution, "entry_points.txt"), "rb") as file:
+            return GROUP.encode() in file.read()
+    except OSError:
+        return False

@@ -8,36 +8,15 @@ from typing import Any
 
 from pydantic import Field
 
+from rbxcompose.base import units
 from rbxcompose.base.config import Config, Secret
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions.types import TYPES, Type, TypeKind, choice_of
 from rbxcompose.base.findings import DID_YOU_MEAN, Finding, FindingKind, Related, Report, Span, replacement
 from rbxcompose.base.printable import plain
-from rbxcompose.base.units import (
-    NUMBER,
-    UNITS,
-    Dimension,
-    Quantity,
-    UnitError,
-    format_number,
-    format_quantity,
-    to_si,
-    written_unit,
-)
+from rbxcompose.manifest import tree
 from rbxcompose.manifest.foreign_words import TYPES as FOREIGN_TYPES
 from rbxcompose.manifest.scalars import describe
-from rbxcompose.manifest.tree import (
-    BROKEN,
-    KeyPath,
-    MappingNode,
-    ScalarNode,
-    SequenceNode,
-    TreeNode,
-    at,
-    children,
-    key_span,
-    value_span,
-)
 from rbxcompose.manifest.validate import (
     MISSING_KEY,
     NOT_A_CHOICE,
@@ -76,25 +55,25 @@ class DeclaredArgument:
 
     name: str
     type: Type
-    default: TreeNode | None
+    default: tree.TreeNode | None
     least: object = None
     most: object = None
 
-    def read(self, node: TreeNode, report: Report) -> object:
+    def read(self, node: tree.TreeNode, report: Report) -> object:
         """Return the typed value of a node, `BROKEN` after a finding: see `read_value`."""
         value = read_value(node, self.type, self.name, report)
         for words, bound, sign in (("at least", self.least, 1), ("at most", self.most, -1)):
-            if BROKEN not in (value, bound) and bound is not None and (size_of(value) - size_of(bound)) * sign < 0:
+            if tree.BROKEN not in (value, bound) and bound is not None and (size_of(value) - size_of(bound)) * sign < 0:
                 message = f"'{self.name}' must be {words} {show(bound)}"
                 report.add(OUT_OF_RANGE.at(node.span, message, label=f"this is {show(value)}"))
-                return BROKEN
+                return tree.BROKEN
         return value
 
 
-def read_argument(name: str, node: TreeNode, path: KeyPath, report: Report) -> DeclaredArgument | None:
+def read_argument(name: str, node: tree.TreeNode, path: tree.KeyPath, report: Report) -> DeclaredArgument | None:
     """Return the declaration of an argument at `path`, None after its findings."""
     model = validate(ArgumentModel, node, path, report)
-    if model is None or not isinstance(node, MappingNode):
+    if model is None or not isinstance(node, tree.MappingNode):
         return None
     declared = _type(model, node, path, report)
     if declared is None:
@@ -103,27 +82,27 @@ def read_argument(name: str, node: TreeNode, path: KeyPath, report: Report) -> D
     for key in ("min", "max"):
         if (bound := node.get(key)) is not None:
             if declared.measure is None:
-                report.add(WRONG_TYPE.at(key_span(node, (key,)), f"'{key}' does not apply to {declared.phrase}"))
+                report.add(WRONG_TYPE.at(tree.key_span(node, (key,)), f"'{key}' does not apply to {declared.phrase}"))
                 continue
             bounds[key] = read_value(bound, declared, key, report)
     if model.choices and model.type != CHOICE:
         message = f"'choices' does not apply to {declared.phrase}"
         help_text = "use 'min' and 'max'" if declared.measure else f"write 'type: {CHOICE}'"
-        report.add(WRONG_TYPE.at(key_span(node, ("choices",)), message, help=help_text))
+        report.add(WRONG_TYPE.at(tree.key_span(node, ("choices",)), message, help=help_text))
     least, most = bounds.get("min"), bounds.get("max")
-    if BROKEN not in bounds.values() and None not in (least, most) and size_of(least) > size_of(most):
-        place = value_span(node, ("min",))
+    if tree.BROKEN not in bounds.values() and None not in (least, most) and size_of(least) > size_of(most):
+        place = tree.value_span(node, ("min",))
         report.add(OUT_OF_RANGE.at(place, f"'min' is above 'max', {show(most)}", help="exchange them"))
         bounds.clear()
     return DeclaredArgument(name, declared, node.get("default"), bounds.get("min"), bounds.get("max"))
 
 
-def _type(model: ArgumentModel, node: MappingNode, path: KeyPath, report: Report) -> Type | None:
+def _type(model: ArgumentModel, node: tree.MappingNode, path: tree.KeyPath, report: Report) -> Type | None:
     written = node.get("type")
     if model.type == CHOICE:
         if model.choices:
             return choice_of(*model.choices)
-        report.add(MISSING_KEY.at(key_span(node, ("type",)), f"{where(path)} is a choice and needs 'choices'"))
+        report.add(MISSING_KEY.at(tree.key_span(node, ("type",)), f"{where(path)} is a choice and needs 'choices'"))
     elif found := TYPES.get(model.type):
         return found
     elif written:
@@ -131,11 +110,11 @@ def _type(model: ArgumentModel, node: MappingNode, path: KeyPath, report: Report
     return None
 
 
-def _unknown_type(written: TreeNode, model: ArgumentModel, default: TreeNode | None) -> Finding:
+def _unknown_type(written: tree.TreeNode, model: ArgumentModel, default: tree.TreeNode | None) -> Finding:
     """Return the finding for a type that does not exist; a default with a unit tells which one is meant."""
     finding = unknown_type(NOT_A_CHOICE, written.span, model.type)
-    unit = written_unit(default.text) if isinstance(default, ScalarNode) else None
-    if unit is None or (meant := UNITS[unit].dimension.name) not in TYPES:
+    unit = units.written_unit(default.text) if isinstance(default, tree.ScalarNode) else None
+    if unit is None or (meant := units.UNITS[unit].dimension.name) not in TYPES:
         return finding
     fix = replacement(written.span, model.type, meant, is_safe=False)
     return NOT_A_CHOICE.at(written.span, finding.message, help=f"{DID_YOU_MEAN} '{meant}'?", fix=fix)
@@ -151,15 +130,15 @@ def unknown_type(kind: FindingKind, span: Span, name: str) -> Finding:
     return kind.misspelt(span, message, name, (*TYPES, CHOICE), "types")
 
 
-def read_value(node: TreeNode, expected: Type, name: str, report: Report) -> object:
+def read_value(node: tree.TreeNode, expected: Type, name: str, report: Report) -> object:
     """Return a node as a value of the type `expected`, `BROKEN` after a finding.
 
     Quantities for dimensions, float for `number`, int for `count`, text for words, names and places, bool for flags,
     the node itself for lists, maps and written-out poses.
     """
-    if isinstance(node, ScalarNode) and node.filled is BROKEN:
-        return BROKEN
-    if expected.dimension and expected.dimension != NUMBER:
+    if isinstance(node, tree.ScalarNode) and node.filled is tree.BROKEN:
+        return tree.BROKEN
+    if expected.dimension and expected.dimension != units.NUMBER:
         return _quantity(node, expected.dimension, name, report)
     value = to_plain(node)
     read: object = None
@@ -170,38 +149,38 @@ def read_value(node: TreeNode, expected: Type, name: str, report: Report) -> obj
             read = value
         case TypeKind.FLAG if isinstance(value, bool):
             read = value
-        case TypeKind.TEXT if isinstance(node, ScalarNode) and value is not None:
+        case TypeKind.TEXT if isinstance(node, tree.ScalarNode) and value is not None:
             read = node.text if node.filled is None else value if isinstance(value, Secret) else show(value)
-        case TypeKind.CHOICE if isinstance(node, ScalarNode):
+        case TypeKind.CHOICE if isinstance(node, tree.ScalarNode):
             read = node.text if node.filled is None else value
             if read not in expected.choices:
                 report.add(not_a_choice(node.span, name, node, list(expected.choices)))
-                return BROKEN
+                return tree.BROKEN
         case TypeKind.PLACE | TypeKind.POSE if isinstance(value, str):
             read = value
-        case TypeKind.POSE | TypeKind.MAP if isinstance(node, MappingNode):
+        case TypeKind.POSE | TypeKind.MAP if isinstance(node, tree.MappingNode):
             read = node
-        case TypeKind.LIST if isinstance(node, SequenceNode):
+        case TypeKind.LIST if isinstance(node, tree.SequenceNode):
             read = node
     if read is None:
         must_be = {TypeKind.COUNT: "a whole number, not below 0", TypeKind.FLAG: "true or false"}
         message = f"'{name}' must be {must_be.get(expected.kind, expected.phrase)}"
         report.add(WRONG_TYPE.at(node.span, message, label=describe(value)))
-        return BROKEN
+        return tree.BROKEN
     return read
 
 
-def _quantity(node: TreeNode, dimension: Dimension, name: str, report: Report) -> object:
+def _quantity(node: tree.TreeNode, dimension: units.Dimension, name: str, report: Report) -> object:
     try:
-        return Quantity(to_si(to_plain(node), dimension), dimension)
-    except UnitError as error:
+        return units.Quantity(units.to_si(to_plain(node), dimension), dimension)
+    except units.UnitError as error:
         report.add(unit_finding(error, node, name))
-        return BROKEN
+        return tree.BROKEN
 
 
 def size_of(value: object) -> float:
     """Return a typed value as a number, in SI; what has no size is 0."""
-    if isinstance(value, Quantity):
+    if isinstance(value, units.Quantity):
         return value.value
     return float(value) if isinstance(value, int | float) else 0.0
 
@@ -211,10 +190,10 @@ def show(value: object) -> str:
     match value:
         case bool():
             return "true" if value else "false"
-        case Quantity(value=number, dimension=dimension):
-            return format_quantity(number, dimension)
+        case units.Quantity(value=number, dimension=dimension):
+            return units.format_quantity(number, dimension)
         case int() | float():
-            return format_number(value)
+            return units.format_number(value)
     return str(value)
 
 
@@ -234,13 +213,13 @@ def given_span(given: Span, use: Span) -> GivenSpan:
     return made
 
 
-def decided_at(root: TreeNode, path: KeyPath, otherwise: Span) -> Span:
+def decided_at(root: tree.TreeNode, path: tree.KeyPath, otherwise: Span) -> Span:
     """Return the place of the one value that was given for something at `path` or below it; else another place."""
-    node = at(root, path)
+    node = tree.at(root, path)
     given, waiting = {}, [node] if node is not None else []
     while waiting:
         one = waiting.pop()
-        waiting += (child for _, child in children(one))
+        waiting += (child for _, child in tree.children(one))
         if isinstance(one.span, GivenSpan):
             given[Span(*one.span)] = one.span
     return next(iter(given.values())) if len(given) == 1 else otherwise

@@ -34,6 +34,7 @@ _MOST_NEIGHBOURS = 1000
 _MOST_NAMESAKES = 3
 
 
+@once
 def shown_name(path: Path) -> str:
     """Return the name of a file in findings: relative to the current folder if it is below it, else as it was named."""
     relative = os.path.relpath(path)

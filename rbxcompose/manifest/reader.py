@@ -11,20 +11,9 @@ from pathlib import Path
 from rbxcompose.base.files import NotRegularError, open_regular
 from rbxcompose.base.findings import Edit, Finding, Fix, Severity, Span, kind
 from rbxcompose.base.printable import FORBIDDEN, code_point
+from rbxcompose.manifest import tree
 from rbxcompose.manifest.foreign_words import foreign_text
 from rbxcompose.manifest.slip_registry import NOT_YAML
-from rbxcompose.manifest.tree import (
-    ALL_BYTES,
-    ALL_VALUES,
-    FILE_BYTES,
-    FILES,
-    FILL_TEXT,
-    ScalarNode,
-    TreeNode,
-    children,
-    count,
-    part_span,
-)
 from rbxcompose.manifest.walk import CHARACTER, Walk
 from rbxcompose.manifest.yaml_nodes import TOO_LARGE, compose
 
@@ -34,23 +23,23 @@ _WITH_PASSWORD = re.compile(r"[A-Za-z][A-Za-z0-9+.-]{0,20}://[^\s/:@]{0,60}:(?P<
 _HIDDEN = re.compile(r"\*+|\$.*|<.*>")  # what stands for a password is none
 
 
-def passwords(text: str, root: TreeNode) -> Iterator[Finding]:
+def passwords(text: str, root: tree.TreeNode) -> Iterator[Finding]:
     """Yield a finding for each password in the values of a file; `text` is that of the whole file."""
     if "://" not in text or not _WITH_PASSWORD.search(text):
         return
     waiting = [root]
     while waiting:
         node = waiting.pop()
-        waiting += (child for _, child in children(node))
-        if isinstance(node, ScalarNode):
+        waiting += (child for _, child in tree.children(node))
+        if isinstance(node, tree.ScalarNode):
             yield from _within(node)
 
 
-def _within(scalar: ScalarNode) -> Iterator[Finding]:
+def _within(scalar: tree.ScalarNode) -> Iterator[Finding]:
     for found in _WITH_PASSWORD.finditer(scalar.text):
         if not _HIDDEN.fullmatch(found["password"]):
             yield PASSWORD.at(
-                part_span(scalar, *found.span("password")),
+                tree.part_span(scalar, *found.span("password")),
                 "this address contains a password, which everybody sees who sees this file",
                 help="where a secret is taken, put the whole address into 'secrets/NAME' and write '${secret.NAME}'",
             )
@@ -63,7 +52,7 @@ _ODD_INDENT = re.compile(
     r"^ *([\u00a0\u2000-\u200a\u202f\u205f\u3000])[ \u00a0\u2000-\u200a\u202f\u205f\u3000]*", re.MULTILINE
 )
 INDENT = "  "  # of one level
-ParsedText = tuple[TreeNode | None, list[Finding]]
+ParsedText = tuple[tree.TreeNode | None, list[Finding]]
 
 
 class Texts(dict[str, str]):
@@ -78,13 +67,13 @@ class Texts(dict[str, str]):
         self.parsed = {} if parsed is None else parsed
         self.total_values = 0  # of all uses of these files
 
-    def use(self, shown: str, root: TreeNode) -> Finding | None:
+    def use(self, shown: str, root: tree.TreeNode) -> Finding | None:
         """Count the values of a file that is used once more; return the finding if they are too many."""
-        self.total_values += count(root)
-        if self.total_values <= ALL_VALUES:
+        self.total_values += tree.count(root)
+        if self.total_values <= tree.ALL_VALUES:
             return None
-        help_text = f"a text with '${{...}}' counts as one for each {FILL_TEXT} characters"
-        return TOO_LARGE.at(None, f"with '{shown}' this robot has more than {ALL_VALUES:,} values", help=help_text)
+        help_text = f"a text with '${{...}}' counts as one for each {tree.FILL_TEXT} characters"
+        return TOO_LARGE.at(None, f"with '{shown}' this robot has more than {tree.ALL_VALUES:,} values", help=help_text)
 
 
 def read_file(path: Path, shown: str, sources: MutableMapping[str, str]) -> ParsedText:
@@ -94,7 +83,7 @@ def read_file(path: Path, shown: str, sources: MutableMapping[str, str]) -> Pars
         return None, findings
     if not isinstance(sources, Texts):
         return read_text(text, shown)
-    if sources.total_values > ALL_VALUES:
+    if sources.total_values > tree.ALL_VALUES:
         return None, []  # reported with the file before
     if (shown, text) not in sources.parsed:
         sources.parsed[shown, text] = read_text(text, shown)
@@ -104,7 +93,7 @@ def read_file(path: Path, shown: str, sources: MutableMapping[str, str]) -> Pars
 
 
 def read_source(
-    path: Path, shown: str, sources: MutableMapping[str, str], most: int = FILE_BYTES, what: str = "a manifest"
+    path: Path, shown: str, sources: MutableMapping[str, str], most: int = tree.FILE_BYTES, what: str = "a manifest"
 ) -> tuple[str | None, list[Finding]]:
     """Read the text of one file and enter it into `sources`; return None with findings if it is not text.
 
@@ -119,8 +108,10 @@ def read_source(
 
 
 def _bytes(path: Path, shown: str, sources: MutableMapping[str, str], most: int, what: str) -> bytes | Finding:
-    if len(sources) >= FILES:
-        return TOO_LARGE.at(None, f"'{shown}' would be file number {FILES + 1} of this robot, {FILES} are the limit")
+    if len(sources) >= tree.FILES:
+        return TOO_LARGE.at(
+            None, f"'{shown}' would be file number {tree.FILES + 1} of this robot, {tree.FILES} are the limit"
+        )
     if isinstance(sources, Texts) and path in sources.unsaved:
         data = sources.unsaved[path].encode(errors="surrogatepass")
     elif isinstance(saved := _saved(path, shown, most), Finding):
@@ -129,9 +120,9 @@ def _bytes(path: Path, shown: str, sources: MutableMapping[str, str], most: int,
         data = saved
     if len(data) > most:
         return TOO_LARGE.at(None, f"'{shown}' is larger than {most:,} bytes, the limit of {what}")
-    if sum(map(len, sources.values())) + len(data) > ALL_BYTES:
+    if sum(map(len, sources.values())) + len(data) > tree.ALL_BYTES:
         return TOO_LARGE.at(
-            None, f"with '{shown}' the files of this robot are larger than {ALL_BYTES:,} bytes together"
+            None, f"with '{shown}' the files of this robot are larger than {tree.ALL_BYTES:,} bytes together"
         )
     return data
 
@@ -172,8 +163,8 @@ def read_text(text: str | bytes, file: str, known_tags: Collection[str] = ()) ->
             return None, findings
     elif text.startswith("\ufeff"):
         text = text[1:]
-    if len(text) > FILE_BYTES:
-        return None, [TOO_LARGE.at(None, f"'{file}' is larger than {FILE_BYTES:,} bytes, the limit of a manifest")]
+    if len(text) > tree.FILE_BYTES:
+        return None, [TOO_LARGE.at(None, f"'{file}' is larger than {tree.FILE_BYTES:,} bytes, the limit of a manifest")]
     if foreign := foreign_text(text, file):
         return None, [foreign]
     if findings := list(_trouble_in_characters(text, file)):

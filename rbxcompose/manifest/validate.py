@@ -18,22 +18,12 @@ from rbxcompose.base.expressions.parser import CURLY_QUOTES
 from rbxcompose.base.findings import DID_YOU_MEAN, SIMILAR, Finding, Report, Span, correction, kind, replacement
 from rbxcompose.base.printable import plain
 from rbxcompose.base.units import NUMBER, Quantity, UnitError, format_quantity, parse_quantity
+from rbxcompose.manifest import tree
 from rbxcompose.manifest.foreign_words import CHOICES as FOREIGN_CHOICES
 from rbxcompose.manifest.foreign_words import FOREIGN
 from rbxcompose.manifest.scalars import describe, number_trouble, plain_value
 from rbxcompose.manifest.shapes import alternatives, dimension_at, field_types, keys_at, models_at
 from rbxcompose.manifest.slip_registry import RefusedValue, value_slip
-from rbxcompose.manifest.tree import (
-    BROKEN,
-    KeyPath,
-    MappingNode,
-    ScalarNode,
-    SequenceNode,
-    TreeNode,
-    at,
-    key_span,
-    value_span,
-)
 
 BOUNDS: Mapping[str, tuple[str, str]] = {
     "greater_than": ("greater than", "gt"),
@@ -59,29 +49,29 @@ EXPECTED: Mapping[str, str] = {
 """What a value must be."""
 
 
-def place_of(node: TreeNode, error: ErrorDetails) -> KeyPath:
+def place_of(node: tree.TreeNode, error: ErrorDetails) -> tree.KeyPath:
     """Return the place of an error in the tree, without pydantic's own steps, such as members of a union."""
-    found: KeyPath = ()
+    found: tree.KeyPath = ()
     for step in error["loc"]:
-        if at(node, (*found, step)) is not None:
+        if tree.at(node, (*found, step)) is not None:
             found = (*found, step)
     if error["type"] == "missing":
         found = (*found, error["loc"][-1])
     return found
 
 
-def repaired(data: Any, error: ErrorDetails, node: TreeNode) -> Any:
+def repaired(data: Any, error: ErrorDetails, node: tree.TreeNode) -> Any:
     """Return `data` with one value converted to what a strict field requires: a number to text, a list to a tuple."""
     path, convert = place_of(node, error), _REPAIRS.get(error["type"])
     if convert is None:
         return data
     try:
-        return changed(data, path, lambda value: convert(value, at(node, path)))
+        return changed(data, path, lambda value: convert(value, tree.at(node, path)))
     except (KeyError, IndexError, TypeError):  # the place is not in the data, such as a missing key
         return data
 
 
-def changed(data: Any, path: KeyPath, convert: Callable[[object], object]) -> Any:
+def changed(data: Any, path: tree.KeyPath, convert: Callable[[object], object]) -> Any:
     """Return `data` with the value at `path` converted; the same object if the value stays the same."""
     if not path:
         return convert(data)
@@ -94,22 +84,25 @@ def changed(data: Any, path: KeyPath, convert: Callable[[object], object]) -> An
     return type(data)(inner if index == key else item for index, item in enumerate(data))
 
 
-def _as_text(value: object, node: TreeNode | None) -> object:
+def _as_text(value: object, node: tree.TreeNode | None) -> object:
     if isinstance(value, Quantity):
         return format_quantity(value.value, value.dimension)
-    if isinstance(node, ScalarNode) and node.filled is None and value is not None:
+    if isinstance(node, tree.ScalarNode) and node.filled is None and value is not None:
         return node.text
     return str(value) if isinstance(value, int | float) else value
 
 
-def _as_tuple(value: object, _node: TreeNode | None) -> object:
+def _as_tuple(value: object, _node: tree.TreeNode | None) -> object:
     return tuple(value) if isinstance(value, list) else value
 
 
-_REPAIRS: dict[str, Callable[[object, TreeNode | None], object]] = {"string_type": _as_text, "tuple_type": _as_tuple}
+_REPAIRS: dict[str, Callable[[object, tree.TreeNode | None], object]] = {
+    "string_type": _as_text,
+    "tuple_type": _as_tuple,
+}
 
 
-def about_key(model: Any, loc: KeyPath) -> str:
+def about_key(model: Any, loc: tree.KeyPath) -> str:
     """Return what the key at `loc` below a model is for, as words that follow its name; empty if that is not known."""
     from rbxcompose.base.config import field_docs  # reads source files
 
@@ -118,9 +111,9 @@ def about_key(model: Any, loc: KeyPath) -> str:
     return f": {about[:1].lower()}{about[1:]}".replace("`", "'") if about else ""
 
 
-def _key_above(model: Any, loc: KeyPath, node: TreeNode | None) -> str:
+def _key_above(model: Any, loc: tree.KeyPath, node: tree.TreeNode | None) -> str:
     """Return the key whose named entries the map `node`, at the unknown key `loc`, looks like one of; else nothing."""
-    if not isinstance(node, MappingNode) or not node.entries:
+    if not isinstance(node, tree.MappingNode) or not node.entries:
         return ""
     fields = (pair for cls in models_at(model, loc[:-1]) for pair in field_types(cls).items())
     maps = (
@@ -133,7 +126,7 @@ def _key_above(model: Any, loc: KeyPath, node: TreeNode | None) -> str:
 
 
 def with_cure(
-    finding: Finding, model: Any, loc: KeyPath, node: TreeNode | None, absent: Sequence[str]
+    finding: Finding, model: Any, loc: tree.KeyPath, node: tree.TreeNode | None, absent: Sequence[str]
 ) -> tuple[Finding, str]:
     """Return the finding about an unknown key at `loc` with what to do, and the key that was meant instead, if any.
 
@@ -147,15 +140,15 @@ def with_cure(
     return finding, ""
 
 
-def written_deeper(node: TreeNode, loc: KeyPath) -> set[KeyPath]:
+def written_deeper(node: tree.TreeNode, loc: tree.KeyPath) -> set[tree.KeyPath]:
     """Return where the keys below the unknown key at `loc` would be one level higher."""
-    below = at(node, loc)
-    return {(*loc[:-1], key) for key in below.entries} if isinstance(below, MappingNode) else set()
+    below = tree.at(node, loc)
+    return {(*loc[:-1], key) for key in below.entries} if isinstance(below, tree.MappingNode) else set()
 
 
-def in_straight_quotes(finding: Finding, node: TreeNode | None) -> Finding:
+def in_straight_quotes(finding: Finding, node: tree.TreeNode | None) -> Finding:
     """Return the finding about a refused value; if it is in the quotes of books, with how to write those of YAML."""
-    text = node.text if isinstance(node, ScalarNode) and node.plain else ""
+    text = node.text if isinstance(node, tree.ScalarNode) and node.plain else ""
     if len(text) < len("''") or text[0] not in CURLY_QUOTES or text[-1] not in CURLY_QUOTES:
         return finding
     right = f'"{text.strip(CURLY_QUOTES)}"'
@@ -169,28 +162,28 @@ def in_straight_quotes(finding: Finding, node: TreeNode | None) -> Finding:
 _NOTHING = ("", "~", "null", "Null", "NULL")  # as YAML writes it
 
 
-def help_of_form(model: Any, loc: KeyPath, value: TreeNode | None, error: str) -> str:
+def help_of_form(model: Any, loc: tree.KeyPath, value: tree.TreeNode | None, error: str) -> str:
     """Return the help for a value at `loc` below `model` that pydantic refuses with this error; nothing for most."""
-    if EXPECTED.get(error) == EXPECTED["model_type"] and isinstance(value, SequenceNode):
+    if EXPECTED.get(error) == EXPECTED["model_type"] and isinstance(value, tree.SequenceNode):
         return _as_map(model, loc, value) or (_with_keys(model, loc) if loc else "")
     if EXPECTED.get(error) == EXPECTED["model_type"] and loc and not _is_empty(value):
         return _with_keys(model, loc)
     if EXPECTED.get(error) == EXPECTED["model_type"] and _is_empty(value):
         name = f"'{loc[-1]}: !remove'" if loc else "'!remove' behind the colon"
         return f"write its keys below it; in a profile or an overlay, {name} removes it"
-    if not isinstance(value, ScalarNode) or not loc:
+    if not isinstance(value, tree.ScalarNode) or not loc:
         return ""
     if isinstance(value.filled, Secret):
         return "a secret may stand only in settings that hide it; what is not secret is '${env.NAME}', or written here"
     return _without_unit(model, loc, value) if error.startswith("int_") else ""
 
 
-def _is_empty(value: TreeNode | None) -> bool:
+def _is_empty(value: tree.TreeNode | None) -> bool:
     """Return whether nothing is written there."""
-    return isinstance(value, ScalarNode) and value.plain and value.text in _NOTHING
+    return isinstance(value, tree.ScalarNode) and value.plain and value.text in _NOTHING
 
 
-def _with_keys(model: Any, loc: KeyPath) -> str:
+def _with_keys(model: Any, loc: tree.KeyPath) -> str:
     """Return what a map with the keys looks like that it needs; nothing if it needs none, or there are several."""
     models = models_at(model, loc)
     fields = models[0].model_fields.items() if len(models) == 1 else ()
@@ -198,9 +191,9 @@ def _with_keys(model: Any, loc: KeyPath) -> str:
     return f"write '{loc[-1]}: {{{needed}}}'" if needed else ""
 
 
-def _as_map(model: Any, loc: KeyPath, value: SequenceNode) -> str:
+def _as_map(model: Any, loc: tree.KeyPath, value: tree.SequenceNode) -> str:
     """Return a list of values as a map, in the order of the keys; nothing if there may be other keys."""
-    models, words = models_at(model, loc), [item.text for item in value.items if isinstance(item, ScalarNode)]
+    models, words = models_at(model, loc), [item.text for item in value.items if isinstance(item, tree.ScalarNode)]
     names = list(models[0].model_fields) if len(models) == 1 else []
     if not words or len(words) != len(value.items) or len(words) > len(names):
         return ""
@@ -208,7 +201,7 @@ def _as_map(model: Any, loc: KeyPath, value: SequenceNode) -> str:
     return f"write each value with its key: '{{{shown}}}'"
 
 
-def _without_unit(model: Any, loc: KeyPath, value: ScalarNode) -> str:
+def _without_unit(model: Any, loc: tree.KeyPath, value: tree.ScalarNode) -> str:
     """Return what a number without a unit counts, if one with a unit is written."""
     try:
         if parse_quantity(value.text).dimension == NUMBER:
@@ -234,16 +227,16 @@ _OF_A_MAP = ("missing", "extra_forbidden")  # errors about a key that its map la
 _ROUNDS = 8  # of repairs; each round goes at least one level deeper into a value
 
 
-def to_plain(node: TreeNode) -> object:
+def to_plain(node: tree.TreeNode) -> object:
     """Return plain data: scalars by YAML's core types, filled ones with their typed value, maps and lists of these."""
     match node:
-        case ScalarNode(filled=None):
+        case tree.ScalarNode(filled=None):
             return plain_value(node)
-        case ScalarNode():
+        case tree.ScalarNode():
             return node.filled
-        case SequenceNode(items=items):
+        case tree.SequenceNode(items=items):
             return [to_plain(item) for item in items]
-        case MappingNode(entries=entries):
+        case tree.MappingNode(entries=entries):
             return {name: to_plain(entry.value) for name, entry in entries.items()}
 
 
@@ -264,8 +257,8 @@ def is_valid(model: Any, data: object) -> bool:
 
 def validate(
     model: type[T],
-    node: TreeNode,
-    path: KeyPath,
+    node: tree.TreeNode,
+    path: tree.KeyPath,
     report: Report,
     context: Mapping[str, object] | None = None,
     *,
@@ -293,12 +286,12 @@ def validate(
 
 
 def _findings(
-    model: Any, node: TreeNode, path: KeyPath, errors: list[ErrorDetails], also: tuple[str, ...]
+    model: Any, node: tree.TreeNode, path: tree.KeyPath, errors: list[ErrorDetails], also: tuple[str, ...]
 ) -> Iterator[Finding]:
     """Turn pydantic's errors into findings: one for each place, none for what was reported before."""
     located = [(place_of(node, error), error) for error in errors]
     lacking = {loc for loc, error in located if error["type"] == "missing"}
-    said: set[KeyPath] = set()
+    said: set[tree.KeyPath] = set()
     for loc, error in located:
         if error["type"] == "extra_forbidden":
             known = [*keys_at(model, loc[:-1]), *(() if len(loc) > 1 else also)]
@@ -306,18 +299,18 @@ def _findings(
             slip = _slip(model, node, path, loc, error, finding, known)
             if not slip and not meant:
                 absent = [str(key_path[-1]) for key_path in lacking - said if key_path[:-1] == loc[:-1]]
-                finding, meant = with_cure(finding, model, loc, at(node, loc), absent)
+                finding, meant = with_cure(finding, model, loc, tree.at(node, loc), absent)
             said |= {loc, (*loc[:-1], meant), *(written_deeper(node, loc) & lacking)}  # these are not missing as well
             yield slip or finding
     for loc, error in located:
-        if loc not in said and not is_broken(at(node, loc)):
+        if loc not in said and not is_broken(tree.at(node, loc)):
             said.add(loc)
-            finding = in_straight_quotes(_finding(model, node, path, loc, error), at(node, loc))
+            finding = in_straight_quotes(_finding(model, node, path, loc, error), tree.at(node, loc))
             keys = keys_at(model, loc) if error["type"].startswith("model") else ()
             yield _slip(model, node, path, loc, error, finding, keys) or finding
 
 
-def where(path: KeyPath) -> str:
+def where(path: tree.KeyPath) -> str:
     """Return the name of a map at `path`: "component 'gui'", "'inputs.teleop' of mux 'cmd_vel'"."""
     match path:
         case ():
@@ -330,7 +323,7 @@ def where(path: KeyPath) -> str:
 
 
 def _unknown_key(
-    known: Iterable[str], node: TreeNode, path: KeyPath, loc: KeyPath, lacking: set[KeyPath]
+    known: Iterable[str], node: tree.TreeNode, path: tree.KeyPath, loc: tree.KeyPath, lacking: set[tree.KeyPath]
 ) -> tuple[Finding, str]:
     """Return the finding for an unknown key, and the missing key that it misspells, if any."""
     key = str(loc[-1])
@@ -338,31 +331,31 @@ def _unknown_key(
     is_foreign = FOREIGN.get(key) in missing
     meant = [FOREIGN[key]] if is_foreign else get_close_matches(key, missing, n=1, cutoff=SIMILAR)
     message = f"unknown key '{plain(key, 60)}' in {where((*path, *loc[:-1]))}"
-    above = at(node, loc[:-1])
-    taken = above.entries if isinstance(above, MappingNode) else ()
-    finding = UNKNOWN_KEY.misspelt(key_span(node, loc), message, key, meant or known, KEYS, taken=taken)
+    above = tree.at(node, loc[:-1])
+    taken = above.entries if isinstance(above, tree.MappingNode) else ()
+    finding = UNKNOWN_KEY.misspelt(tree.key_span(node, loc), message, key, meant or known, KEYS, taken=taken)
     return finding, meant[0] if meant else ""
 
 
-def _finding(model: Any, node: TreeNode, path: KeyPath, loc: KeyPath, error: ErrorDetails) -> Finding:
+def _finding(model: Any, node: tree.TreeNode, path: tree.KeyPath, loc: tree.KeyPath, error: ErrorDetails) -> Finding:
     name = _called((*path, *loc))
-    value = at(node, loc)
+    value = tree.at(node, loc)
     context = error.get("ctx", {})
-    span = value_span(node, loc)
+    span = tree.value_span(node, loc)
     is_key = error["loc"][-1:] == ("[key]",)
-    place = key_span(node, loc) if is_key else span
+    place = tree.key_span(node, loc) if is_key else span
     if "valid" not in context and (is_key or error["type"] == "string_pattern_mismatch"):
-        text = value.text if isinstance(value, ScalarNode) and place is span else name
+        text = value.text if isinstance(value, tree.ScalarNode) and place is span else name
         help_text = "lower-case letters, digits and underscores, starting with a letter"
         near = re.sub(r"\W+", "_", text.strip("/ ")).lower()  # ROS 1 began names of topics with a slash
         help_text += f", such as '{near}'" if re.fullmatch(r"[a-z][a-z0-9_]{0,59}", near) else ""
         return BAD_NAME.at(place, f"'{text}' is not a valid name", help=help_text)
     match error["type"]:
         case "missing" if loc and isinstance(loc[-1], int):
-            return WRONG_TYPE.at(value_span(node, loc[:-1]), f"{where((*path, *loc[:-1]))} needs another item")
+            return WRONG_TYPE.at(tree.value_span(node, loc[:-1]), f"{where((*path, *loc[:-1]))} needs another item")
         case "missing":
             message, about = f"{where((*path, *loc[:-1]))} needs the key '{name}'", about_key(model, loc)
-            return MISSING_KEY.at(key_span(node, loc[:-1]), message, help=f"add '{name}: ...'{about}")
+            return MISSING_KEY.at(tree.key_span(node, loc[:-1]), message, help=f"add '{name}: ...'{about}")
         case "literal_error" | "enum":
             choices = re.findall(r"'([^']*)'|(\d+)", str(context.get("expected", "")))
             return not_a_choice(span, name, value, ["".join(choice) for choice in choices])
@@ -397,9 +390,9 @@ def _finding(model: Any, node: TreeNode, path: KeyPath, loc: KeyPath, error: Err
     return WRONG_TYPE.at(span, f"'{name}': {error['msg'][:1].lower()}{error['msg'][1:]}", label=label_of(value))
 
 
-def not_a_choice(span: Span, name: str, value: TreeNode | None, choices: list[str]) -> Finding:
+def not_a_choice(span: Span, name: str, value: tree.TreeNode | None, choices: list[str]) -> Finding:
     """Return the finding for a value that is not one of the few words that its key accepts."""
-    written = str(value.text if value.filled is None else value.filled) if isinstance(value, ScalarNode) else ""
+    written = str(value.text if value.filled is None else value.filled) if isinstance(value, tree.ScalarNode) else ""
     if (ours := FOREIGN_CHOICES.get(written)) in choices:
         message = f"'{name}' must be one of {', '.join(choices)}"
         return NOT_A_CHOICE.at(span, message, help=f"{DID_YOU_MEAN} '{ours}'?")
@@ -412,46 +405,46 @@ def not_a_choice(span: Span, name: str, value: TreeNode | None, choices: list[st
     return finding if is_near else replace(finding, help="")  # the message lists all of them
 
 
-def _called(path: KeyPath) -> str:
+def _called(path: tree.KeyPath) -> str:
     """Return the name of a value: its key, or its list and index."""
     *above, last = path or ("this file",)
     return f"{above[-1]}[{last}]" if isinstance(last, int) and above else str(last)
 
 
-def is_broken(node: TreeNode | None) -> bool:
+def is_broken(node: tree.TreeNode | None) -> bool:
     """Return whether a value could not be filled in or is a rejected number, both of which were reported."""
-    return isinstance(node, ScalarNode) and (
-        node.filled is BROKEN or (node.filled is None and bool(number_trouble(node)))
+    return isinstance(node, tree.ScalarNode) and (
+        node.filled is tree.BROKEN or (node.filled is None and bool(number_trouble(node)))
     )
 
 
-def label_of(node: TreeNode | None) -> str:
+def label_of(node: tree.TreeNode | None) -> str:
     """Return what a node is, for the label of a finding: "this is text"."""
-    if isinstance(node, ScalarNode) and isinstance(node.filled, Quantity):
+    if isinstance(node, tree.ScalarNode) and isinstance(node.filled, Quantity):
         return f"this is {node.filled.dimension.phrase}"
     return describe(to_plain(node)) if node is not None else ""
 
 
-def unit_finding(error: UnitError, node: TreeNode, name: str) -> Finding:
+def unit_finding(error: UnitError, node: tree.TreeNode, name: str) -> Finding:
     """Return the finding for a value that is not the required quantity."""
     # If it does not even look like a number, what is wrong with the number is no use.
-    is_word = isinstance(node, ScalarNode) and node.filled is None and node.text[:1] not in "+-.0123456789"
+    is_word = isinstance(node, tree.ScalarNode) and node.filled is None and node.text[:1] not in "+-.0123456789"
     label = label_of(node) if is_word or not error.detail else error.detail
     return WRONG_TYPE.at(node.span, f"'{name}' {error.message}", label=label, help=error.help)
 
 
 def _slip(
     model: Any,
-    node: TreeNode,
-    path: KeyPath,
-    loc: KeyPath,
+    node: tree.TreeNode,
+    path: tree.KeyPath,
+    loc: tree.KeyPath,
     error: ErrorDetails,
     finding: Finding,
     keys: Sequence[str] = (),
 ) -> Finding | None:
     """Return the finding about a slip, if the model accepts what was probably meant."""
     refused_at = loc[:-1] if error["type"] in _OF_A_MAP else loc
-    written = at(node, refused_at)
+    written = tree.at(node, refused_at)
     if written is None:
         return None
     for slip in value_slip.at(error["type"]):
@@ -461,11 +454,11 @@ def _slip(
     return None
 
 
-def _with(data: object, path: KeyPath, value: object) -> object:
+def _with(data: object, path: tree.KeyPath, value: object) -> object:
     return changed(data, path, lambda _: value)
 
 
-def _takes(model: Any, data: object, loc: KeyPath) -> bool:
+def _takes(model: Any, data: object, loc: tree.KeyPath) -> bool:
     """Return whether a model accepts the value at `loc`."""
     try:
         adapter(model).validate_python(data)

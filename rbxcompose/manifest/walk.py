@@ -15,22 +15,10 @@ import yaml
 
 from rbxcompose.base.findings import Finding, Related, Severity, Span, kind, replacement
 from rbxcompose.base.printable import FORBIDDEN, code_point, plain
+from rbxcompose.manifest import tree
 from rbxcompose.manifest.foreign_words import help_for_tag
 from rbxcompose.manifest.scalars import number_trouble
 from rbxcompose.manifest.slip_registry import QUOTE_HELP, QUOTES_NEEDED
-from rbxcompose.manifest.tree import (
-    ALIAS_NODES,
-    BROKEN,
-    DEPTH,
-    KEY,
-    KEYS,
-    TEXT,
-    Entry,
-    MappingNode,
-    ScalarNode,
-    SequenceNode,
-    TreeNode,
-)
 from rbxcompose.manifest.yaml_nodes import TOO_LARGE
 
 TWICE = kind("RBX1104")
@@ -69,7 +57,9 @@ class Walk:
         self.may_tag = "!" in text
         self.known_tags = known_tags
         self.findings: list[Finding] = []
-        self._done: dict[int, tuple[TreeNode, int, int]] = {}  # by id: the node, how many nodes it has, how deep it is
+        self._done: dict[
+            int, tuple[tree.TreeNode, int, int]
+        ] = {}  # by id: the node, how many nodes it has, how deep it is
         self._open: set[int] = set()  # ids of the nodes being walked, from the root to the current one
         self._alias_nodes = 0
 
@@ -78,16 +68,16 @@ class Walk:
         if len(self.findings) < _MOST_FINDINGS:
             self.findings.append(finding)
 
-    def node(self, node: yaml.Node) -> TreeNode:
+    def node(self, node: yaml.Node) -> tree.TreeNode:
         """Return a node with all below it; a second visit is an alias and is counted."""
         return self._visit(node)[0]
 
-    def _visit(self, node: yaml.Node) -> tuple[TreeNode, int, int]:
+    def _visit(self, node: yaml.Node) -> tuple[tree.TreeNode, int, int]:
         if not self.may_repeat:
             return self._read(node)
         if id(node) in self._open:
             self._refuse_alias(node, "this alias leads back to what contains it")
-            return MappingNode({}, span_of(node, self.file)), 1, 1
+            return tree.MappingNode({}, span_of(node, self.file)), 1, 1
         if (done := self._done.get(id(node))) is not None:
             return self._repeat(node, done)
         self._open.add(id(node))
@@ -101,16 +91,16 @@ class Walk:
         index = node.start_mark.index
         return self.text[index : index + 1]
 
-    def _repeat(self, node: yaml.Node, done: tuple[TreeNode, int, int]) -> tuple[TreeNode, int, int]:
+    def _repeat(self, node: yaml.Node, done: tuple[tree.TreeNode, int, int]) -> tuple[tree.TreeNode, int, int]:
         _, size, height = done
         self._alias_nodes += size
-        if self._alias_nodes > ALIAS_NODES:
-            self._refuse_alias(node, f"the aliases of this file repeat more than {ALIAS_NODES:,} values")
-        elif len(self._open) + height > DEPTH:
-            self._refuse_alias(node, f"with its aliases values are nested more than {DEPTH} levels deep")
+        if self._alias_nodes > tree.ALIAS_NODES:
+            self._refuse_alias(node, f"the aliases of this file repeat more than {tree.ALIAS_NODES:,} values")
+        elif len(self._open) + height > tree.DEPTH:
+            self._refuse_alias(node, f"with its aliases values are nested more than {tree.DEPTH} levels deep")
         else:
             return done
-        return MappingNode({}, span_of(node, self.file)), 1, 1
+        return tree.MappingNode({}, span_of(node, self.file)), 1, 1
 
     def _refuse_alias(self, node: yaml.Node, message: str) -> None:
         if not any(finding.code == ALIAS.code for finding in self.findings):  # a single bomb makes thousands of them
@@ -130,15 +120,15 @@ class Walk:
                 return Span(self.file, start.line + 1, start.column + 1, end.line + 1, end.column + 1), anchor
         return anchor, anchor
 
-    def _read(self, node: yaml.Node) -> tuple[TreeNode, int, int]:
+    def _read(self, node: yaml.Node) -> tuple[tree.TreeNode, int, int]:
         tag = self._tag(node) if self.may_tag else ""
         if tag == REMOVE:
-            return MappingNode({}, span_of(node, self.file), REMOVE), 1, 1
+            return tree.MappingNode({}, span_of(node, self.file), REMOVE), 1, 1
         kept = "" if tag == _UNKNOWN else tag
         match node:
             case yaml.ScalarNode():
                 scalar = self._scalar(node)
-                return replace(scalar, filled=BROKEN) if tag == _UNKNOWN else scalar, 1, 1
+                return replace(scalar, filled=tree.BROKEN) if tag == _UNKNOWN else scalar, 1, 1
             case yaml.SequenceNode():
                 return self._sequence(node, kept)
             case yaml.MappingNode():
@@ -161,11 +151,11 @@ class Walk:
         self.add(TAG.at(span_of(node, self.file), message, help=help_text))
         return _UNKNOWN
 
-    def _scalar(self, node: yaml.ScalarNode) -> ScalarNode:
-        scalar = ScalarNode(node.value, span_of(node, self.file), not node.style)
+    def _scalar(self, node: yaml.ScalarNode) -> tree.ScalarNode:
+        scalar = tree.ScalarNode(node.value, span_of(node, self.file), not node.style)
         text = scalar.text
-        if len(text) > TEXT:
-            message = f"this text has {len(text):,} characters, {TEXT:,} are the limit"
+        if len(text) > tree.TEXT:
+            message = f"this text has {len(text):,} characters, {tree.TEXT:,} are the limit"
             self.add(TOO_LARGE.at(scalar.span, message))
         if not text.isprintable() and (found := FORBIDDEN.search(text)):
             message = f"this text contains the invisible character {code_point(found.group())}"
@@ -174,9 +164,9 @@ class Walk:
             self.add(NUMBER.at(scalar.span, f"this number {trouble}"))
         return scalar
 
-    def _check_comment(self, value: TreeNode) -> None:
+    def _check_comment(self, value: tree.TreeNode) -> None:
         span = value.span
-        line = self.commented.get(span.end_line) if isinstance(value, ScalarNode) and value.plain else None
+        line = self.commented.get(span.end_line) if isinstance(value, tree.ScalarNode) and value.plain else None
         if line is not None and (found := _SWALLOWED.match(line, span.end_column - 1)):
             start, end = found.span(1)
             place = Span(self.file, span.end_line, start + 1, span.end_line, end + 1)
@@ -193,7 +183,7 @@ class Walk:
                 self.add(QUOTES_NEEDED.at(span, message, label=QUOTE_HELP))
                 return
 
-    def _sequence(self, node: yaml.SequenceNode, tag: str) -> tuple[TreeNode, int, int]:
+    def _sequence(self, node: yaml.SequenceNode, tag: str) -> tuple[tree.TreeNode, int, int]:
         if node.flow_style:
             self._check_cut(node.value)
         items, size, height = [], 1, 0
@@ -203,20 +193,20 @@ class Walk:
             items.append(item)
             size += item_size
             height = max(height, item_height)
-        return SequenceNode(tuple(items), span_of(node, self.file), tag), size, height + 1
+        return tree.SequenceNode(tuple(items), span_of(node, self.file), tag), size, height + 1
 
-    def _mapping(self, node: yaml.MappingNode, tag: str) -> tuple[TreeNode, int, int]:
-        own: dict[str, Entry] = {}
-        merged: dict[str, Entry] = {}
+    def _mapping(self, node: yaml.MappingNode, tag: str) -> tuple[tree.TreeNode, int, int]:
+        own: dict[str, tree.Entry] = {}
+        merged: dict[str, tree.Entry] = {}
         size, height = 1, 0
         cut = len(self.findings)
         if node.flow_style:
             self._check_cut([part for pair in node.value for part in pair])
         is_cut = len(self.findings) > cut
-        if len(node.value) > KEYS:
-            last = span_of(node.value[KEYS][0], self.file)
-            self.add(TOO_LARGE.at(last, f"more than {KEYS:,} keys in one map; those from here on are not read"))
-        for key_node, value_node in node.value[:KEYS]:
+        if len(node.value) > tree.KEYS:
+            last = span_of(node.value[tree.KEYS][0], self.file)
+            self.add(TOO_LARGE.at(last, f"more than {tree.KEYS:,} keys in one map; those from here on are not read"))
+        for key_node, value_node in node.value[: tree.KEYS]:
             value, value_size, value_height = self._visit(value_node)
             size += value_size + 1
             height = max(height, value_height)
@@ -226,15 +216,17 @@ class Walk:
             key = self._key(key_node)
             if key is None:
                 continue
-            entry: Entry | None = Entry(key, value)
+            entry: tree.Entry | None = tree.Entry(key, value)
             if node.flow_style and not is_cut and self._is_missing(value) and not self._has_colon(key_node):
                 entry = self._without_value(key, value, is_first=not own, is_alone=len(node.value) == 1)
             if entry is not None:
                 self._check_comment(entry.value)
                 self._enter(own, entry)
-        return MappingNode({**merged, **own}, span_of(node, self.file), tag), size + len(merged), height + 1
+        return tree.MappingNode({**merged, **own}, span_of(node, self.file), tag), size + len(merged), height + 1
 
-    def _without_value(self, key: ScalarNode, value: TreeNode, *, is_first: bool, is_alone: bool) -> Entry | None:
+    def _without_value(
+        self, key: tree.ScalarNode, value: tree.TreeNode, *, is_first: bool, is_alone: bool
+    ) -> tree.Entry | None:
         """Report a key inside `{}` that has no value; return what was meant: of `x:1`, the key and its value."""
         if key.plain and (tight := _TIGHT.match(key.text)):
             middle = key.span.column + tight.end(1)
@@ -242,7 +234,7 @@ class Walk:
             fix = replacement(before, tight[1], f"{tight[1]} ")
             self.add(NOT_A_KEY.at(before, "a space is missing after this colon", help="write 'key: value'", fix=fix))
             meant = replace(key, text=key.text[tight.end(1) :], span=key.span._replace(column=middle))
-            return Entry(replace(key, text=tight[1][:-1], span=before), meant)
+            return tree.Entry(replace(key, text=tight[1][:-1], span=before), meant)
         if key.plain and not is_first and " " in key.text:  # no key of ours has a space
             help_text = "inside {} and [] a comma ends a text: put quotes around the whole text"
             self.add(QUOTES_NEEDED.at(key.span, "this was cut off from the text before it", help=help_text))
@@ -250,16 +242,16 @@ class Walk:
         alone = f"; for the value of a name in a mission, write '${key.text}'" if is_alone else ""
         help_text = f"inside {{}}, each key needs a value: 'key: value'{plain(alone, 120)}"
         self.add(NOT_A_KEY.at(key.span, f"'{plain(key.text, 60)}' has no value", help=help_text))
-        return Entry(key, value)
+        return tree.Entry(key, value)
 
     def _has_colon(self, key: yaml.Node) -> bool:
         """Return whether a colon follows a key, so that its value was left out on purpose."""
         return self.text[key.end_mark.index : key.end_mark.index + 80].lstrip().startswith(":")
 
-    def _is_missing(self, value: TreeNode) -> bool:
-        return isinstance(value, ScalarNode) and value.plain and not value.text
+    def _is_missing(self, value: tree.TreeNode) -> bool:
+        return isinstance(value, tree.ScalarNode) and value.plain and not value.text
 
-    def _key(self, node: yaml.Node) -> ScalarNode | None:
+    def _key(self, node: yaml.Node) -> tree.ScalarNode | None:
         if self.may_tag:
             self._tag(node)
         if not isinstance(node, yaml.ScalarNode):
@@ -267,31 +259,31 @@ class Walk:
             self.add(NOT_A_KEY.at(span_of(node, self.file), "a key is one word", help=help_text))
             return None
         key = self._scalar(node)
-        if len(key.text) > KEY:
-            message = f"this key has {len(key.text):,} characters, {KEY} are the limit"
+        if len(key.text) > tree.KEY:
+            message = f"this key has {len(key.text):,} characters, {tree.KEY} are the limit"
             self.add(TOO_LARGE.at(key.span, message))
         if not key.text:
             self.add(NOT_A_KEY.at(key.span, "a key is missing before the colon"))
         return key
 
-    def _enter(self, entries: dict[str, Entry], entry: Entry) -> None:
+    def _enter(self, entries: dict[str, tree.Entry], entry: tree.Entry) -> None:
         first = entries.setdefault(entry.key.text, entry)
         if first is not entry:
             related = [Related(first.key.span, "the first")]
             message = f"the key '{plain(entry.key.text, 60)}' is written twice"
             self.add(TWICE.at(entry.key.span, message, label="the second", related=related))
 
-    def _merge(self, merged: dict[str, Entry], value: TreeNode, node: yaml.Node, span: Span) -> None:
+    def _merge(self, merged: dict[str, tree.Entry], value: tree.TreeNode, node: yaml.Node, span: Span) -> None:
         """Add the entries of the map or maps that `<<` names; the earlier one wins."""
-        sources = value.items if isinstance(value, SequenceNode) else (value,)
+        sources = value.items if isinstance(value, tree.SequenceNode) else (value,)
         for source in sources:
-            if not isinstance(source, MappingNode):
-                related = [Related(span_of(node, self.file), "this is none")]
+            if not isinstance(source, tree.MappingNode):
+                related = [Related(span_of(node, self.file), "this is no map")]
                 self.add(ALIAS.at(span, "'<<' takes a map, or a list of maps", related=related))
                 return
             self._alias_nodes += len(source.entries)
-            if self._alias_nodes > ALIAS_NODES:
-                self._refuse_alias(node, f"the aliases of this file repeat more than {ALIAS_NODES:,} values")
+            if self._alias_nodes > tree.ALIAS_NODES:
+                self._refuse_alias(node, f"the aliases of this file repeat more than {tree.ALIAS_NODES:,} values")
                 return
             for name, entry in source.entries.items():
                 merged.setdefault(name, entry)

@@ -10,20 +10,15 @@ from types import new_class
 from typing import Any, ClassVar, ForwardRef
 
 from rbxcompose.base.dataclass import dataclass
+from rbxcompose.msgs import definitions
 from rbxcompose.msgs.arrays import ArrayMessage, holds_numbers, zeros
-from rbxcompose.msgs.definitions import (
-    FLOATS,
-    OCTETS,
-    FieldDefinition,
-    FieldShape,
-    FieldType,
-    Structure,
-    attribute,
-    type_hash,
-)
 from rbxcompose.msgs.types import Action, Message, Service, declared
 
-_ZEROS: Mapping[str, Any] = {"string": "", "bool": False, **dict.fromkeys(FLOATS, 0.0)}  # other numbers are integers
+_ZEROS: Mapping[str, Any] = {
+    "string": "",
+    "bool": False,
+    **dict.fromkeys(definitions.FLOATS, 0.0),
+}  # other numbers are integers
 _lock = RLock()  # two threads must not make two classes of one interface
 
 
@@ -38,7 +33,7 @@ def class_path(name: str, known: Container[str]) -> str:
     return f"{bare}Message" if is_shared else bare.replace("_", ".")
 
 
-def make_class(name: str, structures: Mapping[str, Structure], home: str = "rbxcompose.msgs") -> type[Any]:
+def make_class(name: str, structures: Mapping[str, definitions.Structure], home: str = "rbxcompose.msgs") -> type[Any]:
     """Return the class of an interface, such as `std_srvs/srv/SetBool`; made at the first call.
 
     `structures` has those of the interface and of all messages inside it, whose classes are made as well. A class
@@ -54,7 +49,7 @@ def make_class(name: str, structures: Mapping[str, Structure], home: str = "rbxc
 class _Maker:
     """Makes the classes of one interface."""
 
-    def __init__(self, name: str, structures: Mapping[str, Structure], home: str) -> None:
+    def __init__(self, name: str, structures: Mapping[str, definitions.Structure], home: str) -> None:
         self._name = name
         self._structures = structures
         self._home = home
@@ -92,7 +87,7 @@ class _Maker:
 
     def _message(self, name: str, doc: str) -> type[Any]:
         structure = self._structures[name]
-        fields = {attribute(definition.name): self._field(definition) for definition in structure.fields}
+        fields = {definitions.attribute(definition.name): self._field(definition) for definition in structure.fields}
         constants = {constant.name: constant.value for constant in structure.constants}
         has_arrays = any(holds_numbers(definition.type) for definition in structure.fields)
         annotations = {
@@ -126,26 +121,26 @@ class _Maker:
     def _path(self, name: str) -> str:
         return class_path(name, self._structures)
 
-    def _field(self, definition: FieldDefinition) -> tuple[Any, Any]:
+    def _field(self, definition: definitions.FieldDefinition) -> tuple[Any, Any]:
         """Return the annotation and the default value of a field."""
         type_ = definition.type
-        least = type_.length if type_.shape is FieldShape.ARRAY else 0
+        least = type_.length if type_.shape is definitions.FieldShape.ARRAY else 0
         if holds_numbers(type_):
             # Not the type itself, since numpy is imported when the first array is made.
             return ForwardRef(f"NDArray[np.{type_.base}]"), field(default_factory=partial(zeros, type_.base, least))
-        if type_.shape is not FieldShape.SINGLE and type_.base in OCTETS:
+        if type_.shape is not definitions.FieldShape.SINGLE and type_.base in definitions.OCTETS:
             return bytes, bytes(least)
         if type_.is_message:
             return self._nested(type_, least)
         value = _ZEROS.get(type_.base, 0) if definition.default is None else definition.default
-        if type_.shape is FieldShape.SINGLE:
+        if type_.shape is definitions.FieldShape.SINGLE:
             return type(value), value
         return tuple[type(value), ...], (value,) * least  # type: ignore[misc]
 
-    def _nested(self, type_: FieldType, least: int) -> tuple[Any, Any]:
+    def _nested(self, type_: definitions.FieldType, least: int) -> tuple[Any, Any]:
         # A part of a service or an action is made before what holds it.
         made: Any = declared.get(type_.base) or make_class(type_.base, self._structures, self._home)
-        if type_.shape is FieldShape.SINGLE:
+        if type_.shape is definitions.FieldShape.SINGLE:
             return made, field(default_factory=made)
         repeated: Callable[[], Any] = lambda: (made(),) * least  # noqa: E731
         return tuple[made, ...], field(default_factory=repeated) if least else ()
@@ -154,9 +149,9 @@ class _Maker:
 class _TypeHash:
     """The type hash of a class, computed when it is first read."""
 
-    def __init__(self, structures: Mapping[str, Structure]) -> None:
+    def __init__(self, structures: Mapping[str, definitions.Structure]) -> None:
         self._structures = structures
 
     def __get__(self, instance: object, owner: Any) -> str:
-        owner.HASH = type_hash(owner.TYPE, self._structures)
+        owner.HASH = definitions.type_hash(owner.TYPE, self._structures)
         return str(owner.HASH)

@@ -7,17 +7,8 @@ from math import isfinite
 from operator import attrgetter
 from typing import Any
 
+from rbxcompose.base import units
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.units import (
-    ACCELERATION,
-    ANGULAR_ACCELERATION,
-    ANGULAR_SPEED,
-    FORCE,
-    LENGTH,
-    SPEED,
-    TORQUE,
-    Dimension,
-)
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.arrays import holds_numbers
 from rbxcompose.msgs.definitions import FLOATS, FieldShape, FieldType, attribute, parse_type
@@ -52,23 +43,23 @@ def field_type(message: str, path: str) -> FieldType:
     return field_type(found.base, ".".join(others))
 
 
-Measures = Mapping[str, "Dimension | Measures | None"]
+Measures = Mapping[str, "units.Dimension | Measures | None"]
 """What numbers of a message measure, by field: a map for a nested message, None for what depends on other fields."""
 _GEOMETRY = "geometry_msgs/msg/"
-_MEASURES: Mapping[tuple[str, str], Dimension] = {
-    (f"{_GEOMETRY}Twist", "linear"): SPEED,
-    (f"{_GEOMETRY}Twist", "angular"): ANGULAR_SPEED,
-    (f"{_GEOMETRY}Accel", "linear"): ACCELERATION,
-    (f"{_GEOMETRY}Accel", "angular"): ANGULAR_ACCELERATION,
-    (f"{_GEOMETRY}Wrench", "force"): FORCE,
-    (f"{_GEOMETRY}Wrench", "torque"): TORQUE,
-    (f"{_GEOMETRY}Pose", "position"): LENGTH,
-    (f"{_GEOMETRY}Transform", "translation"): LENGTH,
-    **{(f"{_GEOMETRY}Point", axis): LENGTH for axis in "xyz"},
+_MEASURES: Mapping[tuple[str, str], units.Dimension] = {
+    (f"{_GEOMETRY}Twist", "linear"): units.SPEED,
+    (f"{_GEOMETRY}Twist", "angular"): units.ANGULAR_SPEED,
+    (f"{_GEOMETRY}Accel", "linear"): units.ACCELERATION,
+    (f"{_GEOMETRY}Accel", "angular"): units.ANGULAR_ACCELERATION,
+    (f"{_GEOMETRY}Wrench", "force"): units.FORCE,
+    (f"{_GEOMETRY}Wrench", "torque"): units.TORQUE,
+    (f"{_GEOMETRY}Pose", "position"): units.LENGTH,
+    (f"{_GEOMETRY}Transform", "translation"): units.LENGTH,
+    **{(f"{_GEOMETRY}Point", axis): units.LENGTH for axis in "xyz"},
 }
 
 
-def measure_of(message: str, field: str) -> Dimension | None:
+def measure_of(message: str, field: str) -> units.Dimension | None:
     """Return what a field of a message, and all below it, measures; None if that is not known."""
     return _MEASURES.get((message, field))
 
@@ -86,7 +77,7 @@ class ArrayEntries:
 
     names: str
     values: str
-    each: Mapping[str, Dimension]
+    each: Mapping[str, units.Dimension]
     instead: str = ""
 
     def require_in(self, message: type[Message]) -> None:
@@ -163,9 +154,7 @@ def _collect(message: type[Message], prefix: str, singles: list[str], others: li
 def _test_of_many(type_: FieldType) -> Test | None:
     if type_.is_message:
         return lambda values: all(map(is_finite, values))
-    if holds_numbers(type_) and type_.base in FLOATS:
-        return _is_finite_array
-    return None
+    return _is_finite_array if holds_numbers(type_) and type_.base in FLOATS else None
 
 
 def _all_finite(values: tuple[float, ...]) -> bool:

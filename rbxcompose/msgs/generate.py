@@ -9,25 +9,9 @@ import json
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
+from rbxcompose.msgs import definitions
 from rbxcompose.msgs.arrays import holds_numbers
 from rbxcompose.msgs.classes import class_path
-from rbxcompose.msgs.definitions import (
-    FLOATS,
-    INTERFACES,
-    KINDS,
-    OCTETS,
-    Constant,
-    FieldDefinition,
-    FieldShape,
-    FieldType,
-    Structure,
-    Value,
-    attribute,
-    interface_names,
-    parts,
-    read,
-    type_hash,
-)
 
 INDENT = "    "
 LONGEST = 120  # letters of a line
@@ -36,13 +20,17 @@ DATACLASS = "rbxcompose.base.dataclass"
 ARRAYS = "rbxcompose.msgs.arrays"
 
 
-def all_structures(root: Path = INTERFACES) -> dict[str, Structure]:
+def all_structures(root: Path = definitions.INTERFACES) -> dict[str, definitions.Structure]:
     """Return every structure that the texts below `root` define, by name."""
-    names = [name for kind in KINDS for name in interface_names(kind, root)]
-    return {part: structure for name in names for part, structure in parts(name, read(name, root)).items()}
+    names = [name for kind in definitions.KINDS for name in definitions.interface_names(kind, root)]
+    return {
+        part: structure
+        for name in names
+        for part, structure in definitions.parts(name, definitions.read(name, root)).items()
+    }
 
 
-def modules(structures: Mapping[str, Structure]) -> dict[str, str]:
+def modules(structures: Mapping[str, definitions.Structure]) -> dict[str, str]:
     """Return the Python text of each package."""
     packages = sorted({name.split("/")[0] for name in structures})
     return {package: _Module(package, structures).text() for package in packages}
@@ -51,7 +39,7 @@ def modules(structures: Mapping[str, Structure]) -> dict[str, str]:
 class _Module:
     """Writes the module of one package and tracks its imports."""
 
-    def __init__(self, package: str, structures: Mapping[str, Structure]) -> None:
+    def __init__(self, package: str, structures: Mapping[str, definitions.Structure]) -> None:
         self.package = package
         self.structures = structures
         self.packages: set[str] = set()
@@ -64,7 +52,7 @@ class _Module:
     def _in_order(self) -> list[str]:
         """Return the interfaces of the package in an order in which each one follows the messages inside it."""
         names = sorted(
-            name for name in self.structures if name.startswith(f"{self.package}/") and "_" not in _bare(name)
+            name for name in self.structures if name.startswith(f"{self.package}/") and "_" not in name.split("/")[2]
         )
         ordered: dict[str, None] = {}
 
@@ -157,9 +145,9 @@ class _Module:
         yield f'"""{doc}"""'
         yield ""
         yield f'TYPE: {self._use("ClassVar", "typing")}[str] = "{name}"'
-        yield f'HASH: ClassVar[str] = "{type_hash(name, self.structures)}"'
+        yield f'HASH: ClassVar[str] = "{definitions.type_hash(name, self.structures)}"'
 
-    def _fields_by_name(self, structure: Structure) -> Iterator[str]:
+    def _fields_by_name(self, structure: definitions.Structure) -> Iterator[str]:
         start = f"FIELDS: ClassVar[{self._use('Fields', TYPES)}] = {{"
         if not structure.fields:
             yield start + "}"
@@ -168,29 +156,29 @@ class _Module:
         yield from _indented(f'"{field.name}": "{field.type}",' for field in structure.fields)
         yield "}"
 
-    def _constant(self, constant: Constant) -> str:
+    def _constant(self, constant: definitions.Constant) -> str:
         value = _literal(constant.value)
         return _commented(f"{constant.name}: ClassVar[{type(constant.value).__name__}] = {value}", constant.comment)
 
-    def _field(self, field: FieldDefinition) -> str:
+    def _field(self, field: definitions.FieldDefinition) -> str:
         python_type, default = self._python(field.type)
         if field.default is not None:
             default = _literal(field.default)
-        line = _commented(f"{attribute(field.name)}: {python_type} = {default}", field.comment)
+        line = _commented(f"{definitions.attribute(field.name)}: {python_type} = {default}", field.comment)
         if len(line) <= LONGEST - len(INDENT) or field.comment:
             return line
         return line.replace("field(", f"field(\n{INDENT}{INDENT}").removesuffix(")") + f"\n{INDENT})"
 
-    def _python(self, type_: FieldType) -> tuple[str, str]:
+    def _python(self, type_: definitions.FieldType) -> tuple[str, str]:
         """Return the annotation and the default value of a field."""
         if holds_numbers(type_):
             self._use("TYPE_CHECKING", "typing")
             zeros = f'{self._use("zeros", ARRAYS)}("{type_.base}", {_least(type_)})'
             return f"NDArray[np.{type_.base}]", self._made_by(f"lambda: {zeros}")
-        if type_.shape is not FieldShape.SINGLE and type_.base in OCTETS:
+        if type_.shape is not definitions.FieldShape.SINGLE and type_.base in definitions.OCTETS:
             return "bytes", f"bytes({_least(type_)})" if _least(type_) else 'b""'
         text, default = self._python_single(type_)
-        if type_.shape is FieldShape.SINGLE:
+        if type_.shape is definitions.FieldShape.SINGLE:
             return text, self._made_by(default) if type_.is_message else default
         if not _least(type_):
             return f"tuple[{text}, ...]", "()"
@@ -200,7 +188,7 @@ class _Module:
             )
         return f"tuple[{text}, ...]", f"({default},) * {type_.length}"
 
-    def _python_single(self, type_: FieldType) -> tuple[str, str]:
+    def _python_single(self, type_: definitions.FieldType) -> tuple[str, str]:
         """Return the annotation of one value and its zero; for a message, a factory."""
         match type_.base:
             case "string":
@@ -208,7 +196,7 @@ class _Module:
             case "bool":
                 return "bool", "False"
             case number if not type_.is_message:
-                return ("float", "0.0") if number in FLOATS else ("int", "0")
+                return ("float", "0.0") if number in definitions.FLOATS else ("int", "0")
         package = type_.base.split("/")[0]
         path = self._path(type_.base)
         if package != self.package:
@@ -221,15 +209,11 @@ class _Module:
         return f"{self._use('field', 'dataclasses')}(default_factory={factory})"
 
 
-def _bare(name: str) -> str:
-    return name.split("/")[2]
+def _least(type_: definitions.FieldType) -> int:
+    return type_.length if type_.shape is definitions.FieldShape.ARRAY else 0
 
 
-def _least(type_: FieldType) -> int:
-    return type_.length if type_.shape is FieldShape.ARRAY else 0
-
-
-def _literal(value: Value) -> str:
+def _literal(value: definitions.Value) -> str:
     return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
 
 

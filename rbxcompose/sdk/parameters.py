@@ -21,75 +21,65 @@ from rbxcompose.base.expressions.types import COUNT, FLAG, TEXT, Type, choice_of
 from rbxcompose.base.findings import suggest
 from rbxcompose.base.units import NUMBER, RATIO, UNITS, Dimension, Quantity, UnitError, format_number, format_quantity
 from rbxcompose.manifest.written import is_nearly, rounder_unit
+from rbxcompose.msgs import rcl_interfaces
 from rbxcompose.msgs.cdr import decode, encode
 from rbxcompose.msgs.rbxcompose_parameters import NodeChange
-from rbxcompose.msgs.rcl_interfaces import (
-    FloatingPointRange,
-    IntegerRange,
-    ListParametersResult,
-    Parameter,
-    ParameterDescriptor,
-    ParameterType,
-    ParameterValue,
-)
 
 LOWEST, HIGHEST = -(2**63), 2**63 - 1  # of an integer on the wire
 
 _SINGLE = {
-    ParameterType.PARAMETER_BOOL: "bool_value",
-    ParameterType.PARAMETER_INTEGER: "integer_value",
-    ParameterType.PARAMETER_DOUBLE: "double_value",
-    ParameterType.PARAMETER_STRING: "string_value",
+    rcl_interfaces.ParameterType.PARAMETER_BOOL: "bool_value",
+    rcl_interfaces.ParameterType.PARAMETER_INTEGER: "integer_value",
+    rcl_interfaces.ParameterType.PARAMETER_DOUBLE: "double_value",
+    rcl_interfaces.ParameterType.PARAMETER_STRING: "string_value",
 }
 _ARRAYS = {
-    ParameterType.PARAMETER_BYTE_ARRAY: "byte_array_value",
-    ParameterType.PARAMETER_BOOL_ARRAY: "bool_array_value",
-    ParameterType.PARAMETER_INTEGER_ARRAY: "integer_array_value",
-    ParameterType.PARAMETER_DOUBLE_ARRAY: "double_array_value",
-    ParameterType.PARAMETER_STRING_ARRAY: "string_array_value",
+    rcl_interfaces.ParameterType.PARAMETER_BYTE_ARRAY: "byte_array_value",
+    rcl_interfaces.ParameterType.PARAMETER_BOOL_ARRAY: "bool_array_value",
+    rcl_interfaces.ParameterType.PARAMETER_INTEGER_ARRAY: "integer_array_value",
+    rcl_interfaces.ParameterType.PARAMETER_DOUBLE_ARRAY: "double_array_value",
+    rcl_interfaces.ParameterType.PARAMETER_STRING_ARRAY: "string_array_value",
 }
 
 
 TYPE_WORDS = {
-    ParameterType.PARAMETER_BOOL: "a flag",
-    ParameterType.PARAMETER_INTEGER: "a whole number",
-    ParameterType.PARAMETER_DOUBLE: "a number",
-    ParameterType.PARAMETER_STRING: "text",
-    ParameterType.PARAMETER_BYTE_ARRAY: "bytes",
-    ParameterType.PARAMETER_BOOL_ARRAY: "flags",
-    ParameterType.PARAMETER_INTEGER_ARRAY: "whole numbers",
-    ParameterType.PARAMETER_DOUBLE_ARRAY: "numbers",
-    ParameterType.PARAMETER_STRING_ARRAY: "texts",
+    rcl_interfaces.ParameterType.PARAMETER_BOOL: "a flag",
+    rcl_interfaces.ParameterType.PARAMETER_INTEGER: "a whole number",
+    rcl_interfaces.ParameterType.PARAMETER_DOUBLE: "a number",
+    rcl_interfaces.ParameterType.PARAMETER_STRING: "text",
+    rcl_interfaces.ParameterType.PARAMETER_BYTE_ARRAY: "bytes",
+    rcl_interfaces.ParameterType.PARAMETER_BOOL_ARRAY: "flags",
+    rcl_interfaces.ParameterType.PARAMETER_INTEGER_ARRAY: "whole numbers",
+    rcl_interfaces.ParameterType.PARAMETER_DOUBLE_ARRAY: "numbers",
+    rcl_interfaces.ParameterType.PARAMETER_STRING_ARRAY: "texts",
 }
 
 
-def to_message(value: object) -> ParameterValue | None:
+def to_message(value: object) -> rcl_interfaces.ParameterValue | None:
     """Return a value as a message, None if no parameter can have its type."""
     number = parameter_type(value)
-    if number is None:
-        return None
-    return _made(number, value.value if isinstance(value, Enum) else value)
+    return None if number is None else _made(number, value.value if isinstance(value, Enum) else value)
 
 
-def _made(number: int, value: object) -> ParameterValue:
+def _made(number: int, value: object) -> rcl_interfaces.ParameterValue:
     name = {**_SINGLE, **_ARRAYS}.get(number)
     fields: dict[str, object] = {name: value} if name else {}
-    return ParameterValue(type=number, **fields)  # type: ignore[arg-type]
+    return rcl_interfaces.ParameterValue(type=number, **fields)  # type: ignore[arg-type]
 
 
 def parameter_type(value: object) -> int | None:
     """Return the number of the type of a value, None if it is of no type that a parameter has; None is not set."""
     match value:
         case None:
-            return ParameterType.PARAMETER_NOT_SET
+            return rcl_interfaces.ParameterType.PARAMETER_NOT_SET
         case bool():
-            return ParameterType.PARAMETER_BOOL
+            return rcl_interfaces.ParameterType.PARAMETER_BOOL
         case int() if not isinstance(value, Enum):
-            return ParameterType.PARAMETER_INTEGER if LOWEST <= value <= HIGHEST else None
+            return rcl_interfaces.ParameterType.PARAMETER_INTEGER if LOWEST <= value <= HIGHEST else None
         case float():
-            return ParameterType.PARAMETER_DOUBLE
+            return rcl_interfaces.ParameterType.PARAMETER_DOUBLE
         case str() | Enum(value=str()):
-            return ParameterType.PARAMETER_STRING
+            return rcl_interfaces.ParameterType.PARAMETER_STRING
         case tuple() | list():
             return _array_type(value)
     return None
@@ -97,22 +87,22 @@ def parameter_type(value: object) -> int | None:
 
 def _array_type(values: Sequence[object]) -> int | None:
     numbers = {parameter_type(each) for each in values}
-    if numbers == {ParameterType.PARAMETER_INTEGER, ParameterType.PARAMETER_DOUBLE}:
-        return ParameterType.PARAMETER_DOUBLE_ARRAY
+    if numbers == {rcl_interfaces.ParameterType.PARAMETER_INTEGER, rcl_interfaces.ParameterType.PARAMETER_DOUBLE}:
+        return rcl_interfaces.ParameterType.PARAMETER_DOUBLE_ARRAY
     if not numbers:
-        return ParameterType.PARAMETER_STRING_ARRAY
+        return rcl_interfaces.ParameterType.PARAMETER_STRING_ARRAY
     number = numbers.pop()
     if numbers or any(isinstance(each, Enum) for each in values):
         return None
     return {
-        ParameterType.PARAMETER_BOOL: ParameterType.PARAMETER_BOOL_ARRAY,
-        ParameterType.PARAMETER_INTEGER: ParameterType.PARAMETER_INTEGER_ARRAY,
-        ParameterType.PARAMETER_DOUBLE: ParameterType.PARAMETER_DOUBLE_ARRAY,
-        ParameterType.PARAMETER_STRING: ParameterType.PARAMETER_STRING_ARRAY,
+        rcl_interfaces.ParameterType.PARAMETER_BOOL: rcl_interfaces.ParameterType.PARAMETER_BOOL_ARRAY,
+        rcl_interfaces.ParameterType.PARAMETER_INTEGER: rcl_interfaces.ParameterType.PARAMETER_INTEGER_ARRAY,
+        rcl_interfaces.ParameterType.PARAMETER_DOUBLE: rcl_interfaces.ParameterType.PARAMETER_DOUBLE_ARRAY,
+        rcl_interfaces.ParameterType.PARAMETER_STRING: rcl_interfaces.ParameterType.PARAMETER_STRING_ARRAY,
     }.get(number or 0)
 
 
-def from_message(message: ParameterValue) -> object:
+def from_message(message: rcl_interfaces.ParameterValue) -> object:
     """Return the value in a message, lists as tuples; None if it is not set."""
     if name := _SINGLE.get(message.type):
         return getattr(message, name)
@@ -206,10 +196,10 @@ class ParameterField:
         return dimension_of(self.field) if self.field else None
 
     @property
-    def descriptor(self) -> ParameterDescriptor:
+    def descriptor(self) -> rcl_interfaces.ParameterDescriptor:
         """Return its description and the values that it accepts."""
         numbers, integers = self._ranges()
-        return ParameterDescriptor(
+        return rcl_interfaces.ParameterDescriptor(
             name=self.name,
             type=parameter_type(self.value) or 0,
             description=self._description(),
@@ -241,7 +231,7 @@ class ParameterField:
     def _step(self) -> float:
         return next((step for mark in self._marks if (step := getattr(mark, "multiple_of", None)) is not None), 0)
 
-    def _ranges(self) -> tuple[tuple[FloatingPointRange, ...], tuple[IntegerRange, ...]]:
+    def _ranges(self) -> tuple[tuple[rcl_interfaces.FloatingPointRange, ...], tuple[rcl_interfaces.IntegerRange, ...]]:
         """Return the ranges that the wire has; they have no bounds that are not part of them."""
         low = [(bound, key) for key, bound in self._bounds() if key in ("gt", "ge")]
         high = [(bound, key) for key, bound in self._bounds() if key in ("lt", "le")]
@@ -251,11 +241,11 @@ class ParameterField:
             lows = (math.floor(bound) + 1 if key == "gt" else math.ceil(bound) for bound, key in low)
             highs = (math.ceil(bound) - 1 if key == "lt" else math.floor(bound) for bound, key in high)
             least, most = max(lows, default=LOWEST), min(highs, default=HIGHEST)
-            return (), (IntegerRange(from_value=least, to_value=most, step=int(self._step)),)
+            return (), (rcl_interfaces.IntegerRange(from_value=least, to_value=most, step=int(self._step)),)
         up = (math.nextafter(bound, math.inf) if key == "gt" else bound for bound, key in low)
         down = (math.nextafter(bound, -math.inf) if key == "lt" else bound for bound, key in high)
         lowest, highest = max(up, default=-math.inf), min(down, default=math.inf)
-        return (FloatingPointRange(from_value=lowest, to_value=highest, step=float(self._step)),), ()
+        return (rcl_interfaces.FloatingPointRange(from_value=lowest, to_value=highest, step=float(self._step)),), ()
 
     def _constraints(self) -> str:
         words = [f"{_BOUNDS[key]} {self._shown(bound)}" for key, bound in self._bounds()]
@@ -334,13 +324,13 @@ def _settings_of(
             yield ParameterField(name, value, field, model)
 
 
-def values_of(known: Mapping[str, ParameterField], names: Iterable[str]) -> tuple[ParameterValue, ...]:
+def values_of(known: Mapping[str, ParameterField], names: Iterable[str]) -> tuple[rcl_interfaces.ParameterValue, ...]:
     """Return the values of parameters; one that does not exist is not set."""
     found = (to_message(known[name].value) if name in known else None for name in names)
-    return tuple(value or ParameterValue() for value in found)
+    return tuple(value or rcl_interfaces.ParameterValue() for value in found)
 
 
-def listed(known: Iterable[str], prefixes: Sequence[str], depth: int) -> ListParametersResult:
+def listed(known: Iterable[str], prefixes: Sequence[str], depth: int) -> rcl_interfaces.ListParametersResult:
     """Return the names below one of `prefixes` (none: all), at most `depth` words deep (0: any depth)."""
 
     def is_wanted(name: str, prefix: str) -> bool:
@@ -351,10 +341,10 @@ def listed(known: Iterable[str], prefixes: Sequence[str], depth: int) -> ListPar
 
     names = [name for name in known if any(is_wanted(name, prefix) for prefix in prefixes or ("",))]
     above = dict.fromkeys(name.rpartition(SEPARATOR)[0] for name in names if SEPARATOR in name)
-    return ListParametersResult(names=tuple(names), prefixes=tuple(above))
+    return rcl_interfaces.ListParametersResult(names=tuple(names), prefixes=tuple(above))
 
 
-def changed(config: C, parameters: Sequence[Parameter], bounds: SettingBounds = NO_BOUNDS) -> C:
+def changed(config: C, parameters: Sequence[rcl_interfaces.Parameter], bounds: SettingBounds = NO_BOUNDS) -> C:
     """Return the configuration with all of `parameters` set.
 
     Raises:
@@ -392,7 +382,7 @@ def _is_same(old: object, new: object) -> bool:
     return isinstance(old, float) and isinstance(new, float) and is_nearly(old, new)
 
 
-def _require_single(parameters: Sequence[Parameter]) -> None:
+def _require_single(parameters: Sequence[rcl_interfaces.Parameter]) -> None:
     names = Counter(parameter.name for parameter in parameters)
     if twice := next((name for name, times in names.items() if times > 1), None):
         raise UnsettableError(f"'{twice}' is set twice")
@@ -407,7 +397,7 @@ def _require_within(name: str, value: object, dimension: Dimension | None, bound
                 raise UnsettableError(f"'{name}' must be {words} {limit_text}: {bound.by} says so")
 
 
-def _wanted(known: Mapping[str, ParameterField], parameter: Parameter) -> object:
+def _wanted(known: Mapping[str, ParameterField], parameter: rcl_interfaces.Parameter) -> object:
     setting = known.get(parameter.name)
     if setting is None:
         help_text = suggest(parameter.name, known, "parameters")
@@ -462,7 +452,7 @@ def _reason(error: ErrorDetails, above: str) -> str:
     return f"'{name.removesuffix(SEPARATOR)}' {words}" if name else words
 
 
-def differences(old: Config, new: Config) -> tuple[Parameter, ...]:
+def differences(old: Config, new: Config) -> tuple[rcl_interfaces.Parameter, ...]:
     """Return the parameters that differ in `new`, with their new values."""
     before = settings(old)
     others = (
@@ -470,7 +460,10 @@ def differences(old: Config, new: Config) -> tuple[Parameter, ...]:
         for setting in settings(new).values()
         if setting.name not in before or before[setting.name].value != setting.value
     )
-    return tuple(Parameter(name=other.name, value=to_message(other.value) or ParameterValue()) for other in others)
+    return tuple(
+        rcl_interfaces.Parameter(name=other.name, value=to_message(other.value) or rcl_interfaces.ParameterValue())
+        for other in others
+    )
 
 
 def dimension_of(field: FieldInfo) -> Dimension | None:

@@ -18,6 +18,7 @@ from rbxcompose.domains.servos.transfers import BusLoad, cycle_load
 from rbxcompose.domains.servos.twins.servo_fake import FakeServo
 from rbxcompose.domains.servos.twins.servo_line import FakeLine, FakeReply
 from rbxcompose.domains.servos.twins.servo_port import FakePort
+from tests.soak import rare
 
 CYCLE = 0.01  # [s]
 BUSES = {
@@ -78,7 +79,7 @@ def _extra(model: ServoModel, baud: int, delay: float) -> float:
     return 10 * {1: 8 + 7, 2: 14 + 12}[model.protocol] / baud + delay
 
 
-@pytest.mark.parametrize("baud", [57_600, 1_000_000])
+@pytest.mark.parametrize("baud", [1_000_000, *rare(57_600)])
 @pytest.mark.parametrize("names", BUSES.values(), ids=BUSES)
 def test_a_cycle_takes_as_long_as_computed(names: list[str], baud: int, tmp_path: Path) -> None:
     models = dict(enumerate(names, 1))

@@ -16,6 +16,7 @@ from rbxcompose.domains.servos.twins.servo_fake import FakeServo
 from rbxcompose.domains.servos.twins.servo_line import READ, SYNC_READ, SYNC_WRITE
 from rbxcompose.domains.servos.twins.servo_port import FakePort
 from tests.actuation.conftest import Plugged
+from tests.soak import rare
 
 STATE = ("present_position", "present_speed", "present_load")
 PATIENT, BRISK = 0.2, 0.03  # [s] timeouts: where all answer, and where some do not
@@ -92,7 +93,7 @@ def test_what_looks_like_the_beginning_of_a_packet_is_sent_and_read_as_data(conn
     assert port.line[1].get("goal_position") == -259
 
 
-@pytest.mark.parametrize("is_fast", [False, True])
+@pytest.mark.parametrize("is_fast", [True, *rare(False)])
 @pytest.mark.parametrize("names", [SIX, SIX_OLD, dict.fromkeys(range(1, 7), "MX-28")], ids=["2.0", "1.0", "bulk"])
 @pytest.mark.parametrize("silences_next", [False, True])
 def test_a_mute_servo_costs_only_itself(

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.domains.devices.serial_ports import (
@@ -59,7 +59,6 @@ def test_a_read_gives_just_the_bytes_that_are_asked_for_and_keeps_the_others(lin
     assert line.port.getBytesAvailable() == 1
 
 
-@settings(max_examples=30, deadline=None)
 @given(st.lists(st.binary(min_size=1, max_size=40), max_size=6), st.integers(0, 3))
 def test_nothing_is_lost_or_reordered_between_reads(chunks: list[bytes], back: int) -> None:
     line = Line()

@@ -7,7 +7,7 @@ import time
 from dataclasses import replace
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.domains.servos.dynamixel_bus import DynamixelBus
@@ -18,6 +18,7 @@ from rbxcompose.domains.servos.models import model_named, servo_models
 from rbxcompose.domains.servos.servo_cycle import ServoCycle
 from rbxcompose.domains.servos.twins.servo_fake import FakeServo
 from rbxcompose.domains.servos.twins.servo_twin import TwinBus, pseudo_terminal
+from tests.loops import for_all
 
 PERIOD = 0.01
 LIMITS = MotionLimits(-1.0, 1.5, 2.0, 10.0)
@@ -55,7 +56,7 @@ class Driven:
             self.now += PERIOD
 
 
-@pytest.mark.parametrize("name", servo_models())
+@for_all("name", servo_models())
 @pytest.mark.parametrize("is_inverted", [False, True])
 def test_each_tick_is_the_tick_of_its_angle(name: str, is_inverted: bool) -> None:
     servo_joint = joint(name, is_inverted=is_inverted, neutral=100)
@@ -81,7 +82,6 @@ def test_a_joint_starts_without_torque_and_moves_from_where_it_is() -> None:
     assert driven.drive.measured.position == pytest.approx(start + 0.5, abs=driven.drive.per_tick)
 
 
-@settings(max_examples=60)
 @given(asked=st.lists(st.lists(requests, max_size=2), min_size=1, max_size=40), start=st.integers(320, 760))
 def test_whatever_is_asked_the_goal_keeps_to_the_limits(asked: list[list[MoveTo | Relax | Enable]], start: int) -> None:
     driven = Driven()

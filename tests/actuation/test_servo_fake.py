@@ -10,6 +10,7 @@ from rbxcompose.base.clock import SteppedClock
 from rbxcompose.domains.servos.models import servo_models
 from rbxcompose.domains.servos.twins.servo_fake import FASTEST, FakeServo
 from rbxcompose.domains.servos.twins.servo_line import FakeLine, packet_one, packet_two, packets
+from tests.loops import for_all
 
 MODELS = sorted(servo_models())
 ONE, TWO = ["AX-12", "MX-28"], ["XL430-W250", "XM430-W350", "PH54-200"]
@@ -21,7 +22,7 @@ def written(servo: FakeServo, item: str, raw: int) -> int:
     return servo.write(where.address, where.encode(raw))
 
 
-@pytest.mark.parametrize("name", MODELS)
+@for_all("name", MODELS)
 def test_each_model_is_read_and_written_at_each_register(name: str) -> None:
     servo = FakeServo(name, 7)
     for item in servo.model.items.values():
@@ -34,7 +35,7 @@ def test_each_model_is_read_and_written_at_each_register(name: str) -> None:
     assert written(servo, "present_position", 5) != 0
 
 
-@pytest.mark.parametrize("name", MODELS)
+@for_all("name", MODELS)
 def test_it_goes_to_its_goal_at_the_speed_that_is_set(name: str) -> None:
     servo = FakeServo(name, 1)
     centre = servo.get("present_position")
@@ -52,7 +53,7 @@ def test_it_goes_to_its_goal_at_the_speed_that_is_set(name: str) -> None:
     assert (servo.get("present_position"), servo.get("moving"), servo.get("present_speed")) == (goal, 0, 0)
 
 
-@pytest.mark.parametrize("name", MODELS)
+@for_all("name", MODELS)
 @pytest.mark.parametrize("direction", [1, -1])
 def test_a_wheel_turns_without_an_end(name: str, direction: int) -> None:
     servo = FakeServo(name, 1)
@@ -70,7 +71,7 @@ def test_a_wheel_turns_without_an_end(name: str, direction: int) -> None:
         assert turned == pytest.approx(direction * 2.0, rel=0.03)
 
 
-@pytest.mark.parametrize("name", ONE)
+@for_all("name", ONE)
 def test_writing_a_goal_switches_torque_on_in_protocol_1(name: str) -> None:
     servo = FakeServo(name, 1)
     written(servo, "goal_position", 600)
@@ -90,7 +91,7 @@ def test_switching_torque_on_holds_or_snaps_to_the_old_goal(holds: bool) -> None
     assert servo.get("present_position") == (3000 if holds else 1000)
 
 
-@pytest.mark.parametrize("name", [*ONE, *TWO])
+@for_all("name", [*ONE, *TWO])
 def test_too_much_heat_switches_torque_off_and_is_told(name: str) -> None:
     servo = FakeServo(name, 1)
     written(servo, "torque_enable", 1)
@@ -119,7 +120,7 @@ def test_too_much_load_switches_torque_off() -> None:
     assert (servo.get("hardware_error"), servo.get("torque_enable")) == (32, 0)
 
 
-@pytest.mark.parametrize("name", TWO)
+@for_all("name", TWO)
 def test_memory_that_lasts_is_locked_while_torque_is_on(name: str) -> None:
     servo = FakeServo(name, 1)
     written(servo, "torque_enable", 1)

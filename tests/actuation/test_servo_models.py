@@ -18,9 +18,10 @@ from rbxcompose.domains.servos.models import (
     model_of_number,
     servo_models,
 )
+from tests.loops import for_all
 
 MODELS = list(servo_models().values())
-NAMED = pytest.mark.parametrize("model", MODELS, ids=lambda model: model.name)
+NAMED = for_all("model", MODELS)
 EVERYWHERE = {
     *("model_number", "id", "baud", "return_delay", "torque_enable", "led", "goal_position", "goal_speed"),
     *("goal_velocity", "present_position", "present_speed", "present_load", "present_voltage"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.domains.servos.dynamixel_bus import DynamixelBus
@@ -35,7 +35,6 @@ def fake(model: str, limit: float) -> FakeServo:
     return servo
 
 
-@settings(max_examples=30)
 @given(
     st.sampled_from(["XL430-W250", "PH54-200"]),
     st.floats(0.5, 6.0),

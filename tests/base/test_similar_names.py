@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.findings import MOST_COMPARED, nearest, one_compile, suggest
@@ -43,7 +43,6 @@ def test_a_set_has_no_order_so_its_names_are_listed_by_the_alphabet() -> None:
     assert suggest("xyz", frozenset({"dock", "base", "arm"})) == "valid names: arm, base, dock"
 
 
-@settings(max_examples=40, deadline=None)
 @given(st.text(max_size=100), st.lists(st.text(max_size=20), max_size=5))
 def test_a_name_that_is_there_is_nearest_to_itself(name: str, others: list[str]) -> None:
     if name:
@@ -60,7 +59,6 @@ def test_a_compile_stops_guessing_after_much_work_and_the_next_starts_anew() -> 
     assert suggest(f"batery_1_{'a' * 40}", others) == suggest(f"batery_1_{'a' * 40}", others) == helps[1]
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.text("abc_", max_size=12), st.sets(st.text("abc_", max_size=12), max_size=8), st.integers(1, 3))
 def test_what_is_near_is_what_difflib_tells(name: str, others: set[str], most: int) -> None:
     assert nearest(name, others, most=most) == difflib.get_close_matches(name, sorted(others), n=most)

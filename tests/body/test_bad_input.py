@@ -131,7 +131,7 @@ def test_what_may_be_a_mesh_is_not_told(name: str, tmp_path: Path) -> None:
         assert mesh_problem(tmp_path / name) == ""
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.binary(max_size=300), begin=st.sampled_from([b"", stl(2), b"solid facet", b"ply", b"glTF"]),
        ending=st.sampled_from(FORMATS))  # fmt: skip
 def test_bytes_are_drawn_or_refused(data: bytes, begin: bytes, ending: str, tmp_path: Path) -> None:
@@ -176,7 +176,6 @@ ODD = [
 ]
 
 
-@settings(max_examples=60, deadline=None)
 @given(changes=st.lists(st.tuples(st.integers(0, len(WORDS) - 1), st.sampled_from([*ODD, *WORDS])), max_size=4))
 def test_a_damaged_urdf_is_a_body_of_finite_numbers_or_a_finding_with_its_place(changes: list[tuple[int, str]]) -> None:
     words = list(WORDS)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.findings import Finding, Span
@@ -76,7 +76,6 @@ def test_a_joint_that_nobody_has_moved_is_at_rest(arm: Body) -> None:
     assert arm.poses({}) == arm.poses({"shoulder": 0.5, "slide": 0.0})
 
 
-@settings(deadline=None)
 @given(st.tuples(*3 * [st.floats(-math.pi, math.pi)]))
 def test_angles_of_urdf_are_about_fixed_axes(rpy: tuple[float, float, float]) -> None:
     roll, pitch, yaw = rpy
@@ -163,7 +162,6 @@ def test_a_robot_without_links_is_told() -> None:
     assert [(finding.code, finding.message) for finding in findings] == [("RBX2006", "this robot has no links")]
 
 
-@settings(deadline=None)
 @given(st.recursive(st.just(""), lambda inner: st.lists(inner, max_size=3).map("".join).map("<link>{}</link>".format)))
 def test_whatever_elements_there_are_reading_ends_in_findings(inside: str) -> None:
     read(f"<robot>{inside}</robot>")

@@ -48,7 +48,7 @@ def test_three_libraries_agree_on_every_link_of_the_shipped_robots(soak: Soak) -
 
 
 def _agree(name: str, three: Three, examples: int) -> None:
-    @settings(max_examples=examples, deadline=None, database=None)
+    @settings(max_examples=examples, database=None)
     @given(positions(three.body))
     def agree(at: dict[str, float]) -> None:
         assert three.largest_difference(at) < CLOSE, name
@@ -61,7 +61,7 @@ def test_three_libraries_agree_on_every_link_of_a_random_body(soak: Soak) -> Non
     examples = soak.examples(40, 1000)
     links: list[int] = []
 
-    @settings(max_examples=examples, deadline=None, database=None, suppress_health_check=list(HealthCheck))
+    @settings(max_examples=examples, database=None, suppress_health_check=list(HealthCheck))
     @given(st.data(), urdfs())
     def agree(data: st.DataObject, text: str) -> None:
         three = Three(description_of(text))

@@ -29,7 +29,6 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @given(st.integers(0, 1000), st.floats(0.0, 3.0))
-@settings(max_examples=20, deadline=None)
 def test_the_nearest_point_is_that_of_all_triangles(seed: int, spread: float) -> None:
     draw = np.random.default_rng(seed)
     mesh = trimesh.Trimesh(draw.normal(size=(12, 3)), draw.integers(0, 12, size=(9, 3)), process=False)
@@ -43,7 +42,6 @@ def test_the_nearest_point_is_that_of_all_triangles(seed: int, spread: float) ->
 
 
 @given(st.integers(0, 1000), st.integers(-4, 4))
-@settings(max_examples=20, deadline=None)
 def test_distances_grow_with_the_scale(seed: int, power: int) -> None:
     ball, points = sphere(finer=1), np.random.default_rng(seed).normal(size=(20, 3))
     factor = 10.0**power
@@ -52,7 +50,7 @@ def test_distances_grow_with_the_scale(seed: int, power: int) -> None:
 
 
 @given(st.floats(-2.0, 2.0))
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 def test_the_distance_to_a_shifted_plane_is_the_shift(shift: float) -> None:
     plate: Any = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
     moved = plate.copy()

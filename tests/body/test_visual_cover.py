@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pinocchio
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.domains.body.description import covering, to_xml
@@ -36,7 +36,6 @@ include: {{arm: {{part: rbx:parts/servo_arm.yaml, with: {{bus: servos}}}}}}
 """
 
 
-@settings(max_examples=20, deadline=None)
 @given(st.lists(ELEMENTS, min_size=1, max_size=3))
 def test_collision_shapes_are_all_shapes_that_there_are_each_once(links: list[list[tuple[str, str, str]]]) -> None:
     text = "".join(_link(number, elements) for number, elements in enumerate(links))

@@ -14,6 +14,7 @@ from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.msgs.packages import all_names, package_files, parts_of, whole_text
 from rbxcompose.msgs.rbxcompose_msgs import Recharge, SetBatteryLevel
 from rbxcompose.runtime.recording.topics import definition_of
+from tests.loops import for_all
 
 
 def test_a_type_is_shown_with_its_hash_and_its_parts(capsys: pytest.CaptureFixture[str]) -> None:
@@ -38,7 +39,7 @@ def test_a_type_that_is_misspelt_is_told_with_the_nearest(capsys: pytest.Capture
     assert "did you mean 'nav_msgs/Odometry'?" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("name", all_names())
+@for_all("name", all_names())
 def test_each_part_of_a_type_is_shown_once_in_a_form_that_can_be_read(name: str) -> None:
     _, *rest = whole_text(name).split("=" * 80 + "\n")
     heads = [one.partition("\n")[0] for one in rest]
@@ -98,6 +99,6 @@ def test_a_package_names_the_packages_that_its_types_are_made_of() -> None:
     assert "<depend>geometry_msgs</depend>" in files["package.xml"]
 
 
-@pytest.mark.parametrize("name", [name for name in all_names() if "/msg/" in name])
+@for_all("name", [name for name in all_names() if "/msg/" in name])
 def test_a_recording_has_the_same_text_of_a_message(name: str) -> None:
     assert definition_of(name) == whole_text(name)

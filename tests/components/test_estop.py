@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.compiler.plan.model import Instance
@@ -106,7 +106,6 @@ def test_joints_lose_their_torque_where_that_is_wanted() -> None:
     assert cell.drive.refused == "the robot is stopped"
 
 
-@settings(max_examples=20)
 @given(st.lists(st.sampled_from([True, False, None]), max_size=12))
 def test_the_supervisor_always_knows_the_reason(story: list[bool | None]) -> None:
     robot = Bench(instance("estop", "estop"))

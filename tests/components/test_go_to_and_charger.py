@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.config import Place
@@ -189,7 +189,6 @@ def at_the_dock() -> Bench:
     drain=st.floats(0.1, 20.0),
     tells_at_once=st.booleans(),
 )
-@settings(max_examples=20, deadline=None)
 def test_whenever_the_battery_steps_the_end_of_a_charge_is_seen(
     phase: float, delay: float, starts: float, drain: float, tells_at_once: bool
 ) -> None:

@@ -45,9 +45,8 @@ def ended(bench: Bench, action: Any, topic: str, goal: Any) -> Any:
 
 
 @pytest.mark.timeout(900)
+@pytest.mark.soak
 def test_it_picks_and_places_with_every_seed(plan: Plan, soak: Soak) -> None:
-    if not soak.is_on:
-        pytest.skip("with --soak; a test of the mission `pick_and_place` does it once")
     failures = []
     for seed in range(SEEDS):
         bench = robot(plan, seed)

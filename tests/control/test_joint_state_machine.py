@@ -140,7 +140,7 @@ class AnyJoint(RuleBasedStateMachine):
 
 
 TestAnyJoint = AnyJoint.TestCase
-TestAnyJoint.settings = settings(max_examples=25, stateful_step_count=30, deadline=None)
+TestAnyJoint.settings = settings(stateful_step_count=30)
 
 
 def test_a_command_switches_torque_on_only_behind_the_measured_position_as_goal() -> None:

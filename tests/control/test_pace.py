@@ -6,7 +6,7 @@ import math
 from itertools import pairwise
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.domains.servos.curves import JointSample
@@ -27,7 +27,6 @@ def moving() -> Arm:
     return arm
 
 
-@settings(max_examples=40, deadline=None)
 @given(st.lists(st.tuples(st.integers(1, 120), st.floats(0.0, 1.0)), max_size=5))
 def test_the_joints_stay_on_their_path_and_brake_as_hard_as_they_may(changes: list[tuple[int, float]]) -> None:
     arm, seen = moving(), [(JointSample(0.0), JointSample(0.0))]

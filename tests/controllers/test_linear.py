@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.msgs.builtin_interfaces import Duration
@@ -171,7 +171,6 @@ def test_a_canceled_goal_stops_it() -> None:
     assert lift.at == there
 
 
-@settings(max_examples=15, deadline=None)
 @given(
     asked=st.lists(st.tuples(st.floats(-0.2, 0.3) | st.just(math.inf), st.floats(0.05, 3.0)), min_size=1, max_size=6)
 )

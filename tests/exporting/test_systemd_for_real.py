@@ -16,7 +16,6 @@ from rbxcompose.tools.exporting.exported_share import shares
 from rbxcompose.tools.exporting.systemd import WATCHDOG, unit, unit_name
 from tests.conftest import ROOT
 from tests.exporting.own_systemd import FILES, TREE, OwnSystemd
-from tests.soak import Soak
 from tests.systems.namespaces import NotPermittedError
 
 SYSTEM = """
@@ -37,12 +36,11 @@ def until(holds: Callable[[], bool], within: float = LONGEST) -> None:
         time.sleep(0.1)
 
 
+@pytest.mark.soak
 @pytest.mark.timeout(200)
 def test_systemd_runs_the_unit_restarts_what_hangs_and_stops_it_at_rest(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, soak: Soak
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    if not soak.is_on:
-        pytest.skip("with --soak")
     monkeypatch.chdir(tmp_path)
     (tmp_path / "system.yaml").write_text(SYSTEM.format(tree=ROOT), encoding="utf-8")
     (share,) = shares(compile_system("system.yaml", environment={}))

@@ -12,6 +12,7 @@ from rbxcompose.runtime.folder import STATE
 from rbxcompose.runtime.processes import titled
 from tests.runtime.conftest import robot
 from tests.runtime.real_robot import PATIENCE, Robot, eventually
+from tests.soak import rare
 
 __all__ = ["robot"]
 
@@ -30,7 +31,7 @@ def test_of_many_that_start_it_at_once_one_does(robot: Robot) -> None:
 
 
 @pytest.mark.timeout(40)
-@pytest.mark.parametrize("removed", ["state.json", "control.sock", "lock", "*"])
+@pytest.mark.parametrize("removed", ["*", *rare("state.json", "control.sock", "lock")])
 def test_a_robot_whose_files_were_removed_is_found_and_restores_them(robot: Robot, removed: str) -> None:
     robot.up_detached()
     if removed == "*":
@@ -47,7 +48,7 @@ def test_a_robot_whose_files_were_removed_is_found_and_restores_them(robot: Robo
 
 
 @pytest.mark.timeout(40)
-@pytest.mark.parametrize("is_suspended", [False, True])
+@pytest.mark.parametrize("is_suspended", [True, *rare(False)])
 def test_stop_and_down_find_a_robot_at_once_whose_state_was_removed(robot: Robot, is_suspended: bool) -> None:
     robot.up_detached()
     supervisor = next(iter(titled(f"rbxcompose {robot.name}: supervisor")))

@@ -10,7 +10,7 @@ import pytest
 
 from tests.faults.patrol import MISSION, PARENT, ROBOT, ROUTER, WORLD, Patrol
 from tests.faults.rounds import Fault, Findings, in_turn, run
-from tests.soak import Soak
+from tests.soak import Soak, rare
 
 SEED, ROUNDS = 1, 200
 
@@ -36,7 +36,7 @@ def test_what_died_or_hung_comes_back_and_the_mission_succeeds(tmp_path: Path) -
 @pytest.mark.timeout(60)
 @pytest.mark.parametrize(
     "fault",
-    [Fault(WORLD, signal.SIGSTOP), Fault(PARENT, signal.SIGSTOP)],
+    [Fault(WORLD, signal.SIGSTOP), *rare(Fault(PARENT, signal.SIGSTOP))],
     ids=str,
 )
 def test_without_what_cannot_come_back_the_robot_comes_to_rest_and_ends(fault: Fault, tmp_path: Path) -> None:
@@ -46,9 +46,8 @@ def test_without_what_cannot_come_back_the_robot_comes_to_rest_and_ends(fault: F
 
 
 @pytest.mark.timeout(2 * 3600)
+@pytest.mark.soak
 def test_many_rounds(soak: Soak, tmp_path: Path) -> None:
-    if not soak.is_on:
-        pytest.skip("only under --soak")
     findings, names = Findings(), count()
     for faults in in_turn(SEED, ROUNDS):
         rounds(tmp_path, faults, findings, names, times=2)

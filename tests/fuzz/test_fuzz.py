@@ -26,9 +26,8 @@ def test_a_seed_raises_nothing(seed: Path) -> None:
 
 @pytest.mark.timeout(0)
 @pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.soak
 def test_the_fuzzer_finds_nothing(target: str, soak: Soak, tmp_path: Path) -> None:
-    if not soak.is_on:
-        pytest.skip("only under --soak")
     if importlib.util.find_spec("atheris") is None:
         pytest.skip("needs the extra 'fuzz'")
     command = [sys.executable, "-m", "tests.fuzz.run", target, str(SECONDS), str(tmp_path)]

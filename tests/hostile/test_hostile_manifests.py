@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.findings import Report
@@ -191,7 +191,6 @@ PIECES = st.one_of(
 EDITS = st.lists(st.tuples(st.integers(0, len(TURTLEBOT)), st.integers(0, 12), PIECES), min_size=1, max_size=6)
 
 
-@settings(max_examples=40, deadline=None)
 @given(EDITS)
 def test_a_mutant_of_a_robot_never_raises(folder: Path, edits: list[tuple[int, int, str]]) -> None:
     text = TURTLEBOT
@@ -200,25 +199,21 @@ def test_a_mutant_of_a_robot_never_raises(folder: Path, edits: list[tuple[int, i
     load(text.encode(), folder)
 
 
-@settings(max_examples=40, deadline=None)
 @given(st.binary(max_size=300))
 def test_random_bytes_never_raise(folder: Path, data: bytes) -> None:
     read_text(data, "robot.yaml")
 
 
-@settings(max_examples=40, deadline=None)
 @given(st.text(alphabet="ab:-[]{}&*!|>'\"#%@` \n\t?,<.\\0", max_size=80))
 def test_random_yaml_never_raises(folder: Path, text: str) -> None:
     load(text.encode(), folder)
 
 
-@settings(max_examples=40, deadline=None)
 @given(st.lists(st.text(alphabet="batery.=1 s[]{}:&*!#\n-args", max_size=40), max_size=3).map(tuple))
 def test_random_sets_never_raise(folder: Path, sets: tuple[str, ...]) -> None:
     load(TURTLEBOT.encode(), folder, sets)
 
 
-@settings(max_examples=40, deadline=None)
 @given(EDITS)
 def test_composing_with_nothing_changes_nothing_even_for_mutants(edits: list[tuple[int, int, str]]) -> None:
     text = TURTLEBOT

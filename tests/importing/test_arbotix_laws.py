@@ -7,7 +7,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.units import ANGLE, ANGULAR_SPEED, to_si
@@ -34,7 +34,6 @@ def joint_of(text: str) -> tuple[JointServo, dict[str, list[str]]]:
     return JointServo(servo["id"], model, neutral, servo.get("invert", False)), data["joints"]["pan"].get("limits", {})
 
 
-@settings(max_examples=20, deadline=None)
 @given(st.data(), st.sampled_from(sorted(RANGES)), st.booleans())
 def test_each_tick_has_the_angle_of_the_driver(data: st.DataObject, ticks: int, invert: bool) -> None:
     turn = data.draw(st.sampled_from(RANGES[ticks]))
@@ -48,7 +47,6 @@ def test_each_tick_has_the_angle_of_the_driver(data: st.DataObject, ticks: int, 
         assert servo.angle(tick) == pytest.approx(expected, rel=1e-12, abs=1e-12)
 
 
-@settings(max_examples=20, deadline=None)
 @given(st.floats(-149, 148), st.floats(0.5, 1000))
 def test_limits_are_those_of_the_file(least: float, speed: float) -> None:
     _, limits = joint_of(f"joints: {{pan: {{id: 1, min_angle: {least!r}, max_angle: 149, max_speed: {speed!r}}}}}\n")

@@ -68,7 +68,7 @@ def test_what_it_writes_is_the_same_robot(
     assert [instance.name for instance in first.plan.instances] == [instance.name for instance in second.plan.instances]
 
 
-@settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(sets=st.lists(st.sampled_from(SETS), max_size=4), profiles=st.sampled_from([(), ("tired",)]))
 def test_to_expand_what_was_expanded_changes_nothing(
     sets: list[str], profiles: tuple[str, ...], repository: Path, tmp_path: Path

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.commands import layout as module
@@ -38,7 +38,6 @@ def is_at(x: float, y: float, rect: Rect) -> bool:
     return is_across and rect.y - NEAR <= y <= rect.y + rect.height + NEAR
 
 
-@settings(max_examples=25, deadline=None)
 @given(GRAPHS)
 def test_boxes_and_groups_never_overlap_and_lie_in_the_picture(graph: tuple[list[str], list[tuple[int, int]]]) -> None:
     layout, _ = laid_out(*graph)
@@ -53,7 +52,6 @@ def test_boxes_and_groups_never_overlap_and_lie_in_the_picture(graph: tuple[list
             assert rect.y + rect.height <= layout.height
 
 
-@settings(max_examples=25, deadline=None)
 @given(GRAPHS)
 def test_a_line_begins_and_ends_at_what_it_connects(graph: tuple[list[str], list[tuple[int, int]]]) -> None:
     layout, edges = laid_out(*graph)

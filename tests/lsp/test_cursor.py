@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.tools.lsp.completion import complete
@@ -70,7 +70,6 @@ def test_a_first_key_of_an_item_may_become_a_word() -> None:
 
 
 @given(st.sampled_from(list(TEXTS)), st.data())
-@settings(max_examples=40, deadline=None)
 def test_no_position_in_no_beginning_of_a_text_makes_trouble(path: object, data: st.DataObject) -> None:
     text = TEXTS[path]  # type: ignore[index]
     cut = data.draw(st.integers(0, len(text)))

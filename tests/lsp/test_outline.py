@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import pytest
-
 from rbxcompose.tools.lsp.answers import OutlineEntry, outline
 from tests.conftest import ROOT
+from tests.loops import for_all
 from tests.lsp.places import PATROL, ROBOT
 
 
@@ -45,7 +44,7 @@ def test_a_mission_is_shown_by_its_steps() -> None:
     ]
 
 
-@pytest.mark.parametrize("path", sorted((ROOT / "missions").glob("*.yaml")), ids=lambda path: str(path.name))
+@for_all("path", sorted((ROOT / "missions").glob("*.yaml")))
 def test_each_name_lies_within_its_entry(path: Path) -> None:
     def check(entry: OutlineEntry) -> None:
         assert entry.span.contains(entry.key)

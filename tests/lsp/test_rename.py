@@ -276,7 +276,6 @@ def test_after_any_rename_a_robot_is_the_same_but_for_the_name(shipped: Names, s
 
 
 @given(st.data())
-@settings(max_examples=30, deadline=None)
 def test_texts_that_are_being_typed_make_no_trouble(data: st.DataObject) -> None:
     files = ("robots/turtlebot/robot.yaml", "missions/patrol_machine.yaml", "missions/tests/patrol.test.yaml")
     path = ROOT / data.draw(st.sampled_from(files))

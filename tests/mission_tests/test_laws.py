@@ -14,7 +14,7 @@ from rbxcompose.tools.mission_tests.record import Done, TrialRecord
 from rbxcompose.tools.mission_tests.runner import run_trial
 from tests.mission_tests.trying import Trying
 
-MANY = settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+MANY = settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 MOCKS = """
     mocks:
       go_to:

@@ -7,7 +7,7 @@ import itertools
 import json
 import re
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.missions.engine.events import SkillEnded, SkillStarted
@@ -51,7 +51,6 @@ def check_leaves(simulated: Simulated) -> None:
     assert not running
 
 
-@settings(max_examples=20, deadline=None)
 @given(CASES)
 def test_every_node_that_starts_ends_or_is_halted_exactly_once_and_nothing_raises(case: Case) -> None:
     watching = Watching()
@@ -65,14 +64,12 @@ def test_every_node_that_starts_ends_or_is_halted_exactly_once_and_nothing_raise
     check_leaves(simulated)
 
 
-@settings(max_examples=20, deadline=None)
 @given(CASES)
 def test_the_same_mission_with_the_same_events_tells_the_same_story(case: Case) -> None:
     first, second = case.simulated(), case.simulated(Settings(observer=Watching()))  # who looks on changes nothing
     assert (first.advance(END), first.told) == (second.advance(END), second.told)
 
 
-@settings(max_examples=20, deadline=None)
 @given(CASES, LATER)
 def test_a_mission_that_is_saved_and_restored_goes_on_as_if_nothing_had_been(case: Case, at: float) -> None:
     first = case.simulated()
@@ -91,7 +88,6 @@ def test_a_mission_that_is_saved_and_restored_goes_on_as_if_nothing_had_been(cas
     assert second.told == first.told[told:]
 
 
-@settings(max_examples=20, deadline=None)
 @given(CASES, st.lists(st.integers(0, 80), max_size=10))
 def test_ticks_at_which_nothing_is_due_change_nothing(case: Case, extra: list[int]) -> None:
     plain, disturbed = case.simulated(), case.simulated()
@@ -114,7 +110,6 @@ def _lasting(nodes: st.SearchStrategy[Node]) -> st.SearchStrategy[Node]:
     )
 
 
-@settings(max_examples=20, deadline=None)
 @given(st.recursive(LASTING, _lasting, max_leaves=6), LATER, st.integers(1, 40))
 def test_a_pause_stops_everything_and_shifts_what_follows(body: Node, at: float, quarters: int) -> None:
     case, lasts = Case(body, "react", "continue"), quarters / 4
@@ -141,7 +136,6 @@ BRANCHES = st.lists(
 )
 
 
-@settings(max_examples=20, deadline=None)
 @given(BRANCHES, st.sampled_from(("all", "any", "1", "2")), st.sampled_from(("any", "all", "1", "2")), FAILING)
 def test_the_order_of_branches_never_changes_the_result(
     branches: list[str], succeed_when: str, fail_when: str, failing: frozenset[int]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.findings import Report, Span
@@ -36,7 +36,6 @@ NODES: st.SearchStrategy[TreeNode] = st.recursive(
 )
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.dictionaries(NAMES, NODES, max_size=5), NODES)
 def test_random_trees_never_raise(entries: dict[str, TreeNode], task: TreeNode) -> None:
     report = Report()

@@ -9,7 +9,7 @@ from functools import cache
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.missions.engine.log_replay import ReplayBudget, ReplayError, replay
@@ -117,7 +117,6 @@ PLAIN = st.recursive(
 once = cache(recorded)
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.data())
 def test_a_log_with_anything_changed_is_replayed_or_refused(data: st.DataObject) -> None:
     robot, log = once()

@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.missions.view.replica import MOST_WAITING, Mirror, Replica
@@ -48,7 +48,6 @@ steps = st.lists(
 )
 
 
-@settings(deadline=None)
 @given(steps)
 def test_it_ends_up_with_what_is_there(steps: list[tuple[str, int, int]]) -> None:
     sender, replica = Sender(), Replica()

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.domains.arms.motion.compiled_collisions import chain_of, link_frames
@@ -17,7 +17,6 @@ from tests.motion.test_inverse_kinematics import ARM, DESCRIPTION, GROUP, SPACE
 LINKS = list(DESCRIPTION.body.links)
 
 
-@settings(max_examples=20, deadline=None)
 @given(st.integers(0, 2**31), st.sets(st.sampled_from(LINKS)))
 def test_frames_are_those_of_our_own_kinematics(seed: int, links: set[str]) -> None:
     assert GROUP is not None

@@ -6,7 +6,7 @@ from typing import Any
 
 import coal
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -43,7 +43,6 @@ def coal_points(points: Array) -> Any:
     return made
 
 
-@settings(max_examples=40, deadline=None)
 @given(st.sampled_from((TREE, BOX, CYLINDER, HALF_SPACE)), st.integers(4, 40), st.floats(0.2, 3.0), SEEDS)
 def test_the_gap_is_never_more_than_the_distance_and_there_where_that_is(
     kind: int, count: int, spread: float, seed: int

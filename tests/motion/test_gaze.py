@@ -6,7 +6,7 @@ import math
 from functools import cache
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.compiler.compile import compile_robot
@@ -33,7 +33,6 @@ def gaze(limits: dict[str, MotionLimits] = LIMITS) -> Gaze:
     return Gaze(body(), CAMERA, limits)
 
 
-@settings(deadline=None)
 @given(PANS, TILTS, st.floats(0.3, 20.0), PANS, TILTS)
 def test_a_point_that_can_be_seen_is_looked_at_from_wherever_the_head_is(
     pan: float, tilt: float, away: float, pan_now: float, tilt_now: float
@@ -46,7 +45,6 @@ def test_a_point_that_can_be_seen_is_looked_at_from_wherever_the_head_is(
     assert all(LIMITS[name].clamped(at) == at for name, at in found.positions.items())
 
 
-@settings(deadline=None)
 @given(st.tuples(*[st.floats(-3, 3)] * 3), PANS, TILTS)
 def test_it_never_leaves_the_limits_and_never_looks_further_past_than_before(
     point: tuple[float, float, float], pan: float, tilt: float

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.geometry import Transform3, quaternion_from_rpy, rotate
@@ -23,7 +23,6 @@ ANGLE = st.floats(-math.pi, math.pi)
 AT = (0.3, -0.2, 0.7)
 
 
-@settings(max_examples=25)
 @given(SHAPES, ANGLE, st.sampled_from([0.0, math.pi / 2]), ANGLE)
 def test_fingers_fit_around_what_they_hold(shape: Geometry, yaw: float, roll: float, bearing: float) -> None:
     pose = Transform3(AT, quaternion_from_rpy(roll, 0.0, yaw))

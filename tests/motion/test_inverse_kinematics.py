@@ -69,7 +69,6 @@ def solve(arm: ArmKinematics, target: PoseTarget, free: bool = True) -> PoseSolu
     return ended(solved(arm, SPACE, target, np.zeros(6), lambda values: free, seed=1))
 
 
-@settings(max_examples=15, deadline=None)
 @given(st.integers(0, 2**31))
 def test_each_solution_is_at_the_target_by_two_other_libraries_and_within_limits(arm: ArmKinematics, seed: int) -> None:
     goal = SPACE.samples(1, seed)[0]
@@ -84,7 +83,7 @@ def test_each_solution_is_at_the_target_by_two_other_libraries_and_within_limits
             assert np.allclose(frames["tip"], matrix(pose), atol=2e-4)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(st.integers(0, 2**31))
 def test_the_jacobian_is_what_small_steps_do(seed: int) -> None:
     values, step = SPACE.samples(1, seed)[0], 1e-6
@@ -119,7 +118,6 @@ def test_a_target_at_a_limit_is_met_just_before_it_so_that_curves_through_soluti
         assert np.all(np.delete(np.abs(values), 3) <= 2.6 - EDGE)
 
 
-@settings(max_examples=15, deadline=None)
 @given(st.integers(0, 2**31), st.booleans())
 def test_plain_and_compiled_code_take_the_same_way(seed: int, any_orientation: bool) -> None:
     assert GROUP is not None

@@ -21,7 +21,6 @@ def points(seed: int, count: int) -> Array:
     return np.random.default_rng(seed).uniform(-2.0, 2.0, (count, 3))
 
 
-@settings(max_examples=15, deadline=None)
 @given(SEEDS, st.integers(2, 7), st.floats(0.5, 200.0), st.booleans())
 def test_all_limits_are_kept_from_rest_to_rest(seed: int, count: int, jerk: float, is_one: bool) -> None:
     way, jerks = points(seed, count), np.array((jerk, np.inf if is_one else 2 * jerk, np.inf if is_one else jerk))
@@ -34,7 +33,7 @@ def test_all_limits_are_kept_from_rest_to_rest(seed: int, count: int, jerk: floa
     assert np.all(np.abs(jerks_between(found.times, found.velocities)) <= jerks * (1.0 + 1e-6))
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(SEEDS, st.integers(2, 7), st.floats(1.0, 100.0))
 def test_the_path_is_the_one_without_a_limit_of_jerk(seed: int, count: int, jerk: float) -> None:
     way = points(seed, count)
@@ -47,7 +46,6 @@ def test_the_path_is_the_one_without_a_limit_of_jerk(seed: int, count: int, jerk
         assert np.linalg.norm(curve - position, axis=1).min() < 4e-3
 
 
-@settings(max_examples=15, deadline=None)
 @given(st.lists(st.floats(0.05, 2.0), min_size=2, max_size=30), st.floats(0.01, 3.0), SEEDS)
 def test_a_mean_goes_forward_all_the_way_with_the_window_longer(steps: list[float], window: float, seed: int) -> None:
     way = np.cumsum([0.0, *steps])

@@ -40,7 +40,7 @@ def tilt(array: Array, other: Array) -> float:
     return math.acos(min(1.0, float((other[:3, :3] @ up)[2])))
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=6)
 @given(st.integers(0, 2**31))
 def test_the_tip_is_kept_upright_on_the_very_curves(seed: int) -> None:
     kept = KeptTip(ARM, UPRIGHT, READY)
@@ -57,7 +57,6 @@ def test_the_tip_is_kept_upright_on_the_very_curves(seed: int) -> None:
         assert abs(math.asin(turn[0, 2])) <= TILT + 1e-6
 
 
-@settings(max_examples=15, deadline=None)
 @given(st.integers(0, 2**31))
 def test_what_is_measured_changes_as_the_rates_say(seed: int) -> None:
     kept = KeptTip(ARM, Keep((0.2, 0.2, 0.2), ((0.0, 1.0), (0.0, 1.0), (0.0, 1.0))), READY)

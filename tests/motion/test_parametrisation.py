@@ -6,7 +6,7 @@ import subprocess
 import sys
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.domains.arms.motion.parametrisation import Spline, Trajectory, curve, timed
@@ -30,7 +30,6 @@ def test_a_straight_motion_is_examined_at_no_more_positions_than_needed() -> Non
     assert len(made.dense(0.01)) == 101
 
 
-@settings(max_examples=15, deadline=None)
 @given(SEEDS, st.integers(2, 7))
 def test_a_trajectory_stays_on_the_curve_that_was_looked_at_before(seed: int, count: int) -> None:
     way = np.random.default_rng(seed).uniform(-2.0, 2.0, (count, 3))
@@ -40,7 +39,6 @@ def test_a_trajectory_stays_on_the_curve_that_was_looked_at_before(seed: int, co
     assert max(away) <= 0.005
 
 
-@settings(max_examples=25, deadline=None)
 @given(SEEDS, st.integers(2, 30))
 def test_the_curve_is_the_natural_spline_of_scipy(seed: int, count: int) -> None:
     from scipy.interpolate import CubicSpline

@@ -50,7 +50,6 @@ def elsewhere(seed: int) -> Transform3:
     return Transform3((float(where[0]), float(where[1]), float(where[2])), turned.rotation)
 
 
-@settings(max_examples=15, deadline=None)
 @given(SEEDS)
 def test_a_tip_whose_position_does_not_count_is_turned_as_is_wanted_by_other_libraries(
     arm: ArmKinematics, seed: int
@@ -64,7 +63,6 @@ def test_a_tip_whose_position_does_not_count_is_turned_as_is_wanted_by_other_lib
             assert np.allclose(frames["tip"][:3, :3], matrix(pose)[:3, :3], atol=2e-4)
 
 
-@settings(max_examples=15, deadline=None)
 @given(SEEDS)
 def test_plain_and_compiled_code_turn_the_tip_in_the_same_steps(seed: int) -> None:
     target = PoseTarget(elsewhere(seed), any_position=True)
@@ -74,7 +72,7 @@ def test_plain_and_compiled_code_turn_the_tip_in_the_same_steps(seed: int) -> No
     assert np.allclose(array, other, atol=1e-5)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(SEEDS, KINDS)
 def test_what_will_do_approximately_is_met_exactly_where_it_can_be(
     arm: ArmKinematics, seed: int, kind: dict[str, bool]
@@ -85,7 +83,7 @@ def test_what_will_do_approximately_is_met_exactly_where_it_can_be(
     assert [array.tolist() for array in found.free] == [array.tolist() for array in exact.free]
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(SEEDS, st.booleans())
 def test_no_small_step_gets_nearer_than_what_is_approximate_and_the_start_is_not(seed: int, any_way: bool) -> None:
     target = PoseTarget(elsewhere(seed), any_way, is_approximate=True)
@@ -101,7 +99,7 @@ def test_no_small_step_gets_nearer_than_what_is_approximate_and_the_start_is_not
     assert order == sorted(order)
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(SEEDS)
 def test_plain_and_compiled_code_get_as_near(seed: int) -> None:
     target = PoseTarget(elsewhere(seed), is_approximate=True)
@@ -109,7 +107,7 @@ def test_plain_and_compiled_code_get_as_near(seed: int) -> None:
     assert np.allclose(one, other, atol=1e-5)
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(SEEDS)
 def test_what_is_approximate_is_free_and_never_farther_away_than_the_start(arm: ArmKinematics, seed: int) -> None:
     goal = SPACE.samples(1, seed)[0]
@@ -130,7 +128,6 @@ def test_nothing_is_approximate_unless_that_is_asked_for_and_nothing_that_collid
     assert search(arm, PoseTarget(far, is_approximate=True), most=-9.0).free == ()
 
 
-@settings(max_examples=12, deadline=None)
 @given(SEEDS, SEEDS, KINDS)
 def test_a_preferred_posture_is_never_farther_than_without_and_keeps_the_pose(
     arm: ArmKinematics, seed: int, other: int, kind: dict[str, bool]
@@ -149,7 +146,7 @@ def test_a_preferred_posture_is_never_farther_than_without_and_keeps_the_pose(
         assert target.is_met(ARM.tip_pose(values))
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(SEEDS, KINDS)
 def test_plain_and_compiled_code_prefer_the_same(seed: int, kind: dict[str, bool]) -> None:
     goal, liked = SPACE.samples(2, seed)
@@ -158,7 +155,7 @@ def test_plain_and_compiled_code_prefer_the_same(seed: int, kind: dict[str, bool
     assert np.allclose(one[0], other[0], atol=1e-4)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(SEEDS, KINDS)
 def test_a_posture_that_has_the_pose_is_taken(arm: ArmKinematics, seed: int, kind: dict[str, bool]) -> None:
     liked = SPACE.inside(2 * EDGE).samples(1, seed)[0]

@@ -36,7 +36,7 @@ def found(seed: int, samples: int = 3_000, cut: Cut | None = None) -> ReachMap:
     return list(made)[-1]
 
 
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=5)
 @given(st.integers(0, 2**31))
 def test_inverse_kinematics_reaches_each_cell_that_is_told_as_reached(seed: int) -> None:
     there = found(seed)
@@ -53,7 +53,6 @@ def test_inverse_kinematics_reaches_each_cell_that_is_told_as_reached(seed: int)
         assert there.cell_of(np.array(TOY.tip_pose(reached_cell.values).translation)) == cell
 
 
-@settings(max_examples=20, deadline=None)
 @given(st.integers(0, 2**31))
 def test_manipulability_is_the_product_of_how_far_the_tip_moves_along_its_main_axes(seed: int) -> None:
     values, step = SPACE.samples(1, seed)[0], 1e-6

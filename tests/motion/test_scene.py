@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from rbxcompose.base.geometry import Transform3, quaternion_from_rpy
@@ -45,7 +45,6 @@ def where(scene: PlanningScene, name: str, links: Mapping[str, Transform3]) -> T
     return links[placed_object.link].compose(placed_object.pose)
 
 
-@settings(max_examples=15, deadline=None)
 @given(st.integers(0, 2**31), st.sampled_from(["tip", "fore", "turret"]))
 def test_an_object_stays_where_it_is_when_it_is_attached_and_moves_with_its_link(seed: int, link: str) -> None:
     here, there = SPACE.samples(2, seed)
@@ -145,7 +144,6 @@ ROOM = PlacedObject("thing", FLOOR, "ground", Transform3((0.0, 0.0, -0.2)), piec
 """A floor and two slanted walls, whose boxes have no end."""
 
 
-@settings(max_examples=15, deadline=None)
 @given(objects("thing"), st.integers(0, 2**31), st.floats(0.0, 0.1), st.floats(0.0, 0.1))
 @example(ROOM, 0, 0.0, 0.0)
 @example(PlacedObject("thing", FLOOR, "ground", Transform3()), 0, 0.0, 0.09)
@@ -158,7 +156,6 @@ def test_a_larger_padding_never_frees_anything(one: PlacedObject, seed: int, sma
         assert many.is_free(values) == (not many.colliding(values))  # the tree of boxes overlooks nothing
 
 
-@settings(max_examples=15, deadline=None)
 @given(st.data(), st.integers(0, 2**31))
 def test_what_collides_is_nearer_than_its_padding(data: st.DataObject, seed: int) -> None:
     one = replace(data.draw(objects("thing", solids)), padding=0.03)
@@ -169,7 +166,6 @@ def test_what_collides_is_nearer_than_its_padding(data: st.DataObject, seed: int
             assert pair.collides == (pair.distance < margin) or abs(pair.distance - margin) < 2e-4
 
 
-@settings(max_examples=15, deadline=None)
 @given(poses, poses, solids, solids)
 def test_a_distance_is_the_same_from_both_sides(one: Transform3, other: Transform3, a: Geometry, b: Geometry) -> None:
     values = np.array([0.8, 0.0, 0.2])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.findings import Finding
@@ -59,7 +59,6 @@ def read(text: str) -> SceneFile:
     return found
 
 
-@settings(deadline=None)
 @given(st.data(), st.lists(names, max_size=4, unique=True))
 def test_what_is_written_is_read_as_it_was(data: st.DataObject, chosen: list[str]) -> None:
     found = tuple(replace(data.draw(objects(name)), link="") for name in chosen)

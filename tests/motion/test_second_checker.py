@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.geometry import Transform3
@@ -22,7 +22,6 @@ ALLOWED = adjacent_pairs(DESCRIPTION.body)
 PLANNER = planner()
 
 
-@settings(max_examples=15, deadline=None)
 @given(st.integers(0, 2**31))
 def test_what_is_free_is_what_a_formula_says(seed: int) -> None:
     checker = SecondChecker(DESCRIPTION, JOINTS, ALLOWED)

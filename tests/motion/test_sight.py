@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from rbxcompose.base.geometry import Transform3
@@ -57,7 +57,6 @@ def from_cone(eye: Array, point: Array, radius: float, middle: Array) -> float:
     return float(min(np.linalg.norm(here - nearest), np.linalg.norm(here - end)))
 
 
-@settings(max_examples=20, deadline=None)
 @given(
     st.tuples(st.floats(0.5, 0.95), st.floats(-0.1, 0.1), st.floats(0.45, 0.75)),
     st.tuples(*(st.floats(low, high) for low, high in ((-0.5, 0.5), (0.2, 0.8), (-0.3, 0.3)))),
@@ -75,7 +74,6 @@ def test_a_ball_is_in_the_way_if_and_only_if_it_is_in_the_cone(
     assert line.blocking(values, eye, np.array(WATCHED)) == (["ball"] if away < BALL else [])
 
 
-@settings(max_examples=20, deadline=None)
 @given(st.integers(0, 2**31))
 def test_the_angle_changes_as_the_rates_say(seed: int) -> None:
     values = SPACE.samples(1, seed)[0]

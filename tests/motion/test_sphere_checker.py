@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.geometry import Transform3
@@ -40,7 +40,6 @@ def both(mesh: MeshChecker, points: Array) -> tuple[int | None, int | None]:
     return SphereChecker(mesh, TREES).first_bad(points), first_bad(mesh, points)
 
 
-@settings(max_examples=15, deadline=None)
 @given(THINGS, st.lists(st.tuples(solids, poses), max_size=1), st.floats(0.0, 0.2), SEEDS)
 def test_the_first_bad_position_of_many_is_that_of_coal(
     things: list[PlacedObject], held: list[tuple[Geometry, Transform3]], padding: float, seed: int
@@ -67,7 +66,6 @@ def test_the_answers_follow_what_moves_beside_the_arm() -> None:
     assert len(verdicts) > 1
 
 
-@settings(max_examples=15, deadline=None)
 @given(SEEDS)
 def test_a_fast_plan_is_free_and_within_all_limits_by_other_code(seed: int) -> None:
     used = fast_planner()
@@ -84,7 +82,6 @@ def test_a_fast_plan_is_free_and_within_all_limits_by_other_code(seed: int) -> N
     assert found.trajectory.excess(np.full(3, 2.0), np.full(3, 4.0)) <= 1.0 + 1e-9
 
 
-@settings(max_examples=15, deadline=None)
 @given(objects("thing", solids), SEEDS)
 def test_what_the_fast_path_plans_coal_alone_finds_free(thing: PlacedObject, seed: int) -> None:
     used, mesh = fast_planner(things=[thing]), MeshChecker(ARM, {}, ADJACENT, [thing])

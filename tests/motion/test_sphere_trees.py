@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -48,7 +48,6 @@ def uncovered(tree: SphereTree, points: Array, node: int = 0) -> Array:
     return np.concatenate((out, rest))
 
 
-@settings(deadline=None)
 @given(st.tuples(LENGTHS, LENGTHS, LENGTHS), SEEDS)
 def test_spheres_cover_a_box_within_and_on_its_surface(size: tuple[float, float, float], seed: int) -> None:
     points = np.random.default_rng(seed).uniform(-1, 1, (300, 3))
@@ -58,7 +57,6 @@ def test_spheres_cover_a_box_within_and_on_its_surface(size: tuple[float, float,
     assert len(tree.leaves[0]) <= LEAVES
 
 
-@settings(deadline=None)
 @given(LENGTHS, LENGTHS, SEEDS)
 def test_spheres_cover_a_cylinder_within_and_on_its_surface(radius: float, length: float, seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -71,7 +69,6 @@ def test_spheres_cover_a_cylinder_within_and_on_its_surface(radius: float, lengt
     assert len(tree.leaves[0]) <= LEAVES
 
 
-@settings(max_examples=15, deadline=None)
 @given(st.integers(1, 40), SEEDS)
 def test_spheres_cover_every_triangle_of_a_mesh(count: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -79,7 +76,6 @@ def test_spheres_cover_every_triangle_of_a_mesh(count: int, seed: int) -> None:
     assert not len(uncovered(mesh_tree(triangles), on_surface(triangles, 500, rng)))
 
 
-@settings(max_examples=15, deadline=None)
 @given(st.integers(1, 40), SEEDS)
 def test_the_hulls_of_a_mesh_cover_it_as_its_spheres_do(count: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -112,7 +108,6 @@ def test_a_convex_mesh_is_one_hull_and_another_one_many_small_ones() -> None:
     assert radii.max() < 0.5
 
 
-@settings(deadline=None)
 @given(st.integers(1, 300), st.floats(0.01, 0.2), SEEDS)
 def test_spheres_cover_all_cells_of_an_octree(count: int, side: float, seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -31,7 +31,6 @@ def followed(goal: Transform3) -> tuple[list[Array], LineEnd]:
             return found, end
 
 
-@settings(max_examples=30, deadline=None)
 @given(SHIFT, SHIFT, SHIFT)
 def test_the_tip_stays_on_the_line_also_between_its_points(x: float, y: float, z: float) -> None:
     works = made()[2]

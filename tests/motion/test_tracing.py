@@ -86,7 +86,7 @@ def away_from_line(points: Array, first: Array, last: Array) -> float:
     return float(np.linalg.norm(points - first - shares[:, None] * along, axis=1).max())
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(st.integers(0, 2**31))
 def test_the_tip_keeps_to_its_line_and_turns_evenly_or_tells_how_far_it_gets(seed: int) -> None:
     random = np.random.default_rng(seed)

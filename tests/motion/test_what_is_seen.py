@@ -9,7 +9,7 @@ import coal
 import numpy as np
 import pinocchio
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -54,7 +54,6 @@ arms: {{arm: {{planner: {{type: {planner}}}}}}}
 """
 
 
-@settings(max_examples=15, deadline=None)
 @given(ELEMENTS, st.integers(0, 2**31))
 def test_each_point_of_what_is_seen_or_hit_is_in_a_sphere_of_its_link(
     tmp_path_factory: pytest.TempPathFactory, elements: list[tuple[str, str, str]], seed: int

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.msgs.action_msgs import CancelGoal, GoalInfo
@@ -16,6 +16,7 @@ from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.msgs.std_msgs import Bool, Empty, Float32, Int32, String
 from rbxcompose.msgs.types import Message, declared
 from rbxcompose.msgs.unique_identifier_msgs import UUID
+from tests.loops import for_all
 from tests.msgs.samples import EVERYTHING, MESSAGES, ORACLE, any_message, instances, oracle_encode
 
 GOLDEN = [
@@ -38,14 +39,13 @@ def test_known_messages_have_known_bytes(message: Message, body: str) -> None:
     assert encode(message) == HEADER + bytes.fromhex(body)
 
 
-@pytest.mark.parametrize("message", MESSAGES, ids=lambda message: str(message.TYPE))
+@for_all("message", MESSAGES)
 def test_a_message_of_defaults_is_written_as_rosbags_writes_it_and_read_back(message: type[Message]) -> None:
     payload = encode(message())
     assert payload == oracle_encode(message())
     assert decode(message, payload) == message()
 
 
-@settings(suppress_health_check=[HealthCheck.too_slow])  # most of the time goes into making messages
 @given(any_message())
 def test_any_message_is_written_as_rosbags_writes_it_and_read_back(message: Message) -> None:
     payload = encode(message)

@@ -13,12 +13,13 @@ from rbxcompose.msgs.definitions import (
     parse_type,
     read,
 )
+from tests.loops import for_all
 from tests.msgs.samples import JAZZY, STRUCTURES, description
 
 SHARED = sorted(set(JAZZY.fielddefs) & set(interface_names("msg")))
 
 
-@pytest.mark.parametrize("name", SHARED)
+@for_all("name", SHARED)
 def test_our_text_has_the_fields_and_constants_of_jazzy(name: str) -> None:
     constants, fields = JAZZY.fielddefs[name][:2]
     (ours,) = read(name)

@@ -19,6 +19,7 @@ from rbxcompose.msgs.rcl_interfaces import Log
 from rbxcompose.msgs.std_srvs import SetBool
 from rbxcompose.msgs.types import Action, FeedbackT, GoalT, Message, RequestT, ResponseT, ResultT, Service, declared
 from rbxcompose.msgs.unique_identifier_msgs import UUID
+from tests.loops import for_all
 from tests.msgs.samples import EVERYTHING, MESSAGES, STRUCTURES
 
 
@@ -89,7 +90,7 @@ def test_a_message_is_pickled_copied_and_has_types(message: Any) -> None:
     assert set(get_type_hints(type(message))) >= {"TYPE", "HASH", "FIELDS", *type(message).FIELDS}
 
 
-@pytest.mark.parametrize("message", MESSAGES, ids=lambda message: str(message.TYPE))
+@for_all("message", MESSAGES)
 def test_a_message_is_a_frozen_slotted_dataclass_with_defaults(message: Any) -> None:
     made = message()
     assert not hasattr(made, "__dict__")

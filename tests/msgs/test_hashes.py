@@ -4,6 +4,7 @@ import pytest
 
 from rbxcompose.msgs.definitions import parse, parts, read, type_hash
 from rbxcompose.msgs.generate import all_structures
+from tests.loops import for_all
 from tests.msgs.samples import JAZZY, MESSAGES, ORACLE, STRUCTURES
 
 FIBONACCI = "example_interfaces/action/Fibonacci"
@@ -108,7 +109,7 @@ def test_a_hash_is_the_one_that_others_use(name: str, value: str, structures: di
     assert type_hash(name, structures) == f"RIHS01_{value}"
 
 
-@pytest.mark.parametrize("message", MESSAGES, ids=lambda message: str(message.TYPE))
+@for_all("message", MESSAGES)
 def test_a_class_carries_the_hash_of_its_definition(message: Any) -> None:
     assert type_hash(message.TYPE, STRUCTURES) == message.HASH
 

@@ -389,4 +389,4 @@ class AnyHistory(RuleBasedStateMachine):
 
 
 TestAnyHistory = AnyHistory.TestCase
-TestAnyHistory.settings = settings(max_examples=50, stateful_step_count=50, deadline=None)
+TestAnyHistory.settings = settings(stateful_step_count=50)

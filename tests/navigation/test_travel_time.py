@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.geometry import Pose2, wrap_angle
@@ -22,7 +22,6 @@ def least(start: Pose2, goal: Pose2) -> float:
 
 
 @given(ANGLES, st.floats(0.1, 8.0), ANGLES, ANGLES, st.floats(0.0, 1.0), ANGLES, st.floats(-1.0, 1.0))
-@settings(max_examples=40, deadline=None)
 def test_no_drive_is_faster_and_a_longer_one_is_hardly_slower(
     heading: float, distance: float, bearing: float, at_end: float, off: float, off_to: float, turned: float
 ) -> None:

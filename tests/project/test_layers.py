@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -43,7 +44,9 @@ def imports(path: Path) -> set[str]:
     return {name for name in found if name.startswith("rbxcompose.") and name != "rbxcompose.__version__"}
 
 
-FILES = {path: imports(path) for path in sorted(PACKAGE.rglob("*.py"))}
+@cache
+def files() -> dict[Path, set[str]]:
+    return {path: imports(path) for path in sorted(PACKAGE.rglob("*.py"))}
 
 
 def room_of(module: str) -> str:
@@ -59,15 +62,15 @@ def module_of(path: Path) -> str:
 
 
 def test_every_module_is_in_a_room() -> None:
-    names = {room_of(module_of(path)) for path in FILES if path.parent != PACKAGE}
+    names = {room_of(module_of(path)) for path in files() if path.parent != PACKAGE}
     assert names == set(ROOMS)
-    assert {path.name for path in FILES if path.parent == PACKAGE} == {"__init__.py", "__main__.py"}
+    assert {path.name for path in files() if path.parent == PACKAGE} == {"__init__.py", "__main__.py"}
 
 
 def test_a_room_imports_only_from_those_before_it() -> None:
     wrong = [
         f"{module_of(path)} imports {name}"
-        for path, names in FILES.items()
+        for path, names in files().items()
         if path.parent != PACKAGE
         for name in sorted(names)
         if ROOMS.index(room_of(name)) > ROOMS.index(room_of(module_of(path)))
@@ -78,7 +81,7 @@ def test_a_room_imports_only_from_those_before_it() -> None:
 def test_a_domain_imports_only_those_domains_that_its_row_names() -> None:
     wrong = [
         f"{module} imports {name}"
-        for path, names in FILES.items()
+        for path, names in files().items()
         if (module := module_of(path)).startswith("rbxcompose.domains.")
         for name in sorted(names)
         if name.startswith("rbxcompose.domains.")
@@ -91,7 +94,7 @@ def test_a_domain_imports_only_those_domains_that_its_row_names() -> None:
 def test_the_core_of_a_domain_needs_no_bus_and_nothing_that_runs() -> None:
     wrong = [
         f"{module} imports {name}"
-        for path, names in FILES.items()
+        for path, names in files().items()
         if (module := module_of(path)).startswith("rbxcompose.domains.")
         and not any(map(PLUG_IN.fullmatch, module.split(".")[3:4]))
         for name in sorted(names)

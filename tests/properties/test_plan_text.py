@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.config import Place, Secret
@@ -106,7 +106,6 @@ def test_a_shipped_robot_comes_back_as_it_was(path: Path) -> None:
     assert dump(load(dump(plan))) == dump(plan)
 
 
-@settings(max_examples=20, deadline=None)
 @given(number=NUMBERS, share=st.integers(1, 99), rounds=st.integers(1, 9), word=WORDS)
 def test_any_robot_comes_back_as_it_was(
     tmp_path_factory: pytest.TempPathFactory, number: str, share: int, rounds: int, word: str

@@ -23,6 +23,7 @@ from rbxcompose.runtime.recording.topics import (
     topic_of,
 )
 from rbxcompose.sdk.ports import Qos
+from tests.loops import for_all
 from tests.recording.samples import MAP, ODOM, SECOND, TWIST, recorded, some
 
 HASH = "RIHS01_" + "0" * 64
@@ -77,7 +78,7 @@ def test_topics_are_chosen_by_name_and_by_class(
     assert {one for one in (MAP, ODOM, TWIST) if selection.takes(one)} == taken
 
 
-@pytest.mark.parametrize("name", registry.names("msg"))
+@for_all("name", registry.names("msg"))
 def test_every_definition_is_whole_for_an_independent_decoder(name: str) -> None:
     short = name.replace("/msg/", "/")
     decoder = generate_dynamic(short, definition_of(name))[short]

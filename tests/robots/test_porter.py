@@ -49,9 +49,8 @@ def test_it_has_no_findings(profiles: tuple[str, ...]) -> None:
 
 
 @pytest.mark.timeout(900)
+@pytest.mark.soak
 def test_it_picks_and_places_with_every_seed(soak: Soak) -> None:
-    if not soak.is_on:
-        pytest.skip("with --soak; a test of the mission `pick_and_place` does it once")
     plan = compiled("table").plan
     assert plan
     runs = {(seed, twin): ran(plan, "pick_and_place", seed, twin) for seed in range(SEEDS) for twin in TWINS}

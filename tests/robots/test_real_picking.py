@@ -18,9 +18,8 @@ UP = ("up", "robots/pi_robot", "--profile", "table", "--set", "start=pick_and_pl
 
 
 @pytest.mark.timeout(SEEDS * LONGEST)
+@pytest.mark.soak
 def test_each_run_with_another_seed_picks_and_places(soak: Soak, tmp_path: Path) -> None:
-    if not soak.is_on:
-        pytest.skip("with --soak; a test of the mission `pick_and_place` does it once, in virtual time")
     environment = {**os.environ, "XDG_RUNTIME_DIR": str(tmp_path), "PYTHONPATH": str(ROOT), "NO_COLOR": "1"}
     failures = {}
     for seed in range(SEEDS):

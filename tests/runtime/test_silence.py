@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.levels import Level
@@ -25,7 +25,6 @@ def test_a_process_that_waits_for_a_processor_is_told_but_not_ended_until_it_had
 
 
 @given(share=st.floats(0.0, 0.95))
-@settings(max_examples=20)
 def test_a_process_that_hangs_on_a_loaded_machine_is_ended_once_it_had_its_time(share: float) -> None:
     stage = Stage().start()
     stage.beats.discard("robot")

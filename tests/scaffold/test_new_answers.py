@@ -70,7 +70,7 @@ def test_a_sentence_is_one_line_that_a_manifest_may_hold(text: str) -> None:
     assert refusal(read_text, text).startswith("RBX9103")
 
 
-@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     st.text(min_size=1, max_size=30)
     | st.sampled_from(["a: b", "$", "# x", "$x ${y}", "it's", '"', "true", "- a", "\\n"])

@@ -50,7 +50,7 @@ def test_a_place_with_an_odd_name_is_refused_or_fine(name: str, tmp_path: Path) 
     assert findings(tmp_path, f"{name}=1,1") in ("", "RBX9102")
 
 
-@settings(max_examples=10, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=10, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     st.dictionaries(
         st.from_regex("[a-z][a-z0-9_]{0,9}", fullmatch=True), st.tuples(number, number), min_size=1, max_size=6

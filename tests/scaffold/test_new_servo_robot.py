@@ -10,6 +10,7 @@ from rbxcompose.commands.new_files import write_new
 from rbxcompose.domains.servos.models import servo_models
 from rbxcompose.domains.servos.new_robot import NewServo, ServoRobotAnswers, servo_robot_files
 from rbxcompose.testing import check_file
+from tests.loops import for_all
 
 SUPPLY = 12.0  # [V]
 
@@ -25,7 +26,7 @@ def test_it_has_no_findings_for_any_model_and_port(port: str, tmp_path: Path) ->
     assert getattr(driver, "port", None) == port
 
 
-@pytest.mark.parametrize("name", servo_models())
+@for_all("name", servo_models())
 def test_the_limits_of_a_joint_are_within_the_range_of_its_model(name: str) -> None:
     model = servo_models()[name]
     servo = NewServo(1, model)

@@ -33,18 +33,13 @@ LOSSY = {
 }  # each way
 QUIC = "security: mtls\nlinks: {wifi: {between: [r, d], protocol: quic}}\n"
 LINK = "links: {wifi: {between: [r, d], limit: 128 kbit/s, downsample: {/tf: 20 Hz}}}\n"
+pytestmark = pytest.mark.soak
 CLOCK = """
 import os, time
 _time, _time_ns, _jump = time.time, time.time_ns, os.environ["JUMP"]
 time.time = lambda: _time() + 3600 * os.path.exists(_jump)
 time.time_ns = lambda: _time_ns() + 3600 * 10**9 * os.path.exists(_jump)
 """
-
-
-@pytest.fixture(autouse=True)
-def only_in_soak(soak: Soak) -> None:
-    if not soak.is_on:
-        pytest.skip("with --soak")
 
 
 def share_of_motion(motion: list[tuple[float, bool]], since: float) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.geometry import Velocity2
@@ -17,7 +17,6 @@ CYCLE = 0.02  # [s]
 BASE = ROBOT.robot.components["base"].config
 
 
-@settings(deadline=None)  # the first one reads what all robots have in common
 @given(SHARES)
 def test_a_base_has_a_bound_exactly_if_its_commands_cross(hosts: dict[str, str]) -> None:
     _, robot = spread(hosts)

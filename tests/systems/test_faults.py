@@ -120,9 +120,8 @@ def test_the_base_stands_in_time_and_all_goes_on(tmp_path: Path) -> None:
 
 @pytest.mark.timeout(240)
 @pytest.mark.parametrize("fault", FAULTS, ids=[fault.name for fault in FAULTS])
+@pytest.mark.soak
 def test_each_fault(fault: HostFault, tmp_path: Path, soak: Soak) -> None:
-    if not soak.is_on:
-        pytest.skip("with --soak")
     with patrolling(tmp_path) as patrol:
         stood, moved = bear(patrol, fault)
         stand = f"stood after {stood:.2f} s" if fault.cuts_commands else "need not stop"
@@ -130,9 +129,8 @@ def test_each_fault(fault: HostFault, tmp_path: Path, soak: Soak) -> None:
 
 
 @pytest.mark.timeout(100)
+@pytest.mark.soak
 def test_without_what_cannot_come_back_all_hosts_go_down(tmp_path: Path, soak: Soak) -> None:
-    if not soak.is_on:
-        pytest.skip("with --soak")
     with patrolling(tmp_path) as patrol:
         patrol.wait_until(lambda: patrol.is_moving)
         at = patrol.kill("r", "world")

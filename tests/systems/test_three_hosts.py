@@ -56,9 +56,8 @@ def test_a_host_of_three_may_be_cut_off_and_the_patrol_succeeds_once_it_is_back(
 
 
 @pytest.mark.timeout(900)
+@pytest.mark.soak
 def test_it_goes_on_after_short_cuts_too_whenever_each_end_takes_note_of_them(tmp_path: Path, soak: Soak) -> None:
-    if not soak.is_on:
-        pytest.skip("with --soak: few of many cuts leave a router deaf")
     with three_hosts(tmp_path, rounds=1000) as patrol:
         for host in patrol.hosts.addresses:
             patrol.up(host)

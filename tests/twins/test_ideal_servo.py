@@ -10,6 +10,7 @@ from rbxcompose.base.clock import SteppedClock
 from rbxcompose.domains.servos.models import servo_models
 from rbxcompose.domains.servos.twins.servo_fake import FakeServo
 from rbxcompose.domains.servos.twins.servo_twin import TwinBus
+from tests.loops import for_all
 
 MODELS = sorted(servo_models())
 STATE = ("present_position", "present_speed", "present_load", "present_temperature", "moving")
@@ -19,8 +20,7 @@ def ideal(model: str, clock: SteppedClock) -> TwinBus:
     return TwinBus([FakeServo(model, 1, is_ideal=True)], clock.now)
 
 
-@pytest.mark.parametrize("name", MODELS)
-@given(goals=st.lists(st.integers(-400, 400), min_size=1, max_size=10))
+@given(name=st.sampled_from(MODELS), goals=st.lists(st.integers(-400, 400), min_size=1, max_size=10))
 def test_with_torque_it_is_at_its_goal_in_no_time(name: str, goals: list[int]) -> None:
     clock = SteppedClock()
     bus = ideal(name, clock)
@@ -33,7 +33,7 @@ def test_with_torque_it_is_at_its_goal_in_no_time(name: str, goals: list[int]) -
         clock.advance_to(0.01 * index)
 
 
-@pytest.mark.parametrize("name", MODELS)
+@for_all("name", MODELS)
 def test_without_torque_it_stays(name: str) -> None:
     clock = SteppedClock()
     bus = ideal(name, clock)

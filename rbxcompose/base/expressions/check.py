@@ -5,27 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Protocol
 
+from rbxcompose.base import units
 from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.expressions import tree
 from rbxcompose.base.expressions.functions import FUNCTIONS
-from rbxcompose.base.expressions.tree import (
-    Arithmetic,
-    Comparison,
-    Expression,
-    ExpressionNode,
-    FieldAccess,
-    Flag,
-    FunctionCall,
-    Index,
-    Items,
-    Junction,
-    Membership,
-    Minus,
-    Not,
-    Number,
-    Text,
-    Variable,
-    Word,
-)
 from rbxcompose.base.expressions.types import (
     COUNT,
     FLAG,
@@ -40,50 +23,39 @@ from rbxcompose.base.expressions.types import (
     quantity_of,
 )
 from rbxcompose.base.findings import DID_YOU_MEAN, suggest, surely_meant
-from rbxcompose.base.units import (
-    DIMENSIONS,
-    LENGTH,
-    NUMBER,
-    QUOTIENT,
-    TIME,
-    Dimension,
-    bare_number_help,
-    example,
-    units_of,
-)
 
 
-def _written(node: ExpressionNode) -> Number | None:
+def _written(node: tree.ExpressionNode) -> tree.Number | None:
     """Return the literal number of a node; None if it is something else."""
-    while isinstance(node, Minus):
+    while isinstance(node, tree.Minus):
         node = node.operand
-    return node if isinstance(node, Number) else None
+    return node if isinstance(node, tree.Number) else None
 
 
-def is_bare(node: ExpressionNode) -> bool:
+def is_bare(node: tree.ExpressionNode) -> bool:
     """Return whether a node is a literal number without a unit."""
     number = _written(node)
-    return number is not None and number.dimension == NUMBER
+    return number is not None and number.dimension == units.NUMBER
 
 
-def missing_unit(node: ExpressionNode, dimension: Dimension) -> str:
+def missing_unit(node: tree.ExpressionNode, dimension: units.Dimension) -> str:
     """Return what to write instead of a bare number, or nothing if it is read as SI."""
     sign = 1.0
-    while isinstance(node, Minus):
+    while isinstance(node, tree.Minus):
         node, sign = node.operand, -sign
-    return bare_number_help(dimension, sign * node.value) if isinstance(node, Number) else ""
+    return units.bare_number_help(dimension, sign * node.value) if isinstance(node, tree.Number) else ""
 
 
-def other_unit(left: tuple[ExpressionNode, Type], right: tuple[ExpressionNode, Type]) -> str:
+def other_unit(left: tuple[tree.ExpressionNode, Type], right: tuple[tree.ExpressionNode, Type]) -> str:
     """Return the units of a literal quantity next to one that is not, or where a name gets its unit."""
     for (written, bare), (other, kind) in ((left, right), (right, left)):
         dimension = kind.dimension
-        if dimension not in DIMENSIONS.values() or not dimension or _written(other):
+        if dimension not in units.DIMENSIONS.values() or not dimension or _written(other):
             continue
         if _written(written):
-            return f"units of {kind.phrase}: {', '.join(units_of(dimension)) or 'none'}"
-        if isinstance(written, Variable) and bare.measure == NUMBER and dimension != NUMBER:
-            return f"give '{written.name}' a unit where it is declared, such as '{example(dimension)}'"
+            return f"units of {kind.phrase}: {', '.join(units.units_of(dimension)) or 'none'}"
+        if isinstance(written, tree.Variable) and bare.measure == units.NUMBER and dimension != units.NUMBER:
+            return f"give '{written.name}' a unit where it is declared, such as '{units.example(dimension)}'"
     return ""
 
 
@@ -129,21 +101,21 @@ class ExpressionProblem:
     """Whether it is about a word that had to be one of a few."""
 
 
-def check(expression: Expression, scope: StaticScope) -> tuple[Type, list[ExpressionProblem]]:
+def check(expression: tree.Expression, scope: StaticScope) -> tuple[Type, list[ExpressionProblem]]:
     """Return the type of an expression, unknown if it is wrong, and its problems in the order of the text."""
     checker = _Checker(scope)
     found = checker.type_of(expression.tree)
     return found, checker.sorted()
 
 
-def check_value(expression: Expression, scope: StaticScope, expected: Type) -> list[ExpressionProblem]:
+def check_value(expression: tree.Expression, scope: StaticScope, expected: Type) -> list[ExpressionProblem]:
     """Return the problems of an expression that must give a value of the type `expected`."""
     checker = _Checker(scope)
     checker.require(expression.tree, expected)
     return checker.sorted()
 
 
-def check_condition(expression: Expression, scope: StaticScope) -> list[ExpressionProblem]:
+def check_condition(expression: tree.Expression, scope: StaticScope) -> list[ExpressionProblem]:
     """Return the problems of an expression that must be true or false."""
     return check_value(expression, scope, FLAG)
 
@@ -158,48 +130,48 @@ class _Checker:
     def sorted(self) -> list[ExpressionProblem]:
         return sorted(self.problems, key=lambda problem: (problem.start, problem.end))
 
-    def wrong(self, node: ExpressionNode, message: str, fix: str = "", meant: str | None = "") -> Type:
+    def wrong(self, node: tree.ExpressionNode, message: str, fix: str = "", meant: str | None = "") -> Type:
         self.problems.append(ExpressionProblem(message, node.start, node.end, fix, meant or ""))
         return UNKNOWN
 
-    def type_of(self, node: ExpressionNode, expected: Type = UNKNOWN) -> Type:
+    def type_of(self, node: tree.ExpressionNode, expected: Type = UNKNOWN) -> Type:
         """Return the type of a node; `expected` has the choices that a bare word may be."""
         match node:
-            case Number(value=value, dimension=dimension):
-                return COUNT if dimension == NUMBER and value.is_integer() else quantity_of(dimension)
-            case Text(value=name) | Word(name=name) if name in expected.choices:
+            case tree.Number(value=value, dimension=dimension):
+                return COUNT if dimension == units.NUMBER and value.is_integer() else quantity_of(dimension)
+            case tree.Text(value=name) | tree.Word(name=name) if name in expected.choices:
                 return expected
-            case Text():
+            case tree.Text():
                 return self.text(node, expected)
-            case Flag():
+            case tree.Flag():
                 return FLAG
-            case Variable():
+            case tree.Variable():
                 return self.variable(node)
-            case Word():
+            case tree.Word():
                 return self.word(node, expected)
-            case Items(items=nodes):
+            case tree.Items(items=nodes):
                 types = {self.type_of(item, expected.entry) for item in nodes}
                 return list_of(types.pop() if len(types) == 1 else UNKNOWN)
-            case FieldAccess() | Index():
+            case tree.FieldAccess() | tree.Index():
                 return self.part(node)
-            case FunctionCall():
+            case tree.FunctionCall():
                 return self.call(node)
-            case Minus(operand=operand):
+            case tree.Minus(operand=operand):
                 return self.measured(operand)
-            case Not(operand=operand):
+            case tree.Not(operand=operand):
                 return self.require(operand, FLAG)
-            case Junction(operands=operands):
+            case tree.Junction(operands=operands):
                 for operand in operands:
                     self.require(operand, FLAG)
                 return FLAG
-            case Comparison():
+            case tree.Comparison():
                 return self.comparison(node)
-            case Membership():
+            case tree.Membership():
                 return self.membership(node)
-            case Arithmetic():
+            case tree.Arithmetic():
                 return self.arithmetic(node)
 
-    def require(self, node: ExpressionNode, expected: Type) -> Type:
+    def require(self, node: tree.ExpressionNode, expected: Type) -> Type:
         """Report a node that is not of the type `expected`; return that type."""
         found = self.type_of(node, expected)
         if accepts(expected, found):
@@ -212,12 +184,12 @@ class _Checker:
         self.wrong(node, f"this must be {what}; it is {found.detail}", _WHOLE if expected == COUNT else "")
         return expected
 
-    def text(self, node: Text, expected: Type) -> Type:
+    def text(self, node: tree.Text, expected: Type) -> Type:
         if expected.kind is TypeKind.CHOICE:
             return self.wrong(node, f"unknown choice '{node.value}'", suggest(node.value, expected.choices, "choices"))
         return TEXT
 
-    def variable(self, node: Variable) -> Type:
+    def variable(self, node: tree.Variable) -> Type:
         if found := self.scope.variable(node.name):
             return found
         if self.scope.word(node.name):
@@ -229,7 +201,7 @@ class _Checker:
             fix = f"{fix}; new ones are declared as {_DECLARED}".removeprefix("; ")
         return self.wrong(node, f"unknown name '${node.name}'", fix, f"${meant}" if meant else "")
 
-    def word(self, node: Word, expected: Type) -> Type:
+    def word(self, node: tree.Word, expected: Type) -> Type:
         if found := self.scope.word(node.name):
             return found
         if self.scope.variable(node.name):
@@ -248,16 +220,16 @@ class _Checker:
                 fix, meant = f"did you mean '${variable}'?", f"${variable}"
         return self.wrong(node, f"unknown name '{node.name}'", fix, meant)
 
-    def choice(self, node: Word, expected: Type) -> Type:
+    def choice(self, node: tree.Word, expected: Type) -> Type:
         message = f"'{node.name}' is none of {', '.join(expected.choices)}"
         fix, meant = suggest(node.name, expected.choices, "choices"), surely_meant(node.name, expected.choices) or ""
         fix = fix if fix.startswith(DID_YOU_MEAN) else ""  # the message lists them
         self.problems.append(ExpressionProblem(message, node.start, node.end, fix, meant, is_choice=True))
         return UNKNOWN
 
-    def part(self, node: FieldAccess | Index) -> Type:
+    def part(self, node: tree.FieldAccess | tree.Index) -> Type:
         whole = self.type_of(node.of)
-        if isinstance(node, FieldAccess):
+        if isinstance(node, tree.FieldAccess):
             if whole.names and node.name not in whole.names:
                 return self.wrong(node, f"there is no entry '{node.name}'", f"entries: {', '.join(whole.names)}")
             if whole.kind in (TypeKind.MAP, TypeKind.UNKNOWN):
@@ -269,7 +241,7 @@ class _Checker:
                 return UNKNOWN
             case TypeKind.MAP if key.kind in _NAMES:
                 return whole.entry
-            case TypeKind.LIST if key == UNKNOWN or key.measure in (NUMBER, QUOTIENT):
+            case TypeKind.LIST if key == UNKNOWN or key.measure in (units.NUMBER, units.QUOTIENT):
                 return whole.entry
             case TypeKind.MAP:
                 return self.wrong(node.index, f"an entry of a map is found by a name; this is {key.phrase}")
@@ -277,7 +249,7 @@ class _Checker:
                 return self.wrong(node.index, f"an item of a list is found by a number; this is {key.phrase}")
         return self.wrong(node, f"{whole.phrase} has no items")
 
-    def comparison(self, node: Comparison) -> Type:
+    def comparison(self, node: tree.Comparison) -> Type:
         left, right = self.pair(node.left, node.right)
         if node.operator in ("==", "!="):
             self.equality(node, left, right)
@@ -285,16 +257,16 @@ class _Checker:
             self.joined(node, left, right, "is compared with")
         return FLAG
 
-    def pair(self, left: ExpressionNode, right: ExpressionNode) -> tuple[_Typed, _Typed]:
+    def pair(self, left: tree.ExpressionNode, right: tree.ExpressionNode) -> tuple[_Typed, _Typed]:
         """Return two nodes with their types; a bare word may be a choice of the other one's type."""
-        if isinstance(left, Word | Text):
+        if isinstance(left, tree.Word | tree.Text):
             other = self.type_of(right)
             return _Typed(left, self.type_of(left, other)), _Typed(right, other)
         type_ = self.type_of(left)
         return _Typed(left, type_), _Typed(right, self.type_of(right, type_))
 
-    def membership(self, node: Membership) -> Type:
-        if isinstance(node.group, Items):
+    def membership(self, node: tree.Membership) -> Type:
+        if isinstance(node.group, tree.Items):
             for one in node.group.items:
                 self.equality(one, *self.pair(node.item, one))
             return FLAG
@@ -312,7 +284,7 @@ class _Checker:
                 self.wrong(node.group, f"'in' needs a list or a map; this is {group.phrase}")
         return FLAG
 
-    def equality(self, node: ExpressionNode, left: _Typed, right: _Typed) -> None:
+    def equality(self, node: tree.ExpressionNode, left: _Typed, right: _Typed) -> None:
         if left.type.measure and right.type.measure:
             self.joined(node, left, right, "is compared with")
         elif not are_comparable(left.type, right.type):
@@ -320,7 +292,7 @@ class _Checker:
             fix = "write 'distance(a, b) < 10 cm'" if poses else ""
             self.wrong(node, f"{left.type.phrase} is compared with {right.type.phrase}", fix)
 
-    def joined(self, node: ExpressionNode, left: _Typed, right: _Typed, verb: str) -> Type:
+    def joined(self, node: tree.ExpressionNode, left: _Typed, right: _Typed, verb: str) -> Type:
         """Return the type of the sum, the least or the greatest of two measured values."""
         dimension, other = left.type.measure, right.type.measure
         if not dimension or not other:
@@ -341,16 +313,16 @@ class _Checker:
     def is_measured(self, typed: _Typed) -> bool:
         """Return whether a value can be computed with; report it if not."""
         if typed.type != UNKNOWN and not typed.type.measure:
-            name = typed.node.name if isinstance(typed.node, Variable) and typed.type.kind is TypeKind.MAP else ""
+            name = typed.node.name if isinstance(typed.node, tree.Variable) and typed.type.kind is TypeKind.MAP else ""
             fix = f"read an entry of it: '${name}.NAME'" if name else ""
             self.wrong(typed.node, f"this must be a number; it is {typed.type.phrase}", fix)
         return typed.type.measure is not None
 
-    def measured(self, node: ExpressionNode) -> Type:
+    def measured(self, node: tree.ExpressionNode) -> Type:
         found = self.type_of(node)
         return found if self.is_measured(_Typed(node, found)) else UNKNOWN
 
-    def arithmetic(self, node: Arithmetic) -> Type:
+    def arithmetic(self, node: tree.Arithmetic) -> Type:
         left = _Typed(node.left, self.type_of(node.left))
         right = _Typed(node.right, self.type_of(node.right))
         kinds = {left.type.kind, right.type.kind}
@@ -367,14 +339,14 @@ class _Checker:
             return self.joined(node, left, right, _SUMS[node.operator])
         return _product(node.operator, left.type, right.type)
 
-    def call(self, node: FunctionCall) -> Type:
+    def call(self, node: tree.FunctionCall) -> Type:
         name, arguments = node.function, node.arguments
         if wrong := FUNCTIONS[name].wrong_count(len(arguments)):
             self.wrong(node, f"{name}() {wrong}")
             return _RESULTS.get(name, UNKNOWN)
         match name:
             case "age" | "new":
-                if isinstance(arguments[0], Variable):
+                if isinstance(arguments[0], tree.Variable):
                     self.type_of(arguments[0])
                 else:
                     self.wrong(arguments[0], f"{name}() needs a name with '$'", f"such as {name}($scan)")
@@ -387,7 +359,7 @@ class _Checker:
                     self.require(argument, POSE)
             case "round":
                 found = self.measured(arguments[0])
-                if found.measure not in (None, NUMBER, QUOTIENT):
+                if found.measure not in (None, units.NUMBER, units.QUOTIENT):
                     fix = "divide by a unit first, such as '1 cm' or '1 %'"
                     self.wrong(arguments[0], f"round() needs a number without a unit; this is {found.phrase}", fix)
             case "abs":
@@ -396,7 +368,7 @@ class _Checker:
                 return self.extreme(node)
         return _RESULTS[name]
 
-    def extreme(self, node: FunctionCall) -> Type:
+    def extreme(self, node: tree.FunctionCall) -> Type:
         """Return the type of the least or the greatest of several values, or of the items of one list."""
         first, *others = node.arguments
         if others:
@@ -414,25 +386,31 @@ class _Checker:
 class _Typed:
     """A node with its type."""
 
-    node: ExpressionNode
+    node: tree.ExpressionNode
     type: Type
 
 
 _NAMES = frozenset({TypeKind.TEXT, TypeKind.CHOICE, TypeKind.PLACE, TypeKind.UNKNOWN})
 _SUMS = {"+": "is added to", "-": "is reduced by"}
 _WHOLE = "write round(...) for a whole number"
-_RESULTS = {"age": quantity_of(TIME), "new": FLAG, "count": COUNT, "distance": quantity_of(LENGTH), "round": COUNT}
+_RESULTS = {
+    "age": quantity_of(units.TIME),
+    "new": FLAG,
+    "count": COUNT,
+    "distance": quantity_of(units.LENGTH),
+    "round": COUNT,
+}
 
 
 def _wider(type_: Type, other: Type) -> Type:
     if type_ == other:
         return type_
-    vague = (COUNT, quantity_of(QUOTIENT))
-    return next((found for found in (type_, other) if found not in vague), quantity_of(NUMBER))
+    vague = (COUNT, quantity_of(units.QUOTIENT))
+    return next((found for found in (type_, other) if found not in vague), quantity_of(units.NUMBER))
 
 
 def _product(operator: str, left: Type, right: Type) -> Type:
     if operator == "*" and left == right == COUNT:
         return COUNT
-    dimension, other = left.measure or NUMBER, right.measure or NUMBER
+    dimension, other = left.measure or units.NUMBER, right.measure or units.NUMBER
     return quantity_of(dimension * other if operator == "*" else dimension / other)

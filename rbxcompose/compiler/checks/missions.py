@@ -258,7 +258,7 @@ def stale_event(robot: Robot) -> Iterator[Finding]:
                     doubtful.remove(name)
                     place = Related(robot.key("values", name), "the value")
                     message = f"the last message of '${name}' ends this wait, however old it is"
-                    help_text = f"write 'event: true' at the value '{name}', or 'event: false' if it tells a state"
+                    help_text = f"write 'event: true' at the value '{name}', or 'event: false' if it reports a state"
                     yield stale_event.at(asked.scalar.span, message, help=help_text, related=[place])
 
 

@@ -85,9 +85,9 @@ def _in_percent(robot: Robot, component: RobotComponent) -> list[str]:
 def _limit_in_percent(robot: Robot, component: RobotComponent, limit: Setting[float], writers: list[str]) -> Finding:
     return limit_in_percent.at(
         robot.value(*component.place(limit.field)),
-        f"'{limit.field}' of '{component.name}' is {limit.value:g}, but '{writers[0]}' tells percent, from 0 to 100",
+        f"'{limit.field}' of '{component.name}' is {limit.value:g}, but '{writers[0]}' reports percent, from 0 to 100",
         help=f"write '{limit.field}: {100 * limit.value:g}'",
-        related=[Related(robot.component_span(writer), "tells percent") for writer in writers],
+        related=[Related(robot.component_span(writer), "reports percent") for writer in writers],
     )
 
 

@@ -109,7 +109,7 @@ def two_publishers(robot: Robot) -> Iterator[Finding]:
             own = f"{other.name}: {other.instance}/{other.name}"
             yield two_publishers.at(
                 robot.component_span(other.instance),
-                f"'{other.instance}' and '{first}' both write on '{topic}', and nobody can tell whose it is",
+                f"'{other.instance}' and '{first}' both publish '{topic}', and its messages do not name their source",
                 help=f"give one of them another topic: 'connect: {{{own}}}'",
                 related=[Related(robot.component_span(first), "and this one")],
             )

@@ -16,23 +16,11 @@ from rbxcompose.compiler.sections.args import args
 from rbxcompose.compiler.sections.include import Include, include
 from rbxcompose.compiler.sections.needs import needs
 from rbxcompose.compiler.sections.provides import provides
+from rbxcompose.manifest import tree
 from rbxcompose.manifest.documents import Documents, ManifestHeader
 from rbxcompose.manifest.files import resolve, shown_name
 from rbxcompose.manifest.registry import model_for, naming_in_use, section_named, sections_in_use
 from rbxcompose.manifest.section import PART, Contents, RenamedTopic, Section
-from rbxcompose.manifest.tree import (
-    ALL_BYTES,
-    INCLUDE_DEPTH,
-    INSTANCES,
-    Entry,
-    MappingNode,
-    ScalarNode,
-    SequenceNode,
-    TreeNode,
-    at,
-    key_span,
-    value_span,
-)
 from rbxcompose.manifest.validate import WRONG_TYPE
 from rbxcompose.manifest.yaml_nodes import TOO_LARGE
 
@@ -50,7 +38,7 @@ class Renaming:
     used: set[str] = field(default_factory=set)
 
     @classmethod
-    def of(cls, prefix: str, connect: dict[str, RenamedTopic], roots: Iterable[MappingNode]) -> Renaming:
+    def of(cls, prefix: str, connect: dict[str, RenamedTopic], roots: Iterable[tree.MappingNode]) -> Renaming:
         """Return the renaming for `roots`: the file of a part and all that it includes."""
         trees = list(roots)
         named = [section for section in sections_in_use() if section.names and section.is_composed]
@@ -65,12 +53,12 @@ class Renaming:
         """Return the names of all that the part runs."""
         return frozenset(name for one in naming_in_use(COMPONENT) for name in self.own[one.name])
 
-    def root(self, root: MappingNode) -> MappingNode:
+    def root(self, root: tree.MappingNode) -> tree.MappingNode:
         """Return the sections of a part under their new names."""
         entries = {}
         for name, entry in root.entries.items():
             section = section_named(name)
-            entries[name] = Entry(entry.key, self._section(section, entry.value)) if section else entry
+            entries[name] = tree.Entry(entry.key, self._section(section, entry.value)) if section else entry
         return replace(root, entries=entries)
 
     def topic(self, topic: str) -> str:
@@ -114,27 +102,29 @@ class Renaming:
         changed = (self.name(kind, name) for kind in (COMPONENT, *kinds, *PREFIXED))
         return next((text for text in changed if text != name), name)
 
-    def values(self, given: MappingNode) -> MappingNode:
+    def values(self, given: tree.MappingNode) -> tree.MappingNode:
         """Return the renamed values that a part gives to one that it includes."""
         entries = {
-            name: Entry(entry.key, self.texts(entry.value, self.any_name)) for name, entry in given.entries.items()
+            name: tree.Entry(entry.key, self.texts(entry.value, self.any_name)) for name, entry in given.entries.items()
         }
         return replace(given, entries=entries)
 
-    def texts(self, node: TreeNode, change: Rename) -> TreeNode:
+    def texts(self, node: tree.TreeNode, change: Rename) -> tree.TreeNode:
         """Return a node with every text below it changed, except those that are filled in later."""
         match node:
-            case ScalarNode(text=text):
+            case tree.ScalarNode(text=text):
                 changed = text if "${" in text else change(text)
                 return node if changed == text else replace(node, text=changed)
-            case SequenceNode(items=items):
+            case tree.SequenceNode(items=items):
                 return replace(node, items=tuple(self.texts(item, change) for item in items))
-            case MappingNode(entries=entries):
-                return replace(node, entries={n: Entry(e.key, self.texts(e.value, change)) for n, e in entries.items()})
+            case tree.MappingNode(entries=entries):
+                return replace(
+                    node, entries={n: tree.Entry(e.key, self.texts(e.value, change)) for n, e in entries.items()}
+                )
 
-    def topics(self, node: TreeNode, above: str = "") -> TreeNode:
+    def topics(self, node: tree.TreeNode, above: str = "") -> tree.TreeNode:
         """Return a map with its keys renamed as topics (below `above`, if given); other nodes stay unchanged."""
-        if not isinstance(node, MappingNode):
+        if not isinstance(node, tree.MappingNode):
             return node
         entries = {}
         for name, entry in node.entries.items():
@@ -142,7 +132,7 @@ class Renaming:
             changed = self.topic(topic).removeprefix(self.topic(above.removesuffix("/")) + "/" if above else "")
             # A wrong name is reported where it was given.
             span = self.connect[topic].span if topic in self.connect else entry.key.span
-            entries[changed] = Entry(replace(entry.key, text=changed, span=span), entry.value)
+            entries[changed] = tree.Entry(replace(entry.key, text=changed, span=span), entry.value)
         return replace(node, entries=entries)
 
     def _is_own_topic(self, topic: str) -> bool:
@@ -156,42 +146,44 @@ class Renaming:
             return f"{self.prefix}{name}"
         return instance
 
-    def _section(self, section: Section[Any, Any], node: TreeNode) -> TreeNode:
+    def _section(self, section: Section[Any, Any], node: tree.TreeNode) -> tree.TreeNode:
         node = section.with_references(node, lambda kind, one: self.texts(one, lambda text: self.name(kind, text)))
-        if section.at and isinstance(node, MappingNode):
+        if section.at and isinstance(node, tree.MappingNode):
             return _with(node, section.at[0], lambda named: self._named(section, named))
         return self._named(section, node) if section.names else node
 
-    def _named(self, section: Section[Any, Any], node: TreeNode) -> TreeNode:
-        if not isinstance(node, MappingNode):
+    def _named(self, section: Section[Any, Any], node: tree.TreeNode) -> tree.TreeNode:
+        if not isinstance(node, tree.MappingNode):
             return node
         values = {name: section.rename(self, name, entry.value) for name, entry in node.entries.items()}
-        changed = {name: Entry(entry.key, values[name]) for name, entry in node.entries.items()}
+        changed = {name: tree.Entry(entry.key, values[name]) for name, entry in node.entries.items()}
         if section.has_topics:
             return self.topics(replace(node, entries=changed))
         new = {name: self._new(section, name) for name in changed}
-        entries = {new[name]: Entry(replace(entry.key, text=new[name]), entry.value) for name, entry in changed.items()}
+        entries = {
+            new[name]: tree.Entry(replace(entry.key, text=new[name]), entry.value) for name, entry in changed.items()
+        }
         return replace(node, entries=entries)
 
 
-def topics_of(roots: Iterable[MappingNode]) -> set[str]:
+def topics_of(roots: Iterable[tree.MappingNode]) -> set[str]:
     """Return the topics in trees that `connect:` of an instance may name."""
     return {
         topic
         for root in roots
         for section in sections_in_use()
         for name in section.names_in(root)
-        if (node := at(root, (section.name, *section.at, name))) is not None
+        if (node := tree.at(root, (section.name, *section.at, name))) is not None
         for topic in section.topics(name, node)
     }
 
 
-def _with(node: MappingNode, key: str, change: Callable[[TreeNode], TreeNode]) -> MappingNode:
+def _with(node: tree.MappingNode, key: str, change: Callable[[tree.TreeNode], tree.TreeNode]) -> tree.MappingNode:
     """Return a map with the value of `key` changed, if it has that key."""
     if key not in node.entries:
         return node
     entry = node.entries[key]
-    return replace(node, entries={**node.entries, key: Entry(entry.key, change(entry.value))})
+    return replace(node, entries={**node.entries, key: tree.Entry(entry.key, change(entry.value))})
 
 
 def claims_of(part: Contents) -> Iterator[Claim]:
@@ -199,10 +191,10 @@ def claims_of(part: Contents) -> Iterator[Claim]:
     needed, given = part.of(needs), part.of(provides)
     for section, about, ports in (("needs", About.NEED, needed.ports), ("provides", About.PORT, given.ports)):
         for topic, type_name in ports.items():
-            yield Claim(about, topic, type_name, key_span(part.root, (section, "ports", topic)))
+            yield Claim(about, topic, type_name, tree.key_span(part.root, (section, "ports", topic)))
     for key, about, names in (("skills", About.SKILL, given.skills), ("values", About.VALUE, given.values)):
         for index, name in enumerate(names):
-            yield Claim(about, name, "", value_span(part.root, ("provides", key, index)))
+            yield Claim(about, name, "", tree.value_span(part.root, ("provides", key, index)))
 
 
 def renamed(claim: Claim, renaming: Renaming) -> Claim:
@@ -227,9 +219,9 @@ class PartInstance:
     name: str  # its path: `arm.hand`
     file: str  # file name in findings
     span: Span  # span of the entry that includes it
-    root: MappingNode
-    arguments: MappingNode  # the section `args` of its file
-    given: MappingNode  # `with:`
+    root: tree.MappingNode
+    arguments: tree.MappingNode  # the section `args` of its file
+    given: tree.MappingNode  # `with:`
     claims: tuple[Claim, ...]
 
 
@@ -237,7 +229,7 @@ class PartInstance:
 class _File:
     """A part's file: its tree, and what it needs and provides."""
 
-    root: MappingNode
+    root: tree.MappingNode
     claims: tuple[Claim, ...]
 
 
@@ -262,11 +254,13 @@ class Parts:
     _size: int = 0
 
     @property
-    def roots(self) -> Iterator[MappingNode]:
+    def roots(self) -> Iterator[tree.MappingNode]:
         """Yield the trees of the parts that could be read, each once."""
         return (file.root for file in self._files.values() if file)
 
-    def instances(self, root: MappingNode, path: str = "", above: tuple[_Open, ...] = ()) -> Iterator[PartInstance]:
+    def instances(
+        self, root: tree.MappingNode, path: str = "", above: tuple[_Open, ...] = ()
+    ) -> Iterator[PartInstance]:
         """Yield the instances from the `include:` of a file, each after those that it includes itself."""
         for name, entry, read in Contents(root, self.robot, self.documents).of(include):
             opened = self._open(read, entry, above) if read else None
@@ -278,7 +272,7 @@ class Parts:
             instance = f"{path}.{name}".lstrip(".")
             chain = (entry.key.span, *(open_.span for open_ in reversed(above)))
             self.inclusions.add(shown_name(opened.file), Inclusion(instance, chain))
-            if (file := self._read(opened.file, value_span(entry.value, ("part",)))) is not None:
+            if (file := self._read(opened.file, tree.value_span(entry.value, ("part",)))) is not None:
                 inside = [*self._inside(instance, file, (*above, opened)), _instance(instance, file, opened, entry)]
                 yield from self._renamed(name, read, entry.value, inside)
 
@@ -289,11 +283,11 @@ class Parts:
 
     @property
     def _is_full(self) -> bool:
-        return self._count > INSTANCES or self._size > ALL_BYTES
+        return self._count > tree.INSTANCES or self._size > tree.ALL_BYTES
 
-    def _open(self, read: Include, entry: Entry, above: tuple[_Open, ...]) -> _Open | None:
+    def _open(self, read: Include, entry: tree.Entry, above: tuple[_Open, ...]) -> _Open | None:
         """Return the file of an instance, or None after a finding."""
-        span = value_span(entry.value, ("part",))
+        span = tree.value_span(entry.value, ("part",))
         self._count += 1
         finding = self._limit(span, above)
         if finding is None and "${" in read.part:
@@ -307,12 +301,12 @@ class Parts:
         return None
 
     def _limit(self, span: Span, above: tuple[_Open, ...]) -> Finding | None:
-        if len(above) >= INCLUDE_DEPTH:
-            return TOO_LARGE.at(span, f"parts include each other more than {INCLUDE_DEPTH} deep")
-        if self._count > INSTANCES:
-            return TOO_LARGE.at(span, f"this robot has more than {INSTANCES} instances of parts")
-        if self._size > ALL_BYTES:
-            return TOO_LARGE.at(span, f"the parts of this robot are larger than {ALL_BYTES:,} bytes together")
+        if len(above) >= tree.INCLUDE_DEPTH:
+            return TOO_LARGE.at(span, f"parts include each other more than {tree.INCLUDE_DEPTH} deep")
+        if self._count > tree.INSTANCES:
+            return TOO_LARGE.at(span, f"this robot has more than {tree.INSTANCES} instances of parts")
+        if self._size > tree.ALL_BYTES:
+            return TOO_LARGE.at(span, f"the parts of this robot are larger than {tree.ALL_BYTES:,} bytes together")
         return None
 
     def _read(self, path: Path, span: Span) -> _File | None:
@@ -333,11 +327,13 @@ class Parts:
         return self._files[path]
 
     def _renamed(
-        self, name: str, read: Include, written: TreeNode, inside: list[PartInstance]
+        self, name: str, read: Include, written: tree.TreeNode, inside: list[PartInstance]
     ) -> Iterator[PartInstance]:
         """Yield an instance and those inside it, under the names of the file that includes it."""
         connect = {
-            topic: RenamedTopic(new, value_span(written, ("connect", topic)), key_span(written, ("connect", topic)))
+            topic: RenamedTopic(
+                new, tree.value_span(written, ("connect", topic)), tree.key_span(written, ("connect", topic))
+            )
             for topic, new in read.connect.items()
         }
         renaming = Renaming.of(f"{name}_", connect, [instance.root for instance in inside])
@@ -357,7 +353,7 @@ class Parts:
             self.documents.report.add(finding)
 
 
-def _brought(name: str, root: MappingNode, entry: TreeNode | None) -> MappingNode:
+def _brought(name: str, root: tree.MappingNode, entry: tree.TreeNode | None) -> tree.MappingNode:
     """Return the sections of a part as those of the file that includes it; others' were changed when they were."""
     if entry is None:
         return root
@@ -365,25 +361,25 @@ def _brought(name: str, root: MappingNode, entry: TreeNode | None) -> MappingNod
     for section in sections_in_use(PART):
         there = entries.get(section.name)
         if (node := section.brought(name, there.value if there else None, entry)) is not None:
-            entries[section.name] = Entry(there.key if there else ScalarNode(section.name, node.span), node)
+            entries[section.name] = tree.Entry(there.key if there else tree.ScalarNode(section.name, node.span), node)
     return replace(root, entries=entries)
 
 
-def _instance(name: str, file: _File, opened: _Open, entry: Entry) -> PartInstance:
+def _instance(name: str, file: _File, opened: _Open, entry: tree.Entry) -> PartInstance:
     """Return an instance with the names of its own file."""
     scoped = in_scope(file.root, name)
     own = {
         *ManifestHeader.model_fields,
         *(section.name for section in sections_in_use(PART) if not section.is_composed),
     }
-    given = at(entry.value, ("with",))
+    given = tree.at(entry.value, ("with",))
     return PartInstance(
         name=name,
         file=shown_name(opened.file),
         span=opened.span,
         root=replace(scoped, entries={key: one for key, one in scoped.entries.items() if key not in own}),
         arguments=replace(scoped, entries={key: one for key, one in scoped.entries.items() if key == args.name}),
-        given=given if isinstance(given, MappingNode) else MappingNode({}, opened.span),
+        given=given if isinstance(given, tree.MappingNode) else tree.MappingNode({}, opened.span),
         claims=file.claims,
     )
 
@@ -396,21 +392,23 @@ def _circle(chain: list[_Open], span: Span) -> Finding:
     return CIRCLE.at(span, f"parts include each other in a circle: {names}", related=related)
 
 
-def in_scope(root: MappingNode, scope: str) -> MappingNode:
+def in_scope(root: tree.MappingNode, scope: str) -> tree.MappingNode:
     """Return a tree whose `${args...}` refer to the arguments of the instance `scope`."""
 
-    def scoped(node: TreeNode) -> TreeNode:
+    def scoped(node: tree.TreeNode) -> tree.TreeNode:
         match node:
-            case ScalarNode(text=text):
+            case tree.ScalarNode(text=text):
                 return replace(node, scope=scope) if "$" in text else node
-            case SequenceNode(items=items):
+            case tree.SequenceNode(items=items):
                 return replace(node, items=tuple(map(scoped, items)))
-            case MappingNode(entries=entries):
+            case tree.MappingNode(entries=entries):
                 return replace(
-                    node, entries={name: Entry(entry.key, scoped(entry.value)) for name, entry in entries.items()}
+                    node, entries={name: tree.Entry(entry.key, scoped(entry.value)) for name, entry in entries.items()}
                 )
 
-    return replace(root, entries={name: Entry(entry.key, scoped(entry.value)) for name, entry in root.entries.items()})
+    return replace(
+        root, entries={name: tree.Entry(entry.key, scoped(entry.value)) for name, entry in root.entries.items()}
+    )
 
 
 def included_parts(instances: Sequence[PartInstance]) -> dict[str, IncludedPart]:
@@ -429,6 +427,6 @@ def included_parts(instances: Sequence[PartInstance]) -> dict[str, IncludedPart]
     return found
 
 
-def _names(roots: Iterable[MappingNode], those: Iterable[Section[Any, Any]]) -> frozenset[str]:
+def _names(roots: Iterable[tree.MappingNode], those: Iterable[Section[Any, Any]]) -> frozenset[str]:
     chosen = list(those)
     return frozenset(name for root in roots for section in chosen for name in section.names_in(root))

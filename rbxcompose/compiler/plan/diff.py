@@ -59,9 +59,7 @@ class Difference:
 
     def text(self) -> str:
         """Return the difference as text for people."""
-        if self.is_empty:
-            return "no difference"
-        return "\n".join(self._lines())
+        return "no difference" if self.is_empty else "\n".join(self._lines())
 
     def _lines(self) -> Iterator[str]:
         yield from map(str, self.plan)

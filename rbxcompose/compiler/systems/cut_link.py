@@ -46,7 +46,7 @@ class StopAfterCut:
         """Return it in words."""
         if self.time is None:
             unknown = "its deadline" if self.waiting is None else "how it brakes"
-            return f"'{self.base}' on {self.host} moves for an unknown time: nobody knows {unknown}"
+            return f"'{self.base}' on {self.host} moves for an unknown time: {unknown} is unknown"
         words = (format_quantity(value, TIME) for value in (self.time, self.waiting or 0.0, self.braking or 0.0))
         return "'{}' on {} stands still within {}: {} until it misses commands, {} of braking".format(
             self.base, self.host, *words

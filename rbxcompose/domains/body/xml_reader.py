@@ -9,7 +9,7 @@ from pathlib import Path
 from xml.parsers import expat
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.findings import Finding, Related, Span, kind
+from rbxcompose.base.findings import Finding, Related, Span, kind, once
 from rbxcompose.base.printable import plain
 from rbxcompose.manifest.files import shown_name
 from rbxcompose.manifest.tree import DEPTH, URDF_ELEMENTS
@@ -59,6 +59,7 @@ class XmlElement:
         return next(self.all(name), None)
 
 
+@once  # a profile rarely changes the body
 def read_urdf(text: str, file: str) -> XmlElement | Finding:
     """Return the root of a URDF, or the first mistake that keeps a text from being one.
 

@@ -453,6 +453,8 @@ def model_of_number(number: int) -> ServoModel | None:
 
 def find_model(name: str, models: Mapping[str, ServoModel]) -> ServoModel | None:
     """Return a model by its name; capitals, signs and the revision (`AX-12A`, `AX-12+`) do not matter."""
+    if name in models:
+        return models[name]
     folded = _folded(name)
     known = {_folded(model.name): model for model in models.values()}
     return known.get(folded) or known.get(folded.removesuffix("a").removesuffix("f"))

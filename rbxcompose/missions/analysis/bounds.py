@@ -6,18 +6,7 @@ import math
 from collections.abc import Mapping
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.expressions.tree import (
-    Arithmetic,
-    Comparison,
-    ExpressionNode,
-    Flag,
-    FunctionCall,
-    Junction,
-    Minus,
-    Not,
-    Number,
-    Variable,
-)
+from rbxcompose.base.expressions import tree
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,17 +25,17 @@ _TURNED = {"<": ">=", "<=": ">", ">": "<=", ">=": "<"}
 _MIRRORED = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}
 
 
-def truth(node: ExpressionNode, known: Known) -> bool | None:
+def truth(node: tree.ExpressionNode, known: Known) -> bool | None:
     """Return whether a condition always holds (True), never holds (False), or may do either (None)."""
     match node:
-        case Flag(value=value):
+        case tree.Flag(value=value):
             return value
-        case Not(operand=operand):
+        case tree.Not(operand=operand):
             inner = truth(operand, known)
             return None if inner is None else not inner
-        case Comparison(operator=operator, left=left, right=right):
+        case tree.Comparison(operator=operator, left=left, right=right):
             return _compared(operator, bounds_of(left, known), bounds_of(right, known))
-        case Junction(operator=operator, operands=operands):
+        case tree.Junction(operator=operator, operands=operands):
             return _joined(operands, known, decides=operator == "or")
     return None
 
@@ -63,7 +52,7 @@ def _compared(operator: str, left: Bounds, right: Bounds) -> bool | None:
     return None if not apart else operator == "!="
 
 
-def _joined(operands: tuple[ExpressionNode, ...], known: Known, *, decides: bool) -> bool | None:
+def _joined(operands: tuple[tree.ExpressionNode, ...], known: Known, *, decides: bool) -> bool | None:
     """Evaluate from the left, as at run time: an operand counts only where those before it have not decided."""
     is_open = False
     for operand in operands:
@@ -75,14 +64,14 @@ def _joined(operands: tuple[ExpressionNode, ...], known: Known, *, decides: bool
     return None if is_open else not decides
 
 
-def narrowed(known: Known, node: ExpressionNode, *, holds: bool) -> Known:
+def narrowed(known: Known, node: tree.ExpressionNode, *, holds: bool) -> Known:
     """Return the bounds that are known where a comparison of a `$name` holds, or does not hold."""
-    if not isinstance(node, Comparison) or node.operator not in _TURNED:
+    if not isinstance(node, tree.Comparison) or node.operator not in _TURNED:
         return known
     operator, name, limit = node.operator, node.left, bounds_of(node.right, known)
-    if not isinstance(name, Variable):
+    if not isinstance(name, tree.Variable):
         operator, name, limit = _MIRRORED[operator], node.right, bounds_of(node.left, known)
-    if not isinstance(name, Variable):
+    if not isinstance(name, tree.Variable):
         return known
     operator = operator if holds else _TURNED[operator]
     before = known.get(name.name, ANYTHING)
@@ -91,19 +80,19 @@ def narrowed(known: Known, node: ExpressionNode, *, holds: bool) -> Known:
     return {**known, name.name: Bounds(max(before.least, limit.least), before.most)}
 
 
-def bounds_of(node: ExpressionNode, known: Known) -> Bounds:
+def bounds_of(node: tree.ExpressionNode, known: Known) -> Bounds:
     """Return the bounds of a number; `ANYTHING` for everything else."""
     match node:
-        case Number(value=value):
+        case tree.Number(value=value):
             return Bounds(value, value)
-        case Variable(name=name):
+        case tree.Variable(name=name):
             return known.get(name, ANYTHING)
-        case Minus(operand=operand):
+        case tree.Minus(operand=operand):
             inner = bounds_of(operand, known)
             return Bounds(-inner.most, -inner.least)
-        case Arithmetic(operator=operator, left=left, right=right):
+        case tree.Arithmetic(operator=operator, left=left, right=right):
             return _computed(operator, bounds_of(left, known), bounds_of(right, known))
-        case FunctionCall(function="distance" | "age" | "count" | "abs"):
+        case tree.FunctionCall(function="distance" | "age" | "count" | "abs"):
             return NOT_BELOW_ZERO
     return ANYTHING
 

@@ -15,7 +15,7 @@ from rbxcompose.missions.analysis.examined import Examined, claims_below
 from rbxcompose.missions.language.asked import Asked, inner_span
 from rbxcompose.missions.program.branches import ALL, Branches, compared_with_word
 from rbxcompose.missions.program.outcomes import FAILS, SUCCEEDS, Outcomes
-from rbxcompose.missions.program.program import MissionNode, Program
+from rbxcompose.missions.program.program import MissionNode
 
 
 @mission_check("RBX4138", Severity.WARNING, closed=(OWN,))
@@ -28,7 +28,7 @@ def endless_branch(mission: Examined) -> Iterator[Finding]:
             continue
         endless = [child for child in node.children if not ending.of(child).counting_as(SUCCEEDS)]
         others = [child for child in node.children if child not in endless]
-        endless = [child for child in endless if not _ends_the_mission(program, child)]
+        endless = [child for child in endless if not any(node.step.ends_mission for node in program.below(child))]
         if endless and others and _most_wanted(node, branches) > len(others):
             yield endless_branch.at(
                 program.nodes[endless[0]].span,
@@ -36,11 +36,6 @@ def endless_branch(mission: Examined) -> Iterator[Finding]:
                 help="write 'ends_with' and the name of the branch that decides, or 'succeed_when: any'",
                 related=[Related(program.nodes[others[0]].span, "beside this one")],
             )
-
-
-def _ends_the_mission(program: Program, branch: int) -> bool:
-    """Return whether a branch may end the mission, so that nothing waits for the branch."""
-    return any(node.step.ends_mission for node in program.below(branch))
 
 
 def _most_wanted(node: MissionNode, branches: Branches) -> float:

@@ -38,7 +38,7 @@ def nearest_of_no_places(mission: Examined) -> Iterator[Finding]:
             elif found.kind not in _MAY_BE:
                 yield nearest_of_no_places.at(asked.scalar.span, f"{_ASKED}, and this is {found.phrase}", help=_HELP)
             elif isinstance(item.tree, Text) and not _is_place(view, item.tree.value):
-                message, help_text = _not_a_list(view, item.tree.value)
+                message, help_text = _not_a_place(view, item.tree.value)
                 yield nearest_of_no_places.at(asked.scalar.span, message, help=help_text, about=[item.tree.value])
 
 
@@ -56,7 +56,7 @@ def _in_list(view: View, items: Expression, found: Type) -> Iterator[Finding]:
         words = [item for item in value if isinstance(item, str)] if isinstance(value, list | tuple | Mapping) else []
         for word in words:
             if not _is_place(view, word):
-                message, help_text = _not_a_list(view, word)
+                message, help_text = _not_a_place(view, word)
                 related = [Related(data[name].span, "its items")]
                 yield nearest_of_no_places.at(span, message, help=help_text, related=related, about=[word])
                 return
@@ -66,9 +66,9 @@ def _is_place(view: View, word: str) -> bool:
     return word in view.robot.places or view.robot.may_have(PLACE, word)
 
 
-def _not_a_list(view: View, word: str) -> tuple[str, str]:
+def _not_a_place(view: View, word: str) -> tuple[str, str]:
     help_text = suggest(word, view.robot.places, "places")
-    return f"{_ASKED}, and '{word}' is none", f"{_HELP}; {help_text}".removesuffix("; ")
+    return f"{_ASKED}, and '{word}' is not a place", f"{_HELP}; {help_text}".removesuffix("; ")
 
 
 @mission_check("RBX4107", Severity.WARNING, closed=(OWN,))

@@ -48,7 +48,7 @@ def trapped_state(mission: Examined) -> Iterator[Finding]:
     """A state from which no path leads to an end."""
     for machine, states, leads in transitions(mission.program):
         used = reached(machine.start, leads)
-        goals = {*machine.ends, *(state.name for state in states if _is_endless(state))}
+        goals = {*machine.ends, *(state.name for state in states if state.step.leads_to is None)}
         if not used & machine.ends.keys():
             continue  # it is meant to run for ever
         free = leading_to(goals, leads)
@@ -59,10 +59,6 @@ def trapped_state(mission: Examined) -> Iterator[Finding]:
                     f"no path leads from the state '{state.name}' to an end",
                     help="let one of its outcomes, or of the states after it, lead back or to an end",
                 )
-
-
-def _is_endless(state: MissionNode) -> bool:
-    return state.step.leads_to is None
 
 
 @mission_check("RBX4142", is_fixable=True)

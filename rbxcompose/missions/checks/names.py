@@ -6,18 +6,8 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
+from rbxcompose.base import findings
 from rbxcompose.base.config import MISSION
-from rbxcompose.base.findings import (
-    DID_YOU_MEAN,
-    MOST_NAMES,
-    Finding,
-    Related,
-    correction,
-    nearest,
-    replacement,
-    suggest,
-    surely_meant,
-)
 from rbxcompose.base.printable import plain
 from rbxcompose.base.rules import NAMES, WIRING
 from rbxcompose.manifest.tree import ScalarNode
@@ -35,7 +25,7 @@ from rbxcompose.missions.program.registry import kinds
 
 
 @mission_check(NAME_CLASH)
-def name_clash(mission: Examined) -> Iterator[Finding]:
+def name_clash(mission: Examined) -> Iterator[findings.Finding]:
     """Yield the inputs, data, nodes, branches and items of loops whose name means something else as well."""
     yield from _declared(mission.program, mission.robot)
     for view in mission.views:
@@ -47,7 +37,7 @@ def name_clash(mission: Examined) -> Iterator[Finding]:
 _OTHER = "choose another name, here and where it is meant"
 
 
-def _declared(program: Program, robot: RobotNames) -> Iterator[Finding]:
+def _declared(program: Program, robot: RobotNames) -> Iterator[findings.Finding]:
     for section, entries in (("input", program.inputs), ("datum", program.data)):
         for name, entry in entries.items():
             if name in robot.skills:
@@ -57,11 +47,11 @@ def _declared(program: Program, robot: RobotNames) -> Iterator[Finding]:
                     entry.span, f"the {section} '{name}' is named like a value of the robot", help=_OTHER
                 )
     for name in program.inputs.keys() & program.data.keys():
-        related = [Related(program.inputs[name].span, "the input")]
+        related = [findings.Related(program.inputs[name].span, "the input")]
         yield NAME_CLASH.at(program.data[name].span, f"'{name}' is an input and a datum", related=related)
 
 
-def _of_node(node: MissionNode, program: Program, robot: RobotNames) -> Iterator[Finding]:
+def _of_node(node: MissionNode, program: Program, robot: RobotNames) -> Iterator[findings.Finding]:
     if node.name in robot.skills and node.step.look.form is not Form.STATE:
         yield NAME_CLASH.at(node.span, f"a node cannot be named like the skill '{node.name}'")
     saved = node.saved
@@ -69,7 +59,7 @@ def _of_node(node: MissionNode, program: Program, robot: RobotNames) -> Iterator
         yield NAME_CLASH.at(saved.span, f"'{saved.text}' is taken: choose another name for what is kept")
 
 
-def _branches(node: MissionNode, program: Program, robot: RobotNames) -> Iterator[Finding]:
+def _branches(node: MissionNode, program: Program, robot: RobotNames) -> Iterator[findings.Finding]:
     names = node.step.branches.names if node.step.branches else ()
     for branch, child in zip(names, node.children, strict=False):
         if branch in kinds() or branch in robot.skills:
@@ -77,7 +67,7 @@ def _branches(node: MissionNode, program: Program, robot: RobotNames) -> Iterato
             yield NAME_CLASH.at(program.nodes[child].span, message)
 
 
-def _item(view: View) -> Iterator[Finding]:
+def _item(view: View) -> Iterator[findings.Finding]:
     item, node = view.node.item, view.node
     if item and item in view.scope.names:
         taken = "a value of the robot has" if item in view.robot.values else "the loop already uses"
@@ -88,7 +78,7 @@ def _item(view: View) -> Iterator[Finding]:
 
 
 @mission_check("RBX4150", is_fixable=True, closed=(WIRING, NAMES))
-def unknown_channel(mission: Examined) -> Iterator[Finding]:
+def unknown_channel(mission: Examined) -> Iterator[findings.Finding]:
     """A mission uses a topic or a service that the robot does not have."""
     for node in mission.program.nodes:
         for message in published(node):
@@ -101,7 +91,7 @@ def unknown_channel(mission: Examined) -> Iterator[Finding]:
             yield from _nowhere(message, "service", mission.robot.services)
 
 
-def _nowhere(message: MessageTemplate, what: str, known: Mapping[str, str]) -> Iterator[Finding]:
+def _nowhere(message: MessageTemplate, what: str, known: Mapping[str, str]) -> Iterator[findings.Finding]:
     name = message.target.text
     if name and name not in known:
         text = f"the robot has no {what} '{name}'"
@@ -109,7 +99,7 @@ def _nowhere(message: MessageTemplate, what: str, known: Mapping[str, str]) -> I
 
 
 @mission_check("RBX4144", is_fixable=True)
-def unknown_mission(mission: Examined) -> Iterator[Finding]:
+def unknown_mission(mission: Examined) -> Iterator[findings.Finding]:
     """A mission uses another one that the robot does not have."""
     missions = mission.robot.missions
     for node in mission.program.nodes:
@@ -120,12 +110,16 @@ def unknown_mission(mission: Examined) -> Iterator[Finding]:
             message = f"the robot has no mission '{name}'"
             found = unknown_mission.misspelt(used.span, message, name, missions, "missions of this robot")
             listed = f"list it under 'missions' of the robot, '{plain(name, 60)}: FILE', or use one of them"
-            is_near = found.help.startswith(DID_YOU_MEAN)
-            yield found if is_near else replace(found, help=f"{listed}: {', '.join(list(missions)[:MOST_NAMES])}")
+            is_near = found.help.startswith(findings.DID_YOU_MEAN)
+            yield (
+                found
+                if is_near
+                else replace(found, help=f"{listed}: {', '.join(list(missions)[: findings.MOST_NAMES])}")
+            )
 
 
 @mission_check(UNKNOWN_NAME)
-def unknown_name(mission: Examined) -> Iterator[Finding]:
+def unknown_name(mission: Examined) -> Iterator[findings.Finding]:
     """Yield the assignments to data that the mission does not have."""
     data = mission.program.data
     for node in mission.program.nodes:
@@ -136,11 +130,11 @@ def unknown_name(mission: Examined) -> Iterator[Finding]:
                 message = f"only data can be set; the mission has no datum '{name}'"
                 if name in mission.program.inputs or name in mission.robot.values:
                     what = "an input" if name in mission.program.inputs else "a value of the robot"
-                    help_text = f"'{name}' is {what}, which nobody sets: declare a datum of another name under 'data'"
+                    help_text = f"'{name}' is {what}, which is never set: declare a datum of another name under 'data'"
                     yield UNKNOWN_NAME.at(assignment.span, message, help=help_text)
                     continue
-                help_text = suggest(name, data, "its data") or f"write '{name}: ...' under 'data'"
-                fix = correction(name, data, assignment.span, taken=[one.name for one in set_here])
+                help_text = findings.suggest(name, data, "its data") or f"write '{name}: ...' under 'data'"
+                fix = findings.correction(name, data, assignment.span, taken=[one.name for one in set_here])
                 yield UNKNOWN_NAME.at(assignment.span, message, help=help_text, fix=fix)
 
 
@@ -154,16 +148,16 @@ def _called(node: MissionNode) -> str:
 
 
 @mission_check("RBX4102", is_fixable=True)
-def unknown_skill(mission: Examined) -> Iterator[Finding]:
+def unknown_skill(mission: Examined) -> Iterator[findings.Finding]:
     """A mission uses a skill that the robot does not have."""
     skills = mission.robot.skills
     for node in mission.program.nodes:
         if node.skill and node.skill not in skills:
             known = (*skills, *kinds())
-            close = nearest(node.skill, known)
+            close = findings.nearest(node.skill, known)
             # Else it may belong to a component that could not be read.
             ours = FOREIGN.get(node.skill.casefold(), "")
-            if mission.robot.is_complete or ours or surely_meant(node.skill, known):
+            if mission.robot.is_complete or ours or findings.surely_meant(node.skill, known):
                 message = f"mission '{mission.program.name}' uses a skill that the robot does not have: '{node.skill}'"
                 if not _WORD.fullmatch(node.skill):
                     message = f"'{node.skill}' is no step"
@@ -177,8 +171,9 @@ def unknown_skill(mission: Examined) -> Iterator[Finding]:
                     yield unknown_skill.at(node.span, message, help=help_text, about=[node.skill])
                     continue
                 if ours in kinds():
-                    fix = replacement(node.span, node.skill, ours, is_safe=False)  # what is below it may differ
-                    help_text = f"{DID_YOU_MEAN} '{ours}'?"
+                    # what is below it may differ
+                    fix = findings.replacement(node.span, node.skill, ours, is_safe=False)
+                    help_text = f"{findings.DID_YOU_MEAN} '{ours}'?"
                     yield unknown_skill.at(node.span, message, help=help_text, fix=fix, about=[node.skill])
                     continue
                 owner, is_other, own = node.skill.rpartition("/")

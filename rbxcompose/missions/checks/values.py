@@ -78,17 +78,13 @@ def _missing(view: View, skill: Skill) -> Iterator[Finding]:
 def _one_by_one(view: View, skill: Skill, value: TreeNode) -> str:
     """Return how to do it for each item of a list of words, names or quantities; nothing if that is not meant."""
     items = value.items if isinstance(value, SequenceNode) else ()
-    words = [item.text for item in items if isinstance(item, ScalarNode) and not _is_number(item.text)]
+    words = [item.text for item in items if isinstance(item, ScalarNode) and item.text[:1] not in "+-.0123456789"]
     if not words or len(words) != len(items):
         return ""
     if len(words) == 1:
         return f"write '{skill.name}: {plain(words[0], 60)}', without brackets"
     shown = plain(", ".join(words), 60)
     return f"to do it for each: 'for: one', 'in: [{shown}]', 'do: {{{skill.name}: $one}}', each on a line of its own"
-
-
-def _is_number(text: str) -> bool:
-    return text[:1] in "+-.0123456789"
 
 
 def _argument(view: View, skill: Skill, argument: WrittenArgument) -> Iterator[Finding]:

@@ -15,25 +15,11 @@ from rbxcompose.missions.engine.events import MissionEnded, MissionEvent
 from rbxcompose.missions.engine.logbook import INPUTS, LogRecord
 from rbxcompose.missions.engine.world import POSE, World
 from rbxcompose.missions.execution import missions as broadcast
+from rbxcompose.missions.execution import requests
 from rbxcompose.missions.execution.errands import ENDS, PUBLISHES, VALUE, port_name
 from rbxcompose.missions.execution.mission_run import PATIENCE, MissionRun
 from rbxcompose.missions.execution.missions import RunningMissions
 from rbxcompose.missions.execution.ports import EVENTS, ports_for
-from rbxcompose.missions.execution.requests import (
-    CancelMission,
-    ListedMission,
-    ListMissions,
-    LogPart,
-    LookAtAll,
-    LookAtMission,
-    PauseMission,
-    PictureData,
-    ReadLog,
-    ResumeMission,
-    RunMission,
-    Seen,
-    ShowPicture,
-)
 from rbxcompose.missions.execution.topic_skills import Desks
 from rbxcompose.missions.execution.world import Arrivals, RobotWorld
 from rbxcompose.missions.program.outcomes import IDLE, Result
@@ -133,7 +119,7 @@ class Mission(Component[MissionConfig]):
         self.missions = RunningMissions(self.config, self.world, self.story, self.publish)
         self.broadcast = broadcast.Broadcast(self.config.programs, self.context.window)
         self.is_held = False  # stopped before the start; a release alone lets nothing begin
-        self.kept: dict[str, RunMission] = {}  # requests by people that began missions that still run
+        self.kept: dict[str, requests.RunMission] = {}  # requests by people that began missions that still run
         self.shown = ""  # the last reported status
         self.planned: float | None = None  # the last requested wake [s]
         self.misfits: set[str] = set()  # values whose messages have another shape
@@ -274,15 +260,15 @@ class Mission(Component[MissionConfig]):
 
     # Commands from people
 
-    @answers(RunMission)
-    def run(self, request: RunMission) -> str:
+    @answers(requests.RunMission)
+    def run(self, request: requests.RunMission) -> str:
         """Begin a mission, and restart it after a crash."""
         self.begin(request.mission, request.inputs, request.start)
         self.keep(request)
         return f"mission {request.mission} starts"
 
-    @answers(CancelMission)
-    def cancel(self, request: CancelMission) -> str:
+    @answers(requests.CancelMission)
+    def cancel(self, request: requests.CancelMission) -> str:
         """End a mission for good."""
         run = self.missions.running(request.mission)
         run.abort(self.now)
@@ -291,16 +277,16 @@ class Mission(Component[MissionConfig]):
         self.broadcast.publish(self.missions)
         return f"mission {run.name} cancelled"
 
-    @answers(PauseMission)
-    def pause(self, request: PauseMission) -> str:
+    @answers(requests.PauseMission)
+    def pause(self, request: requests.PauseMission) -> str:
         """Hold a mission."""
         run = self.missions.running(request.mission, lambda one: not one.is_paused)
         if run.is_paused:
             raise Refused(f"mission {run.name} is already paused")
         return self.hold_running(run, "paused")
 
-    @answers(ResumeMission)
-    def resume(self, request: ResumeMission) -> str:
+    @answers(requests.ResumeMission)
+    def resume(self, request: requests.ResumeMission) -> str:
         """Resume a mission, unless the robot is held by a stop."""
         run = self.missions.running(request.mission, lambda one: one.is_paused, "paused")
         if self.context.is_stopped:
@@ -311,28 +297,28 @@ class Mission(Component[MissionConfig]):
         self.look_soon()
         return self.announce(f"mission {run.name} resumed")
 
-    @answers(ListMissions)
-    def listed(self, request: ListMissions) -> tuple[ListedMission, ...]:
+    @answers(requests.ListMissions)
+    def listed(self, request: requests.ListMissions) -> tuple[requests.ListedMission, ...]:
         """Return all missions."""
         return self.missions.listed()
 
-    @answers(ShowPicture)
-    def picture(self, request: ShowPicture) -> PictureData:
+    @answers(requests.ShowPicture)
+    def picture(self, request: requests.ShowPicture) -> requests.PictureData:
         """Return the picture of a mission."""
         return self.missions.picture(request.mission)
 
-    @answers(LookAtMission)
-    def look_at(self, request: LookAtMission) -> Seen:
+    @answers(requests.LookAtMission)
+    def look_at(self, request: requests.LookAtMission) -> requests.Seen:
         """Return the updates of a mission."""
         return self.missions.seen(request.mission, request.since)
 
-    @answers(LookAtAll)
-    def look_at_all(self, request: LookAtAll) -> Seen:
+    @answers(requests.LookAtAll)
+    def look_at_all(self, request: requests.LookAtAll) -> requests.Seen:
         """Return the state of a mission, with its picture."""
         return {**self.missions.seen(request.mission), "picture": self.missions.picture(request.mission)}
 
-    @answers(ReadLog)
-    def log_part(self, request: ReadLog) -> LogPart:
+    @answers(requests.ReadLog)
+    def log_part(self, request: requests.ReadLog) -> requests.LogPart:
         """Return records of the log."""
         return self.missions.since(request.after)
 
@@ -342,7 +328,7 @@ class Mission(Component[MissionConfig]):
         self.broadcast.publish(self.missions)
         return self.announce(f"mission {run.name} {why}")
 
-    def keep(self, begun: RunMission | None = None) -> None:
+    def keep(self, begun: requests.RunMission | None = None) -> None:
         """Let the supervisor repeat, after a crash, the requests by which people began missions that still run."""
         kept = {**self.kept, **({begun.mission: begun} if begun else {})}
         still = {name: entry for name, entry in kept.items() if name in self.missions.names}

@@ -64,9 +64,7 @@ class RunScope:
         """Return a datum, an input or a value of the robot."""
         if name in self.data:
             return self.data[name]
-        if name in self._inputs:
-            return self._inputs[name]
-        return self._values.value(name)
+        return self._inputs[name] if name in self._inputs else self._values.value(name)
 
     def word(self, name: str, /) -> Value:
         """Return the place of this name, else the word itself, which is then a choice."""

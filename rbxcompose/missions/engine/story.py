@@ -9,21 +9,7 @@ from typing import assert_never
 from rbxcompose.base.expressions.values import Value, is_named_pose
 from rbxcompose.base.levels import Level
 from rbxcompose.base.units import format_number
-from rbxcompose.missions.engine.events import (
-    BranchEnded,
-    InterruptEnded,
-    InterruptStarted,
-    Logged,
-    MissionEnded,
-    MissionEvent,
-    NodeEnded,
-    NodeStarted,
-    Published,
-    Reported,
-    SkillEnded,
-    SkillStarted,
-    Transition,
-)
+from rbxcompose.missions.engine import events
 from rbxcompose.missions.engine.value_text import show
 from rbxcompose.missions.program.program import RESTART, Skill
 
@@ -40,37 +26,37 @@ class MissionStory:
         self._labels: dict[int, str] = {}  # what each leaf did last: `go_to corner_1`
         self._results: dict[str, Counter[str]] = {}
 
-    def line(self, event: MissionEvent) -> tuple[Level, str]:
+    def line(self, event: events.MissionEvent) -> tuple[Level, str]:
         """Return how bad an event is, and its line, which is empty if other events say the same."""
         match event:
-            case SkillStarted(leaf=leaf, skill=skill, arguments=arguments):
+            case events.SkillStarted(leaf=leaf, skill=skill, arguments=arguments):
                 self._labels[leaf] = " ".join([skill, *self._written(skill, arguments)])
                 return Level.OK, self._labels[leaf]
-            case SkillEnded(leaf=leaf, skill=skill, result=result, duration=duration, message=message):
+            case events.SkillEnded(leaf=leaf, skill=skill, result=result, duration=duration, message=message):
                 self._results.setdefault(skill, Counter())[result] += 1
                 text = f"{self._labels[leaf]}: {result} ({format_number(round(duration, 1))} s)"
                 return RESULTS.get(result, Level.OK), _with(text, message)
-            case InterruptStarted(name=name, condition=condition, shown=shown):
+            case events.InterruptStarted(name=name, condition=condition, shown=shown):
                 values = ", ".join(f"{name} {value}" for name, value in shown.items())
                 return Level.OK, f"interrupt {name}: {condition}" + (f" ({values})" if values else "")
-            case InterruptEnded(name=name, afterwards=afterwards, back_to=leaves, restarted=restarted):
+            case events.InterruptEnded(name=name, afterwards=afterwards, back_to=leaves, restarted=restarted):
                 back = " and ".join(self._labels[leaf] for leaf in leaves if leaf in self._labels)
                 return Level.OK, f"interrupt {name} done" + _afterwards(afterwards, back, restarted)
-            case NodeStarted(name=name, is_state=is_state):
+            case events.NodeStarted(name=name, is_state=is_state):
                 return Level.OK, f"state {name}" if is_state else f"{name} begins"
-            case NodeEnded(name=name, result=result, is_state=is_state):
+            case events.NodeEnded(name=name, result=result, is_state=is_state):
                 return Level.OK, "" if is_state else f"{name}: {result}"
-            case BranchEnded(name=name, result=result):
+            case events.BranchEnded(name=name, result=result):
                 return Level.OK, f"branch {name}: {result}"
-            case Transition(state=state, outcome=outcome, to=to):
+            case events.Transition(state=state, outcome=outcome, to=to):
                 return Level.OK, f"{state}: {outcome}, on to {to}"
-            case Published(topic=topic, fields=fields):
+            case events.Published(topic=topic, fields=fields):
                 return Level.OK, f"published on {topic}: {show(None, fields)}"
-            case Logged(level=level, text=text):
+            case events.Logged(level=level, text=text):
                 return LEVELS[level], text
-            case Reported(path=path, message=message):
+            case events.Reported(path=path, message=message):
                 return Level.WARN, f"{path}: {message}"
-            case MissionEnded(result=result):
+            case events.MissionEnded(result=result):
                 text = f"mission {self._mission}: {result}"
                 otherwise = Level.WARN if event.doubt else Level.OK
                 return Level.ERROR if result == "failure" else otherwise, _with(text, event.words)

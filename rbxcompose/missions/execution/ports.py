@@ -6,17 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from rbxcompose.missions.engine.world import POSE
-from rbxcompose.missions.execution.errands import (
-    CALLS,
-    ENDS,
-    HALTS,
-    PAUSES,
-    PUBLISHES,
-    SKILL,
-    VALUE,
-    Equipment,
-    port_name,
-)
+from rbxcompose.missions.execution import errands
 from rbxcompose.missions.sources import PAUSE, SkillSource, SkillWay
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.std_msgs import String
@@ -28,39 +18,42 @@ EVENTS = "mission/events"
 Ports = Iterator[tuple[str, Port[Any]]]
 
 
-def ports_for(equipment: Equipment) -> dict[str, Port[Any]]:
+def ports_for(equipment: errands.Equipment) -> dict[str, Port[Any]]:
     """Return a port for each value, skill, topic and service that is used, and for the pose if it is read."""
     return {name: port.named(name) for name, port in _ports(equipment)}
 
 
-def _ports(equipment: Equipment) -> Ports:
+def _ports(equipment: errands.Equipment) -> Ports:
     for name in sorted(equipment.reads & equipment.values.keys()):
         source = equipment.values[name]
-        yield VALUE + name, In(registry.message(source.message), source.topic)
+        yield errands.VALUE + name, In(registry.message(source.message), source.topic)
     for name, skill in equipment.used.items():
         yield from _of_skill(name, skill)
     for topic, target in equipment.topics.items():
-        yield port_name(PUBLISHES, topic), Out(registry.message(target.message), topic, qos=target.qos)
+        yield errands.port_name(errands.PUBLISHES, topic), Out(registry.message(target.message), topic, qos=target.qos)
     for name, service in equipment.services.items():
-        yield port_name(CALLS, name), Calls(registry.service(service), name)
+        yield errands.port_name(errands.CALLS, name), Calls(registry.service(service), name)
     if POSE in equipment.reads:
         yield POSE, Looks(source="base_footprint", target="map")
     if equipment.programs:
-        yield port_name(PUBLISHES, EVENTS), Out(String, EVENTS, qos=Qos.EVENT)
+        yield errands.port_name(errands.PUBLISHES, EVENTS), Out(String, EVENTS, qos=Qos.EVENT)
 
 
 def _of_skill(name: str, source: SkillSource) -> Ports:
     match source.way:
         case SkillWay.SERVICE:
-            yield SKILL + name, Calls(registry.service(source.action), source.topic)
+            yield errands.SKILL + name, Calls(registry.service(source.action), source.topic)
         case SkillWay.ACTION:
-            yield SKILL + name, CallsAction(registry.action(source.action), source.topic)
+            yield errands.SKILL + name, CallsAction(registry.action(source.action), source.topic)
             if source.skill.pausable:
-                yield PAUSES + name, Calls(SetBool, f"{source.topic}/{PAUSE}")
+                yield errands.PAUSES + name, Calls(SetBool, f"{source.topic}/{PAUSE}")
         case SkillWay.TOPIC:
             orders, message = source.orders, registry.message(source.action)
-            yield SKILL + name, SendsOrders(message, source.topic, servers=orders.servers, qos=orders.qos)
+            yield errands.SKILL + name, SendsOrders(message, source.topic, servers=orders.servers, qos=orders.qos)
             if (ends := orders.ends) is not None:
-                yield port_name(ENDS, ends.topic), In(registry.message(ends.message), ends.topic, qos=ends.qos)
+                yield (
+                    errands.port_name(errands.ENDS, ends.topic),
+                    In(registry.message(ends.message), ends.topic, qos=ends.qos),
+                )
             if (halts := orders.halts) is not None:
-                yield HALTS + name, Out(registry.message(halts.message), halts.topic, qos=halts.qos)
+                yield errands.HALTS + name, Out(registry.message(halts.message), halts.topic, qos=halts.qos)

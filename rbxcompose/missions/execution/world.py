@@ -10,17 +10,7 @@ from rbxcompose.base.expressions.values import NOT_ARRIVED, NotArrived, Value
 from rbxcompose.base.levels import level_of
 from rbxcompose.missions.engine.events import MissionEvent
 from rbxcompose.missions.engine.world import POSE
-from rbxcompose.missions.execution.errands import (
-    CALLS,
-    PUBLISHES,
-    SKILL,
-    CallErrand,
-    Errand,
-    GoalErrand,
-    Shell,
-    WhenDone,
-    port_name,
-)
+from rbxcompose.missions.execution import errands
 from rbxcompose.missions.execution.python_skills import PythonErrand
 from rbxcompose.missions.execution.topic_skills import Desks, TopicErrand
 from rbxcompose.missions.program.goals import filled, goal_of, message_of
@@ -85,14 +75,14 @@ class RobotWorld:
 
     def __init__(
         self,
-        shell: Shell,
+        shell: errands.Shell,
         arrivals: Arrivals,
         desks: Desks,
         ended: Callable[[int, Result], None],
         say: Callable[[MissionEvent], None],
     ) -> None:
         self._shell, self._arrivals, self._desks, self._on_end, self._say = shell, arrivals, desks, ended, say
-        self._errands: dict[int, Errand] = {}
+        self._errands: dict[int, errands.Errand] = {}
 
     # Values
 
@@ -122,12 +112,17 @@ class RobotWorld:
     def call(self, leaf: int, service: str, fields: Mapping[str, Value], /) -> None:
         """Call a service."""
         request = message_of(registry.service(self._shell.equipment.services[service]).Request, fields)
-        self._begin(leaf, CallErrand(self._shell, self._done(leaf), service, port_name(CALLS, service), request))
+        self._begin(
+            leaf,
+            errands.CallErrand(
+                self._shell, self._done(leaf), service, errands.port_name(errands.CALLS, service), request
+            ),
+        )
 
     def publish(self, topic: str, fields: Mapping[str, Value], /) -> None:
         """Publish a message; raises ValueError if a field does not fit."""
         message = registry.message(self._shell.equipment.topics[topic].message)
-        self._shell.bound[port_name(PUBLISHES, topic)](message_of(message, fields))
+        self._shell.bound[errands.port_name(errands.PUBLISHES, topic)](message_of(message, fields))
 
     def halt(self, leaf: int, /) -> None:
         """Stop the request of a leaf."""
@@ -160,22 +155,22 @@ class RobotWorld:
         for errand in list(self._errands.values()):
             errand.look()
 
-    def _errand(self, done: WhenDone, skill: str, arguments: Mapping[str, Value]) -> Errand:
+    def _errand(self, done: errands.WhenDone, skill: str, arguments: Mapping[str, Value]) -> errands.Errand:
         source = self._shell.equipment.skills[skill]
         match source.way:
             case SkillWay.ACTION:
                 goal = goal_of(registry.action(source.action), arguments, source.skill.entries)
-                return GoalErrand(self._shell, done, source.skill, goal)
+                return errands.GoalErrand(self._shell, done, source.skill, goal)
             case SkillWay.SERVICE:
                 request = filled(registry.service(source.action).Request, arguments)
-                return CallErrand(self._shell, done, skill, SKILL + skill, request)
+                return errands.CallErrand(self._shell, done, skill, errands.SKILL + skill, request)
             case SkillWay.TOPIC:
                 order = filled(registry.message(source.action), arguments, source.skill.entries)
                 return TopicErrand(self._shell, done, self._desks.of(source), source, order)
             case SkillWay.PYTHON:
                 return PythonErrand(self._shell, done, skill_type(skill), arguments)
 
-    def _begin(self, leaf: int, errand: Errand) -> None:
+    def _begin(self, leaf: int, errand: errands.Errand) -> None:
         self._errands[leaf] = errand
         try:
             errand.begin()
@@ -183,7 +178,7 @@ class RobotWorld:
             self._errands.pop(leaf, None)
             raise
 
-    def _done(self, leaf: int) -> WhenDone:
+    def _done(self, leaf: int) -> errands.WhenDone:
         return partial(self._ended, leaf)
 
     def _ended(self, leaf: int, result: Result) -> None:

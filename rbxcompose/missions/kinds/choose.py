@@ -2,27 +2,19 @@
 
 from __future__ import annotations
 
-from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.expressions.evaluate import evaluate
-from rbxcompose.base.expressions.tree import Expression
 from rbxcompose.base.expressions.values import is_same
-from rbxcompose.missions.engine.task import Site, Task
+from rbxcompose.missions import sdk
 from rbxcompose.missions.language.asked import Asked
-from rbxcompose.missions.language.fields import cases, child, value
 from rbxcompose.missions.program.branches import BranchChoice
-from rbxcompose.missions.program.families import Choosing
-from rbxcompose.missions.program.outcomes import ALWAYS_FAILS, ALWAYS_SUCCEEDS, SKIPPED, Outcomes, either
-from rbxcompose.missions.program.program import Endings, MissionNode
-from rbxcompose.missions.program.registry import kind
 
 
-class ChooseTask(Task):
+class ChooseTask(sdk.Task):
     """Runs the chosen case."""
 
     __slots__ = ("choice", "chosen", "index")
     saved = ("index",)
 
-    def __init__(self, site: Site, step: ChooseStep) -> None:
+    def __init__(self, site: sdk.Site, step: ChooseStep) -> None:
         super().__init__(site)
         self.choice = step.choice
         self.chosen = site.children
@@ -32,7 +24,7 @@ class ChooseTask(Task):
         """Choose a case and start it."""
         if not (self.engine.places.kept and self.engine.places.take_up(self)):
             self.index = self._choose()
-        return SKIPPED if self.index < 0 else self.proceed()
+        return sdk.SKIPPED if self.index < 0 else self.proceed()
 
     def proceed(self) -> int:
         """Continue with the chosen case."""
@@ -40,16 +32,16 @@ class ChooseTask(Task):
 
     def _choose(self) -> int:
         cases = self.choice.cases
-        value = evaluate(self.choice.asked, self.scope)
+        value = sdk.evaluate(self.choice.asked, self.scope)
         for index, case in enumerate(cases):
-            if is_same(evaluate(case.expression, self.scope), value):
+            if is_same(sdk.evaluate(case.expression, self.scope), value):
                 return index
         return len(cases) if len(cases) < len(self.chosen) else -1
 
 
-@kind("choose", ChooseTask)
-@dataclass(frozen=True, slots=True)
-class ChooseStep(Choosing):
+@sdk.kind("choose", ChooseTask)
+@sdk.dataclass(frozen=True, slots=True)
+class ChooseStep(sdk.Choosing):
     """Do the case that matches a value, which is read once; skipped without a match.
 
     Example:
@@ -66,9 +58,9 @@ class ChooseStep(Choosing):
             log: Nothing to do in $room
     """
 
-    value: Expression = value("a value, such as '$room'")
-    cases: tuple[Asked, ...] = cases("What is done for which value.")
-    otherwise = child("What is done for all other values.", "else", optional=True)  # the child after those of the cases
+    value: sdk.Expression = sdk.value("a value, such as '$room'")
+    cases: tuple[Asked, ...] = sdk.cases("What is done for which value.")
+    otherwise = sdk.child("What is done for all other values.", "else", optional=True)  # the last child
 
     @property
     def choice(self) -> BranchChoice:
@@ -80,7 +72,7 @@ class ChooseStep(Choosing):
         """Return the cases, and `else` for all other values."""
         return (*(f"case {case.expression.text}" for case in self.cases), "else")
 
-    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
+    def may_end(self, node: sdk.MissionNode, endings: sdk.Endings) -> sdk.Outcomes:
         """Return the outcomes of all cases; a missing value is a failure."""
-        found = ALWAYS_SUCCEEDS.both(either(map(endings.of, node.children)))
-        return found.both(ALWAYS_FAILS) if node.asked else found
+        found = sdk.ALWAYS_SUCCEEDS.both(sdk.either(map(endings.of, node.children)))
+        return found.both(sdk.ALWAYS_FAILS) if node.asked else found

@@ -4,22 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rbxcompose.missions.program.answers import NodeFlow, NodeLook, Possibility, started
-from rbxcompose.missions.program.in_turn import RANDOM, InTurn, InTurnTask
-from rbxcompose.missions.program.outcomes import FAILS, SUCCEEDS, SUCCESS
-from rbxcompose.missions.program.program import MissionNode, RobotNames
-from rbxcompose.missions.program.registry import kind
+from rbxcompose.missions import sdk
 
 
-class FallbackTask(InTurnTask):
+class FallbackTask(sdk.InTurnTask):
     """A list that ends at the first success."""
 
     __slots__ = ()
-    decides = SUCCESS
+    decides = sdk.SUCCESS
 
 
-@kind("fallback", FallbackTask)
-class FallbackStep(InTurn):
+@sdk.kind("fallback", FallbackTask)
+class FallbackStep(sdk.InTurn):
     """Try the nodes of a list in order, until one succeeds; skipped ones are passed over.
 
     Example:
@@ -30,18 +26,18 @@ class FallbackStep(InTurn):
     """
 
     __slots__ = ()
-    decides = SUCCEEDS
-    flow = NodeFlow.ONE_OF
-    look = NodeLook("?")
+    decides = sdk.SUCCEEDS
+    flow = sdk.NodeFlow.ONE_OF
+    look = sdk.NodeLook("?")
 
     @property
     def goes_on_after(self) -> str:
         """Return failure."""
-        return "" if self.order == RANDOM else FAILS
+        return "" if self.order == sdk.RANDOM else sdk.FAILS
 
     def possibilities(
-        self, node: MissionNode, nodes: tuple[MissionNode, ...], robot: RobotNames
-    ) -> Iterator[Possibility]:
+        self, node: sdk.MissionNode, nodes: tuple[sdk.MissionNode, ...], robot: sdk.RobotNames
+    ) -> Iterator[sdk.Possibility]:
         """Yield each node but the first, which is always tried."""
         for index, child in enumerate(node.children[1:], 2):
-            yield Possibility(nodes[child].span, f"{node.path}: alternative {index}", started(child))
+            yield sdk.Possibility(nodes[child].span, f"{node.path}: alternative {index}", sdk.started(child))

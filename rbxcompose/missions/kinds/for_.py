@@ -5,23 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions.check import StaticScope, check
-from rbxcompose.base.expressions.evaluate import evaluate
-from rbxcompose.base.expressions.tree import Expression, FieldAccess, Index, Variable
-from rbxcompose.base.expressions.types import TEXT, UNKNOWN, Type, TypeKind
-from rbxcompose.base.expressions.values import NOT_ARRIVED, Located, NotArrivedError, Value, is_located
+from rbxcompose.base.expressions.tree import FieldAccess, Index, Variable
+from rbxcompose.base.expressions.types import TEXT
+from rbxcompose.base.expressions.values import NOT_ARRIVED, Located, is_located
+from rbxcompose.missions import sdk
 from rbxcompose.missions.engine.instant_actions import without
 from rbxcompose.missions.engine.scopes import ItemScope
-from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.engine.world import POSE
-from rbxcompose.missions.language.fields import child, choice, flag, item_name, items
-from rbxcompose.missions.program.answers import NO_EFFECTS, NodeEffects, NodeFlow, NodeLook
-from rbxcompose.missions.program.families import Loop
-from rbxcompose.missions.program.outcomes import ANY as ANYHOW
-from rbxcompose.missions.program.outcomes import FAILURE, RUNNING, SKIPPED, SUCCESS, NodeFailed, Outcomes
-from rbxcompose.missions.program.program import NOTHING, Endings, MissionNode, Target
-from rbxcompose.missions.program.registry import kind
+from rbxcompose.missions.program.program import NOTHING
 
 WRITTEN, RANDOM, NEAREST = "written", "random", "nearest"
 STOP, NEXT = "stop", "next"
@@ -29,24 +21,24 @@ ALL, ANY = "all", "any"
 DONE, FAILED = "done", "failed"
 
 
-class ForTask(Task):
+class ForTask(sdk.Task):
     """Runs the body for one item after the other."""
 
     __slots__ = ("body", "did", "done", "failed", "left", "step", "taken", "view")
     saved = ("did", "done", "failed", "left", "taken")
 
-    def __init__(self, site: Site, step: ForStep) -> None:
+    def __init__(self, site: sdk.Site, step: ForStep) -> None:
         super().__init__(site)
         if site.item is None:
             raise TypeError(f"the loop '{site.node.path}' has no item")
         self.body = site.children[0]
         self.view: ItemScope = site.item
         self.step = step
-        self.left: list[Value] = []  # items that have not been taken yet
-        self.taken: Value = None  # the current item
-        self.done: list[Value] = []
-        self.failed: list[Value] = []
-        self.did = SKIPPED
+        self.left: list[sdk.Value] = []  # items that have not been taken yet
+        self.taken: sdk.Value = None  # the current item
+        self.done: list[sdk.Value] = []
+        self.failed: list[sdk.Value] = []
+        self.did = sdk.SKIPPED
 
     def begin(self) -> int:
         """Read the list and begin with its first item, or with the one at which it was halted."""
@@ -54,9 +46,9 @@ class ForTask(Task):
             self.view.item = self.taken
             return self.proceed()
         self.left, self.done, self.failed = self._read_items(), [], []
-        self.did = SKIPPED
+        self.did = sdk.SKIPPED
         if not self.left:
-            return SKIPPED
+            return sdk.SKIPPED
         if self.step.order == RANDOM:
             self.engine.chance().shuffle(self.left)
         self._take()
@@ -65,8 +57,8 @@ class ForTask(Task):
     def proceed(self) -> int:
         """Continue with this item; the next one starts in another tick."""
         status = self.advance(self.body)
-        if status == RUNNING:
-            return RUNNING
+        if status == sdk.RUNNING:
+            return sdk.RUNNING
         self.engine.outcome = ""
         if self._decides(status):
             return status
@@ -74,9 +66,9 @@ class ForTask(Task):
             return self.did
         self._take()
         self.engine.again(self)
-        return RUNNING
+        return sdk.RUNNING
 
-    def restart(self, target: Target) -> bool:
+    def restart(self, target: sdk.Target) -> bool:
         """Restart the current round of this loop, if that is the target."""
         if self.number == target.number and target.is_round:
             if self.current is not None:
@@ -89,21 +81,21 @@ class ForTask(Task):
         """Make the item visible to the body."""
         self.view.item = self.taken
 
-    def result(self) -> Value:
+    def result(self) -> sdk.Value:
         """Return the items that succeeded and those that failed."""
         return {DONE: list(self.done), FAILED: list(self.failed)}
 
     def _decides(self, status: int) -> bool:
         """Record the result of an item, and return whether it decides the result of the loop."""
-        if status == FAILURE:
+        if status == sdk.FAILURE:
             self.failed.append(self.taken)
-            self.did = FAILURE
+            self.did = sdk.FAILURE
             return self.step.if_one_fails == STOP and self.step.succeed_when == ALL
-        if status == SUCCESS:
+        if status == sdk.SUCCESS:
             self.done.append(self.taken)
-            if self.did == SKIPPED:
-                self.did = SUCCESS
-            if self.step.remove_done and isinstance(self.step.items, Expression):
+            if self.did == sdk.SKIPPED:
+                self.did = sdk.SUCCESS
+            if self.step.remove_done and isinstance(self.step.items, sdk.Expression):
                 without(self.step.items.tree, self.taken, self.run.data, self.scope)
             return self.step.succeed_when == ANY
         return False
@@ -118,31 +110,31 @@ class ForTask(Task):
         """Return the index of the item that is nearest to the robot, in a straight line."""
         pose = self.scope.variable(POSE)
         if pose is NOT_ARRIVED:
-            raise NotArrivedError(POSE)
+            raise sdk.NotArrivedError(POSE)
         if not is_located(pose):
-            raise NodeFailed("'order: nearest' needs to know where the robot is")
+            raise sdk.NodeFailed("'order: nearest' needs to know where the robot is")
         ways = [math.hypot(place.x - pose.x, place.y - pose.y) for place in map(self._place, self.left)]
         return ways.index(min(ways))
 
-    def _place(self, item: Value) -> Located:
+    def _place(self, item: sdk.Value) -> Located:
         found = self.engine.robot.places.get(item) if isinstance(item, str) else item
         if not is_located(found):
-            raise NodeFailed(f"'order: nearest' needs places, not {self.run.show('', item)}")
+            raise sdk.NodeFailed(f"'order: nearest' needs places, not {self.run.show('', item)}")
         return found
 
-    def _read_items(self) -> list[Value]:
+    def _read_items(self) -> list[sdk.Value]:
         items = self.step.items
         if isinstance(items, tuple):
-            return [evaluate(item, self.scope) for item in items]
-        value = evaluate(items, self.scope)
+            return [sdk.evaluate(item, self.scope) for item in items]
+        value = sdk.evaluate(items, self.scope)
         if not isinstance(value, list | tuple | Mapping):
-            raise NodeFailed(f"'in' must be a list or a map, not {self.run.show('', value)}")
+            raise sdk.NodeFailed(f"'in' must be a list or a map, not {self.run.show('', value)}")
         return list(value)
 
 
-@kind("for", ForTask)
-@dataclass(frozen=True, slots=True)
-class ForStep(Loop):
+@sdk.kind("for", ForTask)
+@sdk.dataclass(frozen=True, slots=True)
+class ForStep(sdk.Loop):
     """Do the body for each item of a list; the body reads the item by its `$name`.
 
     Example:
@@ -154,58 +146,58 @@ class ForStep(Loop):
             go_to: $corner
     """
 
-    item: str = item_name()
-    items: Expression | tuple[Expression, ...] = items(
+    item: str = sdk.item_name()
+    items: sdk.Expression | tuple[sdk.Expression, ...] = sdk.items(
         "A list, or a map, whose keys it takes; it is read once, at the start.", "in"
     )
-    do = child("What is done for each item.")
-    if_one_fails: str = choice(
+    do = sdk.child("What is done for each item.")
+    if_one_fails: str = sdk.choice(
         STOP, NEXT, help="`stop` fails at once; `next` does the other items and fails at the end."
     )
-    order: str = choice(
+    order: str = sdk.choice(
         *(WRITTEN, RANDOM, NEAREST),
         help="The order: as `written`, `random` (a new draw at each start), or the `nearest` place first.",
     )
-    succeed_when: str = choice(
+    succeed_when: str = sdk.choice(
         *(ALL, ANY), help="`all` must succeed, or `any`: it continues after a failure and ends at the first success."
     )
-    remove_done: bool = flag("Whether an item that succeeded is removed from the data that `in` names.")
+    remove_done: bool = sdk.flag("Whether an item that succeeded is removed from the data that `in` names.")
 
     has_result = True
     result_names = (DONE, FAILED)
-    flow = NodeFlow.PER_ITEM
-    look = NodeLook("↻")
+    flow = sdk.NodeFlow.PER_ITEM
+    look = sdk.NodeLook("↻")
 
-    def shows(self, node: MissionNode, scope: StaticScope) -> Mapping[str, Type]:
+    def shows(self, node: sdk.MissionNode, scope: StaticScope) -> Mapping[str, sdk.Type]:
         """Return the item's name, with the type that all items have."""
         if not node.item:
             return {}
         if isinstance(self.items, tuple):
             types = {check(item, scope)[0] for item in self.items}
-            return {node.item: types.pop() if len(types) == 1 else UNKNOWN}
+            return {node.item: types.pop() if len(types) == 1 else sdk.UNKNOWN}
         found, _ = check(self.items, scope)
-        return {node.item: TEXT if found.kind is TypeKind.MAP else found.entry}
+        return {node.item: TEXT if found.kind is sdk.TypeKind.MAP else found.entry}
 
-    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
+    def may_end(self, node: sdk.MissionNode, endings: sdk.Endings) -> sdk.Outcomes:
         """Return that it fails if its body fails or its list cannot be read."""
         if self.order == NEAREST or self.remove_done or not node.children or not self._is_read(endings):
-            return ANYHOW
-        return Outcomes(fails=endings.of(node.children[0]).plain.fails)
+            return sdk.ANY
+        return sdk.Outcomes(fails=endings.of(node.children[0]).plain.fails)
 
-    def _is_read(self, endings: Endings) -> bool:
+    def _is_read(self, endings: sdk.Endings) -> bool:
         """Return whether its list can always be read."""
         if isinstance(self.items, tuple):
             return not any(item.names for item in self.items)
         written = self.items.tree.name if isinstance(self.items.tree, Variable) else ""
         return isinstance(endings.constants.get(written), list | tuple | Mapping)
 
-    def endless(self, ends: Outcomes) -> None:
+    def endless(self, ends: sdk.Outcomes) -> None:
         """Return no advice: every list has an end."""
 
-    def text(self, node: MissionNode) -> str:
+    def text(self, node: sdk.MissionNode) -> str:
         """Return the item's name and the list."""
         items = ", ".join(asked.scalar.text for asked in node.asked[: node.own])
-        return f"{node.item} in {items}" if items else node.item
+        return f"{node.item} in {sdk.items}" if items else node.item
 
     @property
     def reads(self) -> frozenset[str]:
@@ -213,11 +205,11 @@ class ForStep(Loop):
         return frozenset({POSE}) if self.order == NEAREST else NOTHING
 
     @property
-    def effects(self) -> NodeEffects:
+    def effects(self) -> sdk.NodeEffects:
         """Return the data that holds its items, if it removes those that are done."""
         if not self.remove_done:
-            return NO_EFFECTS
+            return sdk.NO_EFFECTS
         tree = None if isinstance(self.items, tuple) else self.items.tree
         while isinstance(tree, FieldAccess | Index):
             tree = tree.of
-        return NodeEffects(shortened=tree.name if isinstance(tree, Variable) else "")
+        return sdk.NodeEffects(shortened=tree.name if isinstance(tree, Variable) else "")

@@ -2,37 +2,27 @@
 
 from __future__ import annotations
 
-from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.expressions.text import Template
-from rbxcompose.missions.analysis.facts import is_sure
-from rbxcompose.missions.engine.events import Logged
-from rbxcompose.missions.engine.task import Site, Task
-from rbxcompose.missions.language.fields import choice, text
-from rbxcompose.missions.program.answers import LEVELS
-from rbxcompose.missions.program.families import Deed
-from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, ANY, SUCCESS, Outcomes
-from rbxcompose.missions.program.program import Endings, MissionNode
-from rbxcompose.missions.program.registry import kind
+from rbxcompose.missions import sdk
 
 
-class LogTask(Task):
+class LogTask(sdk.Task):
     """Writes one line."""
 
     __slots__ = ("step",)
 
-    def __init__(self, site: Site, step: LogStep) -> None:
+    def __init__(self, site: sdk.Site, step: LogStep) -> None:
         super().__init__(site)
         self.step = step
 
     def begin(self) -> int:
         """Write it."""
-        self.engine.say(Logged(self.step.level, self.run.filled(self.step.template, self.scope)))
-        return SUCCESS
+        self.engine.say(sdk.Logged(self.step.level, self.run.filled(self.step.template, self.scope)))
+        return sdk.SUCCESS
 
 
-@kind("log", LogTask)
-@dataclass(frozen=True, slots=True)
-class LogStep(Deed):
+@sdk.kind("log", LogTask)
+@sdk.dataclass(frozen=True, slots=True)
+class LogStep(sdk.Deed):
     """Write one line; `$name` in it is filled in.
 
     Example:
@@ -41,9 +31,9 @@ class LogStep(Deed):
           level: warn
     """
 
-    template: Template = text()
-    level: str = choice(*LEVELS, help="Its severity.")
+    template: sdk.Template = sdk.text()
+    level: str = sdk.choice(*sdk.LEVELS, help="Its severity.")
 
-    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
+    def may_end(self, node: sdk.MissionNode, endings: sdk.Endings) -> sdk.Outcomes:
         """Return that it fails only if it cannot read a value."""
-        return ALWAYS_SUCCEEDS if is_sure(node, endings.program, endings.robot) else ANY
+        return sdk.ALWAYS_SUCCEEDS if sdk.is_sure(node, endings.program, endings.robot) else sdk.ANY

@@ -6,30 +6,18 @@ from collections.abc import Iterator
 from dataclasses import field
 from typing import Self
 
-from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.expressions.values import Value
-from rbxcompose.missions.engine.events import Transition
-from rbxcompose.missions.engine.task import Site, Task
-from rbxcompose.missions.language.fields import kept
-from rbxcompose.missions.language.grammar import Takes
+from rbxcompose.missions import sdk
 from rbxcompose.missions.language.machine_reader import read_machine, read_state
-from rbxcompose.missions.language.node_reader import NodeReader
-from rbxcompose.missions.program.answers import Advice, Form, NodeFlow, NodeLook, Possibility, Skipped, led
-from rbxcompose.missions.program.families import Loop, Straight
-from rbxcompose.missions.program.in_turn import WithHistory
 from rbxcompose.missions.program.machines import ENDS, FAILED, FINISHED, STATE, MachineStates, Next
-from rbxcompose.missions.program.outcomes import ANY, FAILURE, NAMES, RUNNING, SKIPPED, SUCCESS, NodeFailed, Outcomes
-from rbxcompose.missions.program.program import Endings, MissionNode, RobotNames
-from rbxcompose.missions.program.registry import kind
 
 
-class MachineTask(WithHistory):
+class MachineTask(sdk.WithHistory):
     """Runs one of its states at a time."""
 
     __slots__ = ("index", "is_first", "leads", "machine", "states")
     saved = ("index", "is_first")
 
-    def __init__(self, site: Site, step: MachineStep) -> None:
+    def __init__(self, site: sdk.Site, step: MachineStep) -> None:
         super().__init__(site)
         self.machine = step.states
         self.history = step.history
@@ -53,25 +41,25 @@ class MachineTask(WithHistory):
         """Continue with the state; the next one starts in another tick."""
         self.engine.outcome = ""
         status = self.advance(self.states[self.index])
-        if status == RUNNING:
-            return RUNNING
-        return self._go_on(SUCCESS if status == SKIPPED else status)
+        if status == sdk.RUNNING:
+            return sdk.RUNNING
+        return self._go_on(sdk.SUCCESS if status == sdk.SKIPPED else status)
 
     def _go_on(self, status: int) -> int:
-        name, counts_as = self.machine.names[self.index], NAMES[status]
+        name, counts_as = self.machine.names[self.index], sdk.NAMES[status]
         outcome = self.engine.outcome or counts_as
         to = self._next(name, outcome, counts_as)
         self.engine.outcome = ""
-        self.engine.say(Transition(self.number, name, outcome, to))
+        self.engine.say(sdk.Transition(self.number, name, outcome, to))
         if to in self.machine.names:
             self.index = self.machine.names.index(to)
             self.forget()
             self.engine.again(self)
-            return RUNNING
+            return sdk.RUNNING
         self.forget_places()
         ends = self.machine.ends
         self.engine.outcome = to if to not in ENDS else ""
-        return SUCCESS if ends[to] == NAMES[SUCCESS] else FAILURE
+        return sdk.SUCCESS if ends[to] == sdk.NAMES[sdk.SUCCESS] else sdk.FAILURE
 
     def _next(self, state: str, outcome: str, counts_as: str) -> str:
         """Return the target of an outcome: of its own transition, else of the one for the result it counts as."""
@@ -79,12 +67,12 @@ class MachineTask(WithHistory):
         for key in (outcome, counts_as, "") if leads else ():
             if leads and key in leads.to:
                 return leads.to[key]
-        raise NodeFailed(f"state '{state}' ended with '{outcome}', which leads nowhere")
+        raise sdk.NodeFailed(f"state '{state}' ended with '{outcome}', which leads nowhere")
 
 
-@kind("machine", MachineTask)
-@dataclass(frozen=True, slots=True)
-class MachineStep(Loop):
+@sdk.kind("machine", MachineTask)
+@sdk.dataclass(frozen=True, slots=True)
+class MachineStep(sdk.Loop):
     """Run one state after another; the outcome of a state decides which is next.
 
     It has `start`, `states`, and perhaps `ends` and `history`. A state has `do` or `machine`, modifiers,
@@ -108,46 +96,46 @@ class MachineStep(Loop):
                 failure: failed
     """
 
-    states: MachineStates = kept(Takes.MACHINE, read_machine, "'start' and 'states' below it")
+    states: MachineStates = sdk.kept(sdk.Takes.MACHINE, read_machine, "'start' and 'states' below it")
 
-    flow = NodeFlow.OPEN
-    look = NodeLook("◉", Form.MACHINE)
+    flow = sdk.NodeFlow.OPEN
+    look = sdk.NodeLook("◉", sdk.Form.MACHINE)
 
     @property
     def history(self) -> str:
         """Return the history."""
         return self.states.history
 
-    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
+    def may_end(self, node: sdk.MissionNode, endings: sdk.Endings) -> sdk.Outcomes:
         """Return the ends that its states lead to."""
         leads = (endings.program.nodes[child].step.leads_to for child in node.children)
         reached = {to for lead in leads if lead for to in lead.to.values()}
         named = {end: counts for end, counts in self.states.ends.items() if end in reached and end not in ENDS}
-        return Outcomes(FINISHED in reached, FAILED in reached, named)
+        return sdk.Outcomes(FINISHED in reached, FAILED in reached, named)
 
-    def endless(self, ends: Outcomes) -> Advice | None:
+    def endless(self, ends: sdk.Outcomes) -> sdk.Advice | None:
         """Return advice on a machine without an end."""
-        advice = Advice("this machine never ends and never waits", "put a 'wait' into a state, or lead to an end")
+        advice = sdk.Advice("this machine never ends and never waits", "put a 'wait' into a state, or lead to an end")
         return None if ends.words else advice
 
     def possibilities(
-        self, node: MissionNode, nodes: tuple[MissionNode, ...], robot: RobotNames
-    ) -> Iterator[Possibility]:
+        self, node: sdk.MissionNode, nodes: tuple[sdk.MissionNode, ...], robot: sdk.RobotNames
+    ) -> Iterator[sdk.Possibility]:
         """Yield the transitions."""
         for state in (nodes[child] for child in node.children):
             following = state.step.leads_to or Next()
             for outcome, to in following.to.items():
                 words = f"{outcome}, on to {to}" if outcome else f"on to {to}"
                 span = following.keys.get(outcome, state.span)
-                yield Possibility(span, f"{state.path}: {words}", led(node.number, state.name, to, outcome))
+                yield sdk.Possibility(span, f"{state.path}: {words}", sdk.led(node.number, state.name, to, outcome))
 
 
-class StateTask(Task):
+class StateTask(sdk.Task):
     """The body of a state; its modifiers and hooks surround it."""
 
     __slots__ = ("body",)
 
-    def __init__(self, site: Site, step: StateStep) -> None:
+    def __init__(self, site: sdk.Site, step: StateStep) -> None:
         super().__init__(site)
         self.body = site.children[0]
 
@@ -159,27 +147,27 @@ class StateTask(Task):
         """Continue with the body."""
         return self.advance(self.body)
 
-    def result(self) -> Value:
+    def result(self) -> sdk.Value:
         """Return the result of the body, which `save` keeps."""
         return self.body.result()
 
 
-@kind(STATE, StateTask, is_inner=True)
-@dataclass(frozen=True, slots=True)
-class StateStep(Straight):
+@sdk.kind(STATE, StateTask, is_inner=True)
+@sdk.dataclass(frozen=True, slots=True)
+class StateStep(sdk.Straight):
     """A state of a machine: its body and its transitions (None: its body never ends)."""
 
     leads_to: Next | None = field()
 
-    skipped = Skipped.WITH_ALL_INSIDE
-    flow = NodeFlow.IN_TURN
-    look = NodeLook(form=Form.STATE)
+    skipped = sdk.Skipped.WITH_ALL_INSIDE
+    flow = sdk.NodeFlow.IN_TURN
+    look = sdk.NodeLook(form=sdk.Form.STATE)
 
     @classmethod
-    def read(cls, reader: NodeReader) -> Self:
+    def read(cls, reader: sdk.NodeReader) -> Self:
         """Read the body and the transitions."""
         return cls(read_state(reader))
 
-    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
+    def may_end(self, node: sdk.MissionNode, endings: sdk.Endings) -> sdk.Outcomes:
         """Return the outcomes of the body."""
-        return endings.of(node.children[0]) if node.children else ANY
+        return endings.of(node.children[0]) if node.children else sdk.ANY

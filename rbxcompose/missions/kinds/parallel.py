@@ -2,14 +2,7 @@
 
 from __future__ import annotations
 
-from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.expressions.evaluate import holds
-from rbxcompose.base.expressions.tree import Expression
-from rbxcompose.manifest.tree import ScalarNode
-from rbxcompose.missions.engine.task import Site, Task
-from rbxcompose.missions.language.fields import branch, branches, count, flag, kept
-from rbxcompose.missions.language.grammar import Takes
-from rbxcompose.missions.program.answers import Form, NodeFlow, NodeLook, Skipped
+from rbxcompose.missions import sdk
 from rbxcompose.missions.program.branches import (
     ALL,
     ANY,
@@ -19,37 +12,22 @@ from rbxcompose.missions.program.branches import (
     OutcomeRule,
     read_outcomes,
 )
-from rbxcompose.missions.program.families import Straight
-from rbxcompose.missions.program.outcomes import (
-    FAILS,
-    FAILURE,
-    IDLE,
-    RUNNING,
-    SKIPPED,
-    SUCCEEDS,
-    SUCCESS,
-    NodeFailed,
-    Outcomes,
-    either,
-)
-from rbxcompose.missions.program.program import Endings, MissionNode, Target
-from rbxcompose.missions.program.registry import kind
 
-PLAIN = {SUCCEEDS: SUCCEEDS, FAILS: FAILS}
+PLAIN = {sdk.SUCCEEDS: sdk.SUCCEEDS, sdk.FAILS: sdk.FAILS}
 
 
-class ParallelTask(Task):
+class ParallelTask(sdk.Task):
     """Ticks all branches that have not ended, then decides the result."""
 
     __slots__ = ("branches", "children", "names", "results", "runs", "waits_for_all", "wanted")
     saved = ("names", "results", "runs", "wanted")
 
-    def __init__(self, site: Site, step: ParallelStep) -> None:
+    def __init__(self, site: sdk.Site, step: ParallelStep) -> None:
         super().__init__(site)
         self.children = site.children
         self.branches = step.branches
         self.waits_for_all = step.wait_for_all
-        self.results = [IDLE] * len(self.children)
+        self.results = [sdk.IDLE] * len(self.children)
         self.names = [""] * len(self.children)  # outcomes of their own
         self.runs = [False] * len(self.children)
         self.wanted = (0, 0)  # how many must succeed, how many must fail; 0 for all
@@ -57,7 +35,7 @@ class ParallelTask(Task):
     def begin(self) -> int:
         """Start all branches; with a deep history, only those that had not ended."""
         if not (self.engine.places.kept and self.engine.places.take_up(self)):
-            self.results = [IDLE] * len(self.children)
+            self.results = [sdk.IDLE] * len(self.children)
             self.names = [""] * len(self.children)
         self.runs = [False] * len(self.children)
         branches = self.branches
@@ -71,16 +49,16 @@ class ParallelTask(Task):
         """Tick every branch that has not ended, then decide the result."""
         results, runs, engine = self.results, self.runs, self.engine
         for index, child in enumerate(self.children):
-            if results[index] > RUNNING:
+            if results[index] > sdk.RUNNING:
                 continue
             engine.outcome = ""
             status = child.tick() if runs[index] else child.start()
             results[index] = status
-            runs[index] = status == RUNNING
-            if status != RUNNING:
+            runs[index] = status == sdk.RUNNING
+            if status != sdk.RUNNING:
                 self.names[index] = engine.outcome
         status = self._judge()
-        if status != RUNNING:
+        if status != sdk.RUNNING:
             self.halt_below()
             self._name_outcome()
         else:
@@ -101,7 +79,7 @@ class ParallelTask(Task):
                 self.runs[index] = False
         return False
 
-    def restart(self, target: Target) -> bool:
+    def restart(self, target: sdk.Target) -> bool:
         """Restart the target, if it is in a branch that runs."""
         for index, child in enumerate(self.children):
             if not self.runs[index]:
@@ -116,19 +94,19 @@ class ParallelTask(Task):
 
     def _judge(self) -> int:
         results = self.results
-        open_ones = results.count(RUNNING)
+        open_ones = results.count(sdk.RUNNING)
         if open_ones and self.waits_for_all:
-            return RUNNING
+            return sdk.RUNNING
         if self.branches.ends_with:
             return results[self.branches.names.index(self.branches.ends_with)]
-        failed, succeeded = results.count(FAILURE), results.count(SUCCESS)
+        failed, succeeded = results.count(sdk.FAILURE), results.count(sdk.SUCCESS)
         counted = failed + succeeded + open_ones
         if not counted:
-            return SKIPPED
+            return sdk.SKIPPED
         to_succeed, to_fail = (many or counted for many in self.wanted)
         if failed >= to_fail or succeeded + open_ones < to_succeed:
-            return FAILURE
-        return SUCCESS if succeeded >= to_succeed else RUNNING
+            return sdk.FAILURE
+        return sdk.SUCCESS if succeeded >= to_succeed else sdk.RUNNING
 
     def _name_outcome(self) -> None:
         """Set the outcome by the conditions; without any, take that of the `ends_with` branch, or the plain one."""
@@ -139,24 +117,24 @@ class ParallelTask(Task):
         ended = {name: BranchResult.of(self.results[i], self.names[i]) for i, name in enumerate(branches.names)}
         scope = BranchScope(self.scope, ended)
         for outcome in branches.outcomes:
-            if outcome.condition is None or holds(outcome.condition, scope):
+            if outcome.condition is None or sdk.holds(outcome.condition, scope):
                 self.engine.outcome = outcome.name
                 return
-        raise NodeFailed("none of its outcomes holds")
+        raise sdk.NodeFailed("none of its outcomes holds")
 
-    def _many(self, written: Expression | str, what: str) -> int:
+    def _many(self, written: sdk.Expression | str, what: str) -> int:
         """Return the required number of branches; 0 for all of them."""
         if isinstance(written, str):
             return 0 if written == ALL else 1
         number = self.count_of(written, what)
         if number < 1:
-            raise NodeFailed(f"{what} must be at least 1")
+            raise sdk.NodeFailed(f"{what} must be at least 1")
         return number
 
 
-@kind("parallel", ParallelTask)
-@dataclass(frozen=True, slots=True)
-class ParallelStep(Straight):
+@sdk.kind("parallel", ParallelTask)
+@sdk.dataclass(frozen=True, slots=True)
+class ParallelStep(sdk.Straight):
     """Do several nodes at the same time. Each tick ticks those that have not ended, then decides the result.
 
     Example:
@@ -168,20 +146,22 @@ class ParallelStep(Straight):
               log: On my way
     """
 
-    names: tuple[str, ...] = branches()
-    ends_with: ScalarNode | None = branch("The branch whose result is the result; failures of others do not count.")
-    succeed_when: Expression | str = count(
+    names: tuple[str, ...] = sdk.branches()
+    ends_with: sdk.ScalarNode | None = sdk.branch(
+        "The branch whose result is the result; failures of others do not count."
+    )
+    succeed_when: sdk.Expression | str = sdk.count(
         *(ALL, ANY), help="How many branches must succeed: `all`, `any` or a number.", optional=True, default=ALL
     )
-    fail_when: Expression | str = count(
+    fail_when: sdk.Expression | str = sdk.count(
         *(ANY, ALL),
         help="How many branches must fail for the whole to fail: `any`, `all` or a number.",
         optional=True,
         default=ANY,
     )
-    wait_for_all: bool = flag("Whether it waits for all branches to end, even when the result is decided.")
-    outcomes: tuple[OutcomeRule, ...] = kept(
-        Takes.OUTCOMES,
+    wait_for_all: bool = sdk.flag("Whether it waits for all branches to end, even when the result is decided.")
+    outcomes: tuple[OutcomeRule, ...] = sdk.kept(
+        sdk.Takes.OUTCOMES,
         read_outcomes,
         "a map from outcomes to conditions",
         "Of a state's body: outcome by condition over the results of the branches; the first one wins.",
@@ -189,9 +169,9 @@ class ParallelStep(Straight):
         default=(),
     )
 
-    skipped = Skipped.WITH_ALL_INSIDE
-    flow = NodeFlow.OPEN
-    look = NodeLook("⇉", Form.BESIDE, has_roles=True)
+    skipped = sdk.Skipped.WITH_ALL_INSIDE
+    flow = sdk.NodeFlow.OPEN
+    look = sdk.NodeLook("⇉", sdk.Form.BESIDE, has_roles=True)
 
     @property
     def branches(self) -> Branches:
@@ -206,10 +186,12 @@ class ParallelStep(Straight):
         conditions = (outcome.condition for outcome in self.outcomes if outcome.condition)
         return frozenset(name.name for condition in conditions for name in condition.names).difference(self.names)
 
-    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
+    def may_end(self, node: sdk.MissionNode, endings: sdk.Endings) -> sdk.Outcomes:
         """Return the outcomes by conditions, else those of the `ends_with` branch, else the plain ones."""
         branches = self.branches
         if branches.outcomes:
-            return Outcomes(False, False, {outcome.name: PLAIN.get(outcome.name, "") for outcome in branches.outcomes})
-        deciding = either(map(endings.of, branches.deciding(node.children)))
+            return sdk.Outcomes(
+                False, False, {outcome.name: PLAIN.get(outcome.name, "") for outcome in branches.outcomes}
+            )
+        deciding = sdk.either(map(endings.of, branches.deciding(node.children)))
         return deciding if branches.ends_with in branches.names else deciding.plain

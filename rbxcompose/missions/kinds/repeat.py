@@ -4,20 +4,10 @@ from __future__ import annotations
 
 import math
 
-from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.expressions.evaluate import holds
-from rbxcompose.base.expressions.tree import Expression, Number
-from rbxcompose.missions.analysis.facts import is_simple, takes_time
-from rbxcompose.missions.engine.task import Site, Task
-from rbxcompose.missions.language.fields import child, count_or_forever, duration, watched
-from rbxcompose.missions.program.answers import Advice, NodeFlow, NodeLook
-from rbxcompose.missions.program.families import Loop
-from rbxcompose.missions.program.outcomes import ANY, FAILURE, RUNNING, SKIPPED, SUCCESS, Outcomes
-from rbxcompose.missions.program.program import Endings, MissionNode
-from rbxcompose.missions.program.registry import kind
+from rbxcompose.missions import sdk
 
 
-class RepeatTask(Task):
+class RepeatTask(sdk.Task):
     """Runs one round after the other."""
 
     __slots__ = ("body", "did", "due", "is_between", "left", "period", "step")
@@ -25,7 +15,7 @@ class RepeatTask(Task):
     times = ("due",)
     fresh = ("due", "period")
 
-    def __init__(self, site: Site, step: RepeatStep) -> None:
+    def __init__(self, site: sdk.Site, step: RepeatStep) -> None:
         super().__init__(site)
         self.body = site.children[0]
         self.step = step
@@ -33,7 +23,7 @@ class RepeatTask(Task):
         self.period = 0.0
         self.due = 0.0  # when the next round may start [s]
         self.is_between = False  # one round has ended and the next one has not started
-        self.did = SKIPPED
+        self.did = sdk.SKIPPED
 
     def begin(self) -> int:
         """Start the first round, or the one in which it was halted."""
@@ -44,8 +34,8 @@ class RepeatTask(Task):
         self.left = math.inf if rounds is None else self.count_of(rounds, "'repeat'")
         self.period = 0.0 if every is None else self.number_of(every, "'every'")
         if self.left < 1:
-            return SKIPPED
-        self.did = SKIPPED
+            return sdk.SKIPPED
+        self.did = sdk.SKIPPED
         self.is_between = True
         self.due = self.engine.time
         return self.proceed()
@@ -54,31 +44,31 @@ class RepeatTask(Task):
         """Continue with this round; the next one starts in another tick."""
         if self.is_between:
             if not self.engine.is_due(self.due):
-                return RUNNING
+                return sdk.RUNNING
             self.is_between = False
             self.due = self.engine.time + self.period
             self.forget()
         status = self.advance(self.body)
-        if status == RUNNING:
-            return RUNNING
+        if status == sdk.RUNNING:
+            return sdk.RUNNING
         self.engine.outcome = ""
-        if status == FAILURE:
-            return FAILURE
-        if status == SUCCESS:
-            self.did = SUCCESS
+        if status == sdk.FAILURE:
+            return sdk.FAILURE
+        if status == sdk.SUCCESS:
+            self.did = sdk.SUCCESS
         self.left -= 1
         until = self.step.until
-        if self.left < 1 or (until is not None and holds(until, self.scope)):
+        if self.left < 1 or (until is not None and sdk.holds(until, self.scope)):
             return self.did
         self.is_between = True
         if self.engine.is_due(self.due):
             self.engine.again(self)
-        return RUNNING
+        return sdk.RUNNING
 
 
-@kind("repeat", RepeatTask)
-@dataclass(frozen=True, slots=True)
-class RepeatStep(Loop):
+@sdk.kind("repeat", RepeatTask)
+@sdk.dataclass(frozen=True, slots=True)
+class RepeatStep(sdk.Loop):
     """Do the body repeatedly. It fails with the first round that fails, and succeeds after the last.
 
     Example:
@@ -90,44 +80,44 @@ class RepeatStep(Loop):
             go_to: corner_1
     """
 
-    rounds: Expression | None = count_or_forever(least=1)
-    do = child("What is done in each round.")
-    until: Expression | None = watched(
+    rounds: sdk.Expression | None = sdk.count_or_forever(least=1)
+    do = sdk.child("What is done in each round.")
+    until: sdk.Expression | None = sdk.watched(
         "A condition that ends the loop; it is evaluated after each round and never cuts one short.", optional=True
     )
-    every: Expression | None = duration(
+    every: sdk.Expression | None = sdk.duration(
         "Time from the start of one round to the start of the next.", optional=True, least=0
     )
 
-    flow = NodeFlow.IN_TURN
-    look = NodeLook("↻")
+    flow = sdk.NodeFlow.IN_TURN
+    look = sdk.NodeLook("↻")
 
     @property
-    def lasts(self) -> Expression | None:
+    def lasts(self) -> sdk.Expression | None:
         """Return `every`."""
         return self.every
 
-    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
+    def may_end(self, node: sdk.MissionNode, endings: sdk.Endings) -> sdk.Outcomes:
         """Return the outcomes; an endless loop can only fail."""
-        body = endings.of(node.children[0]).plain if node.children else ANY
+        body = endings.of(node.children[0]).plain if node.children else sdk.ANY
         if self.rounds is None and self.until is None:
-            return Outcomes(succeeds=False, fails=body.fails)
-        return Outcomes(fails=body.fails) if self._is_counted(node) else ANY
+            return sdk.Outcomes(succeeds=False, fails=body.fails)
+        return sdk.Outcomes(fails=body.fails) if self._is_counted(node) else sdk.ANY
 
-    def _is_counted(self, node: MissionNode) -> bool:
+    def _is_counted(self, node: sdk.MissionNode) -> bool:
         """Return whether the number of rounds and their period are literals, and `until` can always be evaluated."""
         if not any(asked.expression.names for asked in node.asked):
             return True
-        return is_simple(node) and all(
-            expression is None or isinstance(expression.tree, Number) for expression in (self.rounds, self.every)
+        return sdk.is_simple(node) and all(
+            expression is None or isinstance(expression.tree, sdk.Number) for expression in (self.rounds, self.every)
         )
 
-    def endless(self, ends: Outcomes) -> Advice | None:
+    def endless(self, ends: sdk.Outcomes) -> sdk.Advice | None:
         """Return advice on an endless loop."""
-        advice = Advice("this loop never waits", "give it 'every: 1 s', or a 'wait' in its body")
+        advice = sdk.Advice("this loop never waits", "give it 'every: 1 s', or a 'wait' in its body")
         return advice if self.rounds is None else None
 
     @property
     def waits(self) -> bool:
         """Return whether it waits between its rounds, which takes a period."""
-        return takes_time(self.every)
+        return sdk.takes_time(self.every)

@@ -2,26 +2,17 @@
 
 from __future__ import annotations
 
-from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.expressions.evaluate import evaluate
-from rbxcompose.base.expressions.tree import Expression
+from rbxcompose.missions import sdk
 from rbxcompose.missions.analysis.held_nodes import HeldNode
-from rbxcompose.missions.engine.task import Site, Task
-from rbxcompose.missions.language.fields import value
-from rbxcompose.missions.program.answers import PLAIN, NodeFlow, Skipped
-from rbxcompose.missions.program.families import Straight
-from rbxcompose.missions.program.outcomes import ALWAYS_FAILS, ANY, NodeFailed, Outcomes, either
-from rbxcompose.missions.program.program import Endings, MissionNode
-from rbxcompose.missions.program.registry import kind
 
 
-class RunTask(Task):
+class RunTask(sdk.Task):
     """Runs the node that its expression yields."""
 
     __slots__ = ("children", "expression", "index", "keys")
     saved = ("index",)
 
-    def __init__(self, site: Site, step: RunStep) -> None:
+    def __init__(self, site: sdk.Site, step: RunStep) -> None:
         super().__init__(site)
         self.expression = step.expression
         self.children = site.children
@@ -32,9 +23,9 @@ class RunTask(Task):
     def begin(self) -> int:
         """Look the node up, and start it."""
         if not (self.engine.places.kept and self.engine.places.take_up(self)):
-            value = evaluate(self.expression, self.scope)
+            value = sdk.evaluate(self.expression, self.scope)
             if not isinstance(value, HeldNode) or value.key not in self.keys:
-                raise NodeFailed(f"'run' needs a node from the data, not {self.run.show('', value)}")
+                raise sdk.NodeFailed(f"'run' needs a node from the data, not {self.run.show('', sdk.value)}")
             self.index = self.keys[value.key]
         return self.proceed()
 
@@ -43,9 +34,9 @@ class RunTask(Task):
         return self.advance(self.children[self.index])
 
 
-@kind("run", RunTask)
-@dataclass(frozen=True, slots=True)
-class RunStep(Straight):
+@sdk.kind("run", RunTask)
+@sdk.dataclass(frozen=True, slots=True)
+class RunStep(sdk.Straight):
     """Do a node that is stored in the data: a chore of a list, a step chosen earlier.
 
     Example:
@@ -60,12 +51,12 @@ class RunStep(Straight):
             run: $step
     """
 
-    expression: Expression = value("data that hold a node, such as '$chore'", holds_nodes=True)
+    expression: sdk.Expression = sdk.value("data that hold a node, such as '$chore'", holds_nodes=True)
 
-    skipped = Skipped.PERHAPS
-    flow = NodeFlow.OPEN
-    look = PLAIN
+    skipped = sdk.Skipped.PERHAPS
+    flow = sdk.NodeFlow.OPEN
+    look = sdk.PLAIN
 
-    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
+    def may_end(self, node: sdk.MissionNode, endings: sdk.Endings) -> sdk.Outcomes:
         """Return the outcomes of all these nodes; it fails if the data have no node there."""
-        return either([ALWAYS_FAILS, *map(endings.of, node.children)]) if node.children else ANY
+        return sdk.either([sdk.ALWAYS_FAILS, *map(endings.of, node.children)]) if node.children else sdk.ANY

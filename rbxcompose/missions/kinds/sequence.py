@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from rbxcompose.missions.program.answers import NodeFlow, NodeLook
-from rbxcompose.missions.program.in_turn import RANDOM, InTurn, InTurnTask
-from rbxcompose.missions.program.outcomes import FAILS, FAILURE, SUCCEEDS
-from rbxcompose.missions.program.registry import kind
+from rbxcompose.missions import sdk
 
 
-class SequenceTask(InTurnTask):
+class SequenceTask(sdk.InTurnTask):
     """A list that ends at the first failure."""
 
     __slots__ = ()
-    decides = FAILURE
+    decides = sdk.FAILURE
     is_kept_after_failure = True
 
 
-@kind("sequence", SequenceTask)
-class SequenceStep(InTurn):
+@sdk.kind("sequence", SequenceTask)
+class SequenceStep(sdk.InTurn):
     """Do the nodes of a list in order, until one fails.
 
     Example:
@@ -28,11 +25,11 @@ class SequenceStep(InTurn):
     """
 
     __slots__ = ()
-    decides = FAILS
-    flow = NodeFlow.IN_TURN
-    look = NodeLook("→")
+    decides = sdk.FAILS
+    flow = sdk.NodeFlow.IN_TURN
+    look = sdk.NodeLook("→")
 
     @property
     def goes_on_after(self) -> str:
         """Return success."""
-        return "" if self.order == RANDOM else SUCCEEDS
+        return "" if self.order == sdk.RANDOM else sdk.SUCCEEDS

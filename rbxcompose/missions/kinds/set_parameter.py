@@ -2,42 +2,29 @@
 
 from __future__ import annotations
 
-from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.expressions.types import Type, TypeKind
-from rbxcompose.base.expressions.values import Value
-from rbxcompose.manifest.tree import ScalarNode
-from rbxcompose.missions.engine.leaf import Leaf
-from rbxcompose.missions.engine.task import Site
-from rbxcompose.missions.language.asked import WrittenArgument
-from rbxcompose.missions.language.fields import new_name, record, value, word
-from rbxcompose.missions.language.written import getter
-from rbxcompose.missions.program.answers import NodeEffects, WrittenSetting
-from rbxcompose.missions.program.families import LeafStep, ends
-from rbxcompose.missions.program.outcomes import ANY, RUNNING
-from rbxcompose.missions.program.program import MissionNode
-from rbxcompose.missions.program.registry import kind
+from rbxcompose.missions import sdk
 
 _ENCODED = {  # the number of `rcl_interfaces/ParameterType` and the field of the value, by the type of a setting
-    TypeKind.FLAG: (1, "bool_value"),
-    TypeKind.COUNT: (2, "integer_value"),
-    TypeKind.QUANTITY: (3, "double_value"),
-    TypeKind.TEXT: (4, "string_value"),
-    TypeKind.CHOICE: (4, "string_value"),
+    sdk.TypeKind.FLAG: (1, "bool_value"),
+    sdk.TypeKind.COUNT: (2, "integer_value"),
+    sdk.TypeKind.QUANTITY: (3, "double_value"),
+    sdk.TypeKind.TEXT: (4, "string_value"),
+    sdk.TypeKind.CHOICE: (4, "string_value"),
 }
 
 
-class SetParameterTask(Leaf):
+class SetParameterTask(sdk.Leaf):
     """Computes the value, sends it to the component, and waits until that has it."""
 
     __slots__ = ("get", "setting", "value", "wanted")
-    saved = (*Leaf.saved, "value")
+    saved = (*sdk.Leaf.saved, "value")
 
-    def __init__(self, site: Site, step: SetParameterStep) -> None:
+    def __init__(self, site: sdk.Site, step: SetParameterStep) -> None:
         super().__init__(site)
         self.setting = step.setting
-        self.wanted: Type = self.engine.robot.settings[self.setting.component.text][self.setting.parameter.text]
-        self.get = getter(step.arguments[0].value, self.wanted)
-        self.value: Value = 0.0
+        self.wanted: sdk.Type = self.engine.robot.settings[self.setting.component.text][self.setting.parameter.text]
+        self.get = sdk.getter(step.arguments[0].value, self.wanted)
+        self.value: sdk.Value = 0.0
 
     def begin(self) -> int:
         """Compute the value and send it."""
@@ -48,19 +35,19 @@ class SetParameterTask(Leaf):
         """Send the value; this happens again after a pause."""
         number, key = _ENCODED[self.wanted.kind]
         parameter = {"name": self.setting.parameter.text, "value": {"type": number, key: self.value}}
-        fields: dict[str, Value] = {"parameters": [parameter], "by": f"mission {self.run.program.name}"}
-        self.status, self.is_asked = RUNNING, True
+        fields: dict[str, sdk.Value] = {"parameters": [parameter], "by": f"mission {self.run.program.name}"}
+        self.status, self.is_asked = sdk.RUNNING, True
         try:
             self.engine.world.call(self.number, self.setting.service, fields)
         except Exception:
             self.is_asked = False
             raise
-        return RUNNING
+        return sdk.RUNNING
 
 
-@kind("set_parameter", SetParameterTask)
-@dataclass(frozen=True, slots=True)
-class SetParameterStep(LeafStep):
+@sdk.kind("set_parameter", SetParameterTask)
+@sdk.dataclass(frozen=True, slots=True)
+class SetParameterStep(sdk.LeafStep):
     """Change a setting of a component that may change while the robot runs; it fails if the component refuses.
 
     Example:
@@ -68,11 +55,11 @@ class SetParameterStep(LeafStep):
           set_parameter: {component: battery, parameter: runtime, value: 30 s}
     """
 
-    given: tuple[ScalarNode, ...] = record(
+    given: tuple[sdk.ScalarNode, ...] = sdk.record(
         "a map with 'component', 'parameter' and 'value'",
-        component=new_name("the name of a component", "The component."),
-        parameter=word("the name of a setting", "One of its settings that may change while it runs."),
-        value=value("a value", "The new value, of the type of the setting."),
+        component=sdk.new_name("the name of a component", "The component."),
+        parameter=sdk.word("the name of a setting", "One of its settings that may change while it runs."),
+        value=sdk.value("a value", "The new value, of the type of the setting."),
     )
 
     waits = True
@@ -81,22 +68,22 @@ class SetParameterStep(LeafStep):
     only_asks = False
 
     @property
-    def setting(self) -> WrittenSetting:
+    def setting(self) -> sdk.WrittenSetting:
         """Return the setting."""
-        return WrittenSetting(*self.given[:2])
+        return sdk.WrittenSetting(*self.given[:2])
 
     @property
-    def arguments(self) -> tuple[WrittenArgument, ...]:
+    def arguments(self) -> tuple[sdk.WrittenArgument, ...]:
         """Return the value."""
-        return (WrittenArgument("value", self.given[2], self.given[2].span),)
+        return (sdk.WrittenArgument("value", self.given[2], self.given[2].span),)
 
-    may_end = ends(ANY)
+    may_end = sdk.ends(sdk.ANY)
 
-    def text(self, node: MissionNode) -> str:
+    def text(self, node: sdk.MissionNode) -> str:
         """Return the setting and its value."""
         return f"{self.setting.path} {self.given[2].text}".strip()
 
     @property
-    def effects(self) -> NodeEffects:
+    def effects(self) -> sdk.NodeEffects:
         """Return the setting."""
-        return NodeEffects(setting=self.setting)
+        return sdk.NodeEffects(setting=self.setting)

@@ -6,47 +6,28 @@ from collections.abc import Iterator, Mapping
 from dataclasses import field
 from typing import Self
 
-from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.expressions.values import Value
-from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, TreeNode
-from rbxcompose.missions.engine.events import Reported, SkillEnded, SkillStarted
-from rbxcompose.missions.engine.leaf import Leaf
-from rbxcompose.missions.engine.task import Site
-from rbxcompose.missions.language.asked import WrittenArgument
-from rbxcompose.missions.language.node_reader import NodeReader
-from rbxcompose.missions.language.written import Getter, getter
-from rbxcompose.missions.program.answers import Possibility, ended
-from rbxcompose.missions.program.families import LeafStep
-from rbxcompose.missions.program.outcomes import (
-    ANY,
-    FAILS,
-    FAILURE,
-    NAMES,
-    RUNNING,
-    SUCCEEDS,
-    SUCCESS,
-    Outcomes,
-    Result,
-)
-from rbxcompose.missions.program.program import Endings, MissionNode, RobotNames
-from rbxcompose.missions.program.registry import SKILL, kind
+from rbxcompose.manifest.tree import MappingNode, SequenceNode, TreeNode
+from rbxcompose.missions import sdk
+from rbxcompose.missions.program.registry import SKILL
 
 
-class SkillTask(Leaf):
+class SkillTask(sdk.Leaf):
     """A leaf that runs a skill of the robot."""
 
     __slots__ = ("arguments", "claims", "getters", "is_restartable", "skill", "started")
-    saved = (*Leaf.saved, "arguments", "started")
+    saved = (*sdk.Leaf.saved, "arguments", "started")
     fresh = ("arguments",)
     reported = ("started",)
 
-    def __init__(self, site: Site, step: SkillStep) -> None:
+    def __init__(self, site: sdk.Site, step: SkillStep) -> None:
         super().__init__(site)
         self.skill = site.engine.robot.skills[step.skill]
         self.claims, self.is_restartable = self.skill.claims, self.skill.restartable
         names = [(argument.name or self.skill.main, argument.value) for argument in step.arguments]
-        self.getters: Mapping[str, Getter] = {name: getter(value, self.skill.arguments[name]) for name, value in names}
-        self.arguments: dict[str, Value] = {}
+        self.getters: Mapping[str, sdk.Getter] = {
+            name: sdk.getter(value, self.skill.arguments[name]) for name, value in names
+        }
+        self.arguments: dict[str, sdk.Value] = {}
         self.started = 0.0  # [s] of robot time
 
     def begin(self) -> int:
@@ -56,32 +37,32 @@ class SkillTask(Leaf):
 
     def ask(self) -> int:
         """Start the skill; this happens again after a pause."""
-        self.started, self.status = self.engine.now, RUNNING
-        self.engine.say(SkillStarted(self.number, self.skill.name, self.arguments))
+        self.started, self.status = self.engine.now, sdk.RUNNING
+        self.engine.say(sdk.SkillStarted(self.number, self.skill.name, self.arguments))
         self.is_asked = True
         try:
             self.engine.world.start(self.number, self.skill.name, self.arguments)
         except Exception:
             self.is_asked = False
             raise
-        return RUNNING
+        return sdk.RUNNING
 
-    def ended(self, result: Result) -> None:
+    def ended(self, result: sdk.Result) -> None:
         """Take the result from the world."""
         super().ended(result)
-        message = self.engine.reasons[self.number] if self.status == FAILURE else result.message
-        self.say_ended(self.outcome or NAMES[self.status], message)
+        message = self.engine.reasons[self.number] if self.status == sdk.FAILURE else result.message
+        self.say_ended(self.outcome or sdk.NAMES[self.status], message)
 
-    def judged(self, result: Result) -> tuple[int, str, str]:
+    def judged(self, result: sdk.Result) -> tuple[int, str, str]:
         """Return what the outcome counts as; an undeclared one is a failure."""
         outcome = result.outcome
-        if outcome in ("", SUCCEEDS, FAILS):
+        if outcome in ("", sdk.SUCCEEDS, sdk.FAILS):
             return super().judged(result)
         if outcome not in self.skill.outcomes:
             message = f"the skill '{self.skill.name}' ended with an outcome that it does not declare: '{outcome}'"
-            self.engine.say(Reported(self.path, message))
-            return FAILURE, "", message
-        status = SUCCESS if self.skill.outcomes[outcome] == SUCCEEDS else FAILURE
+            self.engine.say(sdk.Reported(self.path, message))
+            return sdk.FAILURE, "", message
+        status = sdk.SUCCESS if self.skill.outcomes[outcome] == sdk.SUCCEEDS else sdk.FAILURE
         return status, outcome, result.message or outcome
 
     def suspend(self, from_start: bool) -> bool:
@@ -105,16 +86,16 @@ class SkillTask(Leaf):
 
     def say_ended(self, result: str, message: str) -> None:
         """Report how it ended and how long it took."""
-        self.engine.say(SkillEnded(self.number, self.skill.name, result, self.engine.now - self.started, message))
+        self.engine.say(sdk.SkillEnded(self.number, self.skill.name, result, self.engine.now - self.started, message))
 
 
-@kind(SKILL, SkillTask, is_inner=True)
-@dataclass(frozen=True, slots=True)
-class SkillStep(LeafStep):
+@sdk.kind(SKILL, SkillTask, is_inner=True)
+@sdk.dataclass(frozen=True, slots=True)
+class SkillStep(sdk.LeafStep):
     """A skill by its name, with its arguments."""
 
     skill: str = field()
-    arguments: tuple[WrittenArgument, ...] = field()
+    arguments: tuple[sdk.WrittenArgument, ...] = field()
 
     waits = True
     has_result = True
@@ -122,7 +103,7 @@ class SkillStep(LeafStep):
     only_asks = False
 
     @classmethod
-    def read(cls, reader: NodeReader) -> Self:
+    def read(cls, reader: sdk.NodeReader) -> Self:
         """Read the arguments."""
         return cls(reader.key, reader.arguments())
 
@@ -131,27 +112,27 @@ class SkillStep(LeafStep):
         """Return the name of the skill."""
         return self.skill
 
-    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
+    def may_end(self, node: sdk.MissionNode, endings: sdk.Endings) -> sdk.Outcomes:
         """Return the outcomes that the robot declares."""
         skill = endings.robot.skills.get(self.skill)
-        return Outcomes(named=skill.outcomes) if skill else ANY
+        return sdk.Outcomes(named=skill.outcomes) if skill else sdk.ANY
 
     def possibilities(
-        self, node: MissionNode, nodes: tuple[MissionNode, ...], robot: RobotNames
-    ) -> Iterator[Possibility]:
+        self, node: sdk.MissionNode, nodes: tuple[sdk.MissionNode, ...], robot: sdk.RobotNames
+    ) -> Iterator[sdk.Possibility]:
         """Yield its outcomes."""
         if self.skill in robot.skills:
-            for outcome in (SUCCEEDS, FAILS, *robot.skills[self.skill].outcomes):
-                yield Possibility(node.span, f"{node.path}: {outcome}", ended(node.number, outcome))
+            for outcome in (sdk.SUCCEEDS, sdk.FAILS, *robot.skills[self.skill].outcomes):
+                yield sdk.Possibility(node.span, f"{node.path}: {outcome}", sdk.ended(node.number, outcome))
 
-    def text(self, node: MissionNode) -> str:
+    def text(self, node: sdk.MissionNode) -> str:
         """Return its arguments."""
         return ", ".join(f"{argument.name} {_written(argument.value)}".strip() for argument in self.arguments)
 
 
 def _written(value: TreeNode) -> str:
     match value:
-        case ScalarNode():
+        case sdk.ScalarNode():
             return value.text
         case SequenceNode():
             return ", ".join(map(_written, value.items))

@@ -2,39 +2,26 @@
 
 from __future__ import annotations
 
-from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.expressions.evaluate import evaluate
-from rbxcompose.base.expressions.values import NotArrivedError, Value
-from rbxcompose.manifest.tree import ScalarNode
+from rbxcompose.missions import sdk
 from rbxcompose.missions.engine.resume_points import LAST
-from rbxcompose.missions.engine.task import Site
-from rbxcompose.missions.language.asked import WrittenArgument
-from rbxcompose.missions.language.fields import history, inputs, word
-from rbxcompose.missions.language.written import PLACED, getter, place
-from rbxcompose.missions.program.answers import NodeFlow, NodeLook, Skipped
-from rbxcompose.missions.program.families import Straight
-from rbxcompose.missions.program.in_turn import WithHistory
-from rbxcompose.missions.program.outcomes import FAILURE, RUNNING, Outcomes
-from rbxcompose.missions.program.program import Endings, MissionNode, Target
-from rbxcompose.missions.program.registry import kind
 
 
-class UseTask(WithHistory):
+class UseTask(sdk.WithHistory):
     """Runs the mission."""
 
     __slots__ = ("getters", "inner", "outputs")
     saved = ("outputs",)
 
-    def __init__(self, site: Site, step: UseStep) -> None:
+    def __init__(self, site: sdk.Site, step: UseStep) -> None:
         super().__init__(site)
         if site.inner is None:
             raise TypeError(f"the mission of '{site.node.path}' is not linked")
         self.inner = site.inner
         self.history = step.history
-        self.outputs: dict[str, Value] = {}
+        self.outputs: dict[str, sdk.Value] = {}
         inputs = self.inner.program.inputs
         self.getters = {
-            argument.name: getter(argument.value, inputs[argument.name].type) for argument in step.arguments
+            argument.name: sdk.getter(argument.value, inputs[argument.name].type) for argument in step.arguments
         }
 
     def begin(self) -> int:
@@ -50,10 +37,10 @@ class UseTask(WithHistory):
     def proceed(self) -> int:
         """Continue with the mission."""
         status = self.inner.tick(self.engine.time)
-        if status != RUNNING:
+        if status != sdk.RUNNING:
             self.forget_places()
             self.outputs = self._outputs()
-            if self.inner.ending == FAILURE:
+            if self.inner.ending == sdk.FAILURE:
                 self.engine.reasons[self.number] = self.inner.message or "its mission ended itself in failure"
         return status
 
@@ -73,38 +60,38 @@ class UseTask(WithHistory):
         self.inner.suspend(from_start)
         return False
 
-    def restart(self, target: Target) -> bool:
+    def restart(self, target: sdk.Target) -> bool:
         """Return false: no node of another mission can be named."""
         return False
 
-    def result(self) -> Value:
+    def result(self) -> sdk.Value:
         """Return the outputs."""
         return self.outputs
 
-    def _inputs(self) -> dict[str, Value]:
-        found: dict[str, Value] = {}
+    def _inputs(self) -> dict[str, sdk.Value]:
+        found: dict[str, sdk.Value] = {}
         for name, declared in self.inner.program.inputs.items():
             if name in self.getters:
                 found[name] = self.getters[name](self)
             elif declared.default:
                 value = declared.default.value
-                found[name] = place(self, value) if declared.type.kind in PLACED else value
+                found[name] = sdk.place(self, value) if declared.type.kind in sdk.PLACED else value
         return found
 
-    def _outputs(self) -> dict[str, Value]:
+    def _outputs(self) -> dict[str, sdk.Value]:
         """Return the outputs; one that has no value, because what it reads has not arrived, is left out."""
         found = {}
         for name, asked in self.inner.program.outputs.items():
             try:
-                found[name] = evaluate(asked.expression, self.inner.scope)
-            except NotArrivedError:
+                found[name] = sdk.evaluate(asked.expression, self.inner.scope)
+            except sdk.NotArrivedError:
                 continue
         return found
 
 
-@kind("use", UseTask)
-@dataclass(frozen=True, slots=True)
-class UseStep(Straight):
+@sdk.kind("use", UseTask)
+@sdk.dataclass(frozen=True, slots=True)
+class UseStep(sdk.Straight):
     """Run another mission of the robot; its outputs can be kept with `save`.
 
     It sees the robot's values and places, but of this mission only the values in `with`.
@@ -117,19 +104,19 @@ class UseStep(Straight):
               rounds: 1
     """
 
-    uses: ScalarNode = word("the name of a mission")
-    arguments: tuple[WrittenArgument, ...] = inputs("Values for the inputs of the mission.")
-    history: str = history()
+    uses: sdk.ScalarNode = sdk.word("the name of a mission")
+    arguments: tuple[sdk.WrittenArgument, ...] = sdk.inputs("Values for the inputs of the mission.")
+    history: str = sdk.history()
 
-    skipped = Skipped.PERHAPS
+    skipped = sdk.Skipped.PERHAPS
     has_result = True
-    flow = NodeFlow.OPEN
-    look = NodeLook("↗")
+    flow = sdk.NodeFlow.OPEN
+    look = sdk.NodeLook("↗")
 
-    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
+    def may_end(self, node: sdk.MissionNode, endings: sdk.Endings) -> sdk.Outcomes:
         """Return the outcomes of the mission."""
         return endings.of_mission(self.uses.text)
 
-    def text(self, node: MissionNode) -> str:
+    def text(self, node: sdk.MissionNode) -> str:
         """Return the name of the mission."""
         return self.uses.text

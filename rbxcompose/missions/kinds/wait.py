@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.expressions.tree import Expression, Number
-from rbxcompose.missions.engine.task import Site, Task
-from rbxcompose.missions.language.fields import duration
-from rbxcompose.missions.program.families import LeafStep
-from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, ANY, RUNNING, SUCCESS, Outcomes
-from rbxcompose.missions.program.program import Endings, MissionNode
-from rbxcompose.missions.program.registry import kind
+from rbxcompose.missions import sdk
 
 
-class WaitTask(Task):
+class WaitTask(sdk.Task):
     """Has a deadline."""
 
     __slots__ = ("deadline", "duration")
     saved = times = fresh = ("deadline",)
 
-    def __init__(self, site: Site, step: WaitStep) -> None:
+    def __init__(self, site: sdk.Site, step: WaitStep) -> None:
         super().__init__(site)
         self.duration = step.lasts
         self.deadline = 0.0
@@ -30,12 +23,12 @@ class WaitTask(Task):
 
     def proceed(self) -> int:
         """Succeed once the deadline has come."""
-        return SUCCESS if self.engine.is_due(self.deadline) else RUNNING
+        return sdk.SUCCESS if self.engine.is_due(self.deadline) else sdk.RUNNING
 
 
-@kind("wait", WaitTask)
-@dataclass(frozen=True, slots=True)
-class WaitStep(LeafStep):
+@sdk.kind("wait", WaitTask)
+@sdk.dataclass(frozen=True, slots=True)
+class WaitStep(sdk.LeafStep):
     """Succeed after a time; after an interrupt, only the rest of it remains.
 
     Example:
@@ -44,12 +37,12 @@ class WaitStep(LeafStep):
           - go_to: corner_1
     """
 
-    lasts: Expression = duration(least=0, counted="a wait")
+    lasts: sdk.Expression = sdk.duration(least=0, counted="a wait")
 
     waits = True
     has_result = False
     only_asks = False
 
-    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
+    def may_end(self, node: sdk.MissionNode, endings: sdk.Endings) -> sdk.Outcomes:
         """Return that it always succeeds if the duration is a literal."""
-        return ALWAYS_SUCCEEDS if isinstance(self.lasts.tree, Number) else ANY
+        return sdk.ALWAYS_SUCCEEDS if isinstance(self.lasts.tree, sdk.Number) else sdk.ANY

@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-from rbxcompose.base.dataclass import dataclass
-from rbxcompose.manifest.tree import ScalarNode
-from rbxcompose.missions.engine.task import Site, Task
-from rbxcompose.missions.language.fields import new_name
-from rbxcompose.missions.modifiers.registry import Decorator, modifier
-from rbxcompose.missions.program.modifier import Plain
-from rbxcompose.missions.program.outcomes import RUNNING
+from rbxcompose.missions import sdk
 
 
-class SaveTask(Decorator):
+class SaveTask(sdk.Decorator):
     """Keeps the result at the end."""
 
     __slots__ = ("name",)
 
-    def __init__(self, site: Site, options: Save, inner: Task) -> None:
+    def __init__(self, site: sdk.Site, options: Save, inner: sdk.Task) -> None:
         super().__init__(site, inner)
         self.name = options.kept_as.text
 
@@ -27,14 +21,14 @@ class SaveTask(Decorator):
     def proceed(self) -> int:
         """Continue, and keep the result at the end."""
         status = self.advance(self.inner)
-        if status != RUNNING and self.name:
+        if status != sdk.RUNNING and self.name:
             self.run.data[self.name] = self.inner.result()
         return status
 
 
-@modifier("save", SaveTask)
-@dataclass(frozen=True, slots=True)
-class Save(Plain):
+@sdk.modifier("save", SaveTask)
+@sdk.dataclass(frozen=True, slots=True)
+class Save(sdk.Plain):
     """Keep the result of a skill or a `call`, the outputs of a `use`, or `{done, failed}` of a `for`.
 
     It is also kept after a failure.
@@ -51,12 +45,12 @@ class Save(Plain):
           - log: $tour.failed could not be reached
     """
 
-    kept_as: ScalarNode = new_name("a name for the result")
+    kept_as: sdk.ScalarNode = sdk.new_name("a name for the result")
 
     value = None
 
     @property
-    def saved(self) -> ScalarNode | None:
+    def saved(self) -> sdk.ScalarNode | None:
         """Return the name."""
         return self.kept_as if self.kept_as.text else None
 

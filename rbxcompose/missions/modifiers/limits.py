@@ -5,44 +5,32 @@ from __future__ import annotations
 import math
 from typing import Self
 
-from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.expressions.evaluate import holds
-from rbxcompose.base.expressions.tree import Expression
 from rbxcompose.base.units import TIME, format_quantity
-from rbxcompose.missions import codes
-from rbxcompose.missions.analysis.facts import takes_time
-from rbxcompose.missions.engine.task import Site, Task
-from rbxcompose.missions.engine.world import Watched
-from rbxcompose.missions.language.fields import count_or_forever, duration, watched
-from rbxcompose.missions.language.node_reader import NodeReader
-from rbxcompose.missions.modifiers.registry import Decorator, modifier
-from rbxcompose.missions.program.answers import Advice, ModifierScope
-from rbxcompose.missions.program.modifier import Modifier
-from rbxcompose.missions.program.outcomes import ALWAYS_FAILS, FAILURE, RUNNING, SUCCEEDS, Outcomes
+from rbxcompose.missions import codes, sdk
 
 SHORTEST = 1e-6  # [s] of a meaningful timeout
 
 
-class Cutting(Modifier):
+class Cutting(sdk.Modifier):
     """A modifier that may make its node fail."""
 
     __slots__ = ()
     may_skip = False
-    serves = ModifierScope.ALL
+    serves = sdk.ModifierScope.ALL
 
-    def changed(self, inner: Outcomes) -> Outcomes:
+    def changed(self, inner: sdk.Outcomes) -> sdk.Outcomes:
         """Return that it may also fail."""
-        return inner.both(ALWAYS_FAILS)
+        return inner.both(sdk.ALWAYS_FAILS)
 
 
-class AsLongAsTask(Decorator):
+class AsLongAsTask(sdk.Decorator):
     """Evaluates its condition at each tick."""
 
     __slots__ = ("watched",)
 
-    def __init__(self, site: Site, options: AsLongAs, inner: Task) -> None:
+    def __init__(self, site: sdk.Site, options: AsLongAs, inner: sdk.Task) -> None:
         super().__init__(site, inner)
-        self.watched = Watched.of(options.value)
+        self.watched = sdk.Watched.of(options.value)
 
     def begin(self) -> int:
         """Evaluate the condition for the first time."""
@@ -50,17 +38,17 @@ class AsLongAsTask(Decorator):
 
     def proceed(self) -> int:
         """Evaluate the condition, then continue."""
-        if not holds(self.watched.condition, self.scope):
+        if not sdk.holds(self.watched.condition, self.scope):
             self.cut(f"not as long as {self.watched.condition.text}")
-            return FAILURE
+            return sdk.FAILURE
         status = self.advance(self.inner)
-        if status == RUNNING:
+        if status == sdk.RUNNING:
             self.engine.watch(self.watched)
         return status
 
 
-@modifier("as_long_as", AsLongAsTask)
-@dataclass(frozen=True, slots=True)
+@sdk.modifier("as_long_as", AsLongAsTask)
+@sdk.dataclass(frozen=True, slots=True)
 class AsLongAs(Cutting):
     """Fail as soon as the condition does not hold, and halt the node.
 
@@ -70,17 +58,17 @@ class AsLongAs(Cutting):
           as_long_as: $battery > 20 %
     """
 
-    value: Expression = watched()
+    value: sdk.Expression = sdk.watched()
 
 
-class TimeoutTask(Decorator):
+class TimeoutTask(sdk.Decorator):
     """Has a deadline."""
 
     __slots__ = ("allowed", "deadline", "duration")
     saved = fresh = ("allowed", "deadline")
     times = ("deadline",)
 
-    def __init__(self, site: Site, options: Timeout, inner: Task) -> None:
+    def __init__(self, site: sdk.Site, options: Timeout, inner: sdk.Task) -> None:
         super().__init__(site, inner)
         self.duration = options.value
         self.allowed = 0.0  # [s]
@@ -95,14 +83,14 @@ class TimeoutTask(Decorator):
     def proceed(self) -> int:
         """Continue, unless the deadline has come."""
         status = self.advance(self.inner)
-        if status != RUNNING or not self.engine.is_due(self.deadline):
+        if status != sdk.RUNNING or not self.engine.is_due(self.deadline):
             return status
         self.cut(f"timeout of {format_quantity(self.allowed, TIME)}")
-        return FAILURE
+        return sdk.FAILURE
 
 
-@modifier("timeout", TimeoutTask)
-@dataclass(frozen=True, slots=True)
+@sdk.modifier("timeout", TimeoutTask)
+@sdk.dataclass(frozen=True, slots=True)
 class Timeout(Cutting):
     """Fail when the node takes longer, counting all attempts; a result at that very instant is in time.
 
@@ -112,22 +100,22 @@ class Timeout(Cutting):
           timeout: 30 s
     """
 
-    value: Expression = duration(least=SHORTEST, counted="a timeout")
+    value: sdk.Expression = sdk.duration(least=SHORTEST, counted="a timeout")
 
     @property
-    def limit(self) -> Expression | None:
+    def limit(self) -> sdk.Expression | None:
         """Return the duration."""
         return self.value
 
 
-class AttemptsTask(Decorator):
+class AttemptsTask(sdk.Decorator):
     """Starts the task inside again after a failure."""
 
     __slots__ = ("deadline", "is_between", "left", "tries")
     saved = ("deadline", "is_between", "left")
     times = fresh = ("deadline",)
 
-    def __init__(self, site: Site, options: Attempts, inner: Task) -> None:
+    def __init__(self, site: sdk.Site, options: Attempts, inner: sdk.Task) -> None:
         super().__init__(site, inner)
         self.tries = options
         self.left = math.inf
@@ -144,34 +132,34 @@ class AttemptsTask(Decorator):
         """Continue with this attempt, or begin the next one."""
         if self.is_between:
             if not self.engine.is_due(self.deadline):
-                return RUNNING
+                return sdk.RUNNING
             self._begin_attempt()
         status = self.advance(self.inner)
-        if status == RUNNING and self.tries.timeout and self.engine.is_due(self.deadline):
+        if status == sdk.RUNNING and self.tries.timeout and self.engine.is_due(self.deadline):
             self.cut("timeout of an attempt")
-            status = FAILURE
-        if status != FAILURE:
+            status = sdk.FAILURE
+        if status != sdk.FAILURE:
             return status
         self.left -= 1
         if self.left < 1:
-            return FAILURE
+            return sdk.FAILURE
         self.is_between = True
         self.deadline = self.engine.time + self._seconds(self.tries.pause, "'attempt_pause'")
         if self.engine.is_due(self.deadline):
             self.engine.again(self)
-        return RUNNING
+        return sdk.RUNNING
 
     def _begin_attempt(self) -> None:
         self.is_between = False
         self.deadline = self.engine.time + self._seconds(self.tries.timeout, "'attempt_timeout'")
 
-    def _seconds(self, expression: Expression | None, what: str) -> float:
+    def _seconds(self, expression: sdk.Expression | None, what: str) -> float:
         return 0.0 if expression is None else self.number_of(expression, what)
 
 
-@modifier("attempts", AttemptsTask)
-@dataclass(frozen=True, slots=True)
-class Attempts(Modifier):
+@sdk.modifier("attempts", AttemptsTask)
+@sdk.dataclass(frozen=True, slots=True)
+class Attempts(sdk.Modifier):
     """Retry after a failure, at the next tick or after a pause.
 
     Example:
@@ -182,9 +170,11 @@ class Attempts(Modifier):
           attempt_pause: 2 s
     """
 
-    value: Expression | None = count_or_forever(is_required=False, least=1)
-    timeout: Expression | None = duration("How long each attempt may take.", key="attempt_timeout", optional=True)
-    pause: Expression | None = duration(
+    value: sdk.Expression | None = sdk.count_or_forever(is_required=False, least=1)
+    timeout: sdk.Expression | None = sdk.duration(
+        "How long each attempt may take.", key="attempt_timeout", optional=True
+    )
+    pause: sdk.Expression | None = sdk.duration(
         "The time between an attempt that failed and the next one.", key="attempt_pause", optional=True
     )
 
@@ -192,7 +182,7 @@ class Attempts(Modifier):
     repeats = True
 
     @classmethod
-    def read(cls, reader: NodeReader) -> Self:
+    def read(cls, reader: sdk.NodeReader) -> Self:
         """Read its settings; there must be a number of attempts."""
         read = cls(**cls.values(reader))
         if not reader.has(cls.name):
@@ -200,14 +190,14 @@ class Attempts(Modifier):
             reader.add(codes.MISSING.at(reader.key_span(key), f"'{key}' needs 'attempts': how often it is tried"))
         return read
 
-    def changed(self, inner: Outcomes) -> Outcomes:
+    def changed(self, inner: sdk.Outcomes) -> sdk.Outcomes:
         """Return that endless attempts end in success, unless each has a timeout."""
-        return inner.of(SUCCEEDS) if self.value is None and not self.timeout else inner
+        return inner.of(sdk.SUCCEEDS) if self.value is None and not self.timeout else inner
 
     @property
-    def serves(self) -> ModifierScope:
+    def serves(self) -> sdk.ModifierScope:
         """Return the nodes that may fail; with a timeout for each attempt, any may."""
-        return ModifierScope.ALL if self.timeout else ModifierScope.FAILING
+        return sdk.ModifierScope.ALL if self.timeout else sdk.ModifierScope.FAILING
 
     @property
     def said(self) -> str:
@@ -215,12 +205,14 @@ class Attempts(Modifier):
         return ", ".join(expression.text for expression in (self.value, self.timeout, self.pause) if expression)
 
     @property
-    def endless(self) -> Advice | None:
+    def endless(self) -> sdk.Advice | None:
         """Return advice on endless attempts."""
-        advice = Advice("this retries for ever without waiting", "give it a number of attempts, or an 'attempt_pause'")
-        return advice if self.value is None and not takes_time(self.pause) else None
+        advice = sdk.Advice(
+            "this retries for ever without waiting", "give it a number of attempts, or an 'attempt_pause'"
+        )
+        return advice if self.value is None and not sdk.takes_time(self.pause) else None
 
     @property
-    def attempt_limit(self) -> Expression | None:
+    def attempt_limit(self) -> sdk.Expression | None:
         """Return the time limit of each attempt."""
         return self.timeout

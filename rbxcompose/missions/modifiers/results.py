@@ -4,21 +4,15 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from rbxcompose.base.dataclass import dataclass
-from rbxcompose.missions.engine.task import Site, Task
-from rbxcompose.missions.language.fields import flag
-from rbxcompose.missions.modifiers.registry import Decorator, modifier
-from rbxcompose.missions.program.answers import ModifierScope
-from rbxcompose.missions.program.modifier import Modifier
-from rbxcompose.missions.program.outcomes import ALWAYS_SUCCEEDS, FAILS, FAILURE, SUCCEEDS, SUCCESS, Outcomes
+from rbxcompose.missions import sdk
 
 
-class TurningTask(Decorator):
+class TurningTask(sdk.Decorator):
     """Replaces some results by others, and then drops the name of the outcome."""
 
     __slots__ = ("turned",)
 
-    def __init__(self, site: Site, options: Turning, inner: Task) -> None:
+    def __init__(self, site: sdk.Site, options: Turning, inner: sdk.Task) -> None:
         super().__init__(site, inner)
         self.turned = options.turns if options.is_on else {}
 
@@ -35,11 +29,11 @@ class TurningTask(Decorator):
         return turned
 
 
-@dataclass(frozen=True, slots=True)
-class Turning(Modifier):
+@sdk.dataclass(frozen=True, slots=True)
+class Turning(sdk.Modifier):
     """A modifier that replaces results; it may be switched off."""
 
-    is_on: bool = flag()
+    is_on: bool = sdk.flag()
 
     may_skip = False
     value = None
@@ -52,16 +46,16 @@ class OptionalTask(TurningTask):
     __slots__ = ("failed", "succeeded")
     saved = reported = ("failed", "succeeded")
 
-    def __init__(self, site: Site, options: Optional, inner: Task) -> None:
+    def __init__(self, site: sdk.Site, options: Optional, inner: sdk.Task) -> None:
         super().__init__(site, options, inner)
         self.failed = self.succeeded = False
 
-    def advance(self, child: Task) -> int:
+    def advance(self, child: sdk.Task) -> int:
         """Start the child or continue with it, and keep in mind how it ended."""
         status = super().advance(child)
         if self.turned:
-            self.failed |= status == FAILURE
-            self.succeeded |= status == SUCCESS
+            self.failed |= status == sdk.FAILURE
+            self.succeeded |= status == sdk.SUCCESS
         return status
 
     def only_failed(self) -> bool | None:
@@ -69,7 +63,7 @@ class OptionalTask(TurningTask):
         return not self.succeeded if self.failed or self.succeeded else None
 
 
-@modifier("optional", OptionalTask)
+@sdk.modifier("optional", OptionalTask)
 class Optional(Turning):
     """Count a failure as success.
 
@@ -81,18 +75,18 @@ class Optional(Turning):
     """
 
     __slots__ = ()
-    turns = {FAILURE: SUCCESS}
+    turns = {sdk.FAILURE: sdk.SUCCESS}
 
-    def changed(self, inner: Outcomes) -> Outcomes:
+    def changed(self, inner: sdk.Outcomes) -> sdk.Outcomes:
         """Return the outcomes with failure as success."""
-        if not self.is_on or not inner.counting_as(FAILS):
+        if not self.is_on or not inner.counting_as(sdk.FAILS):
             return inner
-        return inner.of(SUCCEEDS).both(ALWAYS_SUCCEEDS)
+        return inner.of(sdk.SUCCEEDS).both(sdk.ALWAYS_SUCCEEDS)
 
     @property
-    def serves(self) -> ModifierScope:
+    def serves(self) -> sdk.ModifierScope:
         """Return the nodes that may fail."""
-        return ModifierScope.FAILING if self.is_on else ModifierScope.ALL
+        return sdk.ModifierScope.FAILING if self.is_on else sdk.ModifierScope.ALL
 
     @property
     def forgives(self) -> bool:
@@ -100,7 +94,7 @@ class Optional(Turning):
         return True
 
 
-@modifier("invert", TurningTask)
+@sdk.modifier("invert", TurningTask)
 class Invert(Turning):
     """Swap success and failure.
 
@@ -112,9 +106,9 @@ class Invert(Turning):
     """
 
     __slots__ = ()
-    turns = {FAILURE: SUCCESS, SUCCESS: FAILURE}
-    serves = ModifierScope.ALL
+    turns = {sdk.FAILURE: sdk.SUCCESS, sdk.SUCCESS: sdk.FAILURE}
+    serves = sdk.ModifierScope.ALL
 
-    def changed(self, inner: Outcomes) -> Outcomes:
+    def changed(self, inner: sdk.Outcomes) -> sdk.Outcomes:
         """Return the outcomes with success and failure swapped."""
-        return Outcomes(inner.counting_as(FAILS), inner.counting_as(SUCCEEDS)) if self.is_on else inner
+        return sdk.Outcomes(inner.counting_as(sdk.FAILS), inner.counting_as(sdk.SUCCEEDS)) if self.is_on else inner

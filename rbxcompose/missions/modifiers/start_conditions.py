@@ -4,30 +4,22 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.expressions.evaluate import holds
-from rbxcompose.base.expressions.tree import Expression
-from rbxcompose.missions.engine.task import Site, Task
-from rbxcompose.missions.language.fields import condition, duration, flag
-from rbxcompose.missions.modifiers.registry import Decorator, modifier
-from rbxcompose.missions.program.answers import ModifierScope
-from rbxcompose.missions.program.modifier import Skipping
-from rbxcompose.missions.program.outcomes import RUNNING, SKIPPED
+from rbxcompose.missions import sdk
 
 
-class ConditionalTask(Decorator):
+class ConditionalTask(sdk.Decorator):
     """Evaluates a condition once, before the node starts."""
 
     __slots__ = ("condition",)
     skips_if: ClassVar[bool]
 
-    def __init__(self, site: Site, options: Conditional, inner: Task) -> None:
+    def __init__(self, site: sdk.Site, options: Conditional, inner: sdk.Task) -> None:
         super().__init__(site, inner)
         self.condition = options.value
 
     def begin(self) -> int:
         """Evaluate the condition once."""
-        return SKIPPED if holds(self.condition, self.scope) == self.skips_if else self.advance(self.inner)
+        return sdk.SKIPPED if sdk.holds(self.condition, self.scope) == self.skips_if else self.advance(self.inner)
 
 
 class OnlyIfTask(ConditionalTask):
@@ -44,16 +36,16 @@ class SkipIfTask(ConditionalTask):
     skips_if = True
 
 
-@dataclass(frozen=True, slots=True)
-class Conditional(Skipping):
+@sdk.dataclass(frozen=True, slots=True)
+class Conditional(sdk.Skipping):
     """A modifier with a condition."""
 
-    value: Expression = condition()
+    value: sdk.Expression = sdk.condition()
 
-    serves = ModifierScope.ALL
+    serves = sdk.ModifierScope.ALL
 
 
-@modifier("only_if", OnlyIfTask)
+@sdk.modifier("only_if", OnlyIfTask)
 class OnlyIf(Conditional):
     """Start only if the condition holds, else be skipped.
 
@@ -66,7 +58,7 @@ class OnlyIf(Conditional):
     __slots__ = ()
 
 
-@modifier("skip_if", SkipIfTask)
+@sdk.modifier("skip_if", SkipIfTask)
 class SkipIf(Conditional):
     """Be skipped if the condition holds.
 
@@ -79,14 +71,14 @@ class SkipIf(Conditional):
     __slots__ = ()
 
 
-class CountingTask(Decorator):
+class CountingTask(sdk.Decorator):
     """Records when its node ended within this run of the mission; a halt is no end."""
 
     __slots__ = ("ended_at", "ended_in")
     saved = ("ended_at", "ended_in")
     times = ("ended_at",)
 
-    def __init__(self, site: Site, inner: Task) -> None:
+    def __init__(self, site: sdk.Site, inner: sdk.Task) -> None:
         super().__init__(site, inner)
         self.ended_at = 0.0  # [s] of robot time without pauses
         self.ended_in = 0  # the run of the mission, counted from 1
@@ -99,7 +91,7 @@ class CountingTask(Decorator):
     def proceed(self) -> int:
         """Continue, and note when it ends."""
         status = self.advance(self.inner)
-        if status not in (RUNNING, SKIPPED):
+        if status not in (sdk.RUNNING, sdk.SKIPPED):
             self.ended_at, self.ended_in = self.engine.unpaused, self.run.begun
         return status
 
@@ -109,18 +101,18 @@ class OnceTask(CountingTask):
 
     __slots__ = ("is_on",)
 
-    def __init__(self, site: Site, options: Once, inner: Task) -> None:
+    def __init__(self, site: sdk.Site, options: Once, inner: sdk.Task) -> None:
         super().__init__(site, inner)
         self.is_on = options.is_on
 
     def begin(self) -> int:
         """Start if it has not ended yet."""
-        return SKIPPED if self.is_on and self.has_ended else self.proceed()
+        return sdk.SKIPPED if self.is_on and self.has_ended else self.proceed()
 
 
-@modifier("once", OnceTask)
-@dataclass(frozen=True, slots=True)
-class Once(Skipping):
+@sdk.modifier("once", OnceTask)
+@sdk.dataclass(frozen=True, slots=True)
+class Once(sdk.Skipping):
     """Run once per run of the mission, whether it succeeds or fails; then be skipped.
 
     Example:
@@ -132,14 +124,14 @@ class Once(Skipping):
             - go_to: corner_1
     """
 
-    is_on: bool = flag()
+    is_on: bool = sdk.flag()
 
     value = None
 
     @property
-    def serves(self) -> ModifierScope:
+    def serves(self) -> sdk.ModifierScope:
         """Return the nodes that are repeated."""
-        return ModifierScope.REPEATED if self.is_on else ModifierScope.ALL
+        return sdk.ModifierScope.REPEATED if self.is_on else sdk.ModifierScope.ALL
 
 
 class CooldownTask(CountingTask):
@@ -147,22 +139,22 @@ class CooldownTask(CountingTask):
 
     __slots__ = ("duration",)
 
-    def __init__(self, site: Site, options: Cooldown, inner: Task) -> None:
+    def __init__(self, site: sdk.Site, options: Cooldown, inner: sdk.Task) -> None:
         super().__init__(site, inner)
         self.duration = options.value
 
     def begin(self) -> int:
         """Start if that time has passed, or if the node has not ended yet."""
         is_cooling = self.has_ended and not self.engine.has_gone_by(self._seconds(), self.ended_at)
-        return SKIPPED if is_cooling else self.proceed()
+        return sdk.SKIPPED if is_cooling else self.proceed()
 
     def _seconds(self) -> float:
         return self.number_of(self.duration, "'cooldown'")
 
 
-@modifier("cooldown", CooldownTask)
-@dataclass(frozen=True, slots=True)
-class Cooldown(Skipping):
+@sdk.modifier("cooldown", CooldownTask)
+@sdk.dataclass(frozen=True, slots=True)
+class Cooldown(sdk.Skipping):
     """Be skipped for a time after it ends; interrupts count towards it, pauses do not.
 
     Example:
@@ -174,6 +166,6 @@ class Cooldown(Skipping):
             - go_to: corner_1
     """
 
-    value: Expression = duration()
+    value: sdk.Expression = sdk.duration()
 
-    serves = ModifierScope.REPEATED
+    serves = sdk.ModifierScope.REPEATED

@@ -2,35 +2,30 @@
 
 from __future__ import annotations
 
-from rbxcompose.missions.engine.instant_actions import act, act_safely
-from rbxcompose.missions.engine.task import Site, Task
-from rbxcompose.missions.language.fields import hook
-from rbxcompose.missions.modifiers.registry import Decorator, modifier
-from rbxcompose.missions.program.modifier import Acting
-from rbxcompose.missions.program.outcomes import RUNNING
+from rbxcompose.missions import sdk
 
 ON_ENTER, ON_EXIT = "on_enter", "on_exit"
 
 
-class EnteringTask(Decorator):
+class EnteringTask(sdk.Decorator):
     """Runs the hooks when a state is entered and left."""
 
     __slots__ = ("moments",)
 
-    def __init__(self, site: Site, options: Entering, inner: Task) -> None:
+    def __init__(self, site: sdk.Site, options: Entering, inner: sdk.Task) -> None:
         super().__init__(site, inner)
         self.moments = options.moments
 
     def begin(self) -> int:
         """Run the hook of entering, and start."""
-        act(self.moments, ON_ENTER, self)
+        sdk.act(self.moments, ON_ENTER, self)
         return self.proceed()
 
     def proceed(self) -> int:
         """Continue, and run the hook of leaving at the end."""
         status = self.advance(self.inner)
-        if status != RUNNING:
-            act(self.moments, ON_EXIT, self)
+        if status != sdk.RUNNING:
+            sdk.act(self.moments, ON_EXIT, self)
         return status
 
     def suspend(self, from_start: bool) -> bool:
@@ -43,11 +38,11 @@ class EnteringTask(Decorator):
         """Stop the body, and run the hook of leaving unless the whole mission is ended from outside."""
         super().halt()
         if not self.engine.is_aborting:
-            act_safely(self.moments, ON_EXIT, self)
+            sdk.act_safely(self.moments, ON_EXIT, self)
 
 
-@modifier(ON_ENTER, EnteringTask, only_states=True)
-class Entering(Acting):
+@sdk.modifier(ON_ENTER, EnteringTask, only_states=True)
+class Entering(sdk.Acting):
     """Act when a state is entered and left: `set`, `log` or `publish`.
 
     A state is also left when something inside the mission halts it, and also entered when its history brings the
@@ -69,5 +64,5 @@ class Entering(Acting):
                 failure: failed
     """
 
-    on_enter = hook()
-    on_exit = hook("What is set, logged or published when the state is left.")
+    on_enter = sdk.hook()
+    on_exit = sdk.hook("What is set, logged or published when the state is left.")

@@ -101,6 +101,12 @@ class GroupStep(Step):
         """Return no effects."""
         return NO_EFFECTS
 
+    def possibilities(
+        self, node: MissionNode, nodes: tuple[MissionNode, ...], robot: RobotNames
+    ) -> Iterator[Possibility]:
+        """Yield nothing: there is one way through it, or how often it repeats depends on data."""
+        yield from ()
+
     @property
     def has_result(self) -> bool:
         """Return False: only its children have results."""
@@ -120,12 +126,6 @@ class Straight(GroupStep):
     def endless(self, ends: Outcomes) -> None:
         """Return nothing: it runs once."""
 
-    def possibilities(
-        self, node: MissionNode, nodes: tuple[MissionNode, ...], robot: RobotNames
-    ) -> Iterator[Possibility]:
-        """Yield nothing: there is one way through it."""
-        yield from ()
-
 
 class Loop(GroupStep):
     """A group that may repeat its children, or do nothing at all."""
@@ -133,12 +133,6 @@ class Loop(GroupStep):
     __slots__ = ()
     comes_again = True
     skipped = Skipped.PERHAPS
-
-    def possibilities(
-        self, node: MissionNode, nodes: tuple[MissionNode, ...], robot: RobotNames
-    ) -> Iterator[Possibility]:
-        """Yield nothing: how often it repeats depends on data."""
-        yield from ()
 
 
 class Choosing(Straight):

@@ -8,18 +8,7 @@ from types import MappingProxyType
 from typing import Any, TypeVar
 
 from rbxcompose.base.config import Place
-from rbxcompose.base.expressions.types import (
-    COUNT,
-    FLAG,
-    POSE,
-    TEXT,
-    UNKNOWN,
-    Type,
-    choice_of,
-    list_of,
-    quantity_of,
-    record_of,
-)
+from rbxcompose.base.expressions import types
 from rbxcompose.base.expressions.values import Value
 from rbxcompose.base.geometry import Pose2
 from rbxcompose.base.units import NUMBER, TIME, Dimension
@@ -40,14 +29,14 @@ SUCCESS = "success"  # the field of a response that reports success
 STAMPED, POSED = "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/Pose"
 LASTING = "builtin_interfaces/msg/Duration"
 
-_TYPES: Mapping[str, Type] = {
-    STAMPED: POSE,
-    POSED: POSE,
-    LASTING: quantity_of(TIME),
-    "string": TEXT,
-    "bool": FLAG,
-    **dict.fromkeys(("float32", "float64"), quantity_of(NUMBER)),
-    **{f"{sign}int{bits}": COUNT for sign in ("", "u") for bits in (8, 16, 32, 64)},
+_TYPES: Mapping[str, types.Type] = {
+    STAMPED: types.POSE,
+    POSED: types.POSE,
+    LASTING: types.quantity_of(TIME),
+    "string": types.TEXT,
+    "bool": types.FLAG,
+    **dict.fromkeys(("float32", "float64"), types.quantity_of(NUMBER)),
+    **{f"{sign}int{bits}": types.COUNT for sign in ("", "u") for bits in (8, 16, 32, 64)},
 }
 
 
@@ -109,20 +98,24 @@ def _asked(
     entries: ArrayEntries | None = None,
     measures: Measures = MappingProxyType({}),
     choices: Mapping[str, Collection[str]] = MappingProxyType({}),
-) -> tuple[dict[str, Type], str, frozenset[str]]:
+) -> tuple[dict[str, types.Type], str, frozenset[str]]:
     """Return the arguments that a message has fields or entries for, the main one, and the required ones."""
     arguments = _measured_fields(message, measures)
-    arguments |= {name: choice_of(*words) for name, words in choices.items()}
+    arguments |= {name: types.choice_of(*words) for name, words in choices.items()}
     if entries is not None:
         main = next(iter(choices), "")
-        return {name: quantity_of(dimension) for name, dimension in entries.each.items()} | arguments, main, frozenset()
+        return (
+            {name: types.quantity_of(dimension) for name, dimension in entries.each.items()} | arguments,
+            main,
+            frozenset(),
+        )
     main = next(iter(arguments), "")
     is_needed = main in measures or (main and message.FIELDS[main] in (STAMPED, POSED, LASTING))
     needed = frozenset({main} if is_needed else ())
     return arguments, main, needed
 
 
-def _measured_fields(message: type[Message], measures: Measures) -> dict[str, Type]:
+def _measured_fields(message: type[Message], measures: Measures) -> dict[str, types.Type]:
     """Return the types of the fields that missions understand or that have measures, in order."""
     known = typed_fields(message)
     found = {
@@ -132,18 +125,18 @@ def _measured_fields(message: type[Message], measures: Measures) -> dict[str, Ty
     return {name: type_ for name, type_ in found.items() if type_ is not None}
 
 
-def _measured(ros: str, measure: Dimension | Measures | None) -> Type:
+def _measured(ros: str, measure: Dimension | Measures | None) -> types.Type:
     """Return the type of a field: a nested message is a map, an array a list."""
     field_type = parse_type(ros)
-    one = UNKNOWN
+    one = types.UNKNOWN
     if isinstance(measure, Mapping):
-        one = record_of(_measured_fields(registry.message(field_type.base), measure))
+        one = types.record_of(_measured_fields(registry.message(field_type.base), measure))
     elif measure is not None:
-        one = quantity_of(measure)
-    return one if field_type.shape is FieldShape.SINGLE else list_of(one)
+        one = types.quantity_of(measure)
+    return one if field_type.shape is FieldShape.SINGLE else types.list_of(one)
 
 
-def typed_fields(message: type[Message]) -> dict[str, Type]:
+def typed_fields(message: type[Message]) -> dict[str, types.Type]:
     """Return the types of the fields that missions understand, in order."""
     return {field: _TYPES[ros] for field, ros in message.FIELDS.items() if ros in _TYPES}
 
@@ -207,9 +200,7 @@ def _fitted(ros_type: str, value: Any) -> Any:
         return to_plain(_POSES[base](value))
     if base == LASTING and isinstance(value, int | float):
         return to_plain(to_duration(value))
-    if base in INTEGERS and isinstance(value, float) and value.is_integer():
-        return int(value)
-    return value
+    return int(value) if base in INTEGERS and isinstance(value, float) and value.is_integer() else value
 
 
 def values_of(message: Message | None) -> dict[str, Value]:
@@ -243,6 +234,6 @@ _MAKERS: Mapping[str, Callable[[Any], object]] = {
     "bool": bool,
     **dict.fromkeys(("float32", "float64"), float),
     **dict.fromkeys(("string[]", "float32[]", "float64[]"), tuple),
-    **{ros: _whole for ros, wanted in _TYPES.items() if wanted == COUNT},
+    **{ros: _whole for ros, wanted in _TYPES.items() if wanted == types.COUNT},
 }
 _POSES: Mapping[str, Callable[[Any], Message]] = {STAMPED: _stamped, POSED: _pose}

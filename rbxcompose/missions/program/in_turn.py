@@ -9,19 +9,9 @@ from rbxcompose.missions.engine.resume_points import DEEP, NO_HISTORY
 from rbxcompose.missions.engine.task import Site, Task
 from rbxcompose.missions.engine.world import Watched
 from rbxcompose.missions.language.fields import children, choice, flag, history
+from rbxcompose.missions.program import outcomes
 from rbxcompose.missions.program.answers import Skipped
 from rbxcompose.missions.program.families import Straight
-from rbxcompose.missions.program.outcomes import (
-    ALWAYS_FAILS,
-    ALWAYS_SUCCEEDS,
-    FAILS,
-    FAILURE,
-    IDLE,
-    NEVER,
-    RUNNING,
-    SKIPPED,
-    Outcomes,
-)
 from rbxcompose.missions.program.program import Endings, MissionNode
 
 
@@ -67,12 +57,15 @@ class InTurn(Straight):
     skipped = Skipped.WITH_ALL_INSIDE
     decides: ClassVar[str]
 
-    def may_end(self, node: MissionNode, endings: Endings) -> Outcomes:
+    def may_end(self, node: MissionNode, endings: Endings) -> outcomes.Outcomes:
         """Return the deciding outcomes of every child, and all outcomes of the last one that is reached."""
-        found, goes_on_never = NEVER, ALWAYS_FAILS if self.decides == FAILS else ALWAYS_SUCCEEDS
+        found, goes_on_never = (
+            outcomes.NEVER,
+            outcomes.ALWAYS_FAILS if self.decides == outcomes.FAILS else outcomes.ALWAYS_SUCCEEDS,
+        )
         for child in map(endings.of, node.children[:-1]):
             found = found.both(child.of(self.decides))
-            if child.plain in (NEVER, goes_on_never):
+            if child.plain in (outcomes.NEVER, goes_on_never):
                 return found
         return found.both(endings.of(node.children[-1])) if node.children else found
 
@@ -100,7 +93,7 @@ class InTurnTask(WithHistory):
         self.order: list[int] = []  # of the children, if it was drawn
         self.conditions = _conditions(site) if step.reactive else {}
         self.index = 0
-        self.did = SKIPPED
+        self.did = outcomes.SKIPPED
 
     def begin(self) -> int:
         """Start with the first child, or with the one where it was halted."""
@@ -108,7 +101,7 @@ class InTurnTask(WithHistory):
             self.arrange()
             return self.proceed()
         self.index = 0
-        self.did = SKIPPED
+        self.did = outcomes.SKIPPED
         if self.is_random:
             self.order = list(range(len(self.all)))
             self.engine.chance().shuffle(self.order)
@@ -135,16 +128,16 @@ class InTurnTask(WithHistory):
                 status = child.start()
             else:
                 status = child.tick()
-            if status == RUNNING:
+            if status == outcomes.RUNNING:
                 self.index, self.current = index, child
                 if self.conditions:
                     self.watch_conditions()
-                return RUNNING
+                return outcomes.RUNNING
             child = None
             if status == decides:
                 self.index, self.current = index, None
                 return self.end_with(status)
-            if status != SKIPPED:
+            if status != outcomes.SKIPPED:
                 self.did = status
             index += 1
             if index == len(children):
@@ -162,9 +155,9 @@ class InTurnTask(WithHistory):
                 continue
             before = self.statuses[child.number]
             status = child.start()
-            is_other = status in (RUNNING, self.decides) if before == IDLE else status != before
+            is_other = status in (outcomes.RUNNING, self.decides) if before == outcomes.IDLE else status != before
             if is_other:
-                if status == RUNNING:
+                if status == outcomes.RUNNING:
                     child.halt()
                 if self.current is not None:
                     running, self.current = self.current, None
@@ -182,7 +175,7 @@ class InTurnTask(WithHistory):
         """End, and forget the place; a sequence that failed keeps it."""
         if self.history != "none":
             self.forget_places()
-            if status == FAILURE and self.is_kept_after_failure:
+            if status == outcomes.FAILURE and self.is_kept_after_failure:
                 self.engine.places.kept.add(self)
         return status
 

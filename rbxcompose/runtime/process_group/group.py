@@ -25,8 +25,7 @@ from rbxcompose.compiler.plan.dump import dump, load
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.msgs.rosgraph_msgs import Clock as ClockMessage
 from rbxcompose.msgs.stamps import to_nanoseconds
-from rbxcompose.runtime import channel as say
-from rbxcompose.runtime import channel as tell
+from rbxcompose.runtime import channel as messages
 from rbxcompose.runtime.folder import RunOptions
 from rbxcompose.runtime.log import LogFile, Record
 from rbxcompose.runtime.process_group.capture import Capture, take_printed
@@ -78,30 +77,30 @@ def open_stop_line(
     return transport.serve(stop_key(robot, process), asked)
 
 
-def change_settings(host: Host, order: tell.SettingOrder, channel: say.Channel) -> None:
+def change_settings(host: Host, order: messages.SettingOrder, channel: messages.Channel) -> None:
     """Carry out an order, and answer it."""
     changes = host.parameters.changes
     match order:
-        case tell.PrepareChange():
+        case messages.PrepareChange():
             channel.send(_prepared(host, order))
-        case tell.CommitChange(number):
-            channel.send(tell.ChangeFollowed(number, changes.commit(number)))
-        case tell.UndoChange(number):
-            channel.send(tell.ChangeFollowed(number, changes.undo(number)))
-        case tell.EndChange(number):
+        case messages.CommitChange(number):
+            channel.send(messages.ChangeFollowed(number, changes.commit(number)))
+        case messages.UndoChange(number):
+            channel.send(messages.ChangeFollowed(number, changes.undo(number)))
+        case messages.EndChange(number):
             changes.end(number)
-        case tell.ChangeDecided(number, refusal):
+        case messages.ChangeDecided(number, refusal):
             host.parameters.decided(number, refusal)
 
 
-def _prepared(host: Host, order: tell.PrepareChange) -> tell.ChangePrepared:
+def _prepared(host: Host, order: messages.PrepareChange) -> messages.ChangePrepared:
     changes = host.parameters.changes
     try:
         found = changes.prepare(order.number, order.wanted)
     except Refused as refusal:
-        return tell.ChangePrepared(order.number, str(refusal))
+        return messages.ChangePrepared(order.number, str(refusal))
     new = {change.hosted.instance.name: change.new for change in found if change.is_ruled}
-    return tell.ChangePrepared(order.number, "", _text(host, changes.live), _text(host, new))
+    return messages.ChangePrepared(order.number, "", _text(host, changes.live), _text(host, new))
 
 
 def _text(host: Host, configs: dict[str, Config]) -> str:
@@ -184,7 +183,7 @@ class ProcessGroup:
         name: str,
         options: RunOptions,
         log: LogFile,
-        channel: say.Channel,
+        channel: messages.Channel,
         *,
         start: float,
         is_restart: bool = False,
@@ -226,38 +225,42 @@ class ProcessGroup:
 
     # What the driver calls
 
-    def handle(self, message: say.ChannelMessage) -> None:
+    def handle(self, message: messages.ChannelMessage) -> None:
         """Carry out a message from the supervisor."""
-        if isinstance(message, say.Stop | say.Release):
+        if isinstance(message, messages.Stop | messages.Release):
             self._mind_outside(type(message).__name__.lower())
         match message:
-            case say.Configure(str(router), time):
+            case messages.Configure(str(router), time):
                 self._configure(router, time)
-            case say.Activate(names):
+            case messages.Activate(names):
                 self._activate(names)
-            case say.Start():
+            case messages.Start():
                 self._start()
-            case say.Stop():
+            case messages.Stop():
                 self._made_host().stop()
-            case say.Release():
+            case messages.Release():
                 self._made_host().release()
-            case say.Brake():
+            case messages.Brake():
                 self._is_ending = True
-            case say.Lost(names, cause):
+            case messages.Lost(names, cause):
                 self._made_host().lost(names, cause)
-            case say.Ask():
+            case messages.Ask():
                 self._channel.send(self._answer(self._made_host(), message))
-            case say.Adopt(plan):
+            case messages.Adopt(plan):
                 self._plan = load(plan)
-            case say.Retire() | say.Prepare() | say.Reconfigure():
+            case messages.Retire() | messages.Prepare() | messages.Reconfigure():
                 self._change(self._made_host(), message)
             case (
-                tell.PrepareChange() | tell.CommitChange() | tell.UndoChange() | tell.EndChange() | tell.ChangeDecided()
+                messages.PrepareChange()
+                | messages.CommitChange()
+                | messages.UndoChange()
+                | messages.EndChange()
+                | messages.ChangeDecided()
             ):
                 change_settings(self._made_host(), message, self._channel)
-            case say.Blocked(causes):
+            case messages.Blocked(causes):
                 self._made_host().statuses.block(causes)
-            case say.Shutdown():
+            case messages.Shutdown():
                 self._shutdown()
             case _:
                 raise RuntimeError(f"not a message for a process group: {message}")
@@ -265,7 +268,7 @@ class ProcessGroup:
     def _stop_by_bus(self) -> None:
         """Hold everything that moves; the supervisor may be suspended and is informed when it runs."""
         self._made_host().stop()
-        self._channel.send(say.StoppedByBus())
+        self._channel.send(messages.StoppedByBus())
 
     def orphaned(self) -> None:
         """Come to rest and end: the supervisor is gone."""
@@ -287,13 +290,13 @@ class ProcessGroup:
         self._channel.flush()
         if not self._channel.is_behind:
             moves, runs = self._host.work() if self._host is not None else ([], {})
-            self._channel.send(say.Alive(self._clock.now(), moves, runs))
+            self._channel.send(messages.Alive(self._clock.now(), moves, runs))
 
     def settle(self) -> None:
         """Check whether the run must end, whether it has come to rest, and whether the supervisor is gone."""
         if self._time_is_up():
             self._is_ending = True
-            self._channel.send(say.TimeIsUp())
+            self._channel.send(messages.TimeIsUp())
         if self._is_ending and self._rest_deadline is None and self._host is not None:
             self._brake(self._host)
         if self._rest_deadline is not None and not self._is_settled:
@@ -320,7 +323,7 @@ class ProcessGroup:
         try:
             connection = open_bus(self._plan, self._name, router, *loop, self._complain, tape)
         except ConnectionRefusedError as error:
-            self._channel.send(say.Failed("", str(error.strerror)))
+            self._channel.send(messages.Failed("", str(error.strerror)))
             return
         self._bus, self._lifeline = connection.bus, connection.lifeline
         open_stop_line(connection.transport, self._plan.robot, self._name, self._stop_by_bus, self._inbox.put)
@@ -342,12 +345,12 @@ class ProcessGroup:
             self._follow(self._driver, self._host)
         self._host.configure()
         self._watch(HANG)
-        self._channel.send(say.Configured())
+        self._channel.send(messages.Configured())
 
     def _activate(self, names: Sequence[str]) -> None:
         self._has_begun = True
         self._made_host().activate(names)
-        self._channel.send(say.States(self._made_host().states()))
+        self._channel.send(messages.States(self._made_host().states()))
 
     def _start(self) -> None:
         gc.collect()
@@ -358,26 +361,26 @@ class ProcessGroup:
         if isinstance(self._driver, RealTimeDriver):
             self._turns.open()
 
-    def _answer(self, host: Host, asked: say.Ask) -> say.Answered | say.Refusal:
+    def _answer(self, host: Host, asked: messages.Ask) -> messages.Answered | messages.Refusal:
         try:
             request = host.request(asked.instance, asked.request)
             if isinstance(request, Command):
                 self._mind_outside(f"{asked.instance} {request.words}")
-            return say.Answered(asked.number, to_data(host.ask(asked.instance, request)))
+            return messages.Answered(asked.number, to_data(host.ask(asked.instance, request)))
         except Refused as refusal:
-            return say.Refusal(asked.number, str(refusal))
+            return messages.Refusal(asked.number, str(refusal))
 
-    def _change(self, host: Host, message: say.Retire | say.Prepare | say.Reconfigure) -> None:
+    def _change(self, host: Host, message: messages.Retire | messages.Prepare | messages.Reconfigure) -> None:
         self._watch(LONGEST_CONFIGURE)
         match message:
-            case say.Retire(names):
+            case messages.Retire(names):
                 host.retire(names)
-                self._channel.send(say.Retired())
-            case say.Prepare(plan):
+                self._channel.send(messages.Retired())
+            case messages.Prepare(plan):
                 host.prepare(load(plan).instances)
-                self._channel.send(say.Configured())
-            case say.Reconfigure(plan, keys):
-                self._channel.send(say.Reconfigured(host.follow(load(plan).instances, keys)))
+                self._channel.send(messages.Configured())
+            case messages.Reconfigure(plan, keys):
+                self._channel.send(messages.Reconfigured(host.follow(load(plan).instances, keys)))
         self._watch(HANG)
 
     def _shutdown(self) -> None:
@@ -387,7 +390,7 @@ class ProcessGroup:
         if self._host is not None:
             if self._rest_deadline is None:
                 self._host.brake()  # the order to brake came together with this one
-            self._channel.send(say.Summary(self._clock.now(), self._host.summary()))
+            self._channel.send(messages.Summary(self._clock.now(), self._host.summary()))
             self._host.shutdown()
         self.is_over = True
 
@@ -420,7 +423,7 @@ class ProcessGroup:
         self._is_settled = True
         if isinstance(self._driver, SteppedDriver):
             self._driver.halt()
-        self._channel.send(say.AtRest())
+        self._channel.send(messages.AtRest())
 
     # Time from outside
 

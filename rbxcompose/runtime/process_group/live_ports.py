@@ -27,25 +27,13 @@ from rbxcompose.msgs.stamps import NANOSECONDS, to_nanoseconds
 from rbxcompose.msgs.std_srvs import SetBool
 from rbxcompose.msgs.tf2_msgs import TFMessage
 from rbxcompose.runtime.process_group.worker import Call, Worker
+from rbxcompose.sdk import ports
 from rbxcompose.sdk.bound import Later, Sender
 from rbxcompose.sdk.component import Component
-from rbxcompose.sdk.ports import (
-    Calls,
-    CallsAction,
-    In,
-    Looks,
-    Out,
-    Port,
-    Qos,
-    SendsOrders,
-    Serves,
-    ServesAction,
-    ServesTopic,
-)
 from rbxcompose.sdk.updater import CompositeTask, DiagnosticTask, FrequencyTask, StampTask
 
 
-def paced(sender: Sender[Any], port: Out[Any], clock: Clock, watch: Callable[[str, DiagnosticTask], None]) -> Any:
+def paced(sender: Sender[Any], port: ports.Out[Any], clock: Clock, watch: Callable[[str, DiagnosticTask], None]) -> Any:
     """Return `sender`, or one that counts if its port declares a rate."""
     if port.rate is None:
         return sender
@@ -116,8 +104,8 @@ class Frames:
         self._clock, self._log = clock, log
         self._logged: set[str] = set()
         self._lock = threading.Lock()  # who looks back from another thread must not see a history that changes
-        self._moving = bus.subscribe(owner, "/tf", TFMessage, Qos.STATE, self._move, is_patient=is_patient)
-        bus.subscribe(owner, "/tf_static", TFMessage, Qos.LATCHED, self._fix)
+        self._moving = bus.subscribe(owner, "/tf", TFMessage, ports.Qos.STATE, self._move, is_patient=is_patient)
+        bus.subscribe(owner, "/tf_static", TFMessage, ports.Qos.LATCHED, self._fix)
 
     def lookup(self, target: str, source: str) -> Transform3 | None:
         """Return the newest pose of frame `source` in frame `target`, or None while they are not connected."""
@@ -184,7 +172,7 @@ class Handling(Protocol):
         """Return the component's own thread, if it has one."""
         ...
 
-    def refusal(self, port: Port[Any]) -> str:
+    def refusal(self, port: ports.Port[Any]) -> str:
         """Return why a message, request or goal cannot be taken now; empty if it can."""
         ...
 
@@ -207,10 +195,12 @@ def bind(component: Component[Any], instance: Instance, bus: Bus, frames: Frames
         component.bound[name] = _end(component, instance, name, port, bus, frames, handling)
 
 
-def subscribe(component: Component[Any], owner: str, topic: str, port: In[Any], bus: Bus, handling: Handling) -> Any:
+def subscribe(
+    component: Component[Any], owner: str, topic: str, port: ports.In[Any], bus: Bus, handling: Handling
+) -> Any:
     """Subscribe to a topic; its messages go to the handler of the port."""
     handler = _on_message(component, port.name, port, handling)
-    waits = isinstance(port, ServesTopic)  # like goals: a sender that waits for a listener relies on it
+    waits = isinstance(port, ports.ServesTopic)  # like goals: a sender that waits for a listener relies on it
     is_light, interface = handling.worker is None, cast(Any, port.interface)
     return bus.subscribe(
         owner,
@@ -230,42 +220,42 @@ def _end(
     component: Component[Any],
     instance: Instance,
     name: str,
-    port: Port[Any],
+    port: ports.Port[Any],
     bus: Bus,
     frames: Frames | None,
     handling: Handling,
 ) -> object:
     owner, interface = instance.name, cast(Any, port.interface)
     match port:
-        case Looks():
+        case ports.Looks():
             return _lookup(port, frames, handling)
-        case SendsOrders():
+        case ports.SendsOrders():
             return bus.orders(owner, instance.topic(name), interface, port.qos, port.servers)
-        case Out():
+        case ports.Out():
             publisher = bus.publisher(owner, instance.topic(name), interface, port.qos)
             return paced(publisher, port, handling.clock, handling.watch)
-        case In():
+        case ports.In():
             return subscribe(component, owner, instance.topic(name), port, bus, handling)
-        case Serves():
+        case ports.Serves():
             serve = _on_request(component, name, port, handling)
             bus.serve_later(owner, instance.topic(name), interface, serve, waits=True)
             return None
-        case Calls():
+        case ports.Calls():
             return bus.client(owner, instance.topic(name), interface)
-        case ServesAction():
+        case ports.ServesAction():
             topic = instance.topic(name)
             accept = _on_goal(component, name, port, handling)
             server = bus.serve_action(owner, topic, interface, accept, waits=True)
             if port.pausable:
                 bus.serve(owner, f"{topic}/{PAUSE}", SetBool, partial(_pause, server, port, handling))
             return server
-        case CallsAction():
+        case ports.CallsAction():
             return bus.action_client(owner, instance.topic(name), interface)
         case _:
             raise TypeError(f"'{instance.type}' has a port of an unknown kind: {port!r}")
 
 
-def _lookup(port: Looks, frames: Frames | None, handling: Handling) -> Lookup:
+def _lookup(port: ports.Looks, frames: Frames | None, handling: Handling) -> Lookup:
     if frames is None:
         raise RuntimeError("a process with components that look keeps frames")
     if handling.worker is not None:
@@ -274,7 +264,7 @@ def _lookup(port: Looks, frames: Frames | None, handling: Handling) -> Lookup:
 
 
 def _pause(
-    server: ActionServer[Any, Any, Any], port: Port[Any], handling: Handling, request: SetBool.Request
+    server: ActionServer[Any, Any, Any], port: ports.Port[Any], handling: Handling, request: SetBool.Request
 ) -> SetBool.Response:
     """Pause or resume the current goal; while the robot is stopped, nothing resumes."""
     goal = server.current
@@ -286,7 +276,7 @@ def _pause(
     return SetBool.Response(success=True)
 
 
-def _on_message(component: Component[Any], name: str, port: In[Any], handling: Handling) -> Callable[[Any], None]:
+def _on_message(component: Component[Any], name: str, port: ports.In[Any], handling: Handling) -> Callable[[Any], None]:
     own = getattr(component, f"on_{name}", None)
     handler: Callable[[Any], None] = own if own is not None else partial(component.received, name)
     label, depth = f"on_{name}", queue_depth(port.qos)
@@ -295,14 +285,14 @@ def _on_message(component: Component[Any], name: str, port: In[Any], handling: H
         reason = handling.refusal(port)
         if not reason:  # else it only stays the newest value, for whoever reads it
             handling.do(label, partial(handler, message), depth=depth)
-        elif isinstance(port, ServesTopic):
+        elif isinstance(port, ports.ServesTopic):
             handling.log(Level.WARN, f"an order to {name} is not carried out: {reason}")
 
     return take
 
 
 def _on_request(
-    component: Component[Any], name: str, port: Port[Any], handling: Handling
+    component: Component[Any], name: str, port: ports.Port[Any], handling: Handling
 ) -> Callable[[ServedRequest[Any, Any]], None]:
     answer = getattr(component, f"on_{name}")
 
@@ -333,6 +323,6 @@ def _at_once(call: Call) -> None:
     call()
 
 
-def _on_goal(component: Component[Any], name: str, port: Port[Any], handling: Handling) -> Callable[[Any], str]:
+def _on_goal(component: Component[Any], name: str, port: ports.Port[Any], handling: Handling) -> Callable[[Any], str]:
     accept: Callable[[Any], str] = getattr(component, f"accept_{name}", lambda goal: "")
     return lambda goal: handling.refusal(port) or accept(goal)

@@ -29,7 +29,7 @@ from rbxcompose.bus.zenoh_session import NO_LINK, RouterLink, open_router, tls_s
 from rbxcompose.bus.zenoh_transport import ZenohTransport
 from rbxcompose.compiler.plan.dump import load
 from rbxcompose.compiler.plan.model import Exchange, Plan, Share
-from rbxcompose.runtime import channel as say
+from rbxcompose.runtime import channel as messages
 from rbxcompose.runtime.channel import HostReport
 from rbxcompose.runtime.folder import Echo, OffsetFilter
 from rbxcompose.runtime.log import Record, WriteRecord
@@ -204,7 +204,7 @@ class Router:
     """
 
     def __init__(
-        self, plan: Plan, sockets: Path, clock: MonotonicClock, channel: say.Channel, log: WriteRecord
+        self, plan: Plan, sockets: Path, clock: MonotonicClock, channel: messages.Channel, log: WriteRecord
     ) -> None:
         self.is_over = False
         self._plan, self._sockets, self._clock, self._channel = plan, sockets, clock, channel
@@ -238,19 +238,19 @@ class Router:
             self._transport.close()
         self._exchange = self._transport = self._hosts = self._roll = None
 
-    def handle(self, message: say.ChannelMessage) -> None:
+    def handle(self, message: messages.ChannelMessage) -> None:
         """Open the router, or end."""
         match message:
-            case say.Configure(endpoint):
+            case messages.Configure(endpoint):
                 self._open(endpoint)
-            case say.ToHosts(report) if self._hosts is not None:
+            case messages.ToHosts(report) if self._hosts is not None:
                 self._hosts.send(report)
                 self._one_way_links.sent(self._clock.now())
-            case say.ToHosts():
+            case messages.ToHosts():
                 pass  # it is not open yet; the next report comes soon
-            case say.Adopt(plan):
+            case messages.Adopt(plan):
                 self._adopt(load(plan))
-            case say.Shutdown():
+            case messages.Shutdown():
                 self.is_over = True
             case _:
                 raise RuntimeError(f"not a message for a router: {message}")
@@ -270,7 +270,7 @@ class Router:
             self._reopen()
         self._channel.flush()
         if not self._channel.is_behind:
-            self._channel.send(say.Alive(self._clock.now()))
+            self._channel.send(messages.Alive(self._clock.now()))
 
     def settle(self) -> None:
         """Do nothing: a router has nothing to bring to rest."""
@@ -292,14 +292,14 @@ class Router:
                 callbacks = self._receive_report, self._fail, self._clock.stamp, self._judge
                 self._hosts = HostLine(self._plan.robot, self._plan.share, self._transport, *callbacks)
             problem = self._share(self._plan.exchange, self._transport) if self._plan.exchange else ""
-            self._channel.send(say.Failed("", problem) if problem else say.Configured(wanted))
+            self._channel.send(messages.Failed("", problem) if problem else messages.Configured(wanted))
             return
         if endpoint is not None:
             raise OSError(reason)  # another try may find it free again
         self._fail(reason)
 
     def _fail(self, reason: str) -> None:
-        self._channel.send(say.Failed("", reason))
+        self._channel.send(messages.Failed("", reason))
 
     def _share(self, exchange: Exchange, transport: ZenohTransport) -> str:
         """Carry topics between this robot and others; return why this cannot be, or nothing."""
@@ -343,7 +343,7 @@ class Router:
             self._must_reopen = True
 
     def _receive_report(self, report: HostReport) -> None:
-        self._channel.send(say.FromHost(report))
+        self._channel.send(messages.FromHost(report))
 
     def _endpoints(self) -> Iterator[str]:
         bus = self._plan.bus

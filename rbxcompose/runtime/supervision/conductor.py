@@ -13,7 +13,7 @@ from itertools import takewhile
 from rbxcompose.base.levels import Level
 from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.compiler.plan.model import Plan
-from rbxcompose.runtime import channel as say
+from rbxcompose.runtime import channel as messages
 from rbxcompose.runtime.channel import HostReport, RobotEnd
 from rbxcompose.runtime.folder import RunOptions
 from rbxcompose.runtime.supervision.changes import WORLD, Changes
@@ -91,9 +91,9 @@ class Conductor:
         member.is_stopped = self.is_stopped
         self._effects.fork(name, is_restart=member.restarts > 0, is_stopped=self.is_stopped)
         if self.generation:  # the pre-fork parent knows only the first plan
-            self._effects.send(name, say.Adopt(text_of(self.plan, self.plan.of_group(name))))
+            self._effects.send(name, messages.Adopt(text_of(self.plan, self.plan.of_group(name))))
         if name == self._router or self.endpoint is not None:
-            self._effects.send(name, say.Configure(self.endpoint, self.time))
+            self._effects.send(name, messages.Configure(self.endpoint, self.time))
 
     def _proceed(self) -> None:
         """Do the next step of starting, for the whole robot or for restarted processes."""
@@ -110,7 +110,7 @@ class Conductor:
             group = fresh[0].process
             names = [one.name for one in takewhile(lambda instance: instance.process == group, fresh)]
             self.members[group].requested.update(names)
-            self._effects.send(group, say.Activate(names))
+            self._effects.send(group, messages.Activate(names))
             return
         if self.phase is Phase.STARTING:
             if waiting or not self.hosts.is_complete():
@@ -131,55 +131,55 @@ class Conductor:
     def _start(self, member: Member) -> None:
         if not member.is_started and not member.is_given_up:
             member.is_started = True
-            self._effects.send(member.name, say.Start())
+            self._effects.send(member.name, messages.Start())
             for text, request in self.kept.repeated(self.plan.of_group(member.name) if member.restarts else ()):
-                self._effects.send(member.name, say.Ask(0, text, request))  # nobody waits for the answer
+                self._effects.send(member.name, messages.Ask(0, text, request))  # nobody waits for the answer
 
     # What processes say
 
-    def receive(self, name: str, message: say.ChannelWord) -> None:
+    def receive(self, name: str, message: messages.ChannelWord) -> None:
         """Handle a message of a process."""
         member = self.members[name]
         member.last_word = self._scheduler.now
         match message:
-            case say.Configured(endpoint):
+            case messages.Configured(endpoint):
                 self._configured(member, endpoint)
-            case say.States(states):
+            case messages.States(states):
                 self._are(states)
                 self._proceed()
-            case say.Failed(instance, text):
+            case messages.Failed(instance, text):
                 self._failed(instance, text)
-            case say.Repeated() | ComponentNoted():
+            case messages.Repeated() | ComponentNoted():
                 self.kept.receive(message)
                 self._effects.states_changed()
             case MissionOver():
                 self._mission_over(message)
-            case say.TimeIsUp():
+            case messages.TimeIsUp():
                 self.go_down(FINE, "the time is up")
-            case say.StoppedByBus() if not self.is_stopped:
+            case messages.StoppedByBus() if not self.is_stopped:
                 self._effects.log(Level.WARN, "stop over the bus: everything that moves is held until 'release'")
                 self.stop("the command 'stop', over the bus")
             case RobotHeld():
                 self.latch.receive(member, message)
-            case say.AtRest():
+            case messages.AtRest():
                 member.is_at_rest = True
                 if self._closing:
                     self._closing.close_when_at_rest()
-            case say.Answered(number, answer):
+            case messages.Answered(number, answer):
                 self._effects.answer(number, answer)
-            case say.Refusal(number, reason):
+            case messages.Refusal(number, reason):
                 self._effects.refuse(number, reason)
-            case say.Summary(time, facts):
+            case messages.Summary(time, facts):
                 self.time = max(self.time, time)
                 self.facts.update(facts)
-            case say.FromHost(report):
+            case messages.FromHost(report):
                 self._receive_report(report)
-            case say.Retired() if self._changing:
+            case messages.Retired() if self._changing:
                 self._changing.retired(name)
                 self._proceed()
-            case say.Reconfigured(refused) if self._changing:
+            case messages.Reconfigured(refused) if self._changing:
                 self._reconfigured(self._changing, name, refused)
-            case say.Alive(time, moves, runs):
+            case messages.Alive(time, moves, runs):
                 self.time = max(self.time, time)
                 member.moves, member.runs = moves, runs
                 self._alive(member)
@@ -194,7 +194,7 @@ class Conductor:
             self.endpoint = endpoint
             for group in self.plan.groups:
                 if self.members[group].is_there:
-                    self._effects.send(group, say.Configure(endpoint))
+                    self._effects.send(group, messages.Configure(endpoint))
         self._proceed()
 
     def _mission_over(self, over: MissionOver) -> None:
@@ -280,7 +280,7 @@ class Conductor:
         names = [one.name for one in self.plan.of_group(member.name)]
         if names and not member.is_reported_lost:
             member.is_reported_lost = True
-            self._to_configured(say.Lost(names, f"process '{member.name}' {cause}"))
+            self._to_configured(messages.Lost(names, f"process '{member.name}' {cause}"))
 
     def _look_for_silence(self) -> None:
         now = self._scheduler.now
@@ -325,7 +325,7 @@ class Conductor:
         """Return the processes that hold components."""
         return [self.members[group] for group in self.plan.groups]
 
-    def _to_configured(self, message: say.ChannelOrder) -> None:
+    def _to_configured(self, message: messages.ChannelOrder) -> None:
         for member in self._holding():
             if member.is_configured:
                 self._effects.send(member.name, message)
@@ -367,7 +367,7 @@ class Conductor:
         }
         self.hosts.adopt(self.plan.share)
         if self._router and changes.links_change and self.members[self._router].is_there:
-            self._effects.send(self._router, say.Adopt(text_of(self.plan, ())))
+            self._effects.send(self._router, messages.Adopt(text_of(self.plan, ())))
         self.latch.forget([instance.name for instance in self.plan.instances])
         self.states = {
             instance.name: fresh.get(instance.name) or self.states[instance.name] for instance in self.plan.instances

@@ -22,8 +22,7 @@ from rbxcompose.base.config import Config
 from rbxcompose.base.processes import end_with
 from rbxcompose.base.scheduler import ScheduledCallback, Scheduler
 from rbxcompose.compiler.plan.dump import load
-from rbxcompose.runtime import channel as say
-from rbxcompose.runtime import channel as tell
+from rbxcompose.runtime import channel as messages
 from rbxcompose.runtime.folder import ChosenLayers
 from rbxcompose.runtime.processes import close_all, in_child
 from rbxcompose.runtime.supervision.setting_changes import WhenJudged
@@ -31,9 +30,7 @@ from rbxcompose.sdk.parameters import ChangeRefusal, RobotRules
 
 PATIENCE = 10.0  # [s] for an answer; the first one after another plan compiles the robot
 _OWNER = "judge"
-UNKNOWN = ChangeRefusal(
-    "the rules of the robot cannot be checked now", "'rbxcompose check' tells whether it has errors"
-)
+UNKNOWN = ChangeRefusal("the rules of the robot cannot be checked now", "'rbxcompose check' shows its errors")
 
 
 class FiledRules(RobotRules, Protocol):
@@ -49,7 +46,7 @@ class Judge:
 
     def __init__(self, rules: FiledRules | None, title: str, selector: selectors.BaseSelector, scheduler: Scheduler):
         self._rules, self._title, self._selector, self._scheduler = rules, title, selector, scheduler
-        self._channel: say.Channel | None = None
+        self._channel: messages.Channel | None = None
         self._pid = 0
         self._numbers = count(1)
         self._asked: tuple[int, WhenJudged, ScheduledCallback] | None = None
@@ -65,7 +62,7 @@ class Judge:
         number = next(self._numbers)
         late = self._scheduler.at(self._scheduler.now + PATIENCE, _OWNER, self.close)
         self._asked = number, then, late
-        channel.send(tell.AskRules(number, generation, file, layers, now, new))
+        channel.send(messages.AskRules(number, generation, file, layers, now, new))
         self._watch(channel)
 
     def close(self) -> None:
@@ -78,18 +75,18 @@ class Judge:
             os.waitpid(self._pid, 0)
         self._answered(UNKNOWN)
 
-    def _forked(self, rules: FiledRules) -> say.Channel:
+    def _forked(self, rules: FiledRules) -> messages.Channel:
         ours, theirs = socket.socketpair()
         supervisor = os.getpid()
         pid = os.fork()
         if pid == 0:
             in_child(lambda: _run(rules, theirs, self._title, supervisor))
         theirs.close()
-        self._pid, self._channel = pid, say.Channel(ours)
+        self._pid, self._channel = pid, messages.Channel(ours)
         self._selector.register(self._channel, selectors.EVENT_READ, self._receive)
         return self._channel
 
-    def _watch(self, channel: say.Channel) -> None:
+    def _watch(self, channel: messages.Channel) -> None:
         """Wait for the answer, and until the judge can take the rest of a long question."""
         events = selectors.EVENT_READ | (selectors.EVENT_WRITE if channel.is_behind else 0)
         self._selector.modify(channel, events, self._receive)
@@ -99,13 +96,13 @@ class Judge:
         if channel is None:
             return
         channel.flush()
-        messages = channel.receive()
+        received = channel.receive()
         if channel.is_open:
             self._watch(channel)
         else:
             self.close()
-        for message in messages:
-            if isinstance(message, tell.RulesSay) and self._asked is not None and message.number == self._asked[0]:
+        for message in received:
+            if isinstance(message, messages.RulesSay) and self._asked is not None and message.number == self._asked[0]:
                 self._answered(message.refusal)
 
     def _answered(self, refusal: ChangeRefusal | None) -> None:
@@ -124,12 +121,12 @@ def _run(rules: FiledRules, connection: socket.socket, title: str, supervisor: i
     os.setpgid(0, 0)
     setproctitle.setproctitle(title)
     gc.freeze()
-    channel, judging = say.Channel(connection), _Judging(rules)
+    channel, judging = messages.Channel(connection), _Judging(rules)
     while channel.is_open:
         select.select([channel], [channel] if channel.is_behind else [], [])
         for message in channel.receive():
-            if isinstance(message, tell.AskRules):
-                channel.send(tell.RulesSay(message.number, judging.answer(message)))
+            if isinstance(message, messages.AskRules):
+                channel.send(messages.RulesSay(message.number, judging.answer(message)))
         channel.flush()
 
 
@@ -140,7 +137,7 @@ class _Judging:
         self._first, self._generation = rules, 0
         self._rules: RobotRules | None = rules
 
-    def answer(self, asked: tell.AskRules) -> ChangeRefusal | None:
+    def answer(self, asked: messages.AskRules) -> ChangeRefusal | None:
         """Return which rule would be broken, if any."""
         if asked.generation != self._generation:
             self._generation, self._rules = asked.generation, self._first.remade(asked.file, asked.layers)

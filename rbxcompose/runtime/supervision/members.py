@@ -10,7 +10,7 @@ from typing import Any, Protocol
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.levels import Level
 from rbxcompose.compiler.plan.model import Instance, Plan, Wire
-from rbxcompose.runtime import channel as say
+from rbxcompose.runtime import channel as messages
 from rbxcompose.runtime.channel import HostReport, Repeated
 from rbxcompose.runtime.faults import RestartPolicy
 from rbxcompose.runtime.processes import KILLED
@@ -28,7 +28,7 @@ class ConductorEffects(Protocol):
         """Start a process."""
         ...
 
-    def send(self, process: str, message: say.ChannelOrder) -> None:
+    def send(self, process: str, message: messages.ChannelOrder) -> None:
         """Send a message to a process."""
         ...
 
@@ -210,4 +210,4 @@ class BlockedComponents:
         """Tell a process which of its components are blocked."""
         names = [instance.name for instance in plan.of_group(member.name) if instance.name in self.causes]
         if names or is_news:
-            self._effects.send(member.name, say.Blocked({name: blocked_text(self.causes, name) for name in names}))
+            self._effects.send(member.name, messages.Blocked({name: blocked_text(self.causes, name) for name in names}))

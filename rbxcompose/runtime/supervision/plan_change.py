@@ -12,7 +12,7 @@ from itertools import groupby
 
 from rbxcompose.compiler.plan.dump import dump
 from rbxcompose.compiler.plan.model import Instance, Plan
-from rbxcompose.runtime import channel as say
+from rbxcompose.runtime import channel as messages
 from rbxcompose.runtime.supervision.changes import Changes, Fate
 from rbxcompose.runtime.supervision.members import ConductorEffects, Member
 
@@ -59,18 +59,18 @@ class Changing:
         while not self._has_switched and not self._waited_for:
             if self._retiring:
                 process, names = self._retiring.pop(0)
-                self._send(process, say.Retire(names))
+                self._send(process, messages.Retire(names))
             elif self._ending:
                 process = self._ending.pop(0)
                 self._members[process].is_closing = True
-                self._send(process, say.Shutdown())
+                self._send(process, messages.Shutdown())
             else:
                 self._has_switched = True
                 self._switch(self.changes)
                 self._prepare()
                 self._set_live()
 
-    def _send(self, process: str, order: say.ChannelOrder) -> None:
+    def _send(self, process: str, order: messages.ChannelOrder) -> None:
         if self._members[process].is_there:
             self._waited_for = process
             self._effects.send(process, order)
@@ -92,7 +92,7 @@ class Changing:
                     self._fork(group)
             elif mine and member.is_there:
                 member.is_configured = False  # until it has answered
-                self._effects.send(group, say.Prepare(text_of(after, mine)))
+                self._effects.send(group, messages.Prepare(text_of(after, mine)))
 
     def _set_live(self) -> None:
         live = [one for one in self.changes.fated if one.fate is Fate.LIVE]
@@ -102,7 +102,7 @@ class Changing:
             text = text_of(self.changes.after, (item.instance for item in mine))
             if self._members[process].is_there:
                 self._setting.add(process)
-                self._effects.send(process, say.Reconfigure(text, keys))
+                self._effects.send(process, messages.Reconfigure(text, keys))
 
     # What comes back
 

@@ -8,7 +8,7 @@ from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import Command, Refused, Request, UnreadableError, as_data, name_in, requests, to_data
 from rbxcompose.compiler.plan.dump import PlanTextError, load
 from rbxcompose.compiler.plan.model import Instance, Plan
-from rbxcompose.runtime import channel as say
+from rbxcompose.runtime import channel as messages
 from rbxcompose.runtime.folder import ChosenLayers, RobotState
 from rbxcompose.runtime.requests import (
     ROBOT,
@@ -38,7 +38,7 @@ class Supervised(Protocol):
         """Return the state that is known from outside."""
         ...
 
-    def send(self, process: str, message: say.ChannelOrder) -> None:
+    def send(self, process: str, message: messages.ChannelOrder) -> None:
         """Send a message to a process."""
         ...
 
@@ -136,7 +136,7 @@ class RequestHandler:
             self._refuse_at_the_end()
         if self._supervisor.conductor.states[taker.name][0] != "active":
             raise Refused(f"'{taker.name}' is not active")
-        self._supervisor.send(taker.process, say.Ask(number, taker.name, as_data(request)))
+        self._supervisor.send(taker.process, messages.Ask(number, taker.name, as_data(request)))
 
     def _taker(self, name: str, wanted: object) -> Instance:
         """Return the first component that takes a request; one that names its component is for that one."""

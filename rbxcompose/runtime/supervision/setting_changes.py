@@ -16,8 +16,7 @@ from typing import Protocol
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.bus.names import resolve
 from rbxcompose.compiler.plan.model import Plan
-from rbxcompose.runtime import channel as say
-from rbxcompose.runtime import channel as tell
+from rbxcompose.runtime import channel as messages
 from rbxcompose.sdk.parameters import ChangeRefusal, WantedChange
 
 WhenJudged = Callable[[ChangeRefusal | None], None]
@@ -34,7 +33,7 @@ class SettingEffects(Protocol):
         """Return the processes that take orders."""
         ...
 
-    def send(self, process: str, message: say.ChannelOrder) -> None:
+    def send(self, process: str, message: messages.ChannelOrder) -> None:
         """Send a message to a process."""
         ...
 
@@ -55,7 +54,7 @@ class _Change:
     """The change that is being made; `waiting` are processes whose answer is due."""
 
     process: str  # where somebody wants it
-    asked: tell.AskForChange
+    asked: messages.AskForChange
     number: int
     parts: dict[str, WantedChange]  # by process
     step: _Step = _Step.PREPARING
@@ -73,7 +72,7 @@ class SettingChanges:
 
     def __init__(self, effects: SettingEffects) -> None:
         self._effects = effects
-        self._queue: deque[tuple[str, tell.AskForChange]] = deque()
+        self._queue: deque[tuple[str, messages.AskForChange]] = deque()
         self._change: _Change | None = None
         self._count = 0
         self._is_held = False
@@ -92,13 +91,13 @@ class SettingChanges:
         self._is_held = False
         self._begin()
 
-    def receive(self, process: str, message: say.ChannelWord) -> None:
+    def receive(self, process: str, message: messages.ChannelWord) -> None:
         """Take a message of a process; others than those about settings are ignored."""
         match message:
-            case tell.AskForChange():
+            case messages.AskForChange():
                 self._queue.append((process, message))
                 self._begin()
-            case tell.ChangePrepared(number=number) | tell.ChangeFollowed(number=number):
+            case messages.ChangePrepared(number=number) | messages.ChangeFollowed(number=number):
                 change = self._change
                 if change is not None and change.number == number and process in change.waiting:
                     self._answered(change, process, message)
@@ -126,14 +125,14 @@ class SettingChanges:
             process, asked = self._queue.popleft()
             parts, refusal = self._parts(asked.wanted)
             if refusal is not None:
-                self._effects.send(process, tell.ChangeDecided(asked.number, refusal))
+                self._effects.send(process, messages.ChangeDecided(asked.number, refusal))
                 continue
             self._count += 1
             change = self._change = _Change(process, asked, self._count, parts)
             change.waiting = set(self._effects.reached())
             for text in sorted(change.waiting):  # those without a part of it tell the values that they have now
                 part = parts.get(text, WantedChange({}, asked.wanted.by))
-                self._effects.send(text, tell.PrepareChange(change.number, part))
+                self._effects.send(text, messages.PrepareChange(change.number, part))
 
     def _parts(self, wanted: WantedChange) -> tuple[dict[str, WantedChange], ChangeRefusal | None]:
         """Return what is wanted of each process, or why that is impossible."""
@@ -149,17 +148,19 @@ class SettingChanges:
         together = wanted.together or ("together" if len(wanted.parts) > 1 else "")
         return {name: WantedChange(each, wanted.by, together) for name, each in found.items()}, None
 
-    def _answered(self, change: _Change, process: str, message: tell.ChangePrepared | tell.ChangeFollowed) -> None:
+    def _answered(
+        self, change: _Change, process: str, message: messages.ChangePrepared | messages.ChangeFollowed
+    ) -> None:
         change.waiting.remove(process)
         reason = message.refusal
         match message:
-            case tell.ChangePrepared(now=now, new=new):
+            case messages.ChangePrepared(now=now, new=new):
                 change.prepared += [] if reason else [process]
                 change.now += [now] if now else []
                 change.new += [new] if new else []
-            case tell.ChangeFollowed() if change.step is _Step.GOING_BACK:
+            case messages.ChangeFollowed() if change.step is _Step.GOING_BACK:
                 change.stuck += [reason] if reason else []
-            case tell.ChangeFollowed():
+            case messages.ChangeFollowed():
                 change.done += [] if reason else [process]
         if reason and change.step is not _Step.GOING_BACK:
             change.refusal = change.refusal or ChangeRefusal(reason)
@@ -174,9 +175,9 @@ class SettingChanges:
                 change.step = _Step.JUDGING
                 self._effects.judge(change.now, change.new, lambda refusal: self._judged(change, refusal))
             case _Step.PREPARING if change.refusal is None:
-                self._order(change, _Step.COMMITTING, change.parts, tell.CommitChange(change.number))
+                self._order(change, _Step.COMMITTING, change.parts, messages.CommitChange(change.number))
             case _Step.COMMITTING if change.refusal is not None and change.done:
-                self._order(change, _Step.GOING_BACK, change.done, tell.UndoChange(change.number))
+                self._order(change, _Step.GOING_BACK, change.done, messages.UndoChange(change.number))
             case _:
                 self._end(change)
 
@@ -185,20 +186,20 @@ class SettingChanges:
         if change.refusal is not None:
             self._end(change)
         else:
-            self._order(change, _Step.COMMITTING, change.parts, tell.CommitChange(change.number))
+            self._order(change, _Step.COMMITTING, change.parts, messages.CommitChange(change.number))
 
-    def _order(self, change: _Change, step: _Step, processes: Iterable[str], order: say.ChannelOrder) -> None:
+    def _order(self, change: _Change, step: _Step, processes: Iterable[str], order: messages.ChannelOrder) -> None:
         change.step, change.waiting = step, set(processes)
         for process in sorted(change.waiting):
             self._effects.send(process, order)
 
     def _end(self, change: _Change) -> None:
         for process in change.prepared:
-            self._effects.send(process, tell.EndChange(change.number))
+            self._effects.send(process, messages.EndChange(change.number))
         refusal = change.refusal
         if refusal is not None and change.stuck:
             reason = f"{refusal.reason}; not all are as before: {'; '.join(change.stuck)}"
             refusal = ChangeRefusal(reason, is_half_done=True)
-        self._effects.send(change.process, tell.ChangeDecided(change.asked.number, refusal))
+        self._effects.send(change.process, messages.ChangeDecided(change.asked.number, refusal))
         self._change = None
         self._begin()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from rbxcompose.compiler.plan.model import Plan
-from rbxcompose.runtime import channel as say
+from rbxcompose.runtime import channel as messages
 from rbxcompose.runtime.supervision.members import ConductorEffects, Member, Phase
 from rbxcompose.sdk.registry import component_type
 
@@ -29,7 +29,7 @@ class Closing:
         """Bring everything that may move to rest."""
         for member in self._there():
             if member.is_configured and member.name != self._router:
-                self._effects.send(member.name, say.Brake())
+                self._effects.send(member.name, messages.Brake())
             elif member.name != self._router:
                 self._effects.end(member.name)  # it cannot listen yet; its components brake before it ends
         self.close_when_at_rest()
@@ -78,6 +78,6 @@ class Closing:
             return
         member.is_closing = True
         if member.is_configured:
-            self._effects.send(name, say.Shutdown())
+            self._effects.send(name, messages.Shutdown())
         else:
             self._effects.end(name)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import replace
 
-from rbxcompose.runtime import channel as say
+from rbxcompose.runtime import channel as messages
 from rbxcompose.runtime.channel import HostReport, SharedStop, StopMark
 from rbxcompose.runtime.folder import StopState
 from rbxcompose.runtime.supervision.members import ConductorEffects, Member
@@ -72,7 +72,7 @@ class StopLatch:
     def notify(self, member: Member) -> None:
         """Tell a process how it stands."""
         member.is_stopped = self.is_stopped
-        self._effects.send(member.name, say.Stop() if self.is_stopped else say.Release())
+        self._effects.send(member.name, messages.Stop() if self.is_stopped else messages.Release())
 
     def receive(self, member: Member, held: RobotHeld) -> None:
         """Stop everything for a component; its process has stopped by itself, and has logged the reason."""

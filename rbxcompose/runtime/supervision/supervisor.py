@@ -19,7 +19,7 @@ from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.endpoints import is_private, socket_of
 from rbxcompose.compiler.plan.model import Instance, Plan
 from rbxcompose.msgs.geometry_msgs import Twist
-from rbxcompose.runtime import channel as say
+from rbxcompose.runtime import channel as messages
 from rbxcompose.runtime.channel import HostReport
 from rbxcompose.runtime.control import ControlServer
 from rbxcompose.runtime.folder import SILENT, SUSPENDED, ComponentState, Gauge, RobotFolder, RobotState
@@ -112,7 +112,7 @@ def _written(instance: Instance) -> set[str]:
 class _Supervisor(Protocol):
     conductor: Conductor
 
-    def send(self, process: str, message: say.ChannelOrder) -> None: ...
+    def send(self, process: str, message: messages.ChannelOrder) -> None: ...
 
 
 class SettingLine:
@@ -132,7 +132,7 @@ class SettingLine:
         groups = () if conductor.is_going_down else conductor.plan.groups
         return [name for name in groups if conductor.members[name].is_configured]
 
-    def send(self, process: str, message: say.ChannelOrder) -> None:
+    def send(self, process: str, message: messages.ChannelOrder) -> None:
         """Send a message to a process."""
         self._supervisor.send(process, message)
 
@@ -157,7 +157,7 @@ _OWNER = "supervisor"
 class _Child:
     """A child process of the supervisor; its pidfd is known once it has been forked."""
 
-    channel: say.Channel
+    channel: messages.Channel
     process: Process | None = None
     descriptor: int | None = None
     wanted_end: signal.Signals | None = None  # to be sent as soon as it is forked
@@ -270,7 +270,7 @@ class Supervisor:
         self._children[process] = _Child(channel)
         self._selector.register(channel, selectors.EVENT_READ, lambda: self._receive(process, channel))
 
-    def send(self, process: str, message: say.ChannelOrder) -> None:
+    def send(self, process: str, message: messages.ChannelOrder) -> None:
         """Send a message to a process."""
         if process in self._children:
             channel = self._children[process].channel
@@ -281,9 +281,9 @@ class Supervisor:
         """Tell the other hosts of the robot how this one is; a router that is behind has newer reports to come."""
         child = self._children.get(ROUTER)
         if child is not None and not child.channel.is_behind:
-            self.send(ROUTER, say.ToHosts(report))
+            self.send(ROUTER, messages.ToHosts(report))
 
-    def _watch(self, channel: say.Channel) -> None:
+    def _watch(self, channel: messages.Channel) -> None:
         """Wait for messages of a process, and until it can take the rest of a message too long for one send."""
         if channel.is_open:
             events = selectors.EVENT_READ | (selectors.EVENT_WRITE if channel.is_behind else 0)
@@ -344,14 +344,14 @@ class Supervisor:
 
     # What happens
 
-    def _receive(self, name: str, channel: say.Channel) -> None:
-        messages = channel.receive()
+    def _receive(self, name: str, channel: messages.Channel) -> None:
+        received = channel.receive()
         channel.flush()
         if channel.is_open:
             self._watch(channel)
         else:
             self._selector.unregister(channel)
-        for message in messages:
+        for message in received:
             self.conductor.receive(name, message)  # type: ignore[arg-type]
             self.settings.changes.receive(name, message)  # type: ignore[arg-type]
 

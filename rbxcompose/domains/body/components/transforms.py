@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from functools import lru_cache
 from typing import Annotated, Any
 
 from pydantic import AfterValidator
 
-from rbxcompose.base.findings import Finding
+from rbxcompose.base.findings import Finding, once
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.body.model import Body, BodyJoint
+from rbxcompose.domains.body.urdf import body_of as urdf_body
 from rbxcompose.domains.body.urdf import read_body
-from rbxcompose.domains.body.xml_reader import XmlElement, read_urdf
+from rbxcompose.domains.body.xml_reader import read_urdf
 from rbxcompose.msgs.builtin_interfaces import Time
 from rbxcompose.msgs.geometry_msgs import Quaternion, Transform, TransformStamped, Vector3
 from rbxcompose.msgs.sensor_msgs import JointState
@@ -32,6 +32,7 @@ MOVING: dict[str, Port[Any]] = {
 }
 
 
+@once
 def _checked(urdf: str) -> str:
     """Return a URDF; raise ValueError with the first mistake that keeps it from being one."""
     root = read_urdf(urdf, "urdf") if urdf else None
@@ -153,11 +154,9 @@ def link(time: Time, parent: str, child: str, at: Transform3) -> TransformStampe
     )
 
 
-@lru_cache(maxsize=4)
 def body_of(urdf: str) -> Body:
     """Return the body that a checked URDF describes; one without links for an empty text."""
-    root = read_urdf(urdf, "") if urdf else None
-    return read_body(root)[0] if isinstance(root, XmlElement) else Body("")
+    return urdf_body(urdf) if urdf else Body("")
 
 
 def _port(joint: BodyJoint) -> str:
