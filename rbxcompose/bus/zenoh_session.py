@@ -1,69 +1,19 @@
-"""Zenoh sessions: one peer for each process of a robot, the router that lets them find each other, shared memory."""
+"""Zenoh sessions: one peer for each process of a robot, and the router that lets them find each other."""
 
 from __future__ import annotations
 
-import contextlib
 import errno
-import fcntl
 import itertools
 import json
 import os
-import time
 from collections.abc import Mapping
 from dataclasses import field
-from pathlib import Path
 
 import zenoh
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.bus import zenoh_session as shared_memory
+from rbxcompose.bus import shared_memory
 from rbxcompose.bus.endpoints import LINK_LEASE, is_private, socket_of, tcp_endpoint, unix_endpoint
-
-FOLDER = Path("/dev/shm")  # noqa: S108
-POOL = 16 * 1024 * 1024  # [bytes] that a process sets aside for what it sends, once it sends something large
-YOUNG = 0.2  # [s]; a newer file may be about to be locked, which follows its creation immediately
-
-
-def problem(folder: Path = FOLDER) -> str:
-    """Return why shared memory cannot be used; empty if it can."""
-    try:
-        room = os.statvfs(folder)
-    except OSError:
-        return f"there is no {folder}"
-    if not os.access(folder, os.W_OK | os.X_OK):
-        return f"{folder} cannot be written"
-    free = room.f_bavail * room.f_frsize
-    if free < POOL:
-        return f"{folder} has {free / 1e6:.1f} MB free, {POOL / 1e6:.1f} MB are needed"
-    return ""
-
-
-def remove_orphans(folder: Path = FOLDER, *, waits: bool = False) -> int:
-    """Remove the files of processes that have ended and return how many; those in use stay, whoever uses them.
-
-    New files stay as well, unless it `waits` until they are no longer new.
-    """
-    removed = [_remove_if_orphan(path) for path in folder.glob("*.zenoh")]
-    if waits and None in removed:
-        time.sleep(YOUNG)
-        return removed.count(True) + remove_orphans(folder)
-    return removed.count(True)
-
-
-def _remove_if_orphan(path: Path) -> bool | None:
-    """Return whether a file was removed; None if it is too new to be tried."""
-    with contextlib.suppress(OSError):  # somebody else's, in use, or gone by now
-        descriptor = os.open(path, os.O_RDWR | os.O_CLOEXEC | os.O_NOFOLLOW)
-        try:
-            if os.fstat(descriptor).st_ctime > time.time() - YOUNG:
-                return None
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            path.unlink()
-            return True
-        finally:
-            os.close(descriptor)
-    return False
-
 
 LEASE = round(1000 * LINK_LEASE)  # [ms] until a silent link counts as lost
 PATIENCE, LONGER = 1000, 5000  # [ms] that a visitor waits for a router, and a process that cannot do without it

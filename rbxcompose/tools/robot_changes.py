@@ -21,7 +21,7 @@ from rbxcompose.compiler.plan.dump import dump
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.manifest.files import PREFIX
 from rbxcompose.runtime.folder import ChosenLayers, RobotFolder
-from rbxcompose.runtime.requests import ApplyPlan, ComparePlan, PlanComparison
+from rbxcompose.runtime.plan_requests import ApplyPlan, ComparePlan, PlanComparison
 from rbxcompose.runtime.supervision.changes import Fate
 from rbxcompose.runtime.supervision.plan_change import LONGEST
 from rbxcompose.tools.inspection.plan_text import changes_text, with_places

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.bus import zenoh_session as shared_memory
-from rbxcompose.bus.zenoh_session import POOL, YOUNG, peer_settings, problem, remove_orphans
+from rbxcompose.bus.shared_memory import POOL, YOUNG, problem, remove_orphans
+from rbxcompose.bus.zenoh_session import peer_settings
 from rbxcompose.msgs.rcl_interfaces import ParameterValue
 from rbxcompose.sdk.ports import Qos
 from tests.bus.conftest import Network

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rbxcompose.base.requests import to_data
-from rbxcompose.runtime.requests import PlanComparison
+from rbxcompose.runtime.plan_requests import PlanComparison
 from rbxcompose.runtime.supervision.changes import changes
 from rbxcompose.testing import Golden
 from rbxcompose.tools.inspection.plan_text import changes_text, with_places

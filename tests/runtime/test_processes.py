@@ -19,7 +19,7 @@ from rbxcompose.runtime.processes import (
     wait_until_ended,
     waits_of,
 )
-from rbxcompose.runtime.supervision.launch import end_leftovers
+from rbxcompose.runtime.supervision.leftovers import end_leftovers
 
 
 @pytest.fixture

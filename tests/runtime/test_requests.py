@@ -21,16 +21,9 @@ from rbxcompose.missions.execution.requests import ListMissions, PauseMission
 from rbxcompose.runtime import channel as say
 from rbxcompose.runtime.channel import HostReport
 from rbxcompose.runtime.folder import RobotState, RunOptions
+from rbxcompose.runtime.plan_requests import ApplyPlan, ComparePlan, PlanComparison
 from rbxcompose.runtime.processes import Process
-from rbxcompose.runtime.requests import (
-    ApplyPlan,
-    BringDown,
-    ComparePlan,
-    PlanComparison,
-    ReleaseRobot,
-    RobotStatus,
-    StopRobot,
-)
+from rbxcompose.runtime.requests import BringDown, ReleaseRobot, RobotStatus, StopRobot
 from rbxcompose.runtime.supervision.changes import Fate
 from rbxcompose.runtime.supervision.conductor import Conductor
 from rbxcompose.runtime.supervision.judge import Judge

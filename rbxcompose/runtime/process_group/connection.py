@@ -21,7 +21,7 @@ import zenoh
 from rbxcompose.base.clock import Clock, ExternalClock, MonotonicClock, SteppedClock, Turn
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.scheduler import Scheduler
-from rbxcompose.bus import zenoh_session as shared_memory
+from rbxcompose.bus import shared_memory
 from rbxcompose.bus.bus import Bus
 from rbxcompose.bus.endpoints import accepts
 from rbxcompose.bus.liveness import PeerCheck, Probe, ProbeResult, probe_key, roll_key

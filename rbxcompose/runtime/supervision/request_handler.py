@@ -10,17 +10,8 @@ from rbxcompose.compiler.plan.dump import PlanTextError, load
 from rbxcompose.compiler.plan.model import Instance, Plan
 from rbxcompose.runtime import channel as messages
 from rbxcompose.runtime.folder import ChosenLayers, RobotState
-from rbxcompose.runtime.requests import (
-    ROBOT,
-    ApplyPlan,
-    BringDown,
-    ComparePlan,
-    PlanComparison,
-    ReleaseRobot,
-    RevertPlan,
-    RobotStatus,
-    StopRobot,
-)
+from rbxcompose.runtime.plan_requests import ApplyPlan, ComparePlan, PlanComparison, RevertPlan
+from rbxcompose.runtime.requests import ROBOT, BringDown, ReleaseRobot, RobotStatus, StopRobot
 from rbxcompose.runtime.supervision.changes import Changes, changes
 from rbxcompose.runtime.supervision.conductor import FINE, Conductor
 from rbxcompose.runtime.supervision.setting_changes import SettingChanges

@@ -14,7 +14,7 @@ from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, refuse, wr
 from rbxcompose.commands.lookup import answer_of, find_robot, show_answer
 from rbxcompose.commands.options import add_system_options, is_system
 from rbxcompose.commands.targets import add_layer_options, add_path_argument, chosen_layers, compiled, robot_path
-from rbxcompose.runtime.requests import RevertPlan
+from rbxcompose.runtime.plan_requests import RevertPlan
 from rbxcompose.tools.robot_changes import LONGEST_CHANGE, Proposal, carry_out, unsure
 
 _LAST = -1  # generation of the last change

@@ -13,7 +13,7 @@ from rbxcompose.runtime.control import NoAnswerError, ask, supervisor_of
 from rbxcompose.runtime.folder import RobotFolder, RobotState
 from rbxcompose.runtime.processes import Process, wait_until_ended
 from rbxcompose.runtime.requests import BringDown
-from rbxcompose.runtime.supervision.launch import end_leftovers, kill_supervisor
+from rbxcompose.runtime.supervision.leftovers import end_leftovers, kill_supervisor
 
 _ANSWER = 1.0  # [s]
 _ORDERLY = 3.0  # [s] for a supervisor to bring everything down, after it has come to rest

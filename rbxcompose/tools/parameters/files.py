@@ -37,7 +37,7 @@ from rbxcompose.manifest.tree import FILE_BYTES, at
 from rbxcompose.msgs.rbxcompose_parameters import ParameterChange
 from rbxcompose.msgs.rcl_interfaces import GetParameters, Parameter
 from rbxcompose.runtime.folder import RobotFolder, RobotState
-from rbxcompose.runtime.requests import ComparePlan
+from rbxcompose.runtime.plan_requests import ComparePlan
 from rbxcompose.sdk.parameters import UnsettableError, changed, dimension_of, from_message, settings, to_message
 from rbxcompose.tools.inspection.origin import origin_of
 from rbxcompose.tools.live_rules import compiled_with
