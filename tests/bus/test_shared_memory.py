@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from rbxcompose.bus import zenoh_session as shared_memory
 from rbxcompose.bus.shared_memory import POOL, YOUNG, problem, remove_orphans
 from rbxcompose.bus.zenoh_session import peer_settings
 from rbxcompose.msgs.rcl_interfaces import ParameterValue
@@ -78,7 +77,7 @@ def test_without_a_folder_or_room_the_reason_is_told(tmp_path: Path, monkeypatch
 
 @pytest.mark.parametrize("reason", ["", "there is no /dev/shm"])
 def test_a_session_shares_memory_unless_it_cannot(monkeypatch: pytest.MonkeyPatch, reason: str) -> None:
-    monkeypatch.setattr(shared_memory, "problem", lambda: reason)
+    monkeypatch.setattr("rbxcompose.bus.shared_memory.problem", lambda: reason)
     assert peer_settings("tcp/127.0.0.1:1")["transport/shared_memory/enabled"] is not reason
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator
 from pathlib import Path
 
-from rbxcompose.base.config import MISSION as START_MISSION_MISSIONS
+from rbxcompose.base.config import MISSION as MISSION_NAME
 from rbxcompose.base.expressions.tree import (
     Expression,
     ExpressionError,
@@ -283,11 +283,7 @@ _ENDING = ".yaml"
 def start_mission(robot: Robot) -> Iterator[Finding]:
     """`start:` names a mission that the robot does not have."""
     start = robot.manifest.start
-    if (
-        start is None
-        or start in robot.manifest.missions
-        or robot.manifest.contents.may_have(START_MISSION_MISSIONS, start)
-    ):
+    if start is None or start in robot.manifest.missions or robot.manifest.contents.may_have(MISSION_NAME, start):
         return
     place = robot.value("start")
     message = f"the robot has no mission '{start}' to start"

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, Protocol, cast
 
-from rbxcompose.base.clock import NANOSECONDS as FRAMES_NANOSECONDS
+from rbxcompose.base.clock import NANOSECONDS as PER_SECOND
 from rbxcompose.base.clock import Clock
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Pose2, Transform3
@@ -136,7 +136,7 @@ class Frames:
         self._take(message, self._moving.age, static=False)
 
     def _take(self, message: TFMessage, age: float, *, static: bool) -> None:
-        received, unstamped = self._clock.now() - age, self._clock.stamp() - round(age * FRAMES_NANOSECONDS)
+        received, unstamped = self._clock.now() - age, self._clock.stamp() - round(age * PER_SECOND)
         with self._lock:
             for transform in message.transforms:
                 time = to_nanoseconds(transform.header.stamp) or unstamped
