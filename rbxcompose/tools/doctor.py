@@ -174,9 +174,11 @@ def examination(examine: Examine) -> Examine:
 
 
 def examine_all(facts: HostFacts) -> list[ExaminationResult]:
-    """Run every examination, by name."""
-    for name in PLUGINS.names():
-        PLUGINS.load(name)
+    """Run every examination, by name; one of another package that has the name of ours is left out."""
+    PLUGINS.load_shipped()
+    for name in PLUGINS.third_party:
+        if name not in EXAMINATIONS:
+            PLUGINS.load_foreign(name)
     return [ExaminationResult(name, answer) for name in sorted(EXAMINATIONS) for answer in EXAMINATIONS[name](facts)]
 
 
