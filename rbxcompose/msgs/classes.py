@@ -71,10 +71,14 @@ class _Maker:
             part: self._message(f"{name}_{part}", f"{part} of `{path}`.") for part in ("Goal", "Result", "Feedback")
         }
         others = {
-            "SendGoal": self._service(f"{name}_SendGoal", f"Sends a goal of `{path}`."),
-            "GetResult": self._service(f"{name}_GetResult", f"Waits for the result of a goal of `{path}`."),
-            "FeedbackMessage": self._message(
-                f"{name}_FeedbackMessage", f"Feedback of `{path}` and the goal that it is about."
+            "SendGoal": _Part(partial(self._service, f"{name}_SendGoal", f"Sends a goal of `{path}`.")),
+            "GetResult": _Part(
+                partial(self._service, f"{name}_GetResult", f"Waits for the result of a goal of `{path}`.")
+            ),
+            "FeedbackMessage": _Part(
+                partial(
+                    self._message, f"{name}_FeedbackMessage", f"Feedback of `{path}` and the goal that it is about."
+                )
             ),
         }
         doc = self._structures[f"{name}_Goal"].comment or f"The action `{name}`."
@@ -144,6 +148,23 @@ class _Maker:
             return made, field(default_factory=made)
         repeated: Callable[[], Any] = lambda: (made(),) * least  # noqa: E731
         return tuple[made, ...], field(default_factory=repeated) if least else ()
+
+
+class _Part:
+    """A class inside that of an action, made when it is first asked for: a check needs none of them."""
+
+    def __init__(self, make: Callable[[], type[Any]]) -> None:
+        self._make = make
+
+    def __set_name__(self, owner: Any, name: str) -> None:
+        self._name = name
+
+    def __get__(self, instance: object, owner: Any) -> type[Any]:
+        with _lock:
+            if vars(owner)[self._name] is self:
+                setattr(owner, self._name, self._make())
+            made: type[Any] = vars(owner)[self._name]
+            return made
 
 
 class _TypeHash:

@@ -63,7 +63,7 @@ def full_name(name: str, kind: str) -> str:
 
 def _find(name: str, kind: str, base: type[T]) -> type[T]:
     full = full_name(name, kind)
-    found = _shipped_class(full) or declared.get(full)
+    found = _shipped_class(full) or _imported_class(full)
     if found is None or not issubclass(found, base):
         raise KeyError(f"no {_WHAT[kind]} {name!r}; there are {', '.join(names(kind))}")
     return found
@@ -77,6 +77,15 @@ def _shipped_class(full: str) -> type[Any] | None:
     found: Any = package
     for part in class_path(full, package.interfaces().values()).split("."):
         found = getattr(found, part, None)
+    return found if getattr(found, "TYPE", None) == full else None
+
+
+def _imported_class(full: str) -> type[Any] | None:
+    """Return a class of another package, also that of a part, which may not be made yet."""
+    whole, is_part, part = full.rpartition("_")
+    if full in declared or not is_part:
+        return declared.get(full)
+    found = getattr(_imported_class(whole), part, None)
     return found if getattr(found, "TYPE", None) == full else None
 
 

@@ -11,9 +11,10 @@ from tests.project.package import PACKAGE
 
 GIVEN_TIME = ("domains", "missions", "sdk")
 OWN_TIME = {  # drivers of hardware, simulated hardware, processes and commands, which have clocks of their own
+    "command_actions.py",
+    "command_line.py",
     "dynamixel_bus.py",
     "dynamixel_port.py",
-    "servo_line.py",
     "servo_port.py",
     "servo_twin.py",
     "planning_processes.py",

@@ -87,7 +87,7 @@ class ThermalConfig(Config):
     """When joints are too hot [degC], and how long they rest [s]."""
 
     warn: float = 50.0
-    """Above this, people are reported."""
+    """Above this, people are told."""
     limit: float = 60.0
     """Above this, a joint loses its torque and rests."""
     resume: float = 45.0

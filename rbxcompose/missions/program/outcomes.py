@@ -15,6 +15,7 @@ SUCCESS: Final = 2
 FAILURE: Final = 3
 SKIPPED: Final = 4  # did not need to start: neither success nor failure
 NAMES: Final = ("idle", "running", "success", "failure", "skipped")
+SUCCEEDS, FAILS = NAMES[SUCCESS], NAMES[FAILURE]
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,9 +37,6 @@ def words(error: Exception) -> str:
     if isinstance(error, EvaluationError | NotArrivedError | NodeFailed):
         return str(error)
     return f"{type(error).__name__}: {error}"
-
-
-SUCCEEDS, FAILS = NAMES[SUCCESS], NAMES[FAILURE]
 
 
 @dataclass(frozen=True, slots=True)
