@@ -15,7 +15,7 @@ a process of its own if the package is installed.
 
 {table}
 
-- **findings**: what the checks of [bodies](body.md) tell, by code. Each kind was compared with the files. The two
+- **findings**: what the checks of [bodies](body.md) report, by code. Each kind was compared with the files. The two
   that are refused mimic joints under names without their prefix, and have no links at all; the meshes that do not exist
   are at `package:///`, which names no package, and on the disk of their author.
 - **reading** is the processor time to read and check the file, after import; **drawing** that of a picture with all

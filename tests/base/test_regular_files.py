@@ -14,8 +14,9 @@ PACKAGE = Path(rbxcompose.__file__).parent
 # What these open is no file that a user names: the package's own data, what the system tells, files of a running robot.
 MAY_OPEN = {
     "base/files.py",
+    "base/plugins.py",
     "base/processes.py",
-    "bus/zenoh_session.py",
+    "bus/shared_memory.py",
     "commands/finding_pages.py",
     "commands/main.py",
     "commands/new_files.py",

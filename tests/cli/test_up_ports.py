@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.commands.main import main
-from rbxcompose.tools import run_view
 from tests.checks import strangers
 
 BODY = """<robot name="head">
@@ -41,7 +40,7 @@ def nothing_starts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_: object) -> None:
         raise AssertionError("it was started")
 
-    monkeypatch.setattr(run_view, "start_supervisor", refuse)
+    monkeypatch.setattr("rbxcompose.runtime.supervision.launch.start_supervisor", refuse)
 
 
 def test_a_port_that_is_missing_is_told_at_its_line_before_anything_starts(
@@ -64,7 +63,7 @@ def test_neither_a_check_nor_a_simulated_robot_needs_it(tmp_path: Path) -> None:
 def test_a_driver_whose_package_is_missing_is_told_where_it_is_asked_for(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("rbxcompose.tools.run_view.find_spec", lambda _: None)
+    monkeypatch.setattr("rbxcompose.commands.targets.find_spec", lambda _: None)
     (tmp_path / "robot.yaml").write_text(ROBOT.replace("PORT", "/dev/null"), encoding="utf-8")
     for words in (["--real"], ["--set", "buses.servos.sim=pty"]):
         assert main(["up", *words, "robot.yaml"]) == 1

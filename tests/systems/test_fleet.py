@@ -14,7 +14,6 @@ from rbxcompose.commands.main import main
 from rbxcompose.compiler.systems.model import System
 from rbxcompose.manifest.system_file import HostModel
 from rbxcompose.testing.golden import Golden
-from rbxcompose.tools.commands import fleet
 from tests.conftest import ROOT
 
 SYSTEM = """
@@ -54,7 +53,7 @@ def path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     def shares(system: System, config: Path | None) -> Shares:
         return {key: _Host(key[0], HostModel()) for key in shares_of(system, config)}
 
-    monkeypatch.setattr(fleet, "shares_of", shares)
+    monkeypatch.setattr("rbxcompose.commands.hosts.shares_of", shares)
     file = tmp_path / "fleet.yaml"
     file.write_text(SYSTEM.replace("ROOT", str(ROOT)), encoding="utf-8")
     return str(file)

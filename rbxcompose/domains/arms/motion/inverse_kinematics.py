@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
+from rbxcompose.domains.arms.motion.damped_steps import DAMPING, LEAST_DAMPING, LONGEST, PATIENCE, PROGRESS
 from rbxcompose.domains.arms.motion.groups import JointSpace
 
 Array = NDArray[np.float64]
@@ -28,9 +29,6 @@ TOGETHER = 8  # descents of compiled code, after which a search lets others run
 EDGE = 1e-4  # [rad or m] from the limits of joints, so that curves through solutions stay within them
 CLOSER = 0.2  # of a tolerance that the search aims at, so that rounding decides nothing
 # Of a descent by damped least squares; plain and compiled code share them.
-LEAST_DAMPING, DAMPING = 1e-6, 1e-2  # the second one times the square of the error
-LONGEST = 1.0  # [rad or m] that a joint moves in one iteration, at most
-PATIENCE, PROGRESS = 4, 0.8  # iterations without the error's square shrinking to this share, which end a descent
 
 
 @dataclass(frozen=True, slots=True)
