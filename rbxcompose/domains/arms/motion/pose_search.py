@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.domains.arms.motion import inverse_kinematics
+from rbxcompose.domains.arms.motion import damped_steps, inverse_kinematics
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.collisions import Checker
 from rbxcompose.domains.arms.motion.groups import JointSpace
@@ -64,7 +64,7 @@ def slid(
         longest = share * float(np.abs(step).max())
         if longest < LEAST:
             break
-        first = np.clip(here + step * share * min(1.0, inverse_kinematics.LONGEST / longest), *bounds)
+        first = np.clip(here + step * share * min(1.0, damped_steps.LONGEST / longest), *bounds)
         moved = space.nearest_turns(inverse_kinematics.descended(kinematics, space, target, first)[0], values)
         left = posture.distance(space, moved)
         if left <= distance - LEAST and target.is_met(kinematics.tip_pose(moved)) and is_free(moved):
@@ -150,8 +150,7 @@ def _approached(
     for _ in range(MOST_APPROACH_STEPS):
         step = _approach_step(jacobian, error, damping, values, bounds)
         moved = np.clip(
-            values
-            + step * min(1.0, inverse_kinematics.LONGEST / max(float(np.abs(step).max()), inverse_kinematics.LONGEST)),
+            values + step * min(1.0, damped_steps.LONGEST / max(float(np.abs(step).max()), damped_steps.LONGEST)),
             *bounds,
         )
         ahead, there = _weighed(kinematics, target, wanted, moved)
