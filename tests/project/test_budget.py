@@ -51,7 +51,7 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
     "domains/power": (466, 7, 1, 74),
     "domains/servos": (7877, 54, 1, 602),
     "manifest": (3370, 27, 1, 285),
-    "missions": (9745, 119, 16, 1109),
+    "missions": (9747, 119, 16, 1111),
     "msgs": (1327, 13, 2, 99),
     "runtime": (7289, 44, 3, 704),
     "sdk": (1364, 12, 2, 147),
@@ -61,10 +61,10 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 81_884,
+    "lines of code": 81_885,
     "files": 691,
     "files of 1 to 30 lines of code": 61,
-    "lines of imports": 8_336,
+    "lines of imports": 8_338,
     "packages at the top": 12,
     "modules at the top": 0,
     "kB of schemas": 297,

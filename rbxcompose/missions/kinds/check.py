@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from rbxcompose.missions import sdk
+from rbxcompose.missions.sdk import FAILURE, SUCCESS, holds  # looked up in every tick
 
 
 class CheckTask(sdk.Task):
@@ -16,7 +17,7 @@ class CheckTask(sdk.Task):
 
     def begin(self) -> int:
         """Evaluate the condition."""
-        return sdk.SUCCESS if sdk.holds(self.condition, self.scope) else sdk.FAILURE
+        return SUCCESS if holds(self.condition, self.scope) else FAILURE
 
 
 @sdk.kind("check", CheckTask)

@@ -12,6 +12,7 @@ from rbxcompose.missions.language.fields import children, choice, flag, history
 from rbxcompose.missions.program import outcomes
 from rbxcompose.missions.program.answers import Skipped
 from rbxcompose.missions.program.families import Straight
+from rbxcompose.missions.program.outcomes import FAILURE, IDLE, RUNNING, SKIPPED  # looked up in every tick
 from rbxcompose.missions.program.program import Endings, MissionNode
 
 
@@ -93,7 +94,7 @@ class InTurnTask(WithHistory):
         self.order: list[int] = []  # of the children, if it was drawn
         self.conditions = _conditions(site) if step.reactive else {}
         self.index = 0
-        self.did = outcomes.SKIPPED
+        self.did = SKIPPED
 
     def begin(self) -> int:
         """Start with the first child, or with the one where it was halted."""
@@ -101,7 +102,7 @@ class InTurnTask(WithHistory):
             self.arrange()
             return self.proceed()
         self.index = 0
-        self.did = outcomes.SKIPPED
+        self.did = SKIPPED
         if self.is_random:
             self.order = list(range(len(self.all)))
             self.engine.chance().shuffle(self.order)
@@ -128,16 +129,16 @@ class InTurnTask(WithHistory):
                 status = child.start()
             else:
                 status = child.tick()
-            if status == outcomes.RUNNING:
+            if status == RUNNING:
                 self.index, self.current = index, child
                 if self.conditions:
                     self.watch_conditions()
-                return outcomes.RUNNING
+                return RUNNING
             child = None
             if status == decides:
                 self.index, self.current = index, None
                 return self.end_with(status)
-            if status != outcomes.SKIPPED:
+            if status != SKIPPED:
                 self.did = status
             index += 1
             if index == len(children):
@@ -155,9 +156,9 @@ class InTurnTask(WithHistory):
                 continue
             before = self.statuses[child.number]
             status = child.start()
-            is_other = status in (outcomes.RUNNING, self.decides) if before == outcomes.IDLE else status != before
+            is_other = status in (RUNNING, self.decides) if before == IDLE else status != before
             if is_other:
-                if status == outcomes.RUNNING:
+                if status == RUNNING:
                     child.halt()
                 if self.current is not None:
                     running, self.current = self.current, None
@@ -175,7 +176,7 @@ class InTurnTask(WithHistory):
         """End, and forget the place; a sequence that failed keeps it."""
         if self.history != "none":
             self.forget_places()
-            if status == outcomes.FAILURE and self.is_kept_after_failure:
+            if status == FAILURE and self.is_kept_after_failure:
                 self.engine.places.kept.add(self)
         return status
 
