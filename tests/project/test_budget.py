@@ -61,10 +61,10 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 81_885,
+    "lines of code": 81_886,
     "files": 691,
     "files of 1 to 30 lines of code": 61,
-    "lines of imports": 8_338,
+    "lines of imports": 8_339,
     "packages at the top": 12,
     "modules at the top": 0,
     "kB of schemas": 297,

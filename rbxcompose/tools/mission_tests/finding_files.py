@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import stat
 from collections.abc import Iterable
 from pathlib import Path
@@ -26,7 +27,7 @@ def tests_of(paths: Iterable[Path]) -> list[Path]:
 
 
 def _is_odd(path: Path) -> bool:
-    """Return whether a name is that of a test, but leads to a pipe, a device or nothing that can be examined.
+    """Return whether a name is that of a test, but leads to a pipe, a device or nothing that can be read.
 
     Hidden ones are left out: editors mark open files by links to nowhere.
     """
@@ -36,7 +37,7 @@ def _is_odd(path: Path) -> bool:
         mode = path.stat().st_mode
     except OSError:  # such as a link to itself
         return path.is_symlink()
-    return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
+    return not ((stat.S_ISREG(mode) and os.access(path, os.R_OK)) or stat.S_ISDIR(mode))
 
 
 def is_test(path: Path) -> bool:
