@@ -42,6 +42,7 @@ docs: $(VENV)/.test  ## Write the generated pages, tables and schemas, and the p
 	$(BIN)/python -m benchmarks.misconfig --write
 	$(BIN)/python docs/draw_patrol.py
 	$(BIN)/python docs/draw_screens.py
+	$(BIN)/python docs/draw_robots.py
 	$(BIN)/python -m rbxcompose.compiler.schema.documents schemas
 
 messages: $(VENV)/.test  ## Write the stubs of message classes, for mypy and editors, from the interface texts

@@ -14,18 +14,21 @@ from rbxcompose.commands.console import FINDINGS, emit, refuse, write_report
 from rbxcompose.commands.layout import NotDrawnError
 from rbxcompose.commands.targets import add_layer_options, add_path_argument, layers_of, robot_path
 from rbxcompose.compiler.compile import compile_robot
-from rbxcompose.tools.inspection.diagram import diagram_of, dot, mermaid
+from rbxcompose.tools.inspection.diagram import MANY, diagram_of, dot, folded, mermaid
 from rbxcompose.tools.inspection.graph_html import html
 
 USAGE = 2
-FORMATS = {"mermaid": mermaid, "dot": dot, "html": html}
+TEXTS = {"mermaid": mermaid, "dot": dot}
+HTML = "html"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_path_argument(parser)
     add_layer_options(parser)
-    parser.add_argument("--format", choices=list(FORMATS), default="mermaid", help="output format")
+    words = f"draw every mission and every open wire, also if there are more than {MANY} that are alike"
+    parser.add_argument("--all", action="store_true", help=words)
+    parser.add_argument("--format", choices=[*TEXTS, HTML], default="mermaid", help="output format")
     parser.add_argument("--out", metavar="FILE", help="write it to this file")
 
 
@@ -38,7 +41,9 @@ def run(arguments: argparse.Namespace) -> int:
     write_report(compilation.report, compilation.sources)
     if compilation.robot is not None:
         try:
-            text = FORMATS[arguments.format](diagram_of(compilation.robot))
+            whole = diagram_of(compilation.robot)
+            drawn = whole if arguments.all else folded(whole)
+            text = html(drawn, whole) if arguments.format == HTML else TEXTS[arguments.format](drawn)
         except NotDrawnError as error:
             return refuse(error.finding)
         if arguments.out is None:
