@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Literal
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.findings import Finding, Related, Span, kind
+from rbxcompose.base.findings import Finding, Related, Span, kind, once
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.base.printable import plain
 from rbxcompose.domains.body.files import PACKAGE, BodyFile, ReadFile, mesh_mistakes, read_files
@@ -263,6 +263,14 @@ def describe(
     if findings := [one for one in read if isinstance(one, Finding)]:
         return None, findings
     files = [one for one in read if isinstance(one, ReadFile)]
+    return _described(name, home, tuple(parts), tuple(files), covers_visuals)
+
+
+@once  # a profile rarely changes the body
+def _described(
+    name: str, home: Path, parts: tuple[BodyPart, ...], files: tuple[ReadFile, ...], covers_visuals: bool
+) -> tuple[Description | None, list[Finding]]:
+    """Return what `describe` does, of the files of its parts as they were read."""
     notes = [note for one in files for note in one.notes]
     meshes = [part.file.meshes(one.root) for part, one in zip(parts, files, strict=True)]
     respelt = {
