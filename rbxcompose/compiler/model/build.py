@@ -124,7 +124,7 @@ def build_robot(
     }
     robot = Robot(manifest, components, values, skills, missions.read, missions.unread, topics, services, outside)
     if manifest.missions:
-        components[MISSION] = mission_component(robot)
+        return replace(robot, components={**components, MISSION: mission_component(robot)})
     return robot
 
 
