@@ -32,6 +32,7 @@ class _Sample:
 
 _Fields = Sequence[dataclasses.Field[Any]]
 _MISSING = dataclasses.MISSING
+_standard: Any = dataclasses.dataclass  # also while `dataclasses` lends its name to ours
 _SAMPLE: Any = _Sample  # for what only the standard library can make
 _FIELD_TYPE = _SAMPLE.__dataclass_fields__["field"]._field_type
 
@@ -40,7 +41,7 @@ def _made(
     cls: type, *, frozen: bool = False, slots: bool = False, eq: bool = True, kw_only: bool = False, **others: Any
 ) -> type:
     if others:
-        return dataclasses.dataclass(frozen=frozen, slots=slots, eq=eq, kw_only=kw_only, **others)(cls)
+        return _standard(frozen=frozen, slots=slots, eq=eq, kw_only=kw_only, **others)(cls)  # type: ignore[no-any-return]
     own = dict(vars(cls))
     declared = _fields(cls, kw_only)
     fields = tuple(declared.values())

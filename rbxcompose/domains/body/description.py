@@ -17,7 +17,7 @@ from rbxcompose.domains.body.link_pairs import CollisionMatrix
 from rbxcompose.domains.body.lint import lint, orientations
 from rbxcompose.domains.body.model import Body, BodyJoint, BodyLink
 from rbxcompose.domains.body.urdf import read_body
-from rbxcompose.domains.body.xml_reader import XmlElement, read_urdf
+from rbxcompose.domains.body.xml_reader import XmlElement, escaped, quoted, read_urdf
 from rbxcompose.manifest.fields import PieceAttachment
 
 NOT_ATTACHED = kind("RBX2016", is_fixable=True)
@@ -138,10 +138,8 @@ def to_xml(root: XmlElement) -> str:
 
 
 def _lines(element: XmlElement, indent: str) -> Iterator[str]:
-    from xml.sax.saxutils import escape, quoteattr  # imports much of the network's modules; most bodies are one text
-
-    attributes = "".join(f" {name}={quoteattr(value)}" for name, value in element.attributes.items())
-    text = escape(element.text.strip())
+    attributes = "".join(f" {name}={quoted(value)}" for name, value in element.attributes.items())
+    text = escaped(element.text.strip())
     if not element.children:
         yield f"{indent}<{element.name}{attributes}{f'>{text}</{element.name}>' if text else '/>'}"
         return
