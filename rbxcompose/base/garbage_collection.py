@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 _USUAL = gc.get_threshold()
-_NEW_OBJECTS = 150_000  # some 30 MB
+_NEW_OBJECTS = 300_000  # some 60 MB
 
 
 def collect_rarely() -> None:

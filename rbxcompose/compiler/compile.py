@@ -10,6 +10,7 @@ from types import MappingProxyType
 from rbxcompose.base.config import Config
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Related, Report, Severity, Span, kind, one_compile
+from rbxcompose.base.garbage_collection import paused_collection
 from rbxcompose.compiler.check_runner import run_checks
 from rbxcompose.compiler.composition.overlay import SET
 from rbxcompose.compiler.composition.robot_file import load_robot
@@ -39,6 +40,7 @@ class Compilation:
 
 
 @one_compile()
+@paused_collection()
 def compile_robot(
     path: str,
     *,
