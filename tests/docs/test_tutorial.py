@@ -72,7 +72,7 @@ class Reader:
         assert codes == ([block.wrong] if block.wrong else []), str(block)
 
 
-@pytest.mark.timeout(120)
+@pytest.mark.timeout(300)
 def test_who_follows_the_page_sees_what_it_tells(tmp_path: Path) -> None:
     reader = Reader(tmp_path)
     for block in BLOCKS:
