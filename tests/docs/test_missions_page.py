@@ -97,7 +97,7 @@ class Reader:
             self.lent = ""
 
 
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(250)
 def test_who_follows_it_sees_what_it_tells(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
