@@ -19,15 +19,24 @@ from hypothesis import HealthCheck, settings
 from xdist.scheduler import LoadScopeScheduling
 
 from rbxcompose.testing.golden import Golden
-from tests.side_by_side import REAL_TIME, scope_of, turn_of
+from tests.side_by_side import OTHERS, group_of, scope_of, turn_of
 from tests.soak import Soak
 
 ROOT = Path(__file__).parents[1]
 
 
+LONGEST = 180.0  # [s] of a test of real processes, on a busy machine
 CACHES = "RBXCOMPOSE_TEST_CACHES"
 WITH_ARMS = tuple(
-    f"tests/{start}" for start in ("cli/test_arm", "components/", "interop/", "motion/", "robots/", "testing/")
+    f"tests/{start}"
+    for start in (
+        "cli/test_arm",
+        *(f"components/test_{start}" for start in ("arm", "cloud", "con", "fail", "head", "move", "pick", "s")),
+        "interop/",
+        "motion/",
+        "robots/",
+        "testing/",
+    )
 )
 
 
@@ -62,10 +71,18 @@ def pytest_collection_finish(session: pytest.Session) -> None:
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
-    """Wait for what is compiled outside of the time that a test has."""
+    """Wait for what is compiled outside of the time that a test has; leave those of real time the processors."""
+    if "PYTEST_XDIST_WORKER" in os.environ and not group_of(item.nodeid):
+        be_nice()
     if item.nodeid.startswith(WITH_ARMS):
         compile_for_arms()
     return (yield)
+
+
+@cache
+def be_nice() -> None:
+    """Let the tests of other workers go first."""
+    os.nice(OTHERS)
 
 
 @cache
@@ -87,13 +104,21 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         items[:] = [item for item in items if item not in set(rare)]
     items.sort(key=lambda item: turn_of(item.nodeid))
     for item in items:
-        if item.nodeid.startswith(REAL_TIME):
+        if group_of(item.nodeid):
             item.add_marker(pytest.mark.flaky(reruns=2))
+            if not item.get_closest_marker("timeout"):
+                item.add_marker(pytest.mark.timeout(LONGEST))  # what must be quick is asserted by the test itself
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--update-golden", action="store_true", help="write golden files")
     parser.addoption("--soak", action="store_true", help="try many more random examples, and keep the figures")
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int:
+    """Return how many workers `-n auto` starts: another beside each processor, since two of them mostly wait."""
+    return (os.cpu_count() or 1) + 1
 
 
 @pytest.hookimpl(optionalhook=True)

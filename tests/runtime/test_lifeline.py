@@ -28,7 +28,7 @@ from rbxcompose.sdk.bound import Reply
 from rbxcompose.sdk.ports import Qos
 
 ROBOT = "toys"
-PATIENCE = 10.0  # [s]
+PATIENCE = 60.0  # [s]
 
 
 # The decision
