@@ -19,7 +19,7 @@ from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.groups import ArmGroup, ArmJoint, JointSpace, interpolated
 from rbxcompose.domains.arms.motion.hand_task import PlanningHelper
 from rbxcompose.domains.arms.motion.inverse_kinematics import ANGLE_TOLERANCE, RESTARTS, TOLERANCE, SolverSettings
-from rbxcompose.domains.arms.motion.numba_cache import is_installed
+from rbxcompose.domains.arms.motion.numba_cache import is_installed, keep_libraries
 from rbxcompose.domains.arms.motion.planner import MotionPlanner, PlannerSettings
 from rbxcompose.domains.arms.motion.scene import PairDistance, PlacedObject
 from rbxcompose.domains.arms.motion.second_checker import SecondChecker
@@ -219,6 +219,7 @@ class ArmWorks:
         self.planner = MotionPlanner(self.space, self._fast(self._checker), settings, now, unlikely)
         if isinstance(self.planner.checker, collisions.SearchingChecker):
             self.planner.checker.prepare(self.space)
+        keep_libraries()
 
     def place_objects(
         self, objects: Iterable[PlacedObject], paddings: Mapping[str, float] = MappingProxyType({})
