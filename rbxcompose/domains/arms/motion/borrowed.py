@@ -18,7 +18,7 @@ def _typed(_: Numba) -> Callable[[Numba], Numba]:
     return lambda value: value
 
 
-@lower_builtin(borrowed, types.Any)
+@lower_builtin(borrowed, types.Any)  # type: ignore[no-untyped-call, untyped-decorator]
 def _code(context: Numba, builder: Numba, signature: Numba, given: Numba) -> Numba:
     return _without_owner(context, builder, signature.args[0], given[0])
 

@@ -7,9 +7,9 @@ there, the number of its entries, the size of one [B], its address, its shape an
 from __future__ import annotations
 
 import ctypes
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
-from struct import pack
+from struct import Struct, pack
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,8 @@ ENTRY, KINDS = "entry", "kinds"  # what a library exports: the function, and the
 FAILED = -(1 << 63)  # instead of an answer: there was no memory
 WHOLE, REAL, OTHER = "i", "f", "?"
 """Kinds of values; of an array, they are its type and dimensions."""
+_DATA = object.__basicsize__  # where an array has its address, as numpy's C API declares it
+_PACKERS = [Struct(f"{5 + 2 * dimensions}q").pack for dimensions in range(4)]
 MOST_TUPLES = 8  # whose blocks are kept: a model and its workspace are passed again and again
 
 
@@ -59,20 +61,18 @@ class _Held:
 
 def flat(value: Any) -> tuple[str, bytes]:
     """Return the kinds of the numbers that a value consists of, and these as a block."""
-    match value:
-        case tuple():
-            return _flat_tuple(_Held(value))
-        case np.ndarray():
-            if not (value.flags.c_contiguous and value.flags.aligned):
-                return OTHER, b""
-            numbers = (0, 0, value.size, value.itemsize, value.ctypes.data, *value.shape, *value.strides)
-            return array_kind(value.dtype, value.ndim), pack(f"{len(numbers)}q", *numbers)
-        case float():
-            return REAL, pack("d", value)
-        case bool():
+    if isinstance(value, tuple):
+        return _flat_tuple(_Held(value))
+    if isinstance(value, np.ndarray):
+        if not (value.flags.c_contiguous and value.flags.aligned) or value.ndim >= len(_PACKERS):
             return OTHER, b""
-        case int() | np.integer():
-            return WHOLE, pack("q", value)
+        address = ctypes.c_int64.from_address(id(value) + _DATA).value  # `value.ctypes.data` takes four times as long
+        numbers = (0, 0, value.size, value.itemsize, address, *value.shape, *value.strides)
+        return array_kind(value.dtype, value.ndim), _PACKERS[value.ndim](*numbers)
+    if isinstance(value, float):
+        return REAL, pack("d", value)
+    if isinstance(value, int | np.integer) and not isinstance(value, bool):
+        return WHOLE, pack("q", value)
     return OTHER, b""
 
 
@@ -82,6 +82,7 @@ def _flat_tuple(held: _Held) -> tuple[str, bytes]:
     return "".join(kinds for kinds, _ in parts), b"".join(block for _, block in parts)
 
 
+@cache
 def array_kind(dtype: np.dtype[Any], dimensions: int) -> str:
     """Return the kind of an array whose entries follow each other."""
     return f"{dtype.str}{dimensions}"

@@ -13,7 +13,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from llvmlite import binding
+from llvmlite import binding  # type: ignore[import-untyped]
 from numba import types
 from numba.core.codegen import get_host_cpu_features
 from numba.np.numpy_support import as_dtype
@@ -76,9 +76,9 @@ def _object(made: Numba, kinds: str) -> bytes:
     entry = binding.parse_assembly(_entry(module.get_function(made.fndesc.llvm_func_name), kinds) + _RUNTIME)
     entry.triple, entry.data_layout = module.triple, module.data_layout
     module.link_in(entry)
-    machine = binding.Target.from_triple(module.triple).create_target_machine(
-        binding.get_host_cpu_name(), get_host_cpu_features(), opt=3, reloc="pic"
-    )
+    features = get_host_cpu_features()  # type: ignore[no-untyped-call]
+    target = binding.Target.from_triple(module.triple)
+    machine = target.create_target_machine(binding.get_host_cpu_name(), features, opt=3, reloc="pic")
     passes = binding.create_new_module_pass_manager()
     passes.add_global_dead_code_eliminate_pass()  # what Python would call
     passes.run(module, binding.create_pass_builder(machine, binding.create_pipeline_tuning_options()))
