@@ -71,12 +71,14 @@ def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object
 @cache
 def compile_for_arms(flags: int = 0) -> None:
     """Compile what arms need, or take it from the worker that has."""
+    from rbxcompose.domains.arms.motion.numba_cache import keep_libraries
     from tests.motion.toy_arm import fast_planner, kinematics
 
     with open(Path(os.environ[CACHES], "compiling"), "w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX | flags)
         kinematics().hasten()
         fast_planner()
+        keep_libraries()
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

@@ -13,9 +13,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from llvmlite import binding  # type: ignore[import-untyped]
+from llvmlite import binding
 from numba import types
 from numba.core.codegen import get_host_cpu_features
+from numba.core.runtime.nrtdynmod import _meminfo_struct_type
 from numba.np.numpy_support import as_dtype
 
 from rbxcompose.domains.arms.motion.library import ENTRY, FAILED, KINDS, OTHER, REAL, WHOLE, array_kind
@@ -49,11 +50,15 @@ define void @NRT_MemInfo_call_dtor(ptr %info) {
   ret void
 }
 """
-"""Memory with a count of references in front of it [40 B], as numba 0.68 lays it out."""
+"""Memory with a count of references in front of it [40 B]."""
+_COUNTED = "{i64, i8*, i8*, i8*, i64}"
+"""How numba lays that out."""
 
 
 def write_library(dispatcher: Numba, path: Path) -> None:
     """Write a function as a library, unless what it takes or returns cannot be passed, or the linker fails."""
+    if str(_meminfo_struct_type) != _COUNTED:
+        return
     for made in dispatcher.overloads.values():
         kinds = "".join(map(_kinds, made.signature.args))
         if OTHER not in kinds and made.signature.return_type == types.int64:
