@@ -36,11 +36,7 @@ def rows() -> list[Row]:
     description = box.manifest.contents.of(body) if box else None
     if description is None:
         raise ValueError("robots/box_robot has no body")
-    return [
-        *_kinematics("box_robot", description),
-        *_kinematics("an arm of 7 joints", _arm()),
-        *_checks(),
-    ]
+    return [*_kinematics("box_robot", description), *_kinematics("an arm of 7 joints", _arm()), *_checks()]
 
 
 def _arm() -> Description:

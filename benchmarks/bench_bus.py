@@ -35,11 +35,7 @@ class End:
         mine, theirs = socket.socketpair()
         with theirs:
             self._process = subprocess.Popen(
-                command,
-                stdin=theirs.fileno(),
-                stdout=theirs.fileno(),
-                cwd=ROOT,
-                env={**os.environ, **environment},
+                command, stdin=theirs.fileno(), stdout=theirs.fileno(), cwd=ROOT, env={**os.environ, **environment}
             )
         self._lines = mine.makefile("rw", encoding="utf-8", newline="\n")
         mine.close()  # the file is what is left open

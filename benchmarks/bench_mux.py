@@ -18,10 +18,7 @@ def rows() -> list[Row]:
 
 
 def _robot() -> Bench:
-    inputs = {
-        "teleop": {"priority": 100, "timeout": TIMEOUT},
-        "navigation": {"priority": 10, "timeout": TIMEOUT},
-    }
+    inputs = {"teleop": {"priority": 100, "timeout": TIMEOUT}, "navigation": {"priority": 10, "timeout": TIMEOUT}}
     return Bench(instance("cmd_vel", "mux", {"output": "cmd_vel", "inputs": inputs}))
 
 

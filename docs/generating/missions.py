@@ -64,11 +64,7 @@ def of_kind(kind: StepType) -> str:
     others = [(code(option.key), takes(option) + absent[option.is_required], option.help) for option in kind.options()]
     rows = [(code(kind.name), takes(kind.fields[kind.name]), ""), *others]
     return "\n".join(
-        [
-            f"### {code(kind.name)}\n{about(kind)}\n",
-            table(_HEAD, rows),
-            example(example_of(kind), "yaml mission"),
-        ]
+        [f"### {code(kind.name)}\n{about(kind)}\n", table(_HEAD, rows), example(example_of(kind), "yaml mission")]
     )
 
 

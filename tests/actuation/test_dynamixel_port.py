@@ -139,8 +139,7 @@ def test_a_second_program_is_refused(line: Line) -> None:
 
 
 @pytest.mark.parametrize(
-    ("path", "error", "code"),
-    [("/dev/nothing-here", NoPortError, "RBX2201"), ("/dev/null", UnfitPortError, "RBX2204")],
+    ("path", "error", "code"), [("/dev/nothing-here", NoPortError, "RBX2201"), ("/dev/null", UnfitPortError, "RBX2204")]
 )
 def test_what_cannot_be_opened_is_told_with_its_cause(path: str, error: type[PortError], code: str) -> None:
     with pytest.raises(error) as caught:

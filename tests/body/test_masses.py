@@ -68,10 +68,7 @@ WRONG = {
         {"arm": inertial(1.0, 1, 2, 3.1)},
         "RBX2010 link 'arm' has a moment of inertia larger than the two others together: izz = 3.1, ixx + iyy = 3",
     ),
-    "a point": (
-        {"arm": inertial(1.0)},
-        "RBX2010 link 'arm' has a mass and no moment of inertia about an axis",
-    ),
+    "a point": ({"arm": inertial(1.0)}, "RBX2010 link 'arm' has a mass and no moment of inertia about an axis"),
     "points in a line": (
         {"arm": inertial(1.0), "hand": inertial(1.0, at="1 2 0")},
         "RBX2010 link 'arm' and what is fixed to it have a mass and no moment of inertia about an axis",

@@ -88,9 +88,7 @@ def mapped(pid: int) -> set[Path]:
 
 
 @pytest.mark.skipif(problem() != "", reason="needs shared memory")
-def test_pictures_come_whole_from_another_process_and_nothing_is_left_of_it_when_it_is_killed(
-    network: Network,
-) -> None:
+def test_pictures_come_whole_from_another_process_and_nothing_is_left_of_it_when_it_is_killed(network: Network) -> None:
     got: dict[int, ParameterValue] = {}
 
     def take(parameter_value: ParameterValue) -> None:

@@ -77,12 +77,7 @@ def test_it_ends_when_the_camera_looks_at_an_object(parts: dict[str, Instance]) 
         (LookAtPoint.Goal(x=1.0, frame="map"), {"frames": ("map",)}, "unknown_scene", "map"),
         (LookAtPoint.Goal(x=-5.0, z=0.8), {}, "goal_out_of_reach", "deg past it, more than 1.0 deg: 'head_pan_joint'"),
         (LookAtPoint.Goal(frame="camera_depth_frame"), {}, "goal_out_of_reach", "the point is within the camera"),
-        (
-            LookAtPoint.Goal(object="box1"),
-            {"scene": None},
-            "unknown_scene",
-            "no planning scene has been received",
-        ),
+        (LookAtPoint.Goal(object="box1"), {"scene": None}, "unknown_scene", "no planning scene has been received"),
         (LookAtPoint.Goal(object="box1"), {"sees_scene": False}, "unknown_scene", "this robot has no scene"),
         (
             LookAtPoint.Goal(x=1.0),

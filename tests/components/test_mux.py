@@ -12,10 +12,7 @@ SLOW, FAST, ZERO = Twist(linear=Vector3(x=0.1)), Twist(linear=Vector3(x=0.4)), T
 
 
 def bench() -> Bench:
-    inputs = {
-        "teleop": {"priority": 100, "timeout": "0.5 s"},
-        "navigation": {"priority": 10, "timeout": "0.5 s"},
-    }
+    inputs = {"teleop": {"priority": 100, "timeout": "0.5 s"}, "navigation": {"priority": 10, "timeout": "0.5 s"}}
     return Bench(instance("cmd_vel", "mux", {"output": "cmd_vel", "inputs": inputs}))
 
 

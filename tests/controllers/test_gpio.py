@@ -119,12 +119,7 @@ def test_a_stop_leaves_outputs_as_they_are_and_refuses_changes() -> None:
 
 @pytest.mark.parametrize(
     ("settings", "field"),
-    [
-        (LAMP, ""),
-        (RANGE, ""),
-        (PUMP | {"input": "pull_up"}, "input"),
-        (HEAT | {"input": "analog"}, "input"),
-    ],
+    [(LAMP, ""), (RANGE, ""), (PUMP | {"input": "pull_up"}, "input"), (HEAT | {"input": "analog"}, "input")],
 )
 def test_an_input_is_for_ports_that_are_read(settings: dict[str, Any], field: str) -> None:
     mistake = GpioController.mistake(GpioConfig.model_validate(settings))

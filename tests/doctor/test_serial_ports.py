@@ -38,11 +38,9 @@ def test_a_port_that_can_be_opened_is_fine(name: str, tmp_path: Path) -> None:
 
 def test_a_port_that_is_missing_is_told_with_those_that_are_there(tmp_path: Path) -> None:
     missing = PortFile(exists=False)
-    assert told(tmp_path, "/dev/ttyUSB7", missing) == [
-        ("RBX2201", "/dev/ttyUSB7 does not exist", f"connected: {SEEN}"),
-    ]
+    assert told(tmp_path, "/dev/ttyUSB7", missing) == [("RBX2201", "/dev/ttyUSB7 does not exist", f"connected: {SEEN}")]
     assert told(tmp_path, "/dev/ttyUSB7", missing, ()) == [
-        ("RBX2201", "/dev/ttyUSB7 does not exist", "no serial port is connected: plug the adapter in"),
+        ("RBX2201", "/dev/ttyUSB7 does not exist", "no serial port is connected: plug the adapter in")
     ]
 
 
@@ -59,9 +57,7 @@ def test_a_device_that_is_missing_or_there_twice_is_told(tmp_path: Path) -> None
         ("RBX2251", "the USB device 0403:6014 A7 is not connected", f"connected: {SEEN}")
     ]
     twice = "connected: /dev/ttyUSB1 (1a86:7523), /dev/ttyUSB2 (1a86:7523)"
-    assert told(tmp_path, "usb:1a86:7523", PortFile()) == [
-        ("RBX2252", "the USB device 1a86:7523 has 2 ports", twice),
-    ]
+    assert told(tmp_path, "usb:1a86:7523", PortFile()) == [("RBX2252", "the USB device 1a86:7523 has 2 ports", twice)]
     [(code, words, _)] = told(tmp_path, "dev:lidar=usb:0403:6014:A7", PortFile())
     assert (code, words) == ("RBX2251", "the device 'lidar' (0403:6014 A7) is not connected")
 

@@ -27,11 +27,7 @@ class GripEnd(Message):
     force: float = 0.0  # [N]
 
 
-ENDS = {
-    0.0: GripEnd(outcome="empty"),
-    0.1: GripEnd(message="too wide"),
-    0.2: GripEnd(outcome="slippery"),
-}
+ENDS = {0.0: GripEnd(outcome="empty"), 0.1: GripEnd(message="too wide"), 0.2: GripEnd(outcome="slippery")}
 """Ends by the width of the order [m]; all others succeed."""
 
 

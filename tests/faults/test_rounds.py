@@ -34,11 +34,7 @@ def test_what_died_or_hung_comes_back_and_the_mission_succeeds(tmp_path: Path) -
 
 
 @pytest.mark.timeout(60)
-@pytest.mark.parametrize(
-    "fault",
-    [Fault(WORLD, signal.SIGSTOP), *rare(Fault(PARENT, signal.SIGSTOP))],
-    ids=str,
-)
+@pytest.mark.parametrize("fault", [Fault(WORLD, signal.SIGSTOP), *rare(Fault(PARENT, signal.SIGSTOP))], ids=str)
 def test_without_what_cannot_come_back_the_robot_comes_to_rest_and_ends(fault: Fault, tmp_path: Path) -> None:
     findings = Findings()
     rounds(tmp_path, [fault], findings, count())

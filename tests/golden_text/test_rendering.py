@@ -140,15 +140,7 @@ def test_json_holds_everything() -> None:
                 "title": "'two' -> 'one'",
                 "is_safe": True,
                 "edits": [
-                    {
-                        "file": "f",
-                        "line": 1,
-                        "column": 2,
-                        "end_line": 1,
-                        "end_column": 5,
-                        "old": "two",
-                        "text": "one",
-                    }
+                    {"file": "f", "line": 1, "column": 2, "end_line": 1, "end_column": 5, "old": "two", "text": "one"}
                 ],
             },
         }

@@ -136,11 +136,7 @@ PROJECTS: dict[str, Project] = {
     "doubling parts": Project("RBX1103", doubling(14)),
     "600 parts": Project("RBX1103", many(600, BATTERY)),
     "many large parts": Project("RBX1103", many(6, "about: x\n" + "# x\n" * 450_000)),
-    "a pipe as a mission": Project(
-        "RBX1301",
-        named("../../missions/bad.yaml"),
-        pipe,
-    ),
+    "a pipe as a mission": Project("RBX1301", named("../../missions/bad.yaml"), pipe),
     "a part behind a link that leads out": Project(
         "RBX1306", robot(included("../../parts/p.yaml")), linked("/etc/hostname", "parts/p.yaml")
     ),
@@ -245,11 +241,7 @@ PROJECTS: dict[str, Project] = {
         ),
     ),
     "3,000 branches that need the base": Project(
-        "RBX4152",
-        {
-            **mission("do:\n  parallel:\n" + "    - go_to: home\n" * 3_000),
-            **robot(DRIVING),
-        },
+        "RBX4152", {**mission("do:\n  parallel:\n" + "    - go_to: home\n" * 3_000), **robot(DRIVING)}
     ),
     "10,000 states": Project("RBX1103", mission(states(10_000))),
     "900 states in a row": Project("RBX4102", mission(states(900, "fly"))),
@@ -361,10 +353,7 @@ PROJECTS: dict[str, Project] = {
         "RBX1103", mission("data:\n  a: [" + "[1, 2, 3, 4]," * 10_000 + "]\ndo: [{log: $a}]\n")
     ),
     "an input of 20,000 values": Project(
-        "RBX1103",
-        robot(
-            "missions: {work: {file: ../../missions/work.yaml, with: {a: [" + "1," * 20_000 + "]}}}\n",
-        ),
+        "RBX1103", robot("missions: {work: {file: ../../missions/work.yaml, with: {a: [" + "1," * 20_000 + "]}}}\n")
     ),
     # Names
     "1,000 names that are nearly right": Project("RBX3005", robot(strangers(1000))),

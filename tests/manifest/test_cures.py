@@ -80,11 +80,7 @@ CURES = [
     (GO_TO, f"{GO_TO}    profiles: [home]\n", "a section of the file: 'profiles: {NAME: {components: {...}}}'"),
     ("places:", "bus: {use_sim_time: true}\nplaces:", "write 'clock: external' below 'bus'"),
     ("places:", "ros2_control: {}\nplaces:", "'actuators', 'joints' and 'controllers'"),
-    (
-        "missions:",
-        "profiles: [home]\nmissions:",
-        "below: 'home:' instead of '[home]'",
-    ),
+    ("missions:", "profiles: [home]\nmissions:", "below: 'home:' instead of '[home]'"),
     (
         "missions:",
         "values: {level: battery/battery_level}\nmissions:",

@@ -125,10 +125,7 @@ def test_in_a_mission_dollar_names_stay_for_later() -> None:
 
 def test_braces_round_what_is_known_only_later_are_a_finding_with_the_fix() -> None:
     _, (finding,) = filled("${battery} < 30 %", runs=True)
-    assert (finding.code, finding.help) == (
-        "RBX1202",
-        "what is known while the robot runs is written '$battery'",
-    )
+    assert (finding.code, finding.help) == ("RBX1202", "what is known while the robot runs is written '$battery'")
 
 
 def test_a_part_of_an_escaped_text_is_shown_by_the_whole_text() -> None:

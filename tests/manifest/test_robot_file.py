@@ -113,16 +113,7 @@ def test_all_mistakes_are_found_in_one_run_by_place(bench: Bench) -> None:
         ("missions/patrol.yaml", "missions/patrl.yaml"),
     )
     assert robot
-    assert bench.codes == [
-        "RBX1003",
-        "RBX1003",
-        "RBX3004",
-        "RBX1202",
-        "RBX1004",
-        "RBX1001",
-        "RBX1001",
-        "RBX1301",
-    ]
+    assert bench.codes == ["RBX1003", "RBX1003", "RBX3004", "RBX1202", "RBX1004", "RBX1001", "RBX1001", "RBX1301"]
 
 
 def test_a_component_with_mistakes_stays_as_far_as_it_could_be_read(bench: Bench) -> None:

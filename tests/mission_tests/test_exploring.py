@@ -62,10 +62,7 @@ def explored(text: str, limits: ExplorationLimits = ALL) -> Explored:
 
 def test_each_end_comes_with_the_shortest_way() -> None:
     out = explored("do:\n  - a\n  - fallback:\n      - b\n      - c\n")
-    assert out.ends == {
-        "success": ("a succeeds", "b succeeds"),
-        "failure": ("a fails",),
-    }
+    assert out.ends == {"success": ("a succeeds", "b succeeds"), "failure": ("a fails",)}
     assert not out.found
     assert not out.is_cut
 

@@ -77,11 +77,7 @@ OUTCOMES = st.lists(st.sampled_from(("", "person", "empty", "ghost")), max_size=
 def _lists(nodes: st.SearchStrategy[Node]) -> st.SearchStrategy[Node]:
     options = st.fixed_dictionaries(
         {},
-        optional={
-            "reactive": st.just(True),
-            "history": st.sampled_from(("last", "deep")),
-            "order": st.just("random"),
-        },
+        optional={"reactive": st.just(True), "history": st.sampled_from(("last", "deep")), "order": st.just("random")},
     )
     kinds = st.sampled_from(("sequence", "fallback"))
     return st.builds(

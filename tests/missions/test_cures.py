@@ -76,10 +76,7 @@ CURES = [
     ),
     ("inputs: {room: {type: place}}\ndo: {go_to: '{room}'}", ["write '$room'"]),
     ("do: [{recharge: {}, save: got}, {check: $got.failed == 0}]", ["entries: "]),
-    (
-        "do: {yard/dust: dock}",
-        ["a robot 'yard' of the system must share 'dust', and name this robot below 'callers'"],
-    ),
+    ("do: {yard/dust: dock}", ["a robot 'yard' of the system must share 'dust', and name this robot below 'callers'"]),
     (
         "do: [{parallel: {a: recharge, b: {repeat: forever, do: {wait: 1 s}}}, ends_with: b}, recharge]",
         ["name the branch that ends"],

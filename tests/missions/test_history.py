@@ -78,8 +78,7 @@ machine:
 
 
 @pytest.mark.parametrize(
-    ("history", "again"),
-    [("none", ["3.5 a", "4.5 b", "5.5 c"]), ("last", ["3.5 b", "4.5 c"]), ("deep", ["3.5 c"])],
+    ("history", "again"), [("none", ["3.5 a", "4.5 b", "5.5 c"]), ("last", ["3.5 b", "4.5 c"]), ("deep", ["3.5 c"])]
 )
 def test_a_machine_starts_again_in_its_state_and_a_deep_one_also_inside_of_it(history: str, again: list[str]) -> None:
     simulated = tour(MACHINE.format(history), at=2.5)
@@ -131,8 +130,7 @@ def test_a_place_is_forgotten_at_each_new_item_of_a_loop_around_it() -> None:
 
 
 @pytest.mark.parametrize(
-    ("history", "again"),
-    [("last", ["2.5 a", "3.5 b", "4.5 a", "5.5 b"]), ("deep", ["2.5 b", "3.5 a", "4.5 b"])],
+    ("history", "again"), [("last", ["2.5 a", "3.5 b", "4.5 a", "5.5 b"]), ("deep", ["2.5 b", "3.5 a", "4.5 b"])]
 )
 def test_a_deep_one_keeps_the_rounds_of_loops(history: str, again: list[str]) -> None:
     work = f"sequence:\n  - repeat: 2\n    do: [a, b]\nhistory: {history}"

@@ -175,11 +175,7 @@ machine:
 
 @pytest.mark.parametrize(
     ("outcome", "opens", "failing", "end"),
-    [
-        ("", False, False, "success"),
-        ("person", False, False, "success"),
-        ("", True, False, "end_opened"),
-    ],
+    [("", False, False, "success"), ("person", False, False, "success"), ("", True, False, "end_opened")],
 )
 def test_the_first_condition_over_the_results_that_holds_is_the_outcome(
     outcome: str, opens: bool, failing: bool, end: str

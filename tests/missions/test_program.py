@@ -22,10 +22,7 @@ def test_the_patrol_is_a_flat_tuple_of_nodes_in_the_order_of_the_text() -> None:
     ]
     assert {
         name: (input_.type, input_.default and input_.default.value) for name, input_ in program.inputs.items()
-    } == {
-        "rounds": (TYPES["count"], 2.0),
-        "low": (TYPES["ratio"], 0.5),
-    }
+    } == {"rounds": (TYPES["count"], 2.0), "low": (TYPES["ratio"], 0.5)}
     assert [interrupt.name for interrupt in program.interrupts] == ["battery_low"]
     assert program.reads == {"rounds", "corner", "battery", "low"}
 

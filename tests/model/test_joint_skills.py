@@ -96,11 +96,7 @@ def test_it_is_listed_with_an_example(tmp_path: Path, capsys: pytest.CaptureFixt
     [head] = [entry for entry in told(capsys, "mission", "skills", str(tmp_path), "--json") if entry["name"] == "head"]
     assert [
         (argument["name"], argument["type"], argument["needed"], argument["main"]) for argument in head["arguments"]
-    ] == [
-        ("lift", "a length", False, False),
-        ("pan", "an angle", False, False),
-        ("duration", "a time", False, False),
-    ]
+    ] == [("lift", "a length", False, False), ("pan", "an angle", False, False), ("duration", "a time", False, False)]
     command.main(["mission", "skills", str(tmp_path)])
     assert "- head: {lift: 0.5 m}\n" in capsys.readouterr().out
 

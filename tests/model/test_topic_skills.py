@@ -103,8 +103,7 @@ def test_the_fields_of_a_message_are_the_arguments_and_those_of_the_end_the_resu
 
 
 @pytest.mark.parametrize(
-    ("message", "main", "is_needed"),
-    [(PoseStamped, "pose", True), (Twist, "", False), (String, "data", False)],
+    ("message", "main", "is_needed"), [(PoseStamped, "pose", True), (Twist, "", False), (String, "data", False)]
 )
 def test_a_pose_that_is_the_main_argument_has_to_be_given(message: type, main: str, is_needed: bool) -> None:
     skill = topic_skill(message, "one")

@@ -80,14 +80,8 @@ def test_links_are_told_in_the_order_in_which_they_were_asked_for() -> None:
         ({"group_name": "leg"}, MoveItErrorCodes.INVALID_GROUP_NAME),
         ({"ik_link_name": "fore"}, MoveItErrorCodes.INVALID_LINK_NAME),
         ({"pose_stamped": PoseStamped(header=Header(frame_id="moon"))}, MoveItErrorCodes.FRAME_TRANSFORM_FAILURE),
-        (
-            {"pose_stamped": at(9.0)},
-            MoveItErrorCodes.NO_IK_SOLUTION,
-        ),
-        (
-            {"pose_stamped": at(math.nan)},
-            MoveItErrorCodes.NO_IK_SOLUTION,
-        ),
+        ({"pose_stamped": at(9.0)}, MoveItErrorCodes.NO_IK_SOLUTION),
+        ({"pose_stamped": at(math.nan)}, MoveItErrorCodes.NO_IK_SOLUTION),
         ({"robot_state": state(knee=0.0)}, MoveItErrorCodes.INVALID_ROBOT_STATE),
         ({"robot_state": state(turn=math.nan)}, MoveItErrorCodes.INVALID_ROBOT_STATE),
         (

@@ -80,11 +80,7 @@ def test_a_part_may_not_lead_out_of_the_project(project: Project) -> None:
 
 
 MISTAKES = [
-    (
-        "spare: {part: ../../parts/battery.yaml, with: {runtme: 9 s}}",
-        "RBX1001",
-        "part 'spare' has no argument",
-    ),
+    ("spare: {part: ../../parts/battery.yaml, with: {runtme: 9 s}}", "RBX1001", "part 'spare' has no argument"),
     ("spare: {part: ../../parts/battery.yaml, with: {runtime: 9 m}}", "RBX1003", "'runtime' must be a time"),
     ("spare: {part: ../../parts/needy.yaml}", "RBX1206", "part 'spare' needs a value for its argument 'port'"),
     ("spare: {part: ../../parts/battery.yaml, conect: {}}", "RBX1001", "unknown key 'conect'"),

@@ -58,11 +58,7 @@ def uses(finding: Finding) -> list[str]:
 
 @pytest.mark.parametrize(
     ("given", "code", "line"),
-    [
-        ("warn: 150 %", "RBX1005", 13),
-        ("restart: seldom", "RBX1004", 15),
-        ("dock: garage", "RBX1004", 18),
-    ],
+    [("warn: 150 %", "RBX1005", 13), ("restart: seldom", "RBX1004", 15), ("dock: garage", "RBX1004", 18)],
 )
 def test_a_value_of_with_is_told_there(project: Project, given: str, code: str, line: int) -> None:
     robot = f"{HEAD}include:\n  power:\n    part: ../../parts/power.yaml\n    with:\n      {given}\n"

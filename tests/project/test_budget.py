@@ -74,10 +74,7 @@ WHOLE = {
     "pages of findings in code": 0,
 }
 
-SKIPPED = {
-    *(tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT),
-    tokenize.ENDMARKER,
-}
+SKIPPED = {*(tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT), tokenize.ENDMARKER}
 ENDS = (tokenize.NEWLINE, tokenize.ENDMARKER)  # of a statement
 SMALL = 30  # [lines of code]
 PAGE = re.compile(r"\(\s*\"RBX\d{4}\",\s*(?:doc=)?\"\"\"")

@@ -225,10 +225,7 @@ def test_a_robot_whose_path_of_commands_has_failed_is_held() -> None:
     stage = Changed(with_never("mux", "go_to"))
     stage.exit("robot")
     assert stage.conductor.is_stopped
-    assert (
-        Level.ERROR,
-        "'mux' failed on the path of commands: all motion is held until 'release'",
-    ) in stage.records
+    assert (Level.ERROR, "'mux' failed on the path of commands: all motion is held until 'release'") in stage.records
 
 
 def test_what_has_failed_for_good_comes_back_with_the_next_change_and_nobody_waits_any_more() -> None:

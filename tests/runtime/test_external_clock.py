@@ -90,12 +90,7 @@ def test_the_driver_tells_when_time_stands_goes_and_jumps() -> None:
     quiet = PATIENCE + 0.2
     fed = Fed([(0.0, 5.0), (0.1, 5.1), (quiet, 5.1), (quiet + 0.1, 5.2), (quiet + 0.2, 1.0)])
     fed.run()
-    assert fed.turns == [
-        (0.1, Turn.GOES),
-        (quiet, Turn.STANDS),
-        (quiet + 0.1, Turn.GOES),
-        (quiet + 0.2, Turn.JUMPED),
-    ]
+    assert fed.turns == [(0.1, Turn.GOES), (quiet, Turn.STANDS), (quiet + 0.1, Turn.GOES), (quiet + 0.2, Turn.JUMPED)]
 
 
 @pytest.fixture

@@ -95,10 +95,7 @@ def bench() -> Bench:
 
 def test_a_component_tells_its_parameters(bench: Bench) -> None:
     listed = ask(bench, "/toy/list_parameters", rcl.ListParameters, rcl.ListParameters.Request())
-    assert listed.result.names == (
-        *("size", "weight", "name"),
-        *("gains.p", "gains.lean", "gains.way", "gains.fixed"),
-    )
+    assert listed.result.names == (*("size", "weight", "name"), *("gains.p", "gains.lean", "gains.way", "gains.fixed"))
     names = ("name", "size", "nothing")
     values = ask(bench, "/toy/get_parameters", rcl.GetParameters, rcl.GetParameters.Request(names=names)).values
     assert (values[0].string_value, values[1].double_value, values[2].type) == ("toy", 1.0, 0)

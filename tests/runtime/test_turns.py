@@ -109,9 +109,7 @@ def process() -> Iterator[Process]:
 
 
 @given(st.lists(st.tuples(KINDS, OWNERS, SIZES), max_size=60))
-def test_whatever_happens_each_message_runs_once_alone_and_in_its_order(
-    deeds: list[tuple[str, str, int]],
-) -> None:
+def test_whatever_happens_each_message_runs_once_alone_and_in_its_order(deeds: list[tuple[str, str, int]]) -> None:
     process = Process()
     for kind, owner, size in deeds:
         match kind:

@@ -196,11 +196,7 @@ def test_an_arm_of_other_arms_has_the_joints_of_all_in_the_order_of_the_body(tmp
 @pytest.mark.parametrize(
     ("text", "code", "words"),
     [
-        (
-            f"groups: [wrist, more], {LED}}}\n  more: {{groups: [whole], {LED}",
-            "RBX2301",
-            "itself",
-        ),
+        (f"groups: [wrist, more], {LED}}}\n  more: {{groups: [whole], {LED}", "RBX2301", "itself"),
         (f"groups: [wrst], {LED}", "RBX10", "wrst"),
         (f"groups: [right_arm], {LED}", "RBX2302", "does not lead"),
     ],

@@ -165,10 +165,7 @@ def test_faults_reach_the_driver_of_their_bus(tmp_path: Path) -> None:
     assert {
         name: (twin_fault.at, twin_fault.joint, twin_fault.fault, twin_fault.lasts)
         for name, twin_fault in faults.items()
-    } == {
-        "hot": (3.0, "pan_joint", "overheat", 10.0),
-        "pulled": (5.0, "", "unplug", None),
-    }
+    } == {"hot": (3.0, "pan_joint", "overheat", 10.0), "pulled": (5.0, "", "unplug", None)}
 
 
 def test_faults_do_nothing_to_real_servos_which_is_a_warning(tmp_path: Path) -> None:

@@ -85,10 +85,7 @@ def test_each_entry_runs_as_a_component_under_its_name(project: Project) -> None
     assert robot
     assert {
         name: component.type_name for name, component in robot.components.items() if component.path[:1] == ("lamps",)
-    } == {
-        "front": "toy_lantern",
-        "rear": "toy_lantern",
-    }
+    } == {"front": "toy_lantern", "rear": "toy_lantern"}
     assert robot.component_span("rear").line == 8
 
 

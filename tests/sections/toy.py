@@ -43,14 +43,7 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
 
 
 @section(
-    "lamps",
-    Lamp,
-    names=LAMP,
-    runs=True,
-    entry="lamp",
-    short=Short("driver"),
-    needs="driver",
-    components=_components,
+    "lamps", Lamp, names=LAMP, runs=True, entry="lamp", short=Short("driver"), needs="driver", components=_components
 )
 def lamps(reading: Reading[Lamp]) -> dict[str, Lamp]:
     """Lamps of the robot, by name.

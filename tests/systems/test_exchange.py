@@ -163,9 +163,7 @@ components:
 """
 
 
-def test_instances_take_hosts_of_a_label_in_turn_and_only_what_somebody_takes_is_offered(
-    tmp_path: Path,
-) -> None:
+def test_instances_take_hosts_of_a_label_in_turn_and_only_what_somebody_takes_is_offered(tmp_path: Path) -> None:
     (tmp_path / "watcher.yaml").write_text(WATCHER, encoding="utf-8")
     (tmp_path / "system.yaml").write_text(SYSTEM.replace("ROOT", str(ROOT)), encoding="utf-8")
     system = compile_system(str(tmp_path / "system.yaml"), environment={})

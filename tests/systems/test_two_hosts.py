@@ -59,9 +59,7 @@ def test_one_command_starts_shows_stops_and_ends_the_robot_on_all_hosts_over_ssh
 
 
 @pytest.mark.timeout(150)
-def test_the_base_stops_when_the_cable_is_pulled_and_the_patrol_succeeds_once_it_is_back(
-    patrol: PatrolOnHosts,
-) -> None:
+def test_the_base_stops_when_the_cable_is_pulled_and_the_patrol_succeeds_once_it_is_back(patrol: PatrolOnHosts) -> None:
     base, desk = patrol.up("r"), patrol.up("d")
     patrol.watch()
     patrol.wait_until(lambda: patrol.has_moved_since(0.0))

@@ -55,12 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     table: tuple[tuple[str, str, Do, tuple[Declare, ...]], ...] = (
         ("scan", "list the serial ports that are plugged in, and write entries for new ones", _scan, ()),
         ("generate", "print the rules of udev for the devices of a robot", _generate, (group,)),
-        (
-            "check",
-            "report whether the devices of a robot are plugged in, named and open to you",
-            _check,
-            (group,),
-        ),
+        ("check", "report whether the devices of a robot are plugged in, named and open to you", _check, (group,)),
         ("install", install, _install, (group, yes)),
     )
     add_actions(

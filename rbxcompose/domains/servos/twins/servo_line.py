@@ -8,13 +8,7 @@ from collections.abc import Callable, Iterable, Iterator
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.domains.servos.twins import servo_packets as wire
 from rbxcompose.domains.servos.twins.servo_fake import FakeServo
-from rbxcompose.domains.servos.twins.servo_packets import (
-    ServoPacket,
-    crc_of,
-    packet_two,
-    packets,
-    status,
-)
+from rbxcompose.domains.servos.twins.servo_packets import ServoPacket, crc_of, packet_two, packets, status
 
 _BITS = 10  # of a byte on the wire
 _TOLERANCE = 0.03  # of a UART
