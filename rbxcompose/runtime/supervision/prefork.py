@@ -23,6 +23,7 @@ import setproctitle
 
 from rbxcompose.base.clock import MonotonicClock
 from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.garbage_collection import collect_as_usual
 from rbxcompose.base.processes import end_with
 from rbxcompose.base.requests import Family
 from rbxcompose.compiler.plan.model import Plan
@@ -104,6 +105,7 @@ class Parent:
         _import_what_is_common(launch.plan)
         gc.collect()
         gc.freeze()  # a collection writes to every object that it inspects, which would copy all pages
+        collect_as_usual()  # not before: it would begin with a collection of everything
         signal.pthread_sigmask(signal.SIG_BLOCK, _HELD_BACK)
         pid = os.fork()
         if pid == 0:
