@@ -185,7 +185,9 @@ class ArmWorks:
             ModuleNotFoundError: if the extra `arm` is not installed, or `fast` for a planner that needs it.
             ValueError: if a mesh cannot be read.
         """
-        collisions.load_libraries()
+        type_ = config.planner.type
+        is_compiled = type_ == FAST or (type_ == AUTOMATIC and is_fast and is_installed())
+        collisions.load_libraries(with_ompl=not is_compiled)
         self.space, self._description = space_of(config), description_of(config)
         self.kinematics = ArmKinematics(self._description, ArmGroup(self.space.names, config.base, config.tip))
         if is_fast:
@@ -202,8 +204,6 @@ class ArmWorks:
         self.paddings = paddings
         """By which links keep away from them [m]."""
         self._checker = self._checker_among(self.objects)
-        type_ = config.planner.type
-        is_compiled = type_ == FAST or (type_ == AUTOMATIC and is_fast and is_installed())
         self.helpers: Sequence[PlanningHelper] = ()
         """Those that plan elsewhere meanwhile."""
         self._fast = _hastened() if is_compiled else _as_it_is

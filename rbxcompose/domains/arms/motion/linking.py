@@ -6,7 +6,6 @@ which count references to arrays that compiled code makes for itself.
 
 from __future__ import annotations
 
-import os
 import subprocess
 from contextlib import suppress
 from pathlib import Path
@@ -19,6 +18,7 @@ from numba.core.codegen import get_host_cpu_features
 from numba.core.runtime.nrtdynmod import _meminfo_struct_type
 from numba.np.numpy_support import as_dtype
 
+from rbxcompose.base.files import replace_file
 from rbxcompose.domains.arms.motion.library import ENTRY, FAILED, KINDS, OTHER, REAL, WHOLE, array_kind
 
 Numba = Any  # its types and code
@@ -116,9 +116,9 @@ define i64 @{ENTRY}(ptr %block) {{
 
 
 def _link(code: bytes, path: Path) -> None:
-    with TemporaryDirectory(dir=path.parent) as folder:
+    with TemporaryDirectory() as folder:
         source, made = Path(folder, "code.o"), Path(folder, "code.so")
         source.write_bytes(code)
         words = ["ld", "-shared", "-z", "noexecstack", "-o", str(made), str(source)]
         subprocess.run(words, check=True, capture_output=True)
-        os.replace(made, path)
+        replace_file(path, made.read_bytes(), mode=0o600)

@@ -106,7 +106,9 @@ class Compiled:
     @cached_property
     def _library(self) -> Library | None:
         path = self.library_path
-        return Library(path) if path is not None and path.is_file() else None
+        with suppress(OSError):  # it is damaged, or nothing may be executed from there
+            return Library(path) if path is not None and path.is_file() else None
+        return None
 
 
 _made: list[Compiled] = []
