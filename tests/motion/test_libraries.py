@@ -35,10 +35,10 @@ def root(value: float) -> float:
 @compiled
 def weighted(pair: Pair, table: Array, found: Array, times: int) -> int:
     """Write sums that need memory of its own, and return how many entries they have."""
-    pair = borrowed(pair)
-    own = np.empty(len(pair.values))
+    values = borrowed(pair.values)
+    own = np.empty(len(values))
     for index in range(len(own)):
-        own[index] = pair.values[index] * pair.weight * times + root(table[index, 1])
+        own[index] = values[index] * pair.weight * times + root(table[index, 1])
     for index in range(len(own)):
         found[index] = own[index]
     return len(own)
