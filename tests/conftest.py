@@ -88,11 +88,13 @@ def be_nice() -> None:
 @cache
 def compile_for_arms(flags: int = 0) -> None:
     """Compile what arms need, or take it from the worker that has."""
+    from rbxcompose.domains.arms.motion.numba_cache import keep_libraries
     from tests.motion.toy_arm import compile_all
 
     with open(Path(os.environ[CACHES], "compiling"), "w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX | flags)
         compile_all()
+        keep_libraries()
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
