@@ -5,8 +5,6 @@ Here classes share all methods but `__init__`. To type checkers and to `fields`,
 dataclasses as any other; one with another option is left to the standard library.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Iterator, Sequence
 from operator import attrgetter

@@ -1,7 +1,5 @@
 """The tree of frames: where each frame is in its parent, now and lately, and so where any frame is in another."""
 
-from __future__ import annotations
-
 import math
 from array import array
 from bisect import bisect_left

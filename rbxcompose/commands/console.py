@@ -3,8 +3,6 @@
 With `--json`, stdout has JSON in any case: errors without an answer are one document, too, besides the text on stderr.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

@@ -3,8 +3,6 @@
 It gets sizes, not texts, so that the same graph gives the same picture whatever fonts a machine has.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from importlib.util import find_spec

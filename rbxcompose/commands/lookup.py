@@ -1,7 +1,5 @@
 """Find the robot that a command addresses, or its bus; ask it, and show its answer."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

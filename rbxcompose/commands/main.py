@@ -4,8 +4,6 @@ A verb's module has `add_arguments(parser)` and `run(arguments) -> exit code`; t
 help. Only the verb in use is imported, and for help only what help needs.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

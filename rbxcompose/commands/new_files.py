@@ -1,7 +1,5 @@
 """Answers of people, and new files from them and from templates: all of them or none, never over an existing one."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

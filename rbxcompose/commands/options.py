@@ -1,7 +1,5 @@
 """Options and arguments that verbs share; apart from what carries them out, which takes longer to import."""
 
-from __future__ import annotations
-
 import argparse
 import re
 from collections.abc import Callable, Iterable

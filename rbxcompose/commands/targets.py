@@ -1,7 +1,5 @@
 """The robots that a verb is about: by file, by folder, or the only one here; and the layers put over them."""
 
-from __future__ import annotations
-
 import argparse
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence

@@ -3,8 +3,6 @@
 Bytes are lists of numbers here. Omitted fields keep their defaults.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Mapping
 from dataclasses import field

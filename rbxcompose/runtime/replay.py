@@ -1,7 +1,5 @@
 """Runs one component of a recorded robot again from its recorded inputs, and compares what it sends."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections import deque

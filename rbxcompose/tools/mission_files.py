@@ -1,7 +1,5 @@
 """Missions in files: their pictures, the skills that they may use, their logs again, and their exploration."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

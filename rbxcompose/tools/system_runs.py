@@ -1,7 +1,5 @@
 """`up SYSTEM` and `apply SYSTEM`: all hosts, or the share of one, `--host NAME`."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

@@ -1,7 +1,5 @@
 """What `top` shows of a robot and of a whole system: sampled from state file, processes, log and bus; and its lines."""
 
-from __future__ import annotations
-
 import json
 from collections import Counter, deque
 from collections.abc import Iterable, Mapping, Sequence

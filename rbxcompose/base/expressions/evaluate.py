@@ -3,8 +3,6 @@
 A tree becomes a function of the scope at its first use: missions evaluate the same conditions again and again.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Mapping
 from operator import add, ge, gt, le, lt, mul, sub, truediv
 from typing import TypeAlias

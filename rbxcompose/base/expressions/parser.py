@@ -1,7 +1,5 @@
 """Text to tokens, and tokens to a tree, by binding strength."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Sequence
 from enum import Enum, auto

@@ -1,7 +1,5 @@
 """Rules about missions that need the whole robot."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Iterator
 from pathlib import Path
 

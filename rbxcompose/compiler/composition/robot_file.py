@@ -1,7 +1,5 @@
 """A robot's file from text to `RobotManifest`, section by section."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import replace

@@ -4,8 +4,6 @@ A value is written in the layer in effect: the robot's file, `with:` of a part, 
 an argument is written where that argument gets its value. One that no file writes is added to its component.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Sequence
 from dataclasses import replace

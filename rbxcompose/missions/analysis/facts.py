@@ -1,7 +1,5 @@
 """What a mission will do, as far as its text shows: constants, steps that cannot fail, steps that never end."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 
 from rbxcompose.base.config import Place

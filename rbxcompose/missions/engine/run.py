@@ -1,7 +1,5 @@
 """One run of one mission: its data, what runs and what is suspended, its interrupts."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 from rbxcompose.base.expressions.tree import new_names

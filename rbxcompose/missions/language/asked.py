@@ -1,7 +1,5 @@
 """What is written in a node: expressions with their places and types, arguments, poses in place of names."""
 
-from __future__ import annotations
-
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions.parser import parse
 from rbxcompose.base.expressions.tree import Expression, Flag, Number, Text, Word

@@ -4,8 +4,6 @@ Besides the topics of the robot, it holds the events of services, as ROS 2 recor
 the orders that the host received and the instants whose time [s] cannot be computed from nanoseconds.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import replace

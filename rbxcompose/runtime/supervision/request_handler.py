@@ -1,7 +1,5 @@
 """Carries out the requests from the control socket, or passes them on to the component that takes them."""
 
-from __future__ import annotations
-
 from typing import Any, Protocol
 
 from rbxcompose.base.levels import Level

@@ -5,8 +5,6 @@ manifest with errors changes nothing. Changes that are unsafe while the robot mo
 the reason. Of a system, all hosts are asked first: if one refuses, none is changed.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 

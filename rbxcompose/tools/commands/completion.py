@@ -4,8 +4,6 @@ For bash: `rbxcompose completion bash > ~/.local/share/bash-completion/completio
 `_rbxcompose` in a folder of `$fpath`. For fish: `~/.config/fish/completions/rbxcompose.fish`.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import re

@@ -4,8 +4,6 @@ With a robot, by file or name, it examines only that robot, including its device
 error, 1 errors found, 2 wrong usage.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import platform

@@ -1,7 +1,5 @@
 """Stop a robot and end all of its processes, also those that a dead supervisor has left."""
 
-from __future__ import annotations
-
 import argparse
 import json
 

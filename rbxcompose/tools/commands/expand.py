@@ -4,8 +4,6 @@ The output is a manifest itself, for the folder of the robot's file.
 Exit codes: 0 fine, 1 errors found, 2 wrong usage.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 

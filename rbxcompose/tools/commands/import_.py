@@ -5,8 +5,6 @@ files make one robot. Without `--out`, the manifest goes to stdout and the findi
 Exit codes: 0 fine, 1 errors found (what was understood is written nevertheless), 2 wrong usage.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 from dataclasses import replace

@@ -3,8 +3,6 @@
 A large log file is renamed to `log.jsonl.1`, and so on; the log of the previous run is `log.1.jsonl`.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import time

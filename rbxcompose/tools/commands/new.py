@@ -4,8 +4,6 @@ What it writes has no findings and runs in simulation. At a terminal it asks a f
 option. It never overwrites a file.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 from collections.abc import Callable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Show the components of running robots: state, process, restarts; and who has stopped the robot."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from collections.abc import Iterable, Iterator, Mapping

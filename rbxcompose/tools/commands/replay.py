@@ -9,8 +9,6 @@ its recorded inputs, and compares its outputs with the recording. The settings a
 --robot PATH. Exit codes: 0 the same, 1 a difference or findings.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import math

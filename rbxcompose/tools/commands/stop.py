@@ -4,8 +4,6 @@ The base brakes, actions that claim what moves are cancelled, and missions pause
 software, not an emergency stop.
 """
 
-from __future__ import annotations
-
 import argparse
 
 from rbxcompose.commands import lookup

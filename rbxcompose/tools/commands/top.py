@@ -4,8 +4,6 @@ It looks once a second, until q or Ctrl-C. Without a terminal it looks once. The
 messages; the share of a process is that of one processor. Of a system, it shows all robots on all hosts in one picture.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import subprocess

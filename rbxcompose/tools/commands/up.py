@@ -4,8 +4,6 @@ In the foreground it goes down when the mission named by `start:` has ended, or 
 Exit codes: 0 fine, 1 findings, 2 wrong usage, 3 the mission failed, 4 the robot failed, 130 interrupted.
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 import sys

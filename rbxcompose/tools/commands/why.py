@@ -4,8 +4,6 @@ VALUE is a path as for --set (battery.runtime, missions.patrol.with.rounds), or 
 Exit codes: 0 fine, 1 the robot cannot be read or has no such path, 2 wrong usage.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 

@@ -1,7 +1,5 @@
 """This machine: its limits, versions, private files, and what robots have left behind on it."""
 
-from __future__ import annotations
-
 import os
 import re
 import stat

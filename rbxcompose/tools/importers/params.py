@@ -1,7 +1,5 @@
 """`params`: files of ROS 2 parameters, and dumps of `dynamic_reconfigure`."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from pydantic import ValidationError

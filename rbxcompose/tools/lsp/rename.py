@@ -1,7 +1,5 @@
 """Renaming a name of the project in every file that has it, and fixes as changes to texts."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from pathlib import Path

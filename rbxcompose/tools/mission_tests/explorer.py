@@ -1,7 +1,5 @@
 """Explores what could happen to a mission: every result of its skills, values on either side of each number."""
 
-from __future__ import annotations
-
 import json
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Runs a test in the way that it needs, alone or on the whole robot, and judges the result."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace

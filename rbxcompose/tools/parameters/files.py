@@ -1,7 +1,5 @@
 """Live values beside the files of the robot, and into them: `param diff`, `dump`, `save`, also of another host."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import subprocess
