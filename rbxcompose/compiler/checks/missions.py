@@ -24,7 +24,7 @@ from rbxcompose.base.rules import MISSIONS, OWN, WIRING
 from rbxcompose.base.units import TIME, format_quantity
 from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.composition.robot_file import MISSION
-from rbxcompose.compiler.model.mission_facts import blamed, constants, decided, ways_of
+from rbxcompose.compiler.model.mission_facts import constants, decided, ways_of
 from rbxcompose.compiler.model.robot import Robot, RobotMission
 from rbxcompose.manifest.files import files_named
 from rbxcompose.manifest.reader import read_file
@@ -40,40 +40,24 @@ from rbxcompose.missions.program.program import END, Interrupt, MissionNode, Pro
 @check("RBX4123", Severity.WARNING, closed=(MISSIONS,))
 def always_holds(robot: Robot) -> Iterator[Finding]:
     """A condition always holds."""
-    for mission in robot.missions.values():
-        for asked, holds in decided(robot, mission):
-            if holds is True:
-                span, related = blamed(robot, mission, asked)
-                yield always_holds.at(
-                    span,
-                    f"the condition '{asked.expression.text}' always holds",
-                    help="compare with a level that makes a difference",
-                    related=related,
-                )
-
-
-_LEVEL = "compare with a level that can be reached"
+    for asked, span, related in decided(robot, True):
+        message = f"the condition '{asked.expression.text}' always holds"
+        yield always_holds.at(span, message, help="compare with a level that makes a difference", related=related)
 
 
 @check("RBX4122", closed=(OWN,))
 def never_holds(robot: Robot) -> Iterator[Finding]:
     """A condition can never hold."""
-    for mission in robot.missions.values():
-        for asked, holds in decided(robot, mission):
-            if holds is False:
-                span, related = blamed(robot, mission, asked)
-                yield never_holds.at(
-                    span,
-                    f"the condition '{asked.expression.text}' can never hold",
-                    help=_cure(asked.expression),
-                    related=related,
-                )
+    for asked, span, related in decided(robot, False):
+        message = f"the condition '{asked.expression.text}' can never hold"
+        yield never_holds.at(span, message, help=_cure(asked.expression), related=related)
 
 
 def _cure(expression: Expression) -> str:
     tree = expression.tree
     is_contrary = isinstance(tree, Junction) and all(truth(operand, {}) is None for operand in tree.operands)
-    return "its parts contradict each other: join them by 'or', or change a limit" if is_contrary else _LEVEL
+    contrary = "its parts contradict each other: join them by 'or', or change a limit"
+    return contrary if is_contrary else "compare with a level that can be reached"
 
 
 @check("RBX4132", Severity.WARNING, closed=(MISSIONS,))

@@ -77,20 +77,20 @@ def _least_time(robot: Robot, driver: RobotComponent, navigates: Navigates) -> C
 FULL = Bounds(0.0, 1.0)  # possible levels of a battery
 
 
-def decided(robot: Robot, mission: RobotMission) -> Iterator[tuple[Asked, bool]]:
-    """Yield the conditions on the running robot that always hold, or never do.
+def decided(robot: Robot, holds: bool) -> Iterator[tuple[Asked, Span, list[Related]]]:
+    """Yield the conditions on the running robot that always hold, or never do, with the place that decides them.
 
     A condition that only compares written values is left out: it chooses between settings.
     """
     measured = {*robot.values, POSE}
-    known = {name: Bounds(value, value) for name, value in constants(mission).items() if isinstance(value, float)}
-    known |= dict.fromkeys(batteries(robot), FULL)
-    for asked, scope in _conditions(robot, mission):
-        is_measured = any(name.name in measured for name in asked.expression.names)
-        if is_measured and not check_condition(asked.expression, scope):
-            holds = truth(asked.expression.tree, known)
-            if holds is not None:
-                yield asked, holds
+    full = dict.fromkeys(batteries(robot), FULL)
+    for mission in robot.missions.values():
+        known = {name: Bounds(value, value) for name, value in constants(mission).items() if isinstance(value, float)}
+        for asked, scope in _conditions(robot, mission):
+            is_measured = any(name.name in measured for name in asked.expression.names)
+            is_open = is_measured and not check_condition(asked.expression, scope)
+            if is_open and truth(asked.expression.tree, known | full) is holds:
+                yield asked, *blamed(robot, mission, asked)
 
 
 def _conditions(robot: Robot, mission: RobotMission) -> Iterator[tuple[Asked, NodeScope]]:

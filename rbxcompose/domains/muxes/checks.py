@@ -107,18 +107,37 @@ def mux_of_mux(robot: Robot) -> Iterator[Finding]:
 @check("RBX3104")
 def mux_priority(robot: Robot) -> Iterator[Finding]:
     """Two inputs of a mux have the same priority."""
+    for mux, name, _, priority, related in _same_priorities(robot, "default"):
+        yield mux_priority.at(
+            robot.value("muxes", mux, "inputs", name, "priority"),
+            f"two inputs of mux '{mux}' have the same priority {priority}",
+            label=f"input '{name}'",
+            help="the higher priority wins: give each input its own",
+            related=related,
+        )
+
+
+@check("RBX3137", Severity.WARNING)
+def mux_same_rank(robot: Robot) -> Iterator[Finding]:
+    """Two inputs of a mux have the same priority, and the one that holds it keeps it."""
+    for mux, name, other, rank, related in _same_priorities(robot, "yocs"):
+        yield mux_same_rank.at(
+            robot.value("muxes", mux, "inputs", name, "priority"),
+            f"inputs '{other}' and '{name}' of mux '{mux}' have the same priority {rank}: who holds keeps it",
+            help="give each input its own priority",
+            related=related,
+        )
+
+
+def _same_priorities(robot: Robot, profile: str) -> Iterator[tuple[str, str, str, int, list[Related]]]:
+    """Yield mux, input, an earlier input of the same priority, that priority, and the earlier one's place."""
     for mux, entry in robot.manifest.contents.of(muxes).items():
         first: dict[int, str] = {}
-        for name, priority in entry.ranks.items() if entry.profile == "default" else ():
-            other = first.setdefault(priority, name)
+        for name, rank in entry.ranks.items() if entry.profile == profile else ():
+            other = first.setdefault(rank, name)
             if other != name:
-                yield mux_priority.at(
-                    robot.value("muxes", mux, "inputs", name, "priority"),
-                    f"two inputs of mux '{mux}' have the same priority {priority}",
-                    label=f"input '{name}'",
-                    help="the higher priority wins: give each input its own",
-                    related=[Related(robot.value("muxes", mux, "inputs", other, "priority"), f"input '{other}'")],
-                )
+                place = robot.value("muxes", mux, "inputs", other, "priority")
+                yield mux, name, other, rank, [Related(place, f"input '{other}'")]
 
 
 @check("RBX3134", Severity.WARNING)
@@ -170,22 +189,6 @@ def _stops(entry: MuxModel) -> Iterator[tuple[str, ...]]:
     yield from (
         ("inputs", name, "zero_releases") for name, mux_input in entry.inputs.items() if mux_input.zero_releases
     )
-
-
-@check("RBX3137", Severity.WARNING)
-def mux_same_rank(robot: Robot) -> Iterator[Finding]:
-    """Two inputs of a mux have the same priority, and the one that holds it keeps it."""
-    for mux, entry in robot.manifest.contents.of(muxes).items():
-        first: dict[int, str] = {}
-        for name, rank in entry.ranks.items() if entry.profile == "yocs" else ():
-            other = first.setdefault(rank, name)
-            if other != name:
-                yield mux_same_rank.at(
-                    robot.value("muxes", mux, "inputs", name, "priority"),
-                    f"inputs '{other}' and '{name}' of mux '{mux}' have the same priority {rank}: who holds keeps it",
-                    help="give each input its own priority",
-                    related=[Related(robot.value("muxes", mux, "inputs", other, "priority"), f"input '{other}'")],
-                )
 
 
 @check("RBX3003", is_fixable=True, closed=(NAMES,))
