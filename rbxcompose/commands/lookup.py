@@ -38,7 +38,12 @@ def find_robot(wanted: str | None) -> RobotFolder:
     """
     found = {folder.path.name: folder for folder in robots_up()}
     if wanted is None:
-        return _only(found)
+        if not found:
+            raise NotDoneError(NOT_UP.at(None, "no robot is up", help="start one with 'rbxcompose up PATH'"))
+        if len(found) > 1:
+            names = ", ".join(found)
+            raise NotDoneError(WHICH.at(None, f"several robots are up: {names}", help="name one with '--robot NAME'"))
+        return next(iter(found.values()))
     if wanted in found:
         return found[wanted]
     files = {_file_of(folder): folder for folder in found.values()}
@@ -58,15 +63,6 @@ def robots_up() -> list[RobotFolder]:
         return all_folders()
     except UnsafeFolderError as error:
         raise NotDoneError(UNSAFE.at(None, str(error))) from error
-
-
-def _only(found: dict[str, RobotFolder]) -> RobotFolder:
-    if not found:
-        raise NotDoneError(NOT_UP.at(None, "no robot is up", help="start one with 'rbxcompose up PATH'"))
-    if len(found) > 1:
-        names = ", ".join(found)
-        raise NotDoneError(WHICH.at(None, f"several robots are up: {names}", help="name one with '--robot NAME'"))
-    return next(iter(found.values()))
 
 
 def _file_of(folder: RobotFolder) -> str:

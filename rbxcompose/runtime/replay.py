@@ -266,7 +266,15 @@ class RunComparison:
             self._aliases.learn(recorded, now)
         if recorded.payload == (payload := self._aliases.outwards(now.payload)):
             return None
-        return _in_a_field(recorded, payload)
+        try:
+            cls = registry.message(recorded.topic.type)
+            pairs = zip(
+                _leaves(to_plain(decode(cls, recorded.payload))), _leaves(to_plain(decode(cls, payload))), strict=False
+            )
+            field, before, after = next((text, a, b) for (text, a), (other, b) in pairs if (text, a) != (other, b))
+        except (KeyError, CdrError, StopIteration):  # a type that is not installed, or bytes that belong to no field
+            return _whole(recorded, f"{len(recorded.payload)} bytes", f"{len(payload)} other bytes")
+        return RunDifference(recorded.log_time / NANOSECONDS, recorded.topic.name, field, f"{before}", f"{after}")
 
 
 def _at(record: Recorded) -> str:
@@ -275,18 +283,6 @@ def _at(record: Recorded) -> str:
 
 def _whole(record: Recorded, recorded: str, now: str) -> RunDifference:
     return RunDifference(record.log_time / NANOSECONDS, record.topic.name, "", recorded, now)
-
-
-def _in_a_field(record: Recorded, payload: bytes) -> RunDifference:
-    try:
-        cls = registry.message(record.topic.type)
-        pairs = zip(
-            _leaves(to_plain(decode(cls, record.payload))), _leaves(to_plain(decode(cls, payload))), strict=False
-        )
-        field, before, after = next((text, a, b) for (text, a), (other, b) in pairs if (text, a) != (other, b))
-    except (KeyError, CdrError, StopIteration):  # a type that is not installed, or bytes that belong to no field
-        return _whole(record, f"{len(record.payload)} bytes", f"{len(payload)} other bytes")
-    return RunDifference(record.log_time / NANOSECONDS, record.topic.name, field, f"{before}", f"{after}")
 
 
 def _leaves(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:

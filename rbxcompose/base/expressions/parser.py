@@ -107,7 +107,8 @@ def tokens(text: str) -> Iterator[Token]:
     position = 0
     kind = None
     while kind is not TokenKind.END:
-        start = _space_end(text, position)
+        space = _SPACE.match(text, position)
+        start = space.end() if space else position
         match = _TOKEN.match(text, start)
         if not match or not match.lastgroup:
             raise _unreadable(text, start)
@@ -116,11 +117,6 @@ def tokens(text: str) -> Iterator[Token]:
         if kind is TokenKind.NUMBER:
             read, position = _with_unit(text, start, position)
         yield Token(kind, match[match.lastgroup], start, position, read)
-
-
-def _space_end(text: str, position: int) -> int:
-    space = _SPACE.match(text, position)
-    return space.end() if space else position
 
 
 def _with_unit(text: str, start: int, end: int) -> tuple[Quantity, int]:

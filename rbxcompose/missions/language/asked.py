@@ -31,7 +31,11 @@ def expression_of(scalar: ScalarNode) -> Expression:
     end = len(scalar.text)
     match scalar.filled:
         case None:
-            return _parsed(scalar)
+            # Quotes round a whole word are intended: people write 'hello' for a text, and YAML removes the quotes.
+            expression = parse(scalar.text)
+            if not scalar.plain and isinstance(expression.tree, Word):
+                return Expression(scalar.text, Text(0, len(scalar.text), expression.tree.name))
+            return expression
         case Quantity(value=value, dimension=dimension):
             return Expression(scalar.text, Number(0, end, value, dimension))
         case bool() as flag:
@@ -40,14 +44,6 @@ def expression_of(scalar: ScalarNode) -> Expression:
             return Expression(scalar.text, Number(0, end, float(number), NUMBER))
         case text:
             return Expression(scalar.text, Text(0, end, str(text)))
-
-
-def _parsed(scalar: ScalarNode) -> Expression:
-    # Quotes round a whole word are intended: people write 'hello' for a text, and YAML removes the quotes.
-    expression = parse(scalar.text)
-    if not scalar.plain and isinstance(expression.tree, Word):
-        return Expression(scalar.text, Text(0, len(scalar.text), expression.tree.name))
-    return expression
 
 
 @dataclass(frozen=True, slots=True)

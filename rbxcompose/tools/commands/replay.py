@@ -189,19 +189,15 @@ def _replay(arguments: argparse.Namespace, path: Path, summary: RecordingSummary
                 if not topics:
                     return refuse(finding)
                 warn(replace(finding, severity=Severity.WARNING))
-        return _replay_on(place, topics, arguments, path)
-
-
-def _replay_on(place: BusPlace, topics: list[RecordedTopic], arguments: argparse.Namespace, path: Path) -> int:
-    with Guest(place, stays=True) as guest, guest.interruptible():
-        player = Player(guest, topics, arguments.namespace or "")
-        player.wait_for_subscribers()
-        emit(f"replaying {len(topics)} topics of {plain(str(path))}; Ctrl-C ends it")
-        count = _play(path, player, topics, arguments, guest)
-        while arguments.loop and _wait(guest.clock.now() + _PAUSE, guest):  # even if the recording has no duration
-            count += _play(path, player, topics, arguments, guest)
-    emit(f"replayed {count:,} messages")
-    return 0
+        with Guest(place, stays=True) as guest, guest.interruptible():
+            player = Player(guest, topics, arguments.namespace or "")
+            player.wait_for_subscribers()
+            emit(f"replaying {len(topics)} topics of {plain(str(path))}; Ctrl-C ends it")
+            count = _play(path, player, topics, arguments, guest)
+            while arguments.loop and _wait(guest.clock.now() + _PAUSE, guest):  # even if the recording has no duration
+                count += _play(path, player, topics, arguments, guest)
+        emit(f"replayed {count:,} messages")
+        return 0
 
 
 def _sent_already(guest: Guest, topics: list[RecordedTopic], namespace: str) -> list[str]:

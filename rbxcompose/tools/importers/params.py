@@ -26,7 +26,7 @@ from rbxcompose.commands.importing.ros_parameters import (
 from rbxcompose.compiler.composition.dump import exact
 from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.shapes import alternatives, field_types
-from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode
+from rbxcompose.manifest.tree import MappingNode, ScalarNode
 from rbxcompose.sdk.registry import component_type, usable_names
 
 GUESSED_TYPE = kind("RBX2293", Severity.WARNING)
@@ -150,7 +150,7 @@ def _add(known: GivenValues, node: NodeParameters, report: Report) -> None:
     """Add the parameters of a node; report those that cannot be carried over, and those that disagree."""
     for path, entry in scalars_of(node.root):
         shown = f"'{plain(shown_name(path), 60)}' of '{plain(node.node, 60)}'"
-        if path[0] in _OF_ROS and not _is_false(entry.value):
+        if path[0] in _OF_ROS and not (isinstance(entry.value, ScalarNode) and plain_value(entry.value) is False):
             words = f"{shown} is not carried over: {_OF_ROS[path[0]]}"
             report.add(NOT_CARRIED_OVER.at(entry.key.span, words))
         if path[0] in _OF_ROS:
@@ -164,10 +164,6 @@ def _add(known: GivenValues, node: NodeParameters, report: Report) -> None:
         elif (other := known.setdefault(tuple(".".join(path).split(".")), value)) != value:
             words = f"{shown} was something else before; the first one counts"
             report.add(DISAGREES.at(value.span, words, related=[Related(other.span, "the first one")]))
-
-
-def _is_false(node: TreeNode) -> bool:
-    return isinstance(node, ScalarNode) and plain_value(node) is False
 
 
 def _argument_rows(nodes: dict[str, tuple[NodeParameters, GivenValues]]) -> Iterator[Row]:
