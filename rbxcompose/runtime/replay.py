@@ -16,7 +16,7 @@ from rbxcompose.bus.bus import Bus
 from rbxcompose.bus.names import ActionNames, Attachment, data_key, decode_attachment
 from rbxcompose.bus.tokens import EntityKind, mangle
 from rbxcompose.bus.topics import Publisher
-from rbxcompose.bus.transport import LONGEST_WAIT, Arrival, NoTransport, Question, TransportReply
+from rbxcompose.bus.transport import Arrival, NoTransport, OnReply, Question, TransportReply
 from rbxcompose.bus.wire import WIRE_PROFILES
 from rbxcompose.compiler.plan.model import Instance, Plan
 from rbxcompose.msgs import registry
@@ -135,7 +135,7 @@ class ReplayStage(NoTransport):
     session: str = "0"
     subscribers: dict[str, list[Callable[[Arrival], None]]] = field(default_factory=dict)
     servers: dict[str, Callable[[Question], None]] = field(default_factory=dict)
-    waiting: dict[tuple[str, bytes, int], Callable[[TransportReply], None]] = field(default_factory=dict)
+    waiting: dict[tuple[str, bytes, int], OnReply] = field(default_factory=dict)
 
     def wake(self, owner: str, callback: Callable[[], None]) -> None:
         """Let the scheduler run the callback at this instant."""
@@ -154,14 +154,7 @@ class ReplayStage(NoTransport):
         return self
 
     def ask(
-        self,
-        key: str,
-        payload: bytes,
-        attachment: bytes,
-        answered: Callable[[TransportReply], None],
-        *,
-        of_all: bool = True,
-        within: float = LONGEST_WAIT,
+        self, key: str, payload: bytes, attachment: bytes, answered: OnReply, *, of_all: bool, within: float
     ) -> NoTransport:
         """Wait for the recorded reply."""
         source = decode_attachment(attachment)

@@ -10,17 +10,8 @@ from dataclasses import replace
 from typing import Any
 
 from rbxcompose.base.findings import Finding, Report, kind
+from rbxcompose.commands import hosts
 from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, misused, refuse, write_report
-from rbxcompose.commands.hosts import (
-    Running,
-    Shares,
-    follow_commands,
-    is_reachable,
-    label_of,
-    on_all,
-    reached,
-    shares_of,
-)
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.compiler.systems.bundle import bundle_of
@@ -46,11 +37,11 @@ REFUSED_THERE = kind("RBX6128")
 
 def up_everywhere(path: str, system: System, arguments: argparse.Namespace) -> int:
     """Bring the files to all hosts, start all shares, and show what they write until the robots are down."""
-    if not is_reachable(system):
+    if not hosts.is_reachable(system):
         return FINDINGS
-    shares = shares_of(system, arguments.ssh_config)
+    shares = hosts.shares_of(system, arguments.ssh_config)
     bundle = bundle_of(system)
-    folders = reached(shares, bundle)
+    folders = hosts.reached(shares, bundle)
     if folders is None:
         return FINDINGS
     shares = {key: share for key, share in shares.items() if share.is_here or share.name in folders}
@@ -62,10 +53,12 @@ def up_everywhere(path: str, system: System, arguments: argparse.Namespace) -> i
         file = path if remote.is_here else bundle.system
         words = ["up", file, "--host", host, "--robot", robot, *options]
         folder = folders.get(host, "")
-        commands[label_of(shares, host, robot)] = remote.rbxcompose(
+        commands[hosts.label_of(shares, host, robot)] = remote.rbxcompose(
             words, folder=folder, has_terminal=not arguments.detach
         )
-    return follow_commands(commands, [label_of(shares, *key) for key, share in shares.items() if share.model.optional])
+    return hosts.follow_commands(
+        commands, [hosts.label_of(shares, *key) for key, share in shares.items() if share.model.optional]
+    )
 
 
 def run_share(path: str, arguments: argparse.Namespace, options: RunOptions) -> int:
@@ -183,9 +176,9 @@ def apply_system(path: str, arguments: argparse.Namespace) -> int:
         return system
     if arguments.host is not None:
         return _apply_here(system, arguments)
-    if not is_reachable(system):
+    if not hosts.is_reachable(system):
         return FINDINGS
-    shares = shares_of(system, arguments.ssh_config)
+    shares = hosts.shares_of(system, arguments.ssh_config)
     shares = {key: share for key, share in shares.items() if arguments.robot in (None, key[1])}
     change = _SystemChange(path, system, shares, arguments)
     return change.run()
@@ -211,18 +204,18 @@ def _apply_here(system: System, arguments: argparse.Namespace) -> int:
 class _SystemChange:
     """A change of several hosts: all of them, or none."""
 
-    def __init__(self, path: str, system: System, shares: Shares, arguments: argparse.Namespace) -> None:
+    def __init__(self, path: str, system: System, shares: hosts.Shares, arguments: argparse.Namespace) -> None:
         self._path, self._system, self._shares, self._arguments = path, system, shares, arguments
 
     def run(self) -> int:
         """Ask all hosts, then a person, then change one host after another."""
         bundle, arguments = bundle_of(self._system), self._arguments
-        folders = reached(self._shares, bundle, needs_all=not arguments.partial)
+        folders = hosts.reached(self._shares, bundle, needs_all=not arguments.partial)
         if folders is None:
             return FINDINGS
         self._folders, self._file = folders, bundle.system
         usable = {key: share for key, share in self._shares.items() if share.is_here or share.name in self._folders}
-        asked = on_all({" ".join(key): self._command(key, "--dry-run") for key in usable})
+        asked = hosts.on_all({" ".join(key): self._command(key, "--dry-run") for key in usable})
         found = {key: _answer(asked[" ".join(key)]) for key in usable}
         lacks = any(key not in usable and not share.model.optional for key, share in self._shares.items())
         problems = [_refusal(key, entry) for key, entry in found.items() if isinstance(entry, str)]
@@ -259,7 +252,7 @@ class _SystemChange:
         done: list[Key] = []
         for key, generation in generations.items():
             label = " ".join(key)
-            problem = _answer(on_all({label: self._command(key, "--yes")})[label])
+            problem = _answer(hosts.on_all({label: self._command(key, "--yes")})[label])
             if isinstance(problem, str):
                 refuse(_refusal(key, problem))
                 if not self._arguments.partial:
@@ -276,7 +269,7 @@ class _SystemChange:
         """Take the change of a share in this generation back, and report it."""
         words = ["apply", key[1], "--undo", str(generation), "--yes", "--json"]
         label = " ".join(key)
-        answer = _answer(on_all({label: self._shares[key].rbxcompose(words)})[label])
+        answer = _answer(hosts.on_all({label: self._shares[key].rbxcompose(words)})[label])
         if not isinstance(answer, str):
             self._tell(f"{label}: as before")
         elif not may_be_unchanged:
@@ -299,7 +292,7 @@ def _refusal(key: Key, why: str) -> Finding:
     return REFUSED_THERE.at(None, f"'{key[0]}' does not change '{key[1]}': {why}")
 
 
-def _answer(running: Running) -> Any:
+def _answer(running: hosts.Running) -> Any:
     """Return the answer of a host as data, or a text: why it did not do it."""
     exit_code, answer = running.wait(), running.answer
     if exit_code == 0 and isinstance(answer, dict):

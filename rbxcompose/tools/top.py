@@ -14,7 +14,7 @@ from rbxcompose.base.units import UNITS
 from rbxcompose.bus.graph import Graph, GraphName
 from rbxcompose.bus.local import Inbox
 from rbxcompose.bus.names import admin_key
-from rbxcompose.bus.transport import TransportReply
+from rbxcompose.bus.transport import LONGEST_WAIT, TransportReply
 from rbxcompose.bus.window import SCHEMA
 from rbxcompose.commands.guest import LONGEST_QUEUE, Guest, ReceivedMessage
 from rbxcompose.commands.guest import NAME as VISITOR
@@ -526,7 +526,8 @@ class MissionsSeen:
         self._asked.add(path)
         transport, answers = self._guest.transport, _Answers(self, path)
         inbox: Inbox[TransportReply] = Inbox(VISITOR, None, answers.take, self._guest.scheduler.post)
-        transport.ask(admin_key(self._robot, path), b"", b"", lambda answer: inbox.put(answer, transport.wake))
+        take, key = lambda answer: inbox.put(answer, transport.wake), admin_key(self._robot, path)
+        transport.ask(key, b"", b"", take, of_all=True, within=LONGEST_WAIT)
 
     def answered(self, path: str, answer: TransportReply) -> None:
         """Apply the first answer to a query."""
