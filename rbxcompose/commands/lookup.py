@@ -10,7 +10,7 @@ from typing import TypeVar
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, kind, suggest
 from rbxcompose.base.requests import Command, Refused, Request
-from rbxcompose.commands.console import NotDoneError, emit, refuse
+from rbxcompose.commands.console import NotDoneError, emit
 from rbxcompose.commands.options import add_system_options
 from rbxcompose.runtime.control import ANSWER, NoAnswerError, ask
 from rbxcompose.runtime.folder import BrokenStateError, RobotFolder, RobotState, UnsafeFolderError, all_folders
@@ -164,11 +164,8 @@ def add_asking_options(parser: argparse.ArgumentParser) -> None:
 
 def pass_on(arguments: argparse.Namespace, command: Command) -> int:
     """Send a command, print the answer, return the exit code."""
-    try:
-        folder = find_robot(arguments.robot)
-        answer = answer_of(folder, command)
-    except NotDoneError as error:
-        return refuse(error.finding)
+    folder = find_robot(arguments.robot)
+    answer = answer_of(folder, command)
     show_answer(arguments, folder, answer)
     return 0
 

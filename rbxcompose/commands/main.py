@@ -50,17 +50,20 @@ def _interrupted(number: int, frame: object) -> NoReturn:
 
 def _run(name: str, words: Sequence[str]) -> int:
     _leave_out_plugins_of_pydantic()
-    from rbxcompose.commands.console import answered
+    from rbxcompose.commands.console import NotDoneError, answered, refuse
 
     try:
         verb = load(name)
         with answered(in_json="--json" in words):
-            arguments = parser_of(name, verb).parse_args(words)
-            if (where := getattr(verb, "ON_SYSTEM", "")) and (system := _system_of(arguments, where)):
-                from rbxcompose.commands.hosts import forward  # only needed for systems
+            try:
+                arguments = parser_of(name, verb).parse_args(words)
+                if (where := getattr(verb, "ON_SYSTEM", "")) and (system := _system_of(arguments, where)):
+                    from rbxcompose.commands.hosts import forward  # only needed for systems
 
-                return forward(verb, system, where, [name, *words], arguments)
-            return verb.run(arguments)
+                    return forward(verb, system, where, [name, *words], arguments)
+                return verb.run(arguments)
+            except NotDoneError as error:
+                return refuse(error.finding)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # so that the flush at exit has somewhere to go
         return 1

@@ -18,7 +18,7 @@ from rbxcompose.base.units import example
 from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, misused, refuse, table, write_report
 from rbxcompose.commands.layout import NotDrawnError
 from rbxcompose.commands.lookup import answer_of, known_state, robots_up
-from rbxcompose.commands.targets import only_path
+from rbxcompose.commands.targets import robot_path
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.model.skills import python_skills
@@ -58,7 +58,7 @@ def robot_of(path: str | None) -> Robot | None:
         NotDoneError: if no path is given and it is not clear which robot to use.
     """
     if path is None:
-        path = _running_file() or only_path(may_run=False)
+        path = _running_file() or robot_path(None, may_run=False)
     out = compile_robot(path, environment=os.environ)
     write_report(out.report, out.sources)
     return None if out.report.has_errors else out.robot
@@ -119,10 +119,7 @@ def mission_in(robot: Robot, name: str) -> Any:
 
 def skills(arguments: argparse.Namespace) -> int:
     """List all skills that a robot's missions may use."""
-    try:
-        robot = robot_of(arguments.path)
-    except NotDoneError as error:
-        return refuse(error.finding)
+    robot = robot_of(arguments.path)
     if robot is None:
         return FINDINGS
     found = dict(

@@ -11,7 +11,7 @@ from typing import Any
 
 from rbxcompose.base.findings import Finding, Report, kind
 from rbxcompose.commands import hosts
-from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, misused, refuse, write_report
+from rbxcompose.commands.console import FINDINGS, emit, misused, refuse, write_report
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.compiler.systems.bundle import bundle_of
@@ -189,15 +189,12 @@ def _apply_here(system: System, arguments: argparse.Namespace) -> int:
     chosen = chosen_robots(system, arguments)
     if isinstance(chosen, Finding):
         return refuse(chosen)
-    try:
-        for robot in chosen:
-            plan, layers = planned(system, robot, arguments.host), layers_of(system, robot, real=arguments.real)
-            proposal = Proposal.of(plan, robot.robot, layers)
-            emit(json.dumps(proposal.data) if arguments.json else proposal.text())
-            if exit_code := carry_out(proposal, arguments):
-                return exit_code
-    except NotDoneError as error:
-        return refuse(error.finding)
+    for robot in chosen:
+        plan, layers = planned(system, robot, arguments.host), layers_of(system, robot, real=arguments.real)
+        proposal = Proposal.of(plan, robot.robot, layers)
+        emit(json.dumps(proposal.data) if arguments.json else proposal.text())
+        if exit_code := carry_out(proposal, arguments):
+            return exit_code
     return 0
 
 

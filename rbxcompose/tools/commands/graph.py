@@ -10,8 +10,7 @@ from pathlib import Path
 from rbxcompose.base.files import replace_file
 from rbxcompose.commands.console import FINDINGS, emit, refuse, write_report
 from rbxcompose.commands.layout import NotDrawnError
-from rbxcompose.commands.targets import add_layer_options, add_path_argument, layers_of, robot_path
-from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.commands.targets import add_layer_options, add_path_argument, compiled, robot_path
 from rbxcompose.tools.inspection.diagram import diagram_of, dot, mermaid
 from rbxcompose.tools.inspection.graph_html import html
 
@@ -29,10 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the graph; draw a robot with mistakes as far as it could be read, and write its findings to stderr."""
-    path = robot_path(arguments.path)
-    if path is None:
-        return FINDINGS
-    compilation = compile_robot(path, **layers_of(arguments))
+    compilation = compiled(robot_path(arguments.path), arguments)
     write_report(compilation.report, compilation.sources)
     if compilation.robot is not None:
         try:

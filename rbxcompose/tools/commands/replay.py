@@ -123,17 +123,14 @@ def run(arguments: argparse.Namespace) -> int:
         recover_in(path.parent)
     if path.name.endswith(PART) and not path.exists():
         path = path.with_name(path.name.removesuffix(PART))
-    try:
-        if arguments.into is not None:
-            with _opened(path) as reader:
-                return run_again(arguments, path, reader)
-        summary = _look_through(path)
-        if arguments.info:
-            emit(json.dumps(_fields(summary)) if arguments.json else _text(path, summary))
-            return 0
-        return _replay(arguments, path, summary)
-    except NotDoneError as error:
-        return refuse(error.finding)
+    if arguments.into is not None:
+        with _opened(path) as reader:
+            return run_again(arguments, path, reader)
+    summary = _look_through(path)
+    if arguments.info:
+        emit(json.dumps(_fields(summary)) if arguments.json else _text(path, summary))
+        return 0
+    return _replay(arguments, path, summary)
 
 
 def _misused(arguments: argparse.Namespace) -> str:

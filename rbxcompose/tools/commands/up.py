@@ -13,7 +13,6 @@ from rbxcompose.base.units import TIME, UnitError, to_si
 from rbxcompose.commands import targets
 from rbxcompose.commands.console import FINDINGS, refuse, write_report
 from rbxcompose.commands.options import add_system_options, is_system
-from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.runtime.folder import RunOptions
 from rbxcompose.runtime.recording.codes import UNWRITABLE
 from rbxcompose.tools.live_rules import LiveRules
@@ -51,14 +50,12 @@ def run(arguments: argparse.Namespace) -> int:
         sys.stderr.write(f"rbxcompose up: --watch is for the foreground in real time, without {other}\n")
         return USAGE
     path = targets.robot_path(arguments.path, may_run=False)
-    if path is None:
-        return FINDINGS
     if is_system(path):
         return _run_share(path, arguments)
     if arguments.host or arguments.robot:
         sys.stderr.write("rbxcompose up: --host and --robot are for systems\n")
         return USAGE
-    compilation = compile_robot(path, **targets.layers_of(arguments))
+    compilation = targets.compiled(path, arguments)
     write_report(compilation.report, compilation.sources)
     if compilation.plan is None or compilation.robot is None or compilation.report.has_errors:
         return 1
