@@ -124,7 +124,7 @@ class Parser(argparse.ArgumentParser):
 
 
 class NotDoneError(Exception):
-    """Raised with the finding when it is unclear which robot is addressed, or none is up."""
+    """Raised with the finding that says why a verb cannot be carried out; `main` reports it."""
 
     def __init__(self, finding: Finding) -> None:
         super().__init__(finding.message)

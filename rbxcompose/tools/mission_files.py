@@ -15,8 +15,7 @@ from rbxcompose.base.files import TooLargeError, read_regular
 from rbxcompose.base.findings import Span, kind, suggest
 from rbxcompose.base.requests import Refused
 from rbxcompose.base.units import example
-from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, misused, refuse, table, write_report
-from rbxcompose.commands.layout import NotDrawnError
+from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, misused, table, write_report
 from rbxcompose.commands.lookup import answer_of, known_state, robots_up
 from rbxcompose.commands.targets import robot_path
 from rbxcompose.compiler.compile import compile_robot
@@ -72,16 +71,13 @@ def _running_file() -> str | None:
 
 def show(arguments: argparse.Namespace) -> int:
     """Write the picture of a mission; without a path, that of the running robot, with the state of each node."""
-    try:
-        picture, statuses = (None if arguments.path else _live(arguments.name)) or (None, ())
-        if picture is None:
-            robot = robot_of(arguments.path)
-            if robot is None:
-                return FINDINGS
-            picture = picture_of(mission_in(robot, arguments.name), robot.names)
-        text = FORMATS[arguments.format](picture, statuses)
-    except (NotDoneError, NotDrawnError) as error:
-        return refuse(error.finding)
+    picture, statuses = (None if arguments.path else _live(arguments.name)) or (None, ())
+    if picture is None:
+        robot = robot_of(arguments.path)
+        if robot is None:
+            return FINDINGS
+        picture = picture_of(mission_in(robot, arguments.name), robot.names)
+    text = FORMATS[arguments.format](picture, statuses)
     if arguments.out is None:
         emit(text.rstrip("\n"))
         return 0

@@ -4,7 +4,6 @@ import argparse
 import json
 import os
 import socket
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -64,8 +63,7 @@ def up_everywhere(path: str, system: System, arguments: argparse.Namespace) -> i
 def run_share(path: str, arguments: argparse.Namespace, options: RunOptions) -> int:
     """Compile a system and run what one host of it runs; return the exit code."""
     if options.is_stepped or arguments.watch:
-        sys.stderr.write("rbxcompose up: a system runs in real time, without --rate and --watch\n")
-        return USAGE
+        return misused("up", "a system runs in real time, without --rate and --watch")
     system = compiled_for(path, arguments, "up")
     if isinstance(system, int):
         return system

@@ -4,17 +4,14 @@ Exit codes: 0 fine, 1 errors found, 2 wrong usage.
 """
 
 import argparse
-import sys
 from pathlib import Path
 
 from rbxcompose.base.files import replace_file
-from rbxcompose.commands.console import FINDINGS, emit, refuse, write_report
-from rbxcompose.commands.layout import NotDrawnError
+from rbxcompose.commands.console import FINDINGS, emit, misused, write_report
 from rbxcompose.commands.targets import add_layer_options, add_path_argument, compiled, robot_path
 from rbxcompose.tools.inspection.diagram import diagram_of, dot, mermaid
 from rbxcompose.tools.inspection.graph_html import html
 
-USAGE = 2
 FORMATS = {"mermaid": mermaid, "dot": dot, "html": html}
 
 
@@ -31,15 +28,11 @@ def run(arguments: argparse.Namespace) -> int:
     compilation = compiled(robot_path(arguments.path), arguments)
     write_report(compilation.report, compilation.sources)
     if compilation.robot is not None:
-        try:
-            text = FORMATS[arguments.format](diagram_of(compilation.robot))
-        except NotDrawnError as error:
-            return refuse(error.finding)
+        text = FORMATS[arguments.format](diagram_of(compilation.robot))
         if arguments.out is None:
             emit(text.rstrip("\n"))
         elif problem := _write(Path(arguments.out), text):
-            sys.stderr.write(f"rbxcompose graph: {problem}\n")
-            return USAGE
+            return misused("graph", problem)
     return FINDINGS if compilation.report.has_errors else 0
 
 

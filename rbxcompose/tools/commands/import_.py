@@ -11,11 +11,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from rbxcompose.base.findings import Finding, Report, Sources
-from rbxcompose.commands.console import FINDINGS, emit, refuse, write_report
+from rbxcompose.commands.console import FINDINGS, emit, write_report
 from rbxcompose.commands.formats.json_ import as_data
 from rbxcompose.commands.importing.foreign_files import read_files
 from rbxcompose.commands.importing.importer import ImportedFiles, broken_importers, imported, importers
-from rbxcompose.commands.new_files import EXISTS, AnswerError, name_like, read_name, write_new
+from rbxcompose.commands.new_files import EXISTS, name_like, read_name, write_new
 from rbxcompose.commands.options import add_json_option
 from rbxcompose.manifest.files import shown_name
 
@@ -36,10 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Read the files, write the manifest, and report the findings."""
     report, sources = Report(broken_importers()), dict[str, str]()
-    try:
-        name = _name(arguments)
-    except AnswerError as error:
-        return refuse(error.finding)
+    name = _name(arguments)
     files = read_files(map(Path, arguments.files), report, sources)
     made = imported(arguments.program, files, name, report)
     findings = Report(

@@ -72,8 +72,6 @@ def run(arguments: argparse.Namespace) -> int:
     asker = new_files.Asker(is_asking=not arguments.yes)
     try:
         return _write(_MAKERS[arguments.what](arguments, asker))
-    except new_files.AnswerError as error:
-        return refuse(error.finding)
     except MistakenRobotError as error:
         write_report(error.compilation.report, error.compilation.sources)
         return FINDINGS
