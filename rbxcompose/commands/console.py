@@ -131,6 +131,14 @@ class NotDoneError(Exception):
         self.finding = finding
 
 
+class ReportedError(Exception):
+    """Raised with the exit code when a verb cannot be carried out, after the reasons have been written."""
+
+    def __init__(self, exit_code: int = FINDINGS) -> None:
+        super().__init__(exit_code)
+        self.exit_code = exit_code
+
+
 def table(rows: Sequence[Sequence[str]]) -> str:
     """Return rows of cells as lines in aligned columns; make foreign names safe for a terminal."""
     cells = [[plain(cell) for cell in row] for row in rows]

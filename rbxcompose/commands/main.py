@@ -50,7 +50,7 @@ def _interrupted(number: int, frame: object) -> NoReturn:
 
 def _run(name: str, words: Sequence[str]) -> int:
     _leave_out_plugins_of_pydantic()
-    from rbxcompose.commands.console import NotDoneError, answered, refuse
+    from rbxcompose.commands.console import NotDoneError, ReportedError, answered, refuse
 
     try:
         verb = load(name)
@@ -64,6 +64,8 @@ def _run(name: str, words: Sequence[str]) -> int:
                 return verb.run(arguments)
             except NotDoneError as error:
                 return refuse(error.finding)
+            except ReportedError as error:
+                return error.exit_code
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # so that the flush at exit has somewhere to go
         return 1

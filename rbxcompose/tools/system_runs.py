@@ -10,7 +10,7 @@ from typing import Any
 
 from rbxcompose.base.findings import Finding, Report, kind
 from rbxcompose.commands import hosts
-from rbxcompose.commands.console import FINDINGS, emit, misused, refuse, write_report
+from rbxcompose.commands.console import FINDINGS, NotDoneError, ReportedError, emit, misused, refuse, write_report
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.compiler.systems.bundle import bundle_of
@@ -27,7 +27,6 @@ from rbxcompose.tools.live_rules import LiveRules
 from rbxcompose.tools.robot_changes import Proposal, carry_out, unsure
 from rbxcompose.tools.run_view import is_fit, run_plan
 
-USAGE = 2
 WHICH_HOST = kind("RBX6110")
 OTHER_MACHINE = kind("RBX6111")
 WHICH_ROBOT = kind("RBX6112")
@@ -36,13 +35,10 @@ REFUSED_THERE = kind("RBX6128")
 
 def up_everywhere(path: str, system: System, arguments: argparse.Namespace) -> int:
     """Bring the files to all hosts, start all shares, and show what they write until the robots are down."""
-    if not hosts.is_reachable(system):
-        return FINDINGS
+    hosts.require_reachable(system)
     shares = hosts.shares_of(system, arguments.ssh_config)
     bundle = bundle_of(system)
     folders = hosts.reached(shares, bundle)
-    if folders is None:
-        return FINDINGS
     shares = {key: share for key, share in shares.items() if share.is_here or share.name in folders}
     options = [*(["-d"] if arguments.detach else []), *(["--real"] if arguments.real else [])]
     options += [word for name in system.profiles for word in ("--profile", name)]
@@ -65,13 +61,9 @@ def run_share(path: str, arguments: argparse.Namespace, options: RunOptions) -> 
     if options.is_stepped or arguments.watch:
         return misused("up", "a system runs in real time, without --rate and --watch")
     system = compiled_for(path, arguments, "up")
-    if isinstance(system, int):
-        return system
     if arguments.host is None and any(host.ssh for host in system.hosts.values()):
         return up_everywhere(path, system, arguments)
     chosen = chosen_robots(system, arguments)
-    if isinstance(chosen, Finding):
-        return refuse(chosen)
     if len(chosen) > 1 and not arguments.detach:
         names = ", ".join(one.name for one in chosen)
         message = f"'{arguments.host}' runs several robots: {names}"
@@ -91,14 +83,20 @@ def run_share(path: str, arguments: argparse.Namespace, options: RunOptions) -> 
     return 0
 
 
-def compiled_for(path: str, arguments: argparse.Namespace, verb: str) -> System | int:
-    """Return a system without errors, with the layers of a `verb`; the exit code after telling what is wrong."""
+def compiled_for(path: str, arguments: argparse.Namespace, verb: str) -> System:
+    """Return a system without errors, with the layers of a `verb`.
+
+    Raises:
+        ReportedError: if it has errors, or an option is not for systems.
+    """
     for word, given in (("-f", arguments.overlays), ("--set", arguments.sets)):
         if given:
-            return misused(verb, f"{word} is for a robot; a system says itself what its robots are")
+            raise ReportedError(misused(verb, f"{word} is for a robot; a system says itself what its robots are"))
     system = compile_system(path, environment=os.environ, real=arguments.real, profiles=arguments.profile)
     write_report(system.report, system.sources)
-    return FINDINGS if system.report.has_errors else system
+    if system.report.has_errors:
+        raise ReportedError
+    return system
 
 
 def layers_of(system: System, robot: PlacedRobot, *, real: bool) -> ChosenLayers:
@@ -109,18 +107,23 @@ def layers_of(system: System, robot: PlacedRobot, *, real: bool) -> ChosenLayers
     return replace(layers, system=str(system.path.resolve()), system_profiles=system.profiles, member=robot.name)
 
 
-def chosen_robots(system: System, arguments: argparse.Namespace) -> list[PlacedRobot] | Finding:
-    """Return the robots to run on this host."""
+def chosen_robots(system: System, arguments: argparse.Namespace) -> list[PlacedRobot]:
+    """Return the robots to run on this host.
+
+    Raises:
+        NotDoneError: if it is not clear which host this is, or it runs nothing of the robot.
+    """
     host = arguments.host
     if host is None:
         message = "no host is named, and none of the system has 'ssh', by which all could be started from here"
-        return WHICH_HOST.at(None, message, help=f"--host {' or --host '.join(system.hosts)}")
+        raise NotDoneError(WHICH_HOST.at(None, message, help=f"--host {' or --host '.join(system.hosts)}"))
     if host not in system.hosts:
-        return WHICH_HOST.misspelt(None, f"the system has no host '{host}'", host, system.hosts, "hosts")
+        message = f"the system has no host '{host}'"
+        raise NotDoneError(WHICH_HOST.misspelt(None, message, host, system.hosts, "hosts"))
     there = [robot for robot in robots_on(system, host) if arguments.robot in (None, robot.name)]
     if not there:
         what = f"'{arguments.robot}'" if arguments.robot else "any robot"
-        return WHICH_HOST.at(None, f"'{host}' does not run anything of {what}")
+        raise NotDoneError(WHICH_HOST.at(None, f"'{host}' does not run anything of {what}"))
     return there
 
 
@@ -170,12 +173,9 @@ def apply_system(path: str, arguments: argparse.Namespace) -> int:
     if arguments.undo is not None:
         return misused("apply", "--undo is for a robot that runs on this machine, by its name")
     system = compiled_for(path, arguments, "apply")
-    if isinstance(system, int):
-        return system
     if arguments.host is not None:
         return _apply_here(system, arguments)
-    if not hosts.is_reachable(system):
-        return FINDINGS
+    hosts.require_reachable(system)
     shares = hosts.shares_of(system, arguments.ssh_config)
     shares = {key: share for key, share in shares.items() if arguments.robot in (None, key[1])}
     change = _SystemChange(path, system, shares, arguments)
@@ -184,10 +184,7 @@ def apply_system(path: str, arguments: argparse.Namespace) -> int:
 
 def _apply_here(system: System, arguments: argparse.Namespace) -> int:
     """Change what this machine runs as a host of the system."""
-    chosen = chosen_robots(system, arguments)
-    if isinstance(chosen, Finding):
-        return refuse(chosen)
-    for robot in chosen:
+    for robot in chosen_robots(system, arguments):
         plan, layers = planned(system, robot, arguments.host), layers_of(system, robot, real=arguments.real)
         proposal = Proposal.of(plan, robot.robot, layers)
         emit(json.dumps(proposal.data) if arguments.json else proposal.text())
@@ -205,10 +202,8 @@ class _SystemChange:
     def run(self) -> int:
         """Ask all hosts, then a person, then change one host after another."""
         bundle, arguments = bundle_of(self._system), self._arguments
-        folders = hosts.reached(self._shares, bundle, needs_all=not arguments.partial)
-        if folders is None:
-            return FINDINGS
-        self._folders, self._file = folders, bundle.system
+        self._folders = hosts.reached(self._shares, bundle, needs_all=not arguments.partial)
+        self._file = bundle.system
         usable = {key: share for key, share in self._shares.items() if share.is_here or share.name in self._folders}
         asked = hosts.on_all({" ".join(key): self._command(key, "--dry-run") for key in usable})
         found = {key: _answer(asked[" ".join(key)]) for key in usable}

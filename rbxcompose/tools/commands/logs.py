@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 
 from rbxcompose.base.findings import suggest
 from rbxcompose.base.levels import LOG_LEVELS
-from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, has_colour
+from rbxcompose.commands.console import NotDoneError, emit, has_colour
 from rbxcompose.commands.lookup import NOT_UP, add_robot_option, find_robot, known_state
 from rbxcompose.commands.options import add_system_options, is_system
 from rbxcompose.commands.story import StoryWriter
@@ -71,8 +71,7 @@ def _of_system(arguments: argparse.Namespace) -> int:
     options += ["-n", str(arguments.lines)] if arguments.lines is not None else []
     options += ["--json"] if arguments.json else []
     system, *names = arguments.names
-    if (shares := every_share(system, arguments)) is None:
-        return FINDINGS
+    shares = every_share(system, arguments)
     return follow_all(shares, lambda robot: ["logs", robot, *names, *options])
 
 
