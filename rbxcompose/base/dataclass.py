@@ -6,8 +6,6 @@ Here classes share all methods but `__init__`, which is compiled when the first 
 library.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import copy

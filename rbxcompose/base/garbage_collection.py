@@ -1,7 +1,5 @@
 """Holding back Python's garbage collector where much is created and little dropped: it would traverse all in vain."""
 
-from __future__ import annotations
-
 import atexit
 import gc
 from collections.abc import Iterator

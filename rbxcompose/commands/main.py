@@ -4,8 +4,6 @@ A verb's module has `add_arguments(parser)` and `run(arguments) -> exit code`; t
 help. Only the verb in use is imported, and for help only what help needs.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import sys
@@ -54,17 +52,22 @@ def _interrupted(number: int, frame: object) -> NoReturn:
 
 def _run(name: str, words: Sequence[str]) -> int:
     _import_pydantic()
-    from rbxcompose.commands.console import answered
+    from rbxcompose.commands.console import NotDoneError, ReportedError, answered, refuse
 
     try:
         verb = load(name)
         with answered(in_json="--json" in words):
-            arguments = parser_of(name, verb).parse_args(words)
-            if (where := getattr(verb, "ON_SYSTEM", "")) and (system := _system_of(arguments, where)):
-                from rbxcompose.commands.hosts import forward  # only needed for systems
+            try:
+                arguments = parser_of(name, verb).parse_args(words)
+                if (where := getattr(verb, "ON_SYSTEM", "")) and (system := _system_of(arguments, where)):
+                    from rbxcompose.commands.hosts import forward  # only needed for systems
 
-                return forward(verb, system, where, [name, *words], arguments)
-            return verb.run(arguments)
+                    return forward(verb, system, where, [name, *words], arguments)
+                return verb.run(arguments)
+            except NotDoneError as error:
+                return refuse(error.finding)
+            except ReportedError as error:
+                return error.exit_code
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # so that the flush at exit has somewhere to go
         return 1

@@ -1,7 +1,5 @@
 """Checks: rules about the whole robot, one file each in `checks/`, declared by one decorator."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterable
 from typing import Any

@@ -1,7 +1,5 @@
 """The compiler: the only place that knows the order of the stages. It reads like a table of contents."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import field, replace
 from pathlib import Path

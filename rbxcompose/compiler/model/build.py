@@ -1,7 +1,5 @@
 """From the manifest to the robot: sections become components, ports become ends of wires, actions become skills."""
 
-from __future__ import annotations
-
 from bisect import bisect_left, insort
 from collections.abc import Collection, Mapping
 from dataclasses import field, replace

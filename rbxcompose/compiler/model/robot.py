@@ -1,7 +1,5 @@
 """The typed model of a whole robot: its components with their wires, its skills, values and missions."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import field
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Checks of a mission on a robot before it runs: rules in the modules of `missions/checks`."""
 
-from __future__ import annotations
-
 import importlib
 import pkgutil
 from collections.abc import Callable, Iterable, Iterator

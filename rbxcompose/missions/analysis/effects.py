@@ -1,7 +1,5 @@
 """What nodes set, publish and call, by themselves or in their hooks."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 
 from rbxcompose.base.findings import Itself, once
