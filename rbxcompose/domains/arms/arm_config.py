@@ -8,7 +8,6 @@ from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from rbxcompose.base.config import Config
@@ -16,7 +15,7 @@ from rbxcompose.base.geometry import Vector3
 from rbxcompose.base.units import ANGLE, LENGTH, Dimension
 from rbxcompose.domains.arms.motion import collisions
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
-from rbxcompose.domains.arms.motion.groups import ArmGroup, ArmJoint, JointSpace, interpolated
+from rbxcompose.domains.arms.motion.groups import ArmGroup, ArmJoint, Array, JointSpace, interpolated
 from rbxcompose.domains.arms.motion.hand_task import PlanningHelper
 from rbxcompose.domains.arms.motion.inverse_kinematics import ANGLE_TOLERANCE, RESTARTS, TOLERANCE, SolverSettings
 from rbxcompose.domains.arms.motion.numba_cache import is_installed
@@ -264,7 +263,7 @@ class ArmWorks:
         """Return the distances of pairs at positions of its joints, as `MeshChecker.pairs` does."""
         return self._checker.pairs(np.array([positions[name] for name in self.space.names]), between)
 
-    def way(self, points: NDArray[np.float64]) -> tuple[Vector3, ...]:
+    def way(self, points: Array) -> tuple[Vector3, ...]:
         """Return where its tip is in the root's frame [m] on straight lines between points of shape (m, n)."""
         dense = interpolated(points, WAY_STEP)
         some = dense[np.linspace(0, len(dense) - 1, min(len(dense), MOST_OF_WAY)).astype(int)]

@@ -7,10 +7,10 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbxcompose.base.geometry import Transform3, conjugate, multiply, rotate
 from rbxcompose.domains.arms.arm_config import ArmConfig, ArmWorks
+from rbxcompose.domains.arms.motion.groups import Array
 from rbxcompose.domains.arms.motion.inverse_kinematics import PoseTarget
 from rbxcompose.domains.arms.motion.tip_servo import ServoMotion, TipServo, Wish
 from rbxcompose.msgs.geometry_msgs import PoseStamped, TwistStamped
@@ -19,7 +19,6 @@ from rbxcompose.msgs.std_msgs import Header, String
 from rbxcompose.msgs.trajectory_msgs import JointTrajectory, JointTrajectoryPoint
 from rbxcompose.sdk import In, Out, Port
 
-Array = NDArray[np.float64]
 FrameAt = Callable[[Array], Transform3]
 
 TWIST, POSE, STATUS, STREAM = "servo_twist", "servo_pose", "servo_status", "stream"  # its ports

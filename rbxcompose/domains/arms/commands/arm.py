@@ -26,17 +26,10 @@ from rbxcompose.base.config import Config, Length, Time
 from rbxcompose.base.findings import suggest
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.base.units import ANGLE, LENGTH
+from rbxcompose.commands import options
 from rbxcompose.commands.console import NotDoneError, emit, misused, table
 from rbxcompose.commands.guest import Guest, visit, wanted
 from rbxcompose.commands.lookup import add_bus_options
-from rbxcompose.commands.options import (
-    Subcommand,
-    add_actions,
-    add_json_option,
-    add_timeout_option,
-    argument,
-    run_action,
-)
 from rbxcompose.commands.targets import add_layer_options, add_path_argument
 from rbxcompose.domains.arms.arm_config import ArmWorks
 from rbxcompose.domains.arms.command_line import (
@@ -68,7 +61,7 @@ from rbxcompose.domains.arms.motion.figures import (
     problem_files,
     read_problem,
 )
-from rbxcompose.domains.arms.motion.groups import moved_links
+from rbxcompose.domains.arms.motion.groups import Array, moved_links
 from rbxcompose.domains.arms.motion.inverse_kinematics import PoseSolutions, PoseTarget
 from rbxcompose.domains.arms.motion.path_constraints import KeptTip
 from rbxcompose.domains.arms.motion.planner import MotionPlan, MotionRequest, Planning
@@ -87,16 +80,18 @@ M = TypeVar("M", MoveArm.Goal, TraceArm.Goal)
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    goal = argument("goal", metavar="GOAL", help="a pose by name, or '{JOINT: POSITION, ...}'")
-    fk_picture = argument("--picture", metavar="FILE", help="draw it among the things of the scene as PNG")
+    goal = options.argument("goal", metavar="GOAL", help="a pose by name, or '{JOINT: POSITION, ...}'")
+    fk_picture = options.argument("--picture", metavar="FILE", help="draw it among the things of the scene as PNG")
     words = "draw start, goal (green) and the way of the tip as PNG"
-    picture = argument("--picture", metavar="FILE", help=words)
-    way = argument("way", metavar="WAY", help="as in a mission: '{points: [{x: 5 cm}], relative: true}'")
-    start = argument("--from", dest="start", metavar="GOAL", default="", help="where it begins (default: at rest)")
+    picture = options.argument("--picture", metavar="FILE", help=words)
+    way = options.argument("way", metavar="WAY", help="as in a mission: '{points: [{x: 5 cm}], relative: true}'")
+    start = options.argument(
+        "--from", dest="start", metavar="GOAL", default="", help="where it begins (default: at rest)"
+    )
     words = "on the way: '{roll: 10 deg, pitch: 10 deg}'"
-    keep = argument("--keep", metavar="KEEP", default="", help=words)
-    arm = argument("--arm", metavar="NAME", help="which one, if there are several")
-    json_ = argument("--json", action="store_true", help="answer in JSON")
+    keep = options.argument("--keep", metavar="KEEP", default="", help=words)
+    arm = options.argument("--arm", metavar="NAME", help="which one, if there are several")
+    json_ = options.argument("--json", action="store_true", help="answer in JSON")
     shared = (add_path_argument, add_layer_options, json_)
     of_arm = (add_path_argument, arm, add_layer_options, json_)
     ik = "print positions of joints that bring the tip to a pose (inverse kinematics)"
@@ -105,22 +100,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     bench = "measure kinematics, and motions, also those of published problems"
     plan = "plan a motion and print how long it takes, or why there is none"
     actions = (
-        Subcommand("ls", "list the arms of a robot with their joints and poses", _ls, shared),
-        Subcommand("fk", "print where the tip is (forward kinematics)", _fk, (goal, fk_picture, *of_arm)),
-        Subcommand("ik", ik, run_inverse, (add_inverse_options, start, *of_arm)),
-        Subcommand("plan", plan, _plan, (goal, picture, start, *of_arm, keep)),
-        Subcommand("trace", trace, _trace, (way, picture, start, *of_arm)),
-        Subcommand("picture", "draw where the tip gets, and how well, as PNG", _picture, (add_reach_options, *of_arm)),
-        Subcommand("bench", bench, _bench, (add_bench_options, *of_arm)),
-        Subcommand("setup", setup, run_setup, (add_options, *shared)),
-        Subcommand("go", "move an arm of a running robot, and print how that ends", run_go, (add_go_options, keep)),
+        options.Subcommand("ls", "list the arms of a robot with their joints and poses", _ls, shared),
+        options.Subcommand("fk", "print where the tip is (forward kinematics)", _fk, (goal, fk_picture, *of_arm)),
+        options.Subcommand("ik", ik, run_inverse, (add_inverse_options, start, *of_arm)),
+        options.Subcommand("plan", plan, _plan, (goal, picture, start, *of_arm, keep)),
+        options.Subcommand("trace", trace, _trace, (way, picture, start, *of_arm)),
+        options.Subcommand(
+            "picture", "draw where the tip gets, and how well, as PNG", _picture, (add_reach_options, *of_arm)
+        ),
+        options.Subcommand("bench", bench, _bench, (add_bench_options, *of_arm)),
+        options.Subcommand("setup", setup, run_setup, (add_options, *shared)),
+        options.Subcommand(
+            "go", "move an arm of a running robot, and print how that ends", run_go, (add_go_options, keep)
+        ),
     )
-    add_actions(parser, actions)
+    options.add_actions(parser, actions)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the chosen subcommand."""
-    return run_action(arguments)
+    return options.run_action(arguments)
 
 
 def _ls(arguments: argparse.Namespace) -> int:
@@ -216,11 +215,7 @@ def _goal(message: type[M], data: Mapping[str, object]) -> M:
 
 
 def _show_plan(
-    works: ArmWorks,
-    planning: Planning,
-    arguments: argparse.Namespace,
-    start: NDArray[np.float64],
-    goal: NDArray[np.float64] | None = None,
+    works: ArmWorks, planning: Planning, arguments: argparse.Namespace, start: Array, goal: Array | None = None
 ) -> int:
     """Print a plan, and draw it if that is wanted; without a goal, it ends where the plan ends.
 
@@ -347,8 +342,8 @@ def add_go_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("arm", metavar="ARM", help="the arm")
     words = "a pose by name, '{JOINT: POSITION, ...}', or a way of the tip: '{points: [{x: 5 cm}]}'"
     parser.add_argument("goal", metavar="GOAL", help=words)
-    add_timeout_option(parser, "5s")
-    add_json_option(parser)
+    options.add_timeout_option(parser, "5s")
+    options.add_json_option(parser)
     add_bus_options(parser)
 
 
@@ -482,11 +477,7 @@ def _data(one: Tries) -> dict[str, object]:
 
 
 def draw_motion(
-    arguments: argparse.Namespace,
-    works: ArmWorks,
-    start: NDArray[np.float64],
-    goal: NDArray[np.float64],
-    found: MotionPlan | MotionFailure | None,
+    arguments: argparse.Namespace, works: ArmWorks, start: Array, goal: Array, found: MotionPlan | MotionFailure | None
 ) -> int:
     """Draw a motion, or why there is none; return the exit code."""
     from rbxcompose.domains.arms.motion.picture import ArmPicture, draw_arm  # its libraries take long
@@ -550,7 +541,7 @@ def add_reach_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def run_reach(arguments: argparse.Namespace, works: ArmWorks, start: NDArray[np.float64]) -> int:
+def run_reach(arguments: argparse.Namespace, works: ArmWorks, start: Array) -> int:
     """Try positions, draw the picture, print what is in it; return the exit code."""
     layer = "" if arguments.layer in ("", "all") else f", {arguments.layer}"
     wish = read_written(_ReachModel, f"{{cell: {arguments.cell}, time: {arguments.time}{layer}}}")
@@ -577,7 +568,7 @@ def run_reach(arguments: argparse.Namespace, works: ArmWorks, start: NDArray[np.
     return 0
 
 
-def _cut(arguments: argparse.Namespace, works: ArmWorks, wish: _ReachModel, start: NDArray[np.float64]) -> Cut | None:
+def _cut(arguments: argparse.Namespace, works: ArmWorks, wish: _ReachModel, start: Array) -> Cut | None:
     """Return the layer to show; None for all cells."""
     given = [(axis, at) for axis, at in enumerate((wish.x, wish.y, wish.z)) if at is not None]
     if arguments.layer == "all":
@@ -621,9 +612,7 @@ def _summary(arguments: argparse.Namespace, found: ReachMap, cut: Cut | None, to
     return f"the tip gets to {len(counts):,} cells of {found.side * 100:g} cm{where}: {words} ({tried})"
 
 
-def _drawn(
-    what: str, works: ArmWorks, start: NDArray[np.float64], found: ReachMap, cut: Cut | None, text: str
-) -> bytes:
+def _drawn(what: str, works: ArmWorks, start: Array, found: ReachMap, cut: Cut | None, text: str) -> bytes:
     from rbxcompose.domains.arms.motion.picture import ArmPicture
     from rbxcompose.domains.arms.motion.reach import ReachPicture, draw_reach
 

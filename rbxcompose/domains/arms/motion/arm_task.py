@@ -9,13 +9,12 @@ from functools import partial
 from typing import Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.collisions import pairs_shown
-from rbxcompose.domains.arms.motion.groups import JointSpace
+from rbxcompose.domains.arms.motion.groups import Array, JointSpace
 from rbxcompose.domains.arms.motion.inverse_kinematics import ENOUGH, SOLVER, PoseSolutions, PoseTarget, SolverSettings
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory, speeds_of
 from rbxcompose.domains.arms.motion.path_constraints import Keep, KeptTip
@@ -83,7 +82,6 @@ class ArmGoal:
         return "what 'keep' asks of the tip is not possible together with 'approximate'"
 
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
 Solving = Generator[None, None, PoseSolutions]
 

@@ -11,11 +11,9 @@ from numpy.typing import NDArray
 
 from rbxcompose.base.geometry import Transform3, Vector3, rotate
 from rbxcompose.domains.arms.motion.borrowed import borrowed
-from rbxcompose.domains.arms.motion.groups import ArmGroup, leader_of
+from rbxcompose.domains.arms.motion.groups import ArmGroup, Array, leader_of
 from rbxcompose.domains.arms.motion.numba_cache import compiled, inlined
 from rbxcompose.domains.body.model import Body
-
-Array = NDArray[np.float64]
 
 
 @inlined

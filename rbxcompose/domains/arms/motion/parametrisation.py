@@ -12,12 +12,9 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.domains.arms.motion.groups import JointSpace
-
-Array = NDArray[np.float64]
+from rbxcompose.domains.arms.motion.groups import Array, JointSpace
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,16 +8,13 @@ from dataclasses import replace
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.domains.arms.motion import damped_steps, inverse_kinematics
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.collisions import Checker
-from rbxcompose.domains.arms.motion.groups import JointSpace
+from rbxcompose.domains.arms.motion.groups import Array, JointSpace
 from rbxcompose.domains.arms.motion.path_constraints import Keep, KeptTip
-
-Array = NDArray[np.float64]
 
 STEPS = 40  # along the null space, at most
 LEAST = 1e-3  # [rad or m] that a step brings nearer; less is not worth it

@@ -9,9 +9,9 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbxcompose.base.geometry import Transform3, Vector3, quaternion_about
+from rbxcompose.domains.arms.motion.groups import Array
 from rbxcompose.domains.arms.motion.octree_files import read_cells
 from rbxcompose.domains.arms.motion.scene import PlacedObject, ScenePiece
 from rbxcompose.domains.body.model import Geometry
@@ -89,7 +89,7 @@ def _piece(message: SceneShape) -> ScenePiece:
 SAND = (0.85, 0.7, 0.45, 1.0)
 _SHEET = (4.0, 4.0, 0.002)  # [m] of a plane that is shown
 _SIDES = 24  # of a cone
-Points = Sequence[Sequence[float]] | NDArray[np.float64]
+Points = Sequence[Sequence[float]] | Array
 
 
 def markers(objects: Sequence[PlacedObject]) -> MarkerArray:
@@ -175,5 +175,5 @@ def _vector(values: Sequence[float]) -> Vector3:
 
 
 @lru_cache(maxsize=8)
-def _read(file: str, side: float) -> tuple[NDArray[np.float64], float]:
+def _read(file: str, side: float) -> tuple[Array, float]:
     return read_cells(Path(file), side)

@@ -18,8 +18,8 @@ from xxhash import xxh3_128_hexdigest
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import open_regular, replace_file
+from rbxcompose.domains.arms.motion.groups import Array
 
-Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
 Ball = tuple[Array, float]
 

@@ -9,19 +9,16 @@ from itertools import accumulate, pairwise
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Quaternion, Transform3, Vector3, conjugate, lerp, multiply, slerp
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.collisions import Checker, pairs_shown
-from rbxcompose.domains.arms.motion.groups import JointSpace
+from rbxcompose.domains.arms.motion.groups import Array, JointSpace
 from rbxcompose.domains.arms.motion.inverse_kinematics import ANGLE_TOLERANCE, TOLERANCE, PoseTarget, descended
 from rbxcompose.domains.arms.motion.parametrisation import MARGIN, Trajectory, jerks_of, speeds_of, timed
 from rbxcompose.domains.arms.motion.planner import FINE, MotionPlan, MotionPlanner, Planning, examined, mistake_in_start
 from rbxcompose.domains.arms.reasons import MotionFailure, MotionReason
-
-Array = NDArray[np.float64]
 
 TURN = 0.1  # [m/rad]
 SAME = 1e-6  # [m or rad] between poses that are the same
