@@ -138,17 +138,12 @@ def dimensions_of(config: ArmConfig) -> dict[str, Dimension]:
 
 def space_of(config: ArmConfig) -> JointSpace:
     """Return the joints of an arm."""
-    return JointSpace(
-        tuple(
-            ArmJoint(
-                name,
-                MotionLimits(joint.lower, joint.upper, joint.velocity, joint.acceleration, jerk=joint.jerk),
-                joint.is_continuous,
-                joint.slides,
-            )
-            for name, joint in config.joints.items()
-        )
-    )
+    limits = {
+        name: MotionLimits(item.lower, item.upper, item.velocity, item.acceleration, jerk=item.jerk)
+        for name, item in config.joints.items()
+    }
+    joints = config.joints.items()
+    return JointSpace(tuple(ArmJoint(name, limits[name], item.is_continuous, item.slides) for name, item in joints))
 
 
 def description_of(config: ArmConfig) -> Description:
@@ -205,16 +200,12 @@ class ArmWorks:
         is_compiled = type_ == FAST or (type_ == AUTOMATIC and is_fast and is_installed())
         self.helpers: Sequence[PlanningHelper] = ()
         """Those that plan elsewhere meanwhile."""
-        self._fast = _hastened() if is_compiled else _as_it_is
-        unlikely = frozenset(pairs.unlikely if pairs is not None else ())
-        self.solver, planner_config = config.kinematics.settings, config.planner
-        settings = PlannerSettings(
-            planner_config.type,
-            planner_config.time,
-            planner_config.attempts,
-            planner_config.seed,
-            planner_config.simplify,
+        self._fast: Callable[[collisions.MeshChecker], collisions.Checker] = (
+            _hastened() if is_compiled else lambda same: same
         )
+        unlikely = frozenset(pairs.unlikely if pairs is not None else ())
+        self.solver, own = config.kinematics.settings, config.planner
+        settings = PlannerSettings(own.type, own.time, own.attempts, own.seed, own.simplify)
         self.planner = MotionPlanner(self.space, self._fast(self._checker), settings, now, unlikely)
         if isinstance(self.planner.checker, collisions.SearchingChecker):
             self.planner.checker.prepare(self.space)

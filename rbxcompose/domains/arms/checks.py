@@ -223,10 +223,7 @@ def look_frame(robot: Robot) -> Iterator[Finding]:
         return
     skills = {"look_at" if len(found) == 1 else f"look_at_{name}": name for name in found}
     for node in (node for mission in robot.missions.values() for node in mission.program.nodes if node.skill in skills):
-        head, written = (
-            skills[node.skill],
-            next((argument for argument in node.step.arguments if argument.name == "frame"), None),
-        )
+        head, written = (skills[node.skill], next((item for item in node.step.arguments if item.name == "frame"), None))
         frames = (*found[head].model.frames, *contents.of(scene).frames)
         if written is None or not isinstance(written.value, ScalarNode) or "$" in written.value.text:
             continue
@@ -543,9 +540,7 @@ class _Reaches:
         """Yield that a place of a mission is out of reach."""
         (name, span), model = word_of(place, "spot"), place.arm.model
         known = constants(place.mission)
-        numbers = {
-            number: known_value(place.arguments[number], known) for number in _NUMBERS if number in place.arguments
-        }
+        numbers = {item: known_value(place.arguments[item], known) for item in _NUMBERS if item in place.arguments}
         if any(number is None for number in numbers.values()):
             return
         at = {one: number for one, number in numbers.items() if number is not None}
@@ -609,9 +604,7 @@ class _Reaches:
         length = length_of(self.robot, self.body, robot) + math.hypot(*fingers)
         if away <= length + slack + 0.001:
             return
-        shown, most = (
-            format_quantity(round(value, 3), LENGTH, "m" if value >= 1.0 else "cm") for value in (away, length)
-        )
+        shown, most = (format_quantity(round(item, 3), LENGTH, "m" if item >= 1.0 else "cm") for item in (away, length))
         is_unit = away > _TIMES * length
         yield too_far.at(
             span,

@@ -13,13 +13,12 @@ from rbxcompose.domains.arms.motion.inverse_kinematics import SOLVER, PoseTarget
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory
 from rbxcompose.domains.arms.motion.path_constraints import ANGLE as SIGHT_ANGLE
 from rbxcompose.domains.arms.motion.path_constraints import RADIUS, Keep, KeptSight
+from rbxcompose.domains.arms.motion.scene_messages import joint_trajectory
 from rbxcompose.domains.arms.motion.trace_planner import ANY_SPEED, TraceWish, WayPoint
 from rbxcompose.msgs import rbxcompose_msgs
 from rbxcompose.msgs.control_msgs import FollowJointTrajectory
 from rbxcompose.msgs.fields import Measures
 from rbxcompose.msgs.moveit_msgs import ExecuteTrajectory, MoveGroup
-from rbxcompose.msgs.stamps import to_duration
-from rbxcompose.msgs.trajectory_msgs import JointTrajectory, JointTrajectoryPoint
 
 POSE_MEASURES = {**dict.fromkeys(("x", "y", "z"), LENGTH), **dict.fromkeys(("roll", "pitch", "yaw"), ANGLE)}
 SIGHT_MEASURES: Measures = {**dict.fromkeys(("x", "y", "z", "radius"), LENGTH), "angle": ANGLE}
@@ -68,12 +67,7 @@ def feedback_of(message: Any, stage: str) -> Any:
 
 def follow_goal(names: tuple[str, ...], trajectory: Trajectory) -> FollowJointTrajectory.Goal:
     """Return a trajectory as its controller takes it; where the arm is now is not among its points."""
-    rows = zip(trajectory.times[1:].tolist(), trajectory.positions[1:], trajectory.velocities[1:], strict=True)
-    points = tuple(
-        JointTrajectoryPoint(positions=positions, velocities=velocities, time_from_start=to_duration(time))
-        for time, positions, velocities in rows
-    )
-    return FollowJointTrajectory.Goal(trajectory=JointTrajectory(joint_names=names, points=points))
+    return FollowJointTrajectory.Goal(trajectory=joint_trajectory(names, trajectory))
 
 
 def goal_of(message: ArmMessage, solver: SolverSettings = SOLVER) -> ArmGoal:

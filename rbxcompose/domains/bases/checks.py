@@ -84,11 +84,7 @@ def _wheel(body: Body, setting: Setting[str], link: str) -> BodyWheel:
     joint, poses = body.joints[setting.value], body.poses({})
     there = poses[joint.child] if link not in poses else poses[link].inverse().compose(poses[joint.child])
     child = body.links[joint.child]
-    round_ones = [
-        collision
-        for collision in (*child.collisions, *child.visuals)
-        if collision.geometry.kind in ("cylinder", "sphere")
-    ]
+    round_ones = [item for item in (*child.collisions, *child.visuals) if item.geometry.kind in ("cylinder", "sphere")]
     shape = next(iter(round_ones), None)
     centre = there.apply(shape.origin.translation) if shape else there.translation
     radius = shape.geometry.size[0] if shape else None
@@ -358,7 +354,7 @@ def dropped_message(robot: Robot) -> Iterator[Finding]:
             topic = robot.topics.get(message.target.text)
             for (outer, inner), limit in limits.items() if topic and topic.message == Twist.TYPE else ():
                 written = _at(_at(message.body, outer), inner)
-                value = _number(written, constants(mission))
+                value = number_of(written.expression, constants(mission)) if isinstance(written, WrittenValue) else None
                 if isinstance(written, WrittenValue) and value is not None and abs(value) > limit:
                     _, dimension, unit = _FIELDS[outer, inner]
                     most, is_turn = format_quantity(limit, dimension, unit), dimension is ANGULAR_SPEED
@@ -380,10 +376,6 @@ def _dropped_above(robot: Robot, name: str) -> float:
 
 def _at(shape: TemplateShape | None, key: str) -> TemplateShape | None:
     return shape.get(key) if isinstance(shape, Mapping) else None
-
-
-def _number(shape: TemplateShape | None, known: Mapping[str, object]) -> float | None:
-    return number_of(shape.expression, known) if isinstance(shape, WrittenValue) else None
 
 
 @check("RBX3504")

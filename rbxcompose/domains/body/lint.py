@@ -242,7 +242,7 @@ def _limits(joint: BodyJoint, limits: JointLimits) -> Iterator[Finding]:
         message = f"the limits of joint '{name}' lack the {' and the '.join(missing)}"
         yield NO_MOTION.at(limits.span, message, help="write what the motor can do; ROS refuses a URDF without it")
     elif stuck := list(_stuck(joint, limits)):
-        message = f"the {' and the '.join(stuck)} of joint '{name}' {_be(stuck)} zero"
+        message = f"the {' and the '.join(stuck)} of joint '{name}' {('is' if len(stuck) == 1 else 'are')} zero"
         yield NO_MOTION.at(limits.span, message, help=_UNWRITTEN if stuck == ["range"] else _WRITE)
     elif joint.kind == "revolute" and limits.may_be_degrees:
         lower, upper = (math.radians(value or 0.0) for value in (limits.lower, limits.upper))
@@ -261,10 +261,6 @@ def _stuck(joint: BodyJoint, limits: JointLimits) -> Iterator[str]:
         yield "velocity"
         if limits.effort == 0.0:
             yield "effort"
-
-
-def _be(words: list[str]) -> str:
-    return "is" if len(words) == 1 else "are"
 
 
 def _shapes(link: BodyLink, meshes: Collection[str], respelt: Mapping[str, str]) -> Iterator[Finding]:

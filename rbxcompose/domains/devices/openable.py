@@ -34,8 +34,7 @@ LookAt = Callable[[str], PortFile]
 def port_findings(robot: Robot, ports: Sequence[serial_ports.SerialPort], look: LookAt) -> Iterator[Finding]:
     """Yield what is wrong with the ports that components open, given those that are connected."""
     for component, opens in robot.declared(OpensPort):
-        span = setting_span(robot, (component, opens.port.field))
-        yield from _of_port(opens.port.value, ports, look, span)
+        yield from _of_port(opens.port.value, ports, look, setting_span(robot, (component, opens.port.field)))
 
 
 def _of_port(name: str, ports: Sequence[serial_ports.SerialPort], look: LookAt, span: Span) -> Iterator[Finding]:

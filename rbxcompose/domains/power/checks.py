@@ -190,9 +190,7 @@ def _ends_of_loops(program: Program, call: ChargeInterrupt) -> Iterator[Asked]:
 @check("RBX3505", Severity.WARNING, closed=())
 def charger_reach(robot: Robot) -> Iterator[Finding]:
     """The robot may stop too far from its dock to be charged."""
-    drivers = [
-        (component, navigates.tolerance) for component, navigates in robot.declared(Navigates) if navigates.tolerance
-    ]
+    drivers = [(item, navigates.tolerance) for item, navigates in robot.declared(Navigates) if navigates.tolerance]
     if not drivers:
         return
     driver, tolerance = min(drivers, key=lambda one: one[1].value)

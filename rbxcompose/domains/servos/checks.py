@@ -108,9 +108,7 @@ def driven_buses(robot: Robot) -> Iterator[DrivenBus]:
         bus: Any = component.config
         if component.path[:1] == BUSES and bus.kind == DYNAMIXEL:
             servos = {
-                servo.id: (bus.model(servo.model), joint.mode)
-                for joint in bus.joints.values()
-                for servo in joint.servos
+                servo.id: (bus.model(servo.model), item.mode) for item in bus.joints.values() for servo in item.servos
             }
             yield DrivenBus(bus.name, component.path, bus.baud, bus.rate, bus.return_delay, servos)
 
@@ -142,9 +140,7 @@ def baud_of_servo(robot: Robot) -> Iterator[Finding]:
         unfit = [name for name, model in models.items() if model.code_of(bus.baud) is None]
         if unfit:
             names = sorted({models[name].name for name in unfit})
-            common = [
-                baud for baud in COMMON_BAUDS if all(model.code_of(baud) is not None for model in models.values())
-            ]
+            common = [baud for baud in COMMON_BAUDS if all(item.code_of(baud) is not None for item in models.values())]
             yield baud_of_servo.at(
                 robot.value(*bus.path, "baud"),
                 f"{' and '.join(names)} cannot listen at {format_quantity(bus.baud, BIT_RATE)}",
@@ -380,11 +376,7 @@ def no_speed_limit(robot: Robot) -> Iterator[Finding]:
 @check("RBX2245", Severity.WARNING, closed=(WIRING,))
 def speed_of_joint(robot: Robot) -> Iterator[Finding]:
     """A controller is to be faster than its joint."""
-    declared = [
-        (robot_component, bounds)
-        for robot_component, bounds in robot.declared(BoundsGoals)
-        if bounds.speed and bounds.joints
-    ]
+    declared = [(item, bounds) for item, bounds in robot.declared(BoundsGoals) if bounds.speed and bounds.joints]
     led = {joint.name: joint for joint in driven_joints(robot)} if declared else {}
     for component, bounds in declared:
         for name in bounds.joints.value.values() if bounds.joints else ():
@@ -676,11 +668,7 @@ def hasty_motion(robot: Robot) -> Iterator[Finding]:
 
 
 def _movers(robot: Robot) -> dict[str, JointMover]:
-    declared = [
-        (robot_component, bounds)
-        for robot_component, bounds in robot.declared(BoundsGoals)
-        if bounds.duration and bounds.joints
-    ]
+    declared = [(item, bounds) for item, bounds in robot.declared(BoundsGoals) if bounds.duration and bounds.joints]
     led = {joint.name: joint for joint in driven_joints(robot)} if declared else {}
     found = dict[str, JointMover]()
     for component, bounds in declared:
@@ -711,11 +699,7 @@ def _leaves_joints(node: MissionNode) -> bool:
 
 def _after(node: MissionNode, mover: JointMover, known: Constants, before: Positions) -> Positions:
     """Return where the joints are after a step, as far as that is known."""
-    given = {
-        argument.name: (mover.goal(argument, known), argument)
-        for argument in node.step.arguments
-        if argument.name in mover.joints
-    }
+    given = {item.name: (mover.goal(item, known), item) for item in node.step.arguments if item.name in mover.joints}
     stay = {name: pair for name, pair in before.items() if name not in given}
     return stay | {name: (value, argument) for name, (value, argument) in given.items() if value is not None}
 

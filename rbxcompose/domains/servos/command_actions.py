@@ -471,8 +471,7 @@ def _show_values(bus: DynamixelBus, found: FoundServo, items: list[str], argumen
         emit(json.dumps({"id": found.id, "model": found.name, "values": shown_values}))
         return 0
     rows = [
-        (name, str(reading.values[name]), f"{value:.6g} {unit}" if unit else "")
-        for name, (value, unit) in values.items()
+        (name, str(reading.values[name]), f"{item:.6g} {unit}" if unit else "") for name, (item, unit) in values.items()
     ]
     emit(f"{found.name}, id {found.id}, protocol {found.protocol}.0")
     emit(table([("item", "raw", "value"), *rows]))

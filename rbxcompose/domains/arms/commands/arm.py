@@ -14,6 +14,7 @@ import json
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from time import perf_counter, process_time
@@ -62,7 +63,7 @@ from rbxcompose.domains.arms.motion.figures import (
     read_problem,
 )
 from rbxcompose.domains.arms.motion.groups import Array, moved_links
-from rbxcompose.domains.arms.motion.inverse_kinematics import PoseSolutions, PoseTarget
+from rbxcompose.domains.arms.motion.inverse_kinematics import PoseSearch, PoseSolutions, PoseTarget
 from rbxcompose.domains.arms.motion.path_constraints import KeptTip
 from rbxcompose.domains.arms.motion.planner import MotionPlan, MotionRequest, Planning
 from rbxcompose.domains.arms.motion.pose_search import Posture, searched
@@ -117,9 +118,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     options.add_actions(parser, actions)
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Run the chosen subcommand."""
-    return options.run_action(arguments)
+run = options.run_action
 
 
 def _ls(arguments: argparse.Namespace) -> int:
@@ -252,8 +251,7 @@ def _show_plan(
 
 def add_inverse_options(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of `arm ik`."""
-    words = "of the tip: '{x: 20 cm, y: -10 cm, z: 55 cm, yaw: 90 deg}'"
-    parser.add_argument("target", metavar="POSE", help=words)
+    parser.add_argument("target", metavar="POSE", help="of the tip: '{x: 20 cm, y: -10 cm, z: 55 cm, yaw: 90 deg}'")
     parser.add_argument("--frame", metavar="LINK", default="", help="the link in whose frame it is (default: the root)")
     counts = parser.add_mutually_exclusive_group()
     counts.add_argument("--any-orientation", action="store_true", help="only the position counts")
@@ -315,19 +313,10 @@ def _found(
 ) -> PoseSolutions:
     solver, began = works.solver, perf_counter()
     prefer = arguments.prefer or solver.prefer
-    return ended(
-        searched(
-            works.kinematics,
-            works.space,
-            target,
-            start,
-            works.planner.checker.is_free,
-            seed=works.planner.settings.seed,
-            posture=Posture.of(works.space.names, positions_in(works, robot, prefer)) if prefer else None,
-            restarts=solver.restarts,
-            is_late=lambda: perf_counter() - began >= solver.time,
-        )
-    )
+    posture = Posture.of(works.space.names, positions_in(works, robot, prefer)) if prefer else None
+    is_free, seed = works.planner.checker.is_free, works.planner.settings.seed
+    search = PoseSearch(works.kinematics, works.space, target, start, is_free, seed, solver.restarts)
+    return ended(searched(replace(search, is_late=lambda: perf_counter() - began >= solver.time), posture))
 
 
 def _far(away: float, angle: float) -> str:

@@ -15,7 +15,14 @@ from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.collisions import pairs_shown
 from rbxcompose.domains.arms.motion.groups import Array, JointSpace
-from rbxcompose.domains.arms.motion.inverse_kinematics import ENOUGH, SOLVER, PoseSolutions, PoseTarget, SolverSettings
+from rbxcompose.domains.arms.motion.inverse_kinematics import (
+    ENOUGH,
+    SOLVER,
+    PoseSearch,
+    PoseSolutions,
+    PoseTarget,
+    SolverSettings,
+)
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory, speeds_of
 from rbxcompose.domains.arms.motion.path_constraints import Keep, KeptTip
 from rbxcompose.domains.arms.motion.planner import (
@@ -278,23 +285,12 @@ class ArmTask:
         """Return the search for positions that bring the tip to a target in the root's frame."""
         checker, seed, kept, prefer = self._planner.checker, self._planner.settings.seed, self._kept, self._goal.prefer
         posture = Posture.of(self.space.names, self._site.poses[prefer]) if prefer else None
+        ends, kinematics, space = self._site.now + self._solver.time, self._kinematics, self._narrow
+        search = PoseSearch(kinematics, space, target, self._start, checker.is_free, seed, self._solver.restarts)
         if kept is not None and target.any_orientation:
-            keep, first = self._goal.keep, self._start if self._first is None else self._first
-            return kept_solutions(
-                self._kinematics, self._narrow, target, keep, self._start, first, checker, seed=seed, posture=posture
-            )
-        ends, restarts = self._site.now + self._solver.time, self._solver.restarts
-        return searched(
-            self._kinematics,
-            self._narrow,
-            target,
-            self._start,
-            checker.is_free,
-            seed=seed,
-            posture=posture,
-            restarts=restarts,
-            is_late=lambda: self._site.now >= ends,
-        )
+            first = self._start if self._first is None else self._first
+            return kept_solutions(search, self._goal.keep, first, checker, posture)
+        return searched(replace(search, is_late=lambda: self._site.now >= ends), posture)
 
     def _solve(self, target: PoseTarget, solving: Solving) -> None:
         found = self._worked(solving)

@@ -360,8 +360,7 @@ class MeshChecker:
         """Return the pairs of shapes that it examines, and how far they must be from each other [m]."""
         margins = (request.security_margin for request in self._data.collisionRequests)
         return [
-            (pair.first, pair.second, margin)
-            for pair, margin in zip(self._geometry.collisionPairs, margins, strict=True)
+            (pair.first, pair.second, item) for pair, item in zip(self._geometry.collisionPairs, margins, strict=True)
         ]
 
     def collides(self, values: Array, pairs: Iterable[int]) -> bool:

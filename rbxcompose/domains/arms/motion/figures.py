@@ -17,7 +17,7 @@ from rbxcompose.base.files import read_regular
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.groups import Array, JointSpace
-from rbxcompose.domains.arms.motion.inverse_kinematics import PoseTarget, SolverSettings, solved
+from rbxcompose.domains.arms.motion.inverse_kinematics import PoseSearch, PoseTarget, SolverSettings, solved
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory
 from rbxcompose.domains.arms.motion.planner import MotionPlan, MotionPlanner, MotionRequest
 from rbxcompose.domains.arms.motion.scene import PlacedObject, ScenePiece
@@ -97,10 +97,8 @@ def inverse_tries(
             kinematics.tip_pose(goal), tolerance=settings.tolerance, angle_tolerance=settings.angle_tolerance
         )
         began = clock()
-        search = solved(
-            kinematics, space, target, start, lambda _: True, seed=seed, restarts=settings.restarts, enough=1
-        )
-        found += bool(ended(search).free)
+        search = PoseSearch(kinematics, space, target, start, lambda _: True, seed, settings.restarts, 1)
+        found += bool(ended(solved(search)).free)
         times.append(clock() - began)
     return Tries(len(goals), found, tuple(times))
 

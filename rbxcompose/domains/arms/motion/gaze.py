@@ -110,9 +110,7 @@ class Gaze:
 
     def _camera_at(self, positions: Mapping[str, float]) -> Transform3:
         body = self._body
-        return composed(
-            joint.at(body.position(joint, positions)) if joint.moves else joint.origin for joint in self._chain
-        )
+        return composed(item.at(body.position(item, positions)) if item.moves else item.origin for item in self._chain)
 
 
 def past(point: Vector3) -> float:

@@ -53,7 +53,7 @@ def grasps_of(shape: Geometry, pose: geometry.Transform3, bearing: float, widest
     found = [
         Grasp(geometry.Transform3(_held_at(shape, pose, turn, back), turn), width, _quality(turn, pitch) * worth)
         for turned, worth, back in _sides(shape, pose, bearing)
-        if (width := _width(shape, pose, turned)) < widest
+        if (width := (2 * extent(shape, pose.rotation, geometry.rotate(turned, (0.0, 1.0, 0.0))))) < widest
         for pitch in PITCHES
         for turn in (geometry.multiply(turned, geometry.quaternion_from_rpy(0.0, pitch, 0.0)),)
     ]
@@ -108,10 +108,6 @@ def _sides(
     above = geometry.quaternion_about((0.0, 1.0, 0.0), math.pi / 2)
     for yaw, back in product(_closing_from_above(shape, pose, bearing), SHALLOW):
         yield geometry.multiply(geometry.quaternion_from_rpy(0.0, 0.0, yaw), above), FROM_ABOVE * (1.0 - back), back
-
-
-def _width(shape: Geometry, pose: geometry.Transform3, turn: geometry.Quaternion) -> float:
-    return 2 * extent(shape, pose.rotation, geometry.rotate(turn, (0.0, 1.0, 0.0)))
 
 
 def _yaws(shape: Geometry, pose: geometry.Transform3, bearing: float) -> Iterable[tuple[float, float]]:

@@ -29,7 +29,7 @@ from rbxcompose.domains.arms.motion.arm_task import LONGEST_CALL, SETTLING, ArmG
 from rbxcompose.domains.arms.motion.collisions import Checker, pairs_shown
 from rbxcompose.domains.arms.motion.grasps import Grasp, grasps_of, least_width, reach_of, solid_of
 from rbxcompose.domains.arms.motion.groups import Array, JointSpace, interpolated
-from rbxcompose.domains.arms.motion.inverse_kinematics import TOLERANCE, PoseTarget, descended, solved
+from rbxcompose.domains.arms.motion.inverse_kinematics import TOLERANCE, PoseSearch, PoseTarget, descended, solved
 from rbxcompose.domains.arms.motion.planner import RESOLUTION, MotionPlan, MotionPlanner, MotionRequest, Planning
 from rbxcompose.domains.arms.motion.scene import PlacedObject
 from rbxcompose.domains.arms.reasons import GraspReason, MotionFailure, MotionReason, StageFailure
@@ -192,15 +192,9 @@ class ContactSearch:
     def _way(self, contact: Contact, checkers: ContactCheckers) -> Generator[None, None, ContactWay | _Failed]:
         coming, (to, back) = checkers.coming(contact), self.stages
         target = PoseTarget(contact.at)
+        start, is_free = self.start, coming.is_free
         solutions = yield from solved(
-            self.kinematics,
-            self.space,
-            target,
-            self.start,
-            coming.is_free,
-            seed=self.seed,
-            restarts=RESTARTS,
-            enough=ENOUGH,
+            PoseSearch(self.kinematics, self.space, target, start, is_free, self.seed, RESTARTS, ENOUGH)
         )
         if not solutions.free:
             if solutions.colliding:
@@ -377,9 +371,7 @@ class WaysAhead:
         self.close()
         self._scene, self._later, way = scene, [], self._now.way
         last = way.contact if isinstance(way, ContactWay) else None
-        self._looking = self._look(
-            next((after for after, contact in enumerate(self._contacts, 1) if contact is last), 0)
-        )
+        self._looking = self._look(next((item for item, contact in enumerate(self._contacts, 1) if contact is last), 0))
 
     def _is_from(self, request: MotionRequest) -> bool:
         """Return whether the motion was planned from where all joints are."""

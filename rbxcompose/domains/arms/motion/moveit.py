@@ -16,7 +16,7 @@ from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.arm_task import ArmGoal, ArmSite, ArmTask, GivenTask
 from rbxcompose.domains.arms.motion.collisions import Checker, pairs_shown
 from rbxcompose.domains.arms.motion.groups import Array, JointSpace
-from rbxcompose.domains.arms.motion.inverse_kinematics import PoseSolutions, PoseTarget, SolverSettings
+from rbxcompose.domains.arms.motion.inverse_kinematics import PoseSearch, PoseSolutions, PoseTarget, SolverSettings
 from rbxcompose.domains.arms.motion.octree_files import cells_of_octomap
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory
 from rbxcompose.domains.arms.motion.path_constraints import Keep, KeptRange
@@ -30,7 +30,7 @@ from rbxcompose.domains.arms.motion.scene import (
     ScenePiece,
     settled,
 )
-from rbxcompose.domains.arms.motion.scene_messages import pose_message, pose_of
+from rbxcompose.domains.arms.motion.scene_messages import joint_trajectory, pose_message, pose_of
 from rbxcompose.domains.arms.reasons import MotionFailure, MotionReason
 from rbxcompose.domains.arms.section_models import OMPL, PLANNERS
 from rbxcompose.domains.body.model import Body, Geometry
@@ -449,9 +449,7 @@ class KinematicsQuery:
         pose = PoseTarget((links[frame] if frame else Transform3()).compose(pose.pose))
         is_free = self.checker.is_free if request.avoid_collisions else lambda values: True
         space, posture = self._constrained(request.constraints.joint_constraints)
-        search = searched(
-            self.kinematics, space, pose, start, is_free, seed=seed, posture=posture, restarts=TRIES, enough=1
-        )
+        search = searched(PoseSearch(self.kinematics, space, pose, start, is_free, seed, TRIES, 1), posture)
         while True:
             try:
                 next(search)
@@ -565,9 +563,7 @@ class MoveItScene:
             case CollisionObject.APPEND:
                 self.scene.put(self._extended(there, message) if there else self._placed(message))
             case CollisionObject.REMOVE if not message.id:
-                self.scene.objects = {
-                    name: object_ for name, object_ in self.scene.objects.items() if self._is_held(object_)
-                }
+                self.scene.objects = {name: item for name, item in self.scene.objects.items() if self._is_held(item)}
             case CollisionObject.REMOVE:
                 self.scene.remove(message.id)
             case CollisionObject.MOVE:
@@ -622,10 +618,8 @@ class MoveItScene:
         state = RobotState(
             joint_state=JointState(name=tuple(positions), position=np.array([*positions.values()])),
             attached_collision_objects=tuple(
-                AttachedCollisionObject(
-                    link_name=object_.link, object=collision_object(object_), touch_links=object_.touches
-                )
-                for object_ in held
+                AttachedCollisionObject(link_name=item.link, object=collision_object(item), touch_links=item.touches)
+                for item in held
             ),
         )
         return PlanningSceneMessage(
@@ -633,9 +627,7 @@ class MoveItScene:
             robot_model_name=self.scene.body.name,
             robot_state=state,
             link_padding=tuple(LinkPadding(link_name=link, padding=padding) for link, padding in self.paddings.items()),
-            object_colors=tuple(
-                ObjectColor(id=object_.name, color=_color(object_)) for object_ in objects if object_.colour
-            ),
+            object_colors=tuple(ObjectColor(id=item.name, color=_color(item)) for item in objects if item.colour),
             world=PlanningSceneWorld(
                 collision_objects=tuple(collision_object(object_) for object_ in objects if object_ not in held)
             ),
@@ -739,12 +731,7 @@ def code_of(failure: MotionFailure | None, *, is_moving: bool) -> Codes:
 
 def motion_message(names: tuple[str, ...], trajectory: Trajectory) -> RobotTrajectory:
     """Return a motion with where it begins as its first point."""
-    rows = zip(trajectory.times.tolist(), trajectory.positions, trajectory.velocities, strict=True)
-    points = tuple(
-        JointTrajectoryPoint(positions=at, velocities=speed, time_from_start=to_duration(time))
-        for time, at, speed in rows
-    )
-    return RobotTrajectory(joint_trajectory=JointTrajectory(joint_names=names, points=points))
+    return RobotTrajectory(joint_trajectory=joint_trajectory(names, trajectory, begin=0))
 
 
 def trace_message(names: tuple[str, ...], times: list[float], rows: list[list[float]]) -> RobotTrajectory:

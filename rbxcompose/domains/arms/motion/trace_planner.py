@@ -471,7 +471,7 @@ class _Trace:
             )
             found: Traced | None = None
             while found is None:
-                if self._is_late():
+                if self._planner.now() - self._began >= self._planner.settings.time or self._steps >= MOST_STEPS:
                     text = f"no way was found in {self._planner.settings.time:g} s, after {self._steps} steps"
                     return MotionFailure(MotionReason.NO_PATH_IN_TIME, text)
                 try:
@@ -489,9 +489,6 @@ class _Trace:
         if problem and (share < self._wish.least or not parts):
             return MotionFailure(MotionReason.PATH_INCOMPLETE, f"only {share:.1%} of the way: {problem}", share)
         return parts, share if problem else 1.0
-
-    def _is_late(self) -> bool:
-        return self._planner.now() - self._began >= self._planner.settings.time or self._steps >= MOST_STEPS
 
     def _verified(self, parts: list[Traced]) -> Generator[None, None, Trajectory | MotionFailure]:
         made = []

@@ -167,15 +167,9 @@ class DiffDriveController(Controller[DiffDriveConfig]):
             config.turn_jerk,
         )
         own = [wheel.rules.limits for wheel in self.wheels]
-        least = min(
-            (motion_limits.acceleration for motion_limits in own if motion_limits.acceleration is not None),
-            default=math.inf,
-        )
+        least = min((item.acceleration for item in own if item.acceleration is not None), default=math.inf)
         self.drive = WheelDrive(
-            rolling,
-            limits.of_wheels(rolling, least),
-            config.command_timeout,
-            min(motion_limits.speed for motion_limits in own),
+            rolling, limits.of_wheels(rolling, least), config.command_timeout, min(item.speed for item in own)
         )
         fastest = rolling.fastest(Velocity2(config.max_speed, config.max_turn_rate)) * radius
         policy = OdometryPolicy(config.odometry.variance_per_metre, JUMP * fastest, radius * tick, AVERAGED)

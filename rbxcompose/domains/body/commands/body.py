@@ -107,9 +107,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Run the chosen action."""
-    return options.run_action(arguments)
+run = options.run_action
 
 
 def _show(arguments: argparse.Namespace, description: Description) -> int:

@@ -432,8 +432,7 @@ class Mux(Component[MuxConfig]):
 
 
 def _input(name: str, topic: str, config: MuxConfig, max_rate: float | None) -> In[Any]:
-    message = registry.message(config.message)
-    return In(message, topic, qos="command", is_open=True, max_rate=max_rate).named(name)
+    return In(registry.message(config.message), topic, qos="command", is_open=True, max_rate=max_rate).named(name)
 
 
 def _services(output: str) -> dict[str, Port[Any]]:

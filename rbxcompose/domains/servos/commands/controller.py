@@ -39,9 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_actions(parser, actions, add_asking_options)
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Run the chosen subcommand."""
-    return run_action(arguments)
+run = run_action
 
 
 def _listed(folder: RobotFolder) -> Iterator[tuple[str, controller_manager.ControllerState]]:
@@ -60,9 +58,7 @@ def _ls(arguments: argparse.Namespace) -> int:
     elif not found:
         emit("this robot has no controllers")
     else:
-        rows = [
-            (state.name, state.type, _state(state), bus, ", ".join(state.joints), state.note) for bus, state in found
-        ]
+        rows = [(item.name, item.type, _state(item), bus, ", ".join(item.joints), item.note) for bus, item in found]
         emit(table([("name", "type", "state", "bus", "joints", ""), *rows]))
     return 0
 

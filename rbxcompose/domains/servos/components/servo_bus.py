@@ -16,7 +16,7 @@ from rbxcompose.domains.devices.serial_ports import PortError
 from rbxcompose.domains.servos import controller_manager
 from rbxcompose.domains.servos.bus import ServoBus, bus_type
 from rbxcompose.domains.servos.bus_config import ServoBusConfig, drives_of, item_of, joint_ports, mimics_of
-from rbxcompose.domains.servos.controller import controller_type
+from rbxcompose.domains.servos.controller import ControllerSite, controller_type
 from rbxcompose.domains.servos.joint_drive import JointDrive, PositionDrive, ServoJoint
 from rbxcompose.domains.servos.joint_states import Enable, Hold, JointMode, MoveTo
 from rbxcompose.domains.servos.servo_cycle import ServoCycle, ServoItem, prepare, set_up, with_torque
@@ -157,10 +157,8 @@ class ServoBusDriver(Component[ServoBusConfig]):
         self.cycle = ServoCycle(opened.bus, drives, mimics, config.watchdog, config.thermal.scope == "bus")
         self.reboots = Reboots(opened.bus, self.prepare)
         seats = {
-            name: controller_manager.ControllerSeat(
-                self, name, {joint: drives[joint] for joint in controller.config.claimed}
-            )
-            for name, controller in config.controllers.items()
+            name: ControllerSite(self, name, {joint: drives[joint] for joint in item.config.claimed})
+            for name, item in config.controllers.items()
         }
         self.controllers = controller_manager.ControllerManager(
             {
