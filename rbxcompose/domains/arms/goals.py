@@ -25,20 +25,8 @@ SIGHT_MEASURES: Measures = {**dict.fromkeys(("x", "y", "z", "radius"), LENGTH), 
 KEEP_MEASURES: Measures = {**POSE_MEASURES, "joints": {"lower": None, "upper": None}, "sight": SIGHT_MEASURES}
 SHARES = {"speed": RATIO, "acceleration": RATIO}
 MOVE_MEASURES: Measures = {**SHARES, "tolerance": ANGLE, "keep": KEEP_MEASURES}
-REACH_MEASURES: Measures = {
-    **POSE_MEASURES,
-    **SHARES,
-    "tolerance": LENGTH,
-    "angle_tolerance": ANGLE,
-    "keep": KEEP_MEASURES,
-}
-TRACE_MEASURES: Measures = {
-    "points": POSE_MEASURES,
-    "speed": SPEED,
-    "acceleration": RATIO,
-    "blend": LENGTH,
-    "least": RATIO,
-}
+REACH_MEASURES: Measures = {**POSE_MEASURES, **MOVE_MEASURES, "tolerance": LENGTH, "angle_tolerance": ANGLE}
+TRACE_MEASURES: Measures = {**SHARES, "points": POSE_MEASURES, "speed": SPEED, "blend": LENGTH, "least": RATIO}
 ACTIONS = (
     rbxcompose_msgs.MoveArm,
     rbxcompose_msgs.ReachPose,

@@ -72,11 +72,8 @@ def about(point: Vector3, at: Transform3, mass: float, own: Tensor) -> Tensor:
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = _turned(own, at)
     x, y, z = (place - origin for place, origin in zip(at.translation, point, strict=True))
     xy, xz, yz = xy - mass * x * y, xz - mass * x * z, yz - mass * y * z
-    return (
-        (xx + mass * (y * y + z * z), xy, xz),
-        (xy, yy + mass * (x * x + z * z), yz),
-        (xz, yz, zz + mass * (x * x + y * y)),
-    )
+    xx, yy, zz = xx + mass * (y * y + z * z), yy + mass * (x * x + z * z), zz + mass * (x * x + y * y)
+    return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
 
 
 def _turned(tensor: Tensor, at: Transform3) -> Tensor:

@@ -280,9 +280,8 @@ def _beyond_reach(driven: DrivenJoint) -> Iterator[Finding]:
     if body and not driven.slides and body.may_be_degrees:
         return  # reported as RBX2021
     if body and not is_free and (intended := _in_degrees(driven)):
-        yield out_of_reach.at(
-            body.span, message, help=f"limits in a URDF are in radians: for degrees, write {intended}"
-        )
+        help_text = f"limits in a URDF are in radians: for degrees, write {intended}"
+        yield out_of_reach.at(body.span, message, help=help_text)
         return
     yield out_of_reach.at(
         _place(driven, is_shifted=limits.least > last or limits.greatest < first),

@@ -465,9 +465,8 @@ def _show_values(bus: DynamixelBus, found: FoundServo, items: list[str], argumen
         return refuse(SILENT.at(None, words, help="connect one alone"))
     values = {name: shown(bus.servos[found.id], name, reading.values[name]) for name in items}
     if arguments.json:
-        shown_values = {
-            name: {"raw": reading.values[name], "value": value, "unit": u} for name, (value, u) in values.items()
-        }
+        raws = reading.values
+        shown_values = {name: {"raw": raws[name], "value": value, "unit": u} for name, (value, u) in values.items()}
         emit(json.dumps({"id": found.id, "model": found.name, "values": shown_values}))
         return 0
     rows = [

@@ -49,19 +49,7 @@ from rbxcompose.domains.arms.command_line import (
     write_picture,
 )
 from rbxcompose.domains.arms.goals import goal_of
-from rbxcompose.domains.arms.motion.figures import (
-    NO_TRIES,
-    MotionProblem,
-    ProblemError,
-    Tries,
-    call_time,
-    ended,
-    free_pairs,
-    inverse_tries,
-    motion_tries,
-    problem_files,
-    read_problem,
-)
+from rbxcompose.domains.arms.motion import figures as measures
 from rbxcompose.domains.arms.motion.groups import Array, moved_links
 from rbxcompose.domains.arms.motion.inverse_kinematics import PoseSearch, PoseSolutions, PoseTarget
 from rbxcompose.domains.arms.motion.path_constraints import KeptTip
@@ -222,7 +210,7 @@ def _show_plan(
         NotDoneError: if there is none.
     """
     began = perf_counter()
-    found = ended(planning)
+    found = measures.ended(planning)
     took = perf_counter() - began
     if goal is None:
         goal = found.waypoints[-1] if isinstance(found, MotionPlan) else start
@@ -316,7 +304,7 @@ def _found(
     posture = Posture.of(works.space.names, positions_in(works, robot, prefer)) if prefer else None
     is_free, seed = works.planner.checker.is_free, works.planner.settings.seed
     search = PoseSearch(works.kinematics, works.space, target, start, is_free, seed, solver.restarts)
-    return ended(searched(replace(search, is_late=lambda: perf_counter() - began >= solver.time), posture))
+    return measures.ended(searched(replace(search, is_late=lambda: perf_counter() - began >= solver.time), posture))
 
 
 def _far(away: float, angle: float) -> str:
@@ -386,28 +374,28 @@ def add_bench_options(parser: argparse.ArgumentParser) -> None:
 
 def run_bench(arguments: argparse.Namespace, works: ArmWorks) -> int:
     """Measure, and print the figures; return 1 if a plan collides by the second examination."""
-    problems = list[MotionProblem]()
+    problems = list[measures.MotionProblem]()
     if arguments.problems is not None:
         try:
-            files = problem_files(arguments.problems, arguments.count)
-            problems = [read_problem(*file, works.kinematics.body.root) for file in files]
+            files = measures.problem_files(arguments.problems, arguments.count)
+            problems = [measures.read_problem(*file, works.kinematics.body.root) for file in files]
             for each in problems:
                 _prove_fit(works, each)
-        except ProblemError as error:
+        except measures.ProblemError as error:
             return misused("arm bench", str(error))
     kinematics, clock = works.kinematics, process_time
     samples = works.space.samples(arguments.count, SEED)
     rest = np.array([kinematics.body.joints[name].rest for name in works.space.names])
     calls = {
-        "forward kinematics": call_time(partial(kinematics.tip, with_jacobian=False), samples, clock),
-        "Jacobian": call_time(partial(kinematics.tip, with_jacobian=True), samples, clock),
+        "forward kinematics": measures.call_time(partial(kinematics.tip, with_jacobian=False), samples, clock),
+        "Jacobian": measures.call_time(partial(kinematics.tip, with_jacobian=True), samples, clock),
     }
     tries = {
-        "inverse kinematics": inverse_tries(kinematics, works.space, works.solver, rest, samples, clock),
+        "inverse kinematics": measures.inverse_tries(kinematics, works.space, works.solver, rest, samples, clock),
         "random motions": _motions(works, arguments.count),
     }
     for scenario, found in _solved(works, problems):
-        tries[scenario] = tries.get(scenario, NO_TRIES).with_(found)
+        tries[scenario] = tries.get(scenario, measures.NO_TRIES).with_(found)
     is_fast = kinematics.compiled is not None
     if arguments.json:
         data = {name: _data(entry) for name, entry in tries.items()}
@@ -419,18 +407,19 @@ def run_bench(arguments: argparse.Namespace, works: ArmWorks) -> int:
         emit(table([HEAD, *rows, *(_row(name, entry) for name, entry in tries.items())]))
         for name, one in tries.items():
             for reason, count in Counter(one.failures).most_common(SHOWN):
-                emit(
-                    f"not solved in {name}, {count} times: {reason}" if count > 1 else f"not solved in {name}: {reason}"
-                )
+                often = f", {count} times" if count > 1 else ""
+                emit(f"not solved in {name}{often}: {reason}")
     return 1 if any(entry.colliding for entry in tries.values()) else 0
 
 
-def _motions(works: ArmWorks, count: int) -> Tries:
+def _motions(works: ArmWorks, count: int) -> measures.Tries:
     second = works.second_checker(works.objects)
-    return motion_tries(works.planner, free_pairs(works.planner, count, SEED), second.is_free_along, process_time)
+    return measures.motion_tries(
+        works.planner, measures.free_pairs(works.planner, count, SEED), second.is_free_along, process_time
+    )
 
 
-def _solved(works: ArmWorks, problems: list[MotionProblem]) -> Iterator[tuple[str, Tries]]:
+def _solved(works: ArmWorks, problems: list[measures.MotionProblem]) -> Iterator[tuple[str, measures.Tries]]:
     """Yield what became of each problem, with its scenario."""
     names = works.space.names
     for problem in problems:
@@ -439,10 +428,13 @@ def _solved(works: ArmWorks, problems: list[MotionProblem]) -> Iterator[tuple[st
         works.place_objects(problem.objects)
         second = works.second_checker(problem.objects, others)
         start, goal = (np.array([at[name] for name in names]) for at in (problem.start, problem.goal))
-        yield problem.scenario, motion_tries(works.planner, [(start, goal)], second.is_free_along, process_time)
+        yield (
+            problem.scenario,
+            measures.motion_tries(works.planner, [(start, goal)], second.is_free_along, process_time),
+        )
 
 
-def _prove_fit(works: ArmWorks, problem: MotionProblem) -> None:
+def _prove_fit(works: ArmWorks, problem: measures.MotionProblem) -> None:
     """Raise if a problem is about another arm.
 
     Raises:
@@ -450,16 +442,18 @@ def _prove_fit(works: ArmWorks, problem: MotionProblem) -> None:
     """
     for at, word in ((problem.start, "start"), (problem.goal, "goal")):
         if lacking := [name for name in works.space.names if name not in at]:
-            raise ProblemError(f"{word} {problem.scenario}/{problem.name} does not say where '{lacking[0]}' is")
+            raise measures.ProblemError(
+                f"{word} {problem.scenario}/{problem.name} does not say where '{lacking[0]}' is"
+            )
 
 
-def _row(name: str, one: Tries) -> tuple[str, ...]:
+def _row(name: str, one: measures.Tries) -> tuple[str, ...]:
     times = [f"{1e3 * took:.3g} ms" if one.times else "" for took in (one.median, one.p95)]
     ways = (f"{one.length:.2f} rad", f"{one.colliding}") if one.lengths else ("", "")
     return (name, f"{one.solved} of {one.count}", *times, *ways)
 
 
-def _data(one: Tries) -> dict[str, object]:
+def _data(one: measures.Tries) -> dict[str, object]:
     figures = {"median": one.median, "p95": one.p95, "length": one.length}
     known = {name: value for name, value in figures.items() if math.isfinite(value)}
     return {"count": one.count, "solved": one.solved, **known, "colliding": one.colliding}

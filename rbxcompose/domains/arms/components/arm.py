@@ -26,19 +26,10 @@ from rbxcompose.domains.arms.planning_processes import compile_elsewhere, planni
 from rbxcompose.domains.arms.reasons import REASONS
 from rbxcompose.domains.arms.section_models import FAST
 from rbxcompose.domains.arms.teleoperation import PERIOD, ArmServo, servo_ports
+from rbxcompose.msgs import moveit_msgs
 from rbxcompose.msgs.control_msgs import FollowJointTrajectory
 from rbxcompose.msgs.fields import ArrayEntries
 from rbxcompose.msgs.geometry_msgs import PoseStamped, TwistStamped
-from rbxcompose.msgs.moveit_msgs import (
-    DisplayTrajectory,
-    ExecuteTrajectory,
-    GetPositionFK,
-    GetPositionIK,
-    MoveGroup,
-    MoveItErrorCodes,
-    RobotState,
-    RobotTrajectory,
-)
 from rbxcompose.msgs.nav_msgs import Path
 from rbxcompose.msgs.rbxcompose_msgs import (
     LocateArm,
@@ -115,7 +106,9 @@ class Arm(PicksAndPlaces, sdk.Component[ArmConfig]):
                 **shared,
             ).named(REACH),
             WAY: sdk.Out(Path, f"{config.name}/plan", qos="latched").named(WAY),
-            DISPLAY: sdk.Out(DisplayTrajectory, f"{config.name}/display_planned_path", qos="latched").named(DISPLAY),
+            DISPLAY: sdk.Out(moveit_msgs.DisplayTrajectory, f"{config.name}/display_planned_path", qos="latched").named(
+                DISPLAY
+            ),
             TRACE: sdk.ServesAction(
                 TraceArm, f"{config.name}/trace", skill=f"trace_{config.name}", measures=traced, **shared
             ).named(TRACE),
@@ -274,7 +267,7 @@ class Arm(PicksAndPlaces, sdk.Component[ArmConfig]):
 
     def task_of(self, message: Any) -> AnyTask:
         """Return the task of a goal."""
-        if isinstance(message, MoveGroup.Goal | ExecuteTrajectory.Goal):
+        if isinstance(message, moveit_msgs.MoveGroup.Goal | moveit_msgs.ExecuteTrajectory.Goal):
             return self.moveit_task(message)
         if self.config.hand is not None and isinstance(message, PickObject.Goal | PlaceObject.Goal):
             return hand_task(self, self.works, self.config.hand, message)
@@ -387,15 +380,15 @@ class Arm(PicksAndPlaces, sdk.Component[ArmConfig]):
             self.config.name, works.kinematics, works.space, works.planner.checker, self.positions
         )
 
-    def on_forward(self, request: GetPositionFK.Request) -> GetPositionFK.Response:
+    def on_forward(self, request: moveit_msgs.GetPositionFK.Request) -> moveit_msgs.GetPositionFK.Response:
         """Return where links are."""
         busy = self.task is not None
-        return GetPositionFK.Response(error_code=moveit.busy()) if busy else self.query.forward(request)
+        return moveit_msgs.GetPositionFK.Response(error_code=moveit.busy()) if busy else self.query.forward(request)
 
-    def on_inverse(self, request: GetPositionIK.Request) -> GetPositionIK.Response:
+    def on_inverse(self, request: moveit_msgs.GetPositionIK.Request) -> moveit_msgs.GetPositionIK.Response:
         """Return positions of joints that bring the tip to a pose."""
         if self.task is not None:
-            return GetPositionIK.Response(error_code=moveit.busy())
+            return moveit_msgs.GetPositionIK.Response(error_code=moveit.busy())
         wanted, begin = request.ik_request, self.now
         most = min(to_seconds(wanted.timeout) or IK_TIME, IK_TIME)
         for answer in self.query.inverse(wanted, self.config.planner.seed):
@@ -403,20 +396,22 @@ class Arm(PicksAndPlaces, sdk.Component[ArmConfig]):
                 return answer
             if self.now - begin > most:
                 break
-        return GetPositionIK.Response(error_code=moveit.late(most))
+        return moveit_msgs.GetPositionIK.Response(error_code=moveit.late(most))
 
-    def moveit_task(self, message: MoveGroup.Goal | ExecuteTrajectory.Goal) -> moveit.MoveItTask:
+    def moveit_task(
+        self, message: moveit_msgs.MoveGroup.Goal | moveit_msgs.ExecuteTrajectory.Goal
+    ) -> moveit.MoveItTask:
         """Return the task of a goal; one that is refused is over."""
         works, config, task = self.works, self.config, moveit.MoveItTask(self, self.works.planner)
         try:
-            led_by = message.controller_names if isinstance(message, ExecuteTrajectory.Goal) else ()
+            led_by = message.controller_names if isinstance(message, moveit_msgs.ExecuteTrajectory.Goal) else ()
             if other := [name for name in led_by if name != config.controller]:
                 words = f"'{config.controller}' leads this arm, not '{other[0]}'"
-                raise moveit.RequestError(MoveItErrorCodes.CONTROL_FAILED, words)
+                raise moveit.RequestError(moveit_msgs.MoveItErrorCodes.CONTROL_FAILED, words)
             if self.unreported:
-                raise moveit.RequestError(MoveItErrorCodes.ROBOT_STATE_STALE, self.unreported)
+                raise moveit.RequestError(moveit_msgs.MoveItErrorCodes.ROBOT_STATE_STALE, self.unreported)
             at, names = self.positions, works.space.names
-            if isinstance(message, ExecuteTrajectory.Goal):
+            if isinstance(message, moveit_msgs.ExecuteTrajectory.Goal):
                 given = moveit.trajectory_of(message.trajectory, names, np.array([at[name] for name in names]))
                 task.follow_given(works.kinematics, given)
             else:
@@ -458,12 +453,12 @@ class Arm(PicksAndPlaces, sdk.Component[ArmConfig]):
         self.way, self.duration = self.works.way(trajectory.positions), trajectory.duration
         self.bound[WAY](path_of(self.way, self.works.kinematics.body.root))
         state = JointState(name=tuple(self.measured), position=np.array([at for at, _ in self.measured.values()]))
-        motion = RobotTrajectory(joint_trajectory=arm_goals.follow_goal(names, trajectory).trajectory)
+        motion = moveit_msgs.RobotTrajectory(joint_trajectory=arm_goals.follow_goal(names, trajectory).trajectory)
         self.bound[DISPLAY](
-            DisplayTrajectory(
+            moveit_msgs.DisplayTrajectory(
                 model_id=self.works.kinematics.body.name,
                 trajectory=(motion,),
-                trajectory_start=RobotState(joint_state=state),
+                trajectory_start=moveit_msgs.RobotState(joint_state=state),
             )
         )
 
@@ -484,19 +479,21 @@ def moveit_ports(config: ArmConfig) -> dict[str, sdk.Port[Any]]:
     """Return the ports that `move_group` passes on to what comes under the names of ROS 2."""
     claims = config.controller
     found: dict[str, sdk.Port[Any]] = {
-        FORWARD: sdk.Serves(GetPositionFK, f"{config.name}/compute_fk", skill=None),
-        INVERSE: sdk.Serves(GetPositionIK, f"{config.name}/compute_ik", skill=None),
-        MOTION: sdk.ServesAction(MoveGroup, f"{config.name}/move_action", claims=claims, skill=None),
-        GIVEN: sdk.ServesAction(ExecuteTrajectory, f"{config.name}/execute_trajectory", claims=claims, skill=None),
+        FORWARD: sdk.Serves(moveit_msgs.GetPositionFK, f"{config.name}/compute_fk", skill=None),
+        INVERSE: sdk.Serves(moveit_msgs.GetPositionIK, f"{config.name}/compute_ik", skill=None),
+        MOTION: sdk.ServesAction(moveit_msgs.MoveGroup, f"{config.name}/move_action", claims=claims, skill=None),
+        GIVEN: sdk.ServesAction(
+            moveit_msgs.ExecuteTrajectory, f"{config.name}/execute_trajectory", claims=claims, skill=None
+        ),
     }
     return {name: port.named(name) for name, port in found.items()}
 
 
 def is_turned_away(goal: AnyGoal) -> bool:
     """Return whether a goal that comes while another one is carried out only wants a plan; then it has ended."""
-    if not isinstance(goal.request, MoveGroup.Goal) or not goal.request.planning_options.plan_only:
+    if not isinstance(goal.request, moveit_msgs.MoveGroup.Goal) or not goal.request.planning_options.plan_only:
         return False
-    goal.aborted("the arm moves", MoveGroup.Result(error_code=moveit.busy()))
+    goal.aborted("the arm moves", moveit_msgs.MoveGroup.Result(error_code=moveit.busy()))
     return True
 
 

@@ -93,9 +93,7 @@ def inverse_tries(
     """Solve for the poses of the tip at positions of shape (m, n), each from `start`; collisions are not looked at."""
     times, found = [], 0
     for seed, goal in enumerate(goals):
-        target = PoseTarget(
-            kinematics.tip_pose(goal), tolerance=settings.tolerance, angle_tolerance=settings.angle_tolerance
-        )
+        target = PoseTarget(kinematics.tip_pose(goal), False, settings.tolerance, settings.angle_tolerance)
         began = clock()
         search = PoseSearch(kinematics, space, target, start, lambda _: True, seed, settings.restarts, 1)
         found += bool(ended(solved(search)).free)

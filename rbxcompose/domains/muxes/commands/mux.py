@@ -124,11 +124,8 @@ def _watch(arguments: argparse.Namespace) -> int:
     while True:
         changes = answer_of(folder, requests.ReadMuxChanges(mux, after))
         for change in changes if after else changes[-1:]:
-            emit(
-                json.dumps({"mux": mux, **to_data(change)})
-                if arguments.json
-                else f"{change.time:9.2f} s  {change.text}"
-            )
+            line = f"{change.time:9.2f} s  {change.text}"
+            emit(json.dumps({"mux": mux, **to_data(change)}) if arguments.json else line)
             shown += 1
             if arguments.count is not None and shown >= arguments.count:
                 return 0

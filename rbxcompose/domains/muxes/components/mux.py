@@ -322,16 +322,13 @@ class Mux(Component[MuxConfig]):
 
     def on_add(self, request: MuxAdd.Request) -> MuxAdd.Response:
         """Add a topic as an input."""
-        topic = request.topic
-        return MuxAdd.Response(
-            success=self.does(lambda: self.add(requests.AddMuxInput(self.name, topic.strip("/"), topic)))
-        )
+        order = requests.AddMuxInput(self.name, request.topic.strip("/"), request.topic)
+        return MuxAdd.Response(success=self.does(lambda: self.add(order)))
 
     def on_delete(self, request: MuxDelete.Request) -> MuxDelete.Response:
         """Delete an input by its name or topic."""
-        return MuxDelete.Response(
-            success=self.does(lambda: self.delete(requests.DeleteMuxInput(self.name, request.topic)))
-        )
+        order = requests.DeleteMuxInput(self.name, request.topic)
+        return MuxDelete.Response(success=self.does(lambda: self.delete(order)))
 
     def on_list(self, request: MuxList.Request) -> MuxList.Response:
         """Return the topics of all inputs."""

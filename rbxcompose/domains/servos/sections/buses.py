@@ -126,11 +126,8 @@ def _places(led: Mapping[str, ControllerConfig]) -> dict[str, KeyPath]:
     for name, config in led.items():
         cls = controller_type(config.type)
         for port in cls.ports(name, config):
-            found[f"{name}_{port}"] = (
-                "controllers",
-                name,
-                *(cls.topics[port].split(".") if port in cls.topics else ()),
-            )
+            where = cls.topics[port].split(".") if port in cls.topics else ()
+            found[f"{name}_{port}"] = ("controllers", name, *where)
     return found
 
 

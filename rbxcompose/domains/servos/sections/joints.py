@@ -33,14 +33,8 @@ def _either(turning: units.Dimension, sliding: units.Dimension) -> PlainValidato
     """Return what reads a quantity of a joint that turns or slides."""
 
     def read(value: object) -> units.Quantity:
-        read = (
-            value
-            if isinstance(value, units.Quantity)
-            else units.parse_quantity(value)
-            if isinstance(value, str)
-            else None
-        )
-        if read is None or read.dimension not in (turning, sliding):
+        read = units.parse_quantity(value) if isinstance(value, str) else value
+        if not isinstance(read, units.Quantity) or read.dimension not in (turning, sliding):
             raise units.UnitError(f"must be {turning.phrase} or {sliding.phrase}, such as '{units.example(turning)}'")
         return read
 
