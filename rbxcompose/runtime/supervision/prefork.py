@@ -18,6 +18,7 @@ import socket
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import setproctitle
 
@@ -265,7 +266,7 @@ def _make_messages(names: Collection[str]) -> None:
     from rbxcompose.runtime.process_group.parameters import INTERFACES
 
     of_kind = {"msg": registry.message, "srv": registry.service, "action": registry.action}
-    used = [of_kind[name.split("/")[1]](name) for name in sorted(names)]
+    used: list[Any] = [of_kind[name.split("/")[1]](name) for name in sorted(names)]
     for interface in (*INTERFACES, Log, DiagnosticArray, CancelGoal, GoalStatusArray, *used):
         if issubclass(interface, Action):
             _ = interface.SendGoal.HASH, interface.GetResult.HASH, interface.FeedbackMessage.HASH
