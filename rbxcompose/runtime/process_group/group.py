@@ -1,7 +1,5 @@
 """The main of a process group: its scheduler, clock, bus, host and driver, controlled by the supervisor."""
 
-from __future__ import annotations
-
 import faulthandler
 import gc
 import math

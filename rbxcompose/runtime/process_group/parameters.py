@@ -1,7 +1,5 @@
 """Parameters on the bus, and changes of live settings in two phases."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
 from functools import partial

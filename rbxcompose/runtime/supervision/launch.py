@@ -1,7 +1,5 @@
 """Starting a supervisor as a process of its own, and receiving its reports on the start and the end."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import select

@@ -7,8 +7,6 @@ All processes of a robot share the memory that the supervisor has filled before 
 the supervisor imports what the groups need, though it uses none of it.
 """
 
-from __future__ import annotations
-
 import array
 import gc
 import os
