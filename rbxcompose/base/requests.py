@@ -1,7 +1,5 @@
 """Requests to a running robot and other frozen dataclasses as plain data for JSON, and back."""
 
-from __future__ import annotations
-
 import inspect
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence

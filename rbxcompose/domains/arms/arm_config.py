@@ -19,7 +19,7 @@ from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.groups import ArmGroup, ArmJoint, JointSpace, interpolated
 from rbxcompose.domains.arms.motion.hand_task import PlanningHelper
 from rbxcompose.domains.arms.motion.inverse_kinematics import ANGLE_TOLERANCE, RESTARTS, TOLERANCE, SolverSettings
-from rbxcompose.domains.arms.motion.numba_cache import is_installed
+from rbxcompose.domains.arms.motion.numba_cache import is_installed, keep_libraries
 from rbxcompose.domains.arms.motion.planner import MotionPlanner, PlannerSettings
 from rbxcompose.domains.arms.motion.scene import PairDistance, PlacedObject
 from rbxcompose.domains.arms.motion.second_checker import SecondChecker
@@ -185,7 +185,9 @@ class ArmWorks:
             ModuleNotFoundError: if the extra `arm` is not installed, or `fast` for a planner that needs it.
             ValueError: if a mesh cannot be read.
         """
-        collisions.load_libraries()
+        type_ = config.planner.type
+        is_compiled = type_ == FAST or (type_ == AUTOMATIC and is_fast and is_installed())
+        collisions.load_libraries(with_ompl=not is_compiled)
         self.space, self._description = space_of(config), description_of(config)
         self.kinematics = ArmKinematics(self._description, ArmGroup(self.space.names, config.base, config.tip))
         if is_fast:
@@ -202,8 +204,6 @@ class ArmWorks:
         self.paddings = paddings
         """By which links keep away from them [m]."""
         self._checker = self._checker_among(self.objects)
-        type_ = config.planner.type
-        is_compiled = type_ == FAST or (type_ == AUTOMATIC and is_fast and is_installed())
         self.helpers: Sequence[PlanningHelper] = ()
         """Those that plan elsewhere meanwhile."""
         self._fast = _hastened() if is_compiled else _as_it_is
@@ -219,6 +219,7 @@ class ArmWorks:
         self.planner = MotionPlanner(self.space, self._fast(self._checker), settings, now, unlikely)
         if isinstance(self.planner.checker, collisions.SearchingChecker):
             self.planner.checker.prepare(self.space)
+        keep_libraries()
 
     def place_objects(
         self, objects: Iterable[PlacedObject], paddings: Mapping[str, float] = MappingProxyType({})

@@ -16,7 +16,7 @@ from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.model.mission_facts import constants
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.domains.arms.mission_goals import WrittenReach, first_joint_in, length_of, word_of, written_reaches
-from rbxcompose.domains.arms.motion.grasps import grasps_of, least_width, reach_of, solid_of
+from rbxcompose.domains.arms.motion.grasps import least_width, reach_of, solid_of, widths_of
 from rbxcompose.domains.arms.motion.scene import PlacedObject, settled
 from rbxcompose.domains.arms.section_models import SpotModel
 from rbxcompose.domains.arms.sections.arms import ArmOfRobot, arms, hand_in
@@ -633,13 +633,9 @@ def _width(
         return least_width(solid.shape), widest
     if thing.link != body.root:
         return None, widest  # nobody knows how it will be turned
-    at = thing.pose.compose(solid.pose)
-
-    def held(limit: float) -> list[float]:
-        turns = (math.tau * index / _BEARINGS for index in range(_BEARINGS))
-        return [grasp.width for turn in turns for grasp in grasps_of(solid.shape, at, turn, limit)]
-
-    return (None if held(widest) else min(held(math.inf), default=None)), widest
+    at, turns = thing.pose.compose(solid.pose), (math.tau * index / _BEARINGS for index in range(_BEARINGS))
+    width = min((width for turn in turns for width in widths_of(solid.shape, at, turn)), default=None)
+    return (None if width is not None and width < widest else width), widest
 
 
 _COUNTS = {"any_position": ("x", "y", "z", "tolerance"), "any_orientation": ("roll", "pitch", "yaw", "angle_tolerance")}

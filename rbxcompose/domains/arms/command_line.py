@@ -156,8 +156,6 @@ class KeepModel(Config):
 def chosen_robot(arguments: argparse.Namespace) -> Robot | None:
     """Return the robot; None after its errors."""
     path = robot_path(arguments.path)
-    if path is None:
-        return None
     compilation = compiled(path, arguments)
     report = Report()
     report.extend(finding for finding in compilation.report if finding.severity.value == "error")

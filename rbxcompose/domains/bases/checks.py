@@ -15,7 +15,6 @@ from rbxcompose.compiler.model.mission_facts import constants
 from rbxcompose.compiler.model.robot import PortEnd, Robot
 from rbxcompose.domains.bases.body_wheels import BodyWheel, differs, rolling_bases
 from rbxcompose.domains.body.sections.body import body
-from rbxcompose.domains.servos.sections.joints import joints
 from rbxcompose.missions.analysis.effects import published
 from rbxcompose.missions.analysis.facts import number_of
 from rbxcompose.missions.program.machines import TemplateShape, WrittenValue
@@ -185,6 +184,8 @@ def wheel_speed(robot: Robot) -> Iterator[Finding]:
 
 def _limit(robot: Robot, wheel: BodyWheel) -> float:
     """Return how fast a wheel may turn [rad/s], infinite if nothing limits it."""
+    from rbxcompose.domains.servos.sections.joints import joints  # few robots have bases whose wheels are joints
+
     driven, limits = robot.manifest.contents.of(joints).get(wheel.joint.name), wheel.joint.limits
     own = driven.limits.velocity.value if driven and driven.limits.velocity else math.inf
     return min(own, limits.velocity if limits and limits.velocity is not None else math.inf)

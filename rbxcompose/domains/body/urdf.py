@@ -122,8 +122,8 @@ def read_body(root: XmlElement) -> tuple[model.Body, list[Finding]]:
 
 
 @lru_cache(maxsize=4)  # components are asked for their ports many times, which follow from the body
-def body_of(urdf: str) -> model.Body:
-    """Return the body that a URDF of a plan describes.
+def read_text(urdf: str) -> tuple[model.Body, list[Finding]]:
+    """Return the body that the text of a URDF describes, and what is wrong with it, see `read_body`.
 
     Raises:
         ValueError: if it is not XML.
@@ -131,7 +131,16 @@ def body_of(urdf: str) -> model.Body:
     root = read_urdf(urdf, "urdf")
     if not isinstance(root, XmlElement):
         raise ValueError(root.message)
-    return read_body(root)[0]
+    return read_body(root)
+
+
+def body_of(urdf: str) -> model.Body:
+    """Return the body that a URDF of a plan describes.
+
+    Raises:
+        ValueError: if it is not XML.
+    """
+    return read_text(urdf)[0]
 
 
 class _MistakeError(Exception):

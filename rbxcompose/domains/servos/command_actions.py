@@ -14,7 +14,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, Report
 from rbxcompose.base.printable import plain
 from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, refuse, table, write_report
-from rbxcompose.commands.new_files import AnswerError, read_name, taken, write_new
+from rbxcompose.commands.new_files import read_name, taken, write_new
 from rbxcompose.domains.devices.serial_ports import port_path, serial_ports, slow_adapter
 from rbxcompose.domains.servos.bus import ID_TAKEN, NO_ITEM, OTHER_RATE, REFUSED, SILENT, UNKNOWN_MODEL, FoundServo
 from rbxcompose.domains.servos.dynamixel_bus import DynamixelBus, change_id
@@ -288,10 +288,7 @@ def _moved(found: FoundServo, baud: int, taken: set[int], port: str) -> str:
 
 def new_robot(arguments: argparse.Namespace) -> int:
     """Look for servos, and write a robot of those at the rate that most have."""
-    try:
-        name = read_name(arguments.name, "the robot")
-    except AnswerError as error:
-        return refuse(error.finding)
+    name = read_name(arguments.name, "the robot")
     if finding := taken(arguments.into, servo_robot_paths(name)):
         return refuse(finding)
     choice = choose({baud: _surveyed(arguments, baud) for baud in dict.fromkeys(arguments.baud)}, arguments.port)

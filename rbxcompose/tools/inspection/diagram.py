@@ -1,7 +1,5 @@
 """A robot as boxes and wires: the common basis of all graphs, as DOT and as Mermaid."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field, replace

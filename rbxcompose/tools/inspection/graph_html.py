@@ -1,7 +1,5 @@
 """A robot as one self-contained HTML page: a picture to hover over, and tables of its contents."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from html import escape
 

@@ -432,14 +432,17 @@ class MeshChecker:
         return margin if kind == self._kinds[second] and kind in (_GEOM, _BVH) else max(margin, 0.0)
 
 
-def load_libraries() -> None:
+def load_libraries(*, with_ompl: bool) -> None:
     """Import what planning needs, which takes seconds and should not delay the first goal.
+
+    Where a search of ours comes first, OMPL is for what that does not find in time, and can be imported then.
 
     Raises:
         ModuleNotFoundError: if the extra `arm` is not installed.
     """
     atexit.unregister(gc.freeze)  # without a last collection at the exit, OMPL prints all that it had
-    import_module("ompl.geometric")
+    if with_ompl:
+        import_module("ompl.geometric")
     toppra()
 
 

@@ -60,6 +60,11 @@ def grasps_of(shape: Geometry, pose: geometry.Transform3, bearing: float, widest
     return sorted(found, key=lambda grasp: -grasp.quality)
 
 
+def widths_of(shape: Geometry, pose: geometry.Transform3, bearing: float) -> list[float]:
+    """Return the widths of the grasps of a box, cylinder or sphere, however wide, see `grasps_of`."""
+    return [_width(shape, pose, turned) for turned, _, _ in _sides(shape, pose, bearing)]
+
+
 def least_width(shape: Geometry) -> float:
     """Return the least distance between fingers on both sides of an object."""
     match shape.kind:

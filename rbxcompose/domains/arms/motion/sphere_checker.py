@@ -60,7 +60,7 @@ class SphereChecker:
     def first_bad(self, points: Array) -> int | None:
         """Return the first of some positions, of shape (m, n), where something collides; None if there is none."""
         self._refresh()
-        begin = 0
+        points, begin = np.ascontiguousarray(points), 0  # another layout would be compiled anew
         while begin < len(points):
             count = near_pairs(self._model, points[begin:], self._found, self._work)
             near = self._found[:count]

@@ -18,7 +18,6 @@ from rbxcompose.commands import options
 from rbxcompose.commands.console import FINDINGS, emit, has_colour, misused, refuse, table, write_report
 from rbxcompose.commands.formats.json_ import as_data
 from rbxcompose.commands.formats.text import render_text
-from rbxcompose.commands.layout import NotDrawnError
 from rbxcompose.commands.lookup import add_bus_options
 from rbxcompose.domains.body.command_pose import sliders_of
 from rbxcompose.domains.body.description import Description
@@ -122,10 +121,7 @@ def _show(arguments: argparse.Namespace, description: Description) -> int:
 
 
 def _tree(arguments: argparse.Namespace, description: Description) -> int:
-    try:
-        content = _drawn(arguments.format, description)
-    except NotDrawnError as error:
-        return refuse(error.finding)
+    content = _drawn(arguments.format, description)
     if arguments.out is not None:
         return write(Path(arguments.out), content)
     if arguments.format == PDF:

@@ -8,12 +8,10 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator
 
-from rbxcompose.base.findings import Finding, once
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.body.model import Body, BodyJoint
 from rbxcompose.domains.body.urdf import body_of as urdf_body
-from rbxcompose.domains.body.urdf import read_body
-from rbxcompose.domains.body.xml_reader import read_urdf
+from rbxcompose.domains.body.urdf import read_text
 from rbxcompose.msgs.builtin_interfaces import Time
 from rbxcompose.msgs.geometry_msgs import Quaternion, Transform, TransformStamped, Vector3
 from rbxcompose.msgs.sensor_msgs import JointState
@@ -32,12 +30,9 @@ MOVING: dict[str, Port[Any]] = {
 }
 
 
-@once
 def _checked(urdf: str) -> str:
     """Return a URDF; raise ValueError with the first mistake that keeps it from being one."""
-    root = read_urdf(urdf, "urdf") if urdf else None
-    mistakes = [root] if isinstance(root, Finding) else read_body(root)[1] if root is not None else []
-    if mistakes:
+    if urdf and (mistakes := read_text(urdf)[1]):
         raise ValueError(mistakes[0].message)
     return urdf
 
