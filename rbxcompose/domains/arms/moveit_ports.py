@@ -9,7 +9,7 @@ import numpy as np
 
 from rbxcompose.domains.arms.arm_config import ArmConfig, ArmWorks
 from rbxcompose.domains.arms.motion import moveit
-from rbxcompose.domains.arms.motion.scene import PlacedObject
+from rbxcompose.domains.arms.motion.scene import SCENE_LIMITS, PlacedObject
 from rbxcompose.msgs.moveit_msgs import ExecuteTrajectory, GetPositionFK, GetPositionIK, MoveGroup, MoveItErrorCodes
 from rbxcompose.msgs.moveit_msgs import PlanningScene as PlanningSceneMessage
 from rbxcompose.msgs.stamps import to_seconds
@@ -30,10 +30,14 @@ class ProgrammedArm(moveit.MoveItSite, Protocol):
 def moveit_ports(config: ArmConfig) -> dict[str, Port[Any]]:
     """Return the ports; `move_group` passes on to them what comes under the names of ROS 2."""
     motion: ServesAction[Any, Any, Any] = ServesAction(
-        MoveGroup, f"{config.name}/move_action", claims=config.controller, skill=None
+        MoveGroup, f"{config.name}/move_action", claims=config.controller, skill=None, limits=SCENE_LIMITS
     )
     given: ServesAction[Any, Any, Any] = ServesAction(
-        ExecuteTrajectory, f"{config.name}/execute_trajectory", claims=config.controller, skill=None
+        ExecuteTrajectory,
+        f"{config.name}/execute_trajectory",
+        claims=config.controller,
+        skill=None,
+        limits=SCENE_LIMITS,
     )
     return {
         FORWARD: Serves(GetPositionFK, f"{config.name}/compute_fk", skill=None).named(FORWARD),

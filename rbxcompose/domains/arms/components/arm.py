@@ -20,7 +20,7 @@ from rbxcompose.domains.arms.motion.collisions import pairs_shown, readers_of
 from rbxcompose.domains.arms.motion.hand_task import HandTask
 from rbxcompose.domains.arms.motion.moveit import MoveItTask
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory
-from rbxcompose.domains.arms.motion.scene import PlacedObject, mistake_in
+from rbxcompose.domains.arms.motion.scene import SCENE_LIMITS, PlacedObject, mistake_among
 from rbxcompose.domains.arms.motion.scene_messages import path_of, placed_object
 from rbxcompose.domains.arms.moveit_ports import (
     GIVEN,
@@ -76,7 +76,7 @@ class Arm(PicksAndPlaces, LocationService, KinematicsServices, sdk.Component[Arm
     rate = 20.0
     steps_for_goals = True
     joint_states = sdk.In(JointState, "joint_states", is_open=True)
-    scene = sdk.In(SceneObjects, "scene", qos="latched")
+    scene = sdk.In(SceneObjects, "scene", qos="latched", limits=SCENE_LIMITS)
 
     @classmethod
     def ports(cls, config: ArmConfig) -> dict[str, sdk.Port[Any]]:
@@ -184,8 +184,7 @@ class Arm(PicksAndPlaces, LocationService, KinematicsServices, sdk.Component[Arm
     def on_scene(self, message: SceneObjects) -> None:
         """Plan among other objects from now on; while one of them cannot be, nothing is planned."""
         found, body = tuple(map(placed_object, message.objects)), self.works.kinematics.body
-        wrong = ((item.name, mistake_in(item, body)) for item in found)
-        self.problem = message.problem or next((f"object '{name}': {words}" for name, words in wrong if words), "")
+        self.problem = message.problem or mistake_among(found, body)
         if not self.problem:
             paddings = dict(zip(message.padded_links, message.paddings.tolist(), strict=False))
             try:
