@@ -216,12 +216,11 @@ def given_span(given: Span, use: Span) -> GivenSpan:
 def decided_at(root: tree.TreeNode, path: tree.KeyPath, otherwise: Span) -> Span:
     """Return the place of the one value that was given for something at `path` or below it; else another place."""
     node = tree.at(root, path)
-    given, waiting = {}, [node] if node is not None else []
-    while waiting:
-        one = waiting.pop()
-        waiting += (child for _, child in tree.children(one))
-        if isinstance(one.span, GivenSpan):
-            given[Span(*one.span)] = one.span
+    spans = (found.span for found in tree.all_nodes(node)) if node is not None else ()
+    given: dict[Span, GivenSpan] = {}
+    for span in spans:
+        if isinstance(span, GivenSpan):
+            given.setdefault(Span(*span), span)
     return next(iter(given.values())) if len(given) == 1 else otherwise
 
 

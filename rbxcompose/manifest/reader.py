@@ -27,10 +27,7 @@ def passwords(text: str, root: tree.TreeNode) -> Iterator[Finding]:
     """Yield a finding for each password in the values of a file; `text` is that of the whole file."""
     if "://" not in text or not _WITH_PASSWORD.search(text):
         return
-    waiting = [root]
-    while waiting:
-        node = waiting.pop()
-        waiting += (child for _, child in tree.children(node))
+    for node in tree.all_nodes(root):
         if isinstance(node, tree.ScalarNode):
             yield from _within(node)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import field
 
 from rbxcompose.base.dataclass import dataclass
@@ -95,16 +95,25 @@ class MappingNode:
 TreeNode = ScalarNode | SequenceNode | MappingNode
 
 
-def children(node: TreeNode) -> Iterator[tuple[Key, TreeNode]]:
-    """Yield the nodes directly below a node, with their keys or indices."""
+def children(node: TreeNode) -> Iterable[tuple[Key, TreeNode]]:
+    """Return the nodes directly below a node, with their keys or indices."""
     match node:
+        case ScalarNode():
+            return ()
         case MappingNode(entries=entries):
-            for name, entry in entries.items():
-                yield name, entry.value
+            return [(name, entry.value) for name, entry in entries.items()]
         case SequenceNode(items=items):
-            yield from enumerate(items)
-        case _:
-            return
+            return enumerate(items)
+
+
+def all_nodes(root: TreeNode) -> Iterator[TreeNode]:
+    """Yield a node and all those below it, in the order in which they are written."""
+    waiting = [root]
+    while waiting:
+        node = waiting.pop()
+        yield node
+        if not isinstance(node, ScalarNode):
+            waiting += reversed([below for _, below in children(node)])
 
 
 def with_children(node: TreeNode, change: Callable[[Key, TreeNode], TreeNode]) -> TreeNode:
@@ -123,23 +132,16 @@ def with_children(node: TreeNode, change: Callable[[Key, TreeNode], TreeNode]) -
 
 def size(node: TreeNode) -> int:
     """Return the approximate size of a tree [bytes]: its texts, and a fixed amount for each node."""
-    total, waiting = 0, [node]
-    while waiting:
-        now = waiting.pop()
-        total += NODE_BYTES + (len(now.text) if isinstance(now, ScalarNode) else 0)
-        waiting += (child for _, child in children(now))
-    return total
+    return sum(NODE_BYTES + (len(found.text) if isinstance(found, ScalarNode) else 0) for found in all_nodes(node))
 
 
 def count(node: TreeNode) -> int:
     """Return how many values a tree has, with its root; a text to fill in counts by its length, too."""
-    total, waiting = 0, [node]
-    while waiting:
-        now = waiting.pop()
+    total = 0
+    for found in all_nodes(node):
         total += 1
-        if isinstance(now, ScalarNode) and ("${" in now.text or "$$" in now.text):
-            total += len(now.text) // FILL_TEXT
-        waiting += (child for _, child in children(now))
+        if isinstance(found, ScalarNode) and ("${" in found.text or "$$" in found.text):
+            total += len(found.text) // FILL_TEXT
     return total
 
 

@@ -20,7 +20,7 @@ from rbxcompose.manifest.files import PROFILE, find, shown_name
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.registry import model_for, section_named, sections
 from rbxcompose.manifest.section import OVERLAY, ROBOT, Contents, SetScope
-from rbxcompose.manifest.tree import KEYS, Entry, MappingNode, ScalarNode, TreeNode, with_children
+from rbxcompose.manifest.tree import KEYS, Entry, Key, MappingNode, ScalarNode, TreeNode, with_children
 from rbxcompose.manifest.yaml_nodes import TOO_LARGE
 
 BAD_SET = kind("RBX1303")
@@ -162,14 +162,14 @@ def compose_robot(root: MappingNode, file: Path, chosen: Chosen, documents: Docu
 def _with_few_keys(root: MappingNode, report: Report) -> MappingNode:
     """Return a tree whose maps have as few keys as that of one file may have: layers can bring more together."""
 
-    def shortened(node: TreeNode) -> TreeNode:
+    def shortened(_: Key, node: TreeNode) -> TreeNode:
         if isinstance(node, MappingNode) and len(node.entries) > KEYS:
             last = list(node.entries.values())[KEYS]
             report.add(TOO_LARGE.at(last.key.span, f"with this key, a map of the robot has more than {KEYS:,}"))
             node = replace(node, entries=dict(islice(node.entries.items(), KEYS)))
-        return node if isinstance(node, ScalarNode) else with_children(node, lambda _, below: shortened(below))
+        return node if isinstance(node, ScalarNode) else with_children(node, shortened)
 
-    short = shortened(root)
+    short = shortened("", root)
     return short if isinstance(short, MappingNode) else root
 
 

@@ -29,7 +29,7 @@ from rbxcompose.manifest.registry import (
 )
 from rbxcompose.manifest.secrets import Secrets
 from rbxcompose.manifest.section import ROBOT, Contents, Section, is_empty
-from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode, at, children, key_span
+from rbxcompose.manifest.tree import MappingNode, ScalarNode, all_nodes, at, key_span
 from rbxcompose.manifest.validate import UNKNOWN_KEY
 from rbxcompose.manifest.yaml_nodes import is_moderate
 
@@ -71,18 +71,12 @@ def unread_arguments(root: MappingNode) -> Iterator[Finding]:
     declared = root.get("args")
     if not isinstance(declared, MappingNode):
         return
-    read = frozenset(_read(root))
+    texts = (node.text for node in all_nodes(root) if isinstance(node, ScalarNode) and "args." in node.text)
+    read = {name for text in texts for name in _NAME.findall(text)}
     for name, entry in declared.entries.items():
         if name not in read and isinstance(entry.value, MappingNode):
             help_text = f"write '${{args.{name}}}' where its value belongs, or remove it"
             yield UNREAD_ARGUMENT.at(entry.key.span, f"nothing reads the argument '{name}'", help=help_text)
-
-
-def _read(node: TreeNode) -> Iterator[str]:
-    if isinstance(node, ScalarNode):
-        yield from _NAME.findall(node.text) if "args." in node.text else ()
-    for _, below in children(node):
-        yield from _read(below)
 
 
 TAKEN_NAME = kind("RBX1007")

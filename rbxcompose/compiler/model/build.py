@@ -237,8 +237,8 @@ def _component(manifest: RobotManifest, wanted: WantedComponent, given: Mapping[
         wanted.is_sound,
     )
     live = (name for name, one in leaves(config) if is_live(one))
-    bounds = {name: manifest.bounds_at(made.place(key_of(config, name))) for name in live}
-    return replace(made, bounds={name: each for name, each in bounds.items() if each})
+    bounds = {name: bounds for name in live if (bounds := manifest.bounds_at(made.place(key_of(config, name))))}
+    return replace(made, bounds=bounds) if bounds else made
 
 
 def values_of(manifest: RobotManifest, components: Mapping[str, RobotComponent]) -> dict[str, ValueSource]:

@@ -17,7 +17,7 @@ from rbxcompose.manifest.fill import SHOWN_SECRET
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.salvage import salvaged
 from rbxcompose.manifest.section import Reading, Short
-from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode, children
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode, all_nodes
 from rbxcompose.manifest.yaml_nodes import is_moderate
 
 INPUT = "input"
@@ -88,7 +88,6 @@ def _mission(reading: Reading[MissionModel], name: str, entry: Entry) -> Mission
 
 def _refuse_secrets(node: TreeNode, report: Report) -> None:
     """Add a finding for each secret that would go into a mission, where it would be shown."""
-    if isinstance(node, ScalarNode) and isinstance(node.filled, Secret):
-        report.add(SHOWN_SECRET.at(node.span, "a mission cannot hold a secret: what it does is logged"))
-    for _, inner in children(node):
-        _refuse_secrets(inner, report)
+    for found in all_nodes(node):
+        if isinstance(found, ScalarNode) and isinstance(found.filled, Secret):
+            report.add(SHOWN_SECRET.at(found.span, "a mission cannot hold a secret: what it does is logged"))

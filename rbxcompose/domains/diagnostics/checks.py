@@ -251,12 +251,11 @@ def too_few_items(robot: Robot) -> Iterator[Finding]:
     """A group needs more items than its components report."""
     for path, analyzer in each_analyzer(robot.manifest.contents.of(diagnostics).analyzers):
         least, _ = analyzer.counted or (0, None)
-        is_plain = all(
-            isinstance(condition, str) and condition in robot.components for condition in analyzer.conditions
-        )
-        matched = [component for component in robot.components.values() if matches(analyzer, component.name)]
-        if not least or not is_plain or not matched or analyzer.analyzers or analyzer.expected or analyzer.strip_prefix:
+        names = {condition if isinstance(condition, str) else "" for condition in analyzer.conditions}
+        is_plain = names <= robot.components.keys()  # then what it matches needs no comparison with all components
+        if not least or not is_plain or not names or analyzer.analyzers or analyzer.expected or analyzer.strip_prefix:
             continue
+        matched = [robot.components[name] for name in names]
         most = sum(map(_items, matched))
         if most < least and not any(map(_may_watch, matched)):
             keys = ("count",) if isinstance(analyzer.count, int) else ("count", "min")
@@ -301,7 +300,8 @@ def unmatched_analyzer(robot: Robot) -> Iterator[Finding]:
             wanted = component_of(pattern)  # which details it has shows only while it runs
             tried = () if wanted in known or not is_glob(wanted) else known
             compared += len(tried)
-            if wanted not in known | named_elsewhere and not any(fits(wanted, component) for component in tried):
+            is_known = wanted in known or wanted in named_elsewhere
+            if not is_known and not any(fits(wanted, component) for component in tried):
                 yield unmatched_analyzer.misspelt(
                     place,
                     f"analyzer '{path[-1]}' matches no component with '{pattern}'",

@@ -9,6 +9,7 @@ from typing import Self
 from rbxcompose.missions import sdk
 from rbxcompose.missions.language.machine_reader import read_machine, read_state
 from rbxcompose.missions.program.machines import ENDS, FAILED, FINISHED, STATE, MachineStates, Next
+from rbxcompose.missions.sdk import FAILURE, NAMES, RUNNING, SKIPPED, SUCCESS, Transition  # looked up in every tick
 
 
 class MachineTask(sdk.WithHistory):
@@ -41,25 +42,25 @@ class MachineTask(sdk.WithHistory):
         """Continue with the state; the next one starts in another tick."""
         self.engine.outcome = ""
         status = self.advance(self.states[self.index])
-        if status == sdk.RUNNING:
-            return sdk.RUNNING
-        return self._go_on(sdk.SUCCESS if status == sdk.SKIPPED else status)
+        if status == RUNNING:
+            return RUNNING
+        return self._go_on(SUCCESS if status == SKIPPED else status)
 
     def _go_on(self, status: int) -> int:
-        name, counts_as = self.machine.names[self.index], sdk.NAMES[status]
+        name, counts_as = self.machine.names[self.index], NAMES[status]
         outcome = self.engine.outcome or counts_as
         to = self._next(name, outcome, counts_as)
         self.engine.outcome = ""
-        self.engine.say(sdk.Transition(self.number, name, outcome, to))
+        self.engine.say(Transition(self.number, name, outcome, to))
         if to in self.machine.names:
             self.index = self.machine.names.index(to)
             self.forget()
             self.engine.again(self)
-            return sdk.RUNNING
+            return RUNNING
         self.forget_places()
         ends = self.machine.ends
         self.engine.outcome = to if to not in ENDS else ""
-        return sdk.SUCCESS if ends[to] == sdk.NAMES[sdk.SUCCESS] else sdk.FAILURE
+        return SUCCESS if ends[to] == NAMES[SUCCESS] else FAILURE
 
     def _next(self, state: str, outcome: str, counts_as: str) -> str:
         """Return the target of an outcome: of its own transition, else of the one for the result it counts as."""

@@ -12,6 +12,7 @@ from rbxcompose.missions.program.branches import (
     OutcomeRule,
     read_outcomes,
 )
+from rbxcompose.missions.sdk import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS  # looked up in every tick
 
 PLAIN = {sdk.SUCCEEDS: sdk.SUCCEEDS, sdk.FAILS: sdk.FAILS}
 
@@ -27,7 +28,7 @@ class ParallelTask(sdk.Task):
         self.children = site.children
         self.branches = step.branches
         self.waits_for_all = step.wait_for_all
-        self.results = [sdk.IDLE] * len(self.children)
+        self.results = [IDLE] * len(self.children)
         self.names = [""] * len(self.children)  # outcomes of their own
         self.runs = [False] * len(self.children)
         self.wanted = (0, 0)  # how many must succeed, how many must fail; 0 for all
@@ -35,7 +36,7 @@ class ParallelTask(sdk.Task):
     def begin(self) -> int:
         """Start all branches; with a deep history, only those that had not ended."""
         if not (self.engine.places.kept and self.engine.places.take_up(self)):
-            self.results = [sdk.IDLE] * len(self.children)
+            self.results = [IDLE] * len(self.children)
             self.names = [""] * len(self.children)
         self.runs = [False] * len(self.children)
         branches = self.branches
@@ -49,16 +50,16 @@ class ParallelTask(sdk.Task):
         """Tick every branch that has not ended, then decide the result."""
         results, runs, engine = self.results, self.runs, self.engine
         for index, child in enumerate(self.children):
-            if results[index] > sdk.RUNNING:
+            if results[index] > RUNNING:
                 continue
             engine.outcome = ""
             status = child.tick() if runs[index] else child.start()
             results[index] = status
-            runs[index] = status == sdk.RUNNING
-            if status != sdk.RUNNING:
+            runs[index] = status == RUNNING
+            if status != RUNNING:
                 self.names[index] = engine.outcome
         status = self._judge()
-        if status != sdk.RUNNING:
+        if status != RUNNING:
             self.halt_below()
             self._name_outcome()
         else:
@@ -94,19 +95,19 @@ class ParallelTask(sdk.Task):
 
     def _judge(self) -> int:
         results = self.results
-        open_ones = results.count(sdk.RUNNING)
+        open_ones = results.count(RUNNING)
         if open_ones and self.waits_for_all:
-            return sdk.RUNNING
+            return RUNNING
         if self.branches.ends_with:
             return results[self.branches.names.index(self.branches.ends_with)]
-        failed, succeeded = results.count(sdk.FAILURE), results.count(sdk.SUCCESS)
+        failed, succeeded = results.count(FAILURE), results.count(SUCCESS)
         counted = failed + succeeded + open_ones
         if not counted:
-            return sdk.SKIPPED
+            return SKIPPED
         to_succeed, to_fail = (many or counted for many in self.wanted)
         if failed >= to_fail or succeeded + open_ones < to_succeed:
-            return sdk.FAILURE
-        return sdk.SUCCESS if succeeded >= to_succeed else sdk.RUNNING
+            return FAILURE
+        return SUCCESS if succeeded >= to_succeed else RUNNING
 
     def _name_outcome(self) -> None:
         """Set the outcome by the conditions; without any, take that of the `ends_with` branch, or the plain one."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from rbxcompose.missions import sdk
+from rbxcompose.missions.sdk import FAILURE, RUNNING, SKIPPED, SUCCESS  # looked up in every tick
 
 
 class RepeatTask(sdk.Task):
@@ -23,7 +24,7 @@ class RepeatTask(sdk.Task):
         self.period = 0.0
         self.due = 0.0  # when the next round may start [s]
         self.is_between = False  # one round has ended and the next one has not started
-        self.did = sdk.SKIPPED
+        self.did = SKIPPED
 
     def begin(self) -> int:
         """Start the first round, or the one in which it was halted."""
@@ -34,8 +35,8 @@ class RepeatTask(sdk.Task):
         self.left = math.inf if rounds is None else self.count_of(rounds, "'repeat'")
         self.period = 0.0 if every is None else self.number_of(every, "'every'")
         if self.left < 1:
-            return sdk.SKIPPED
-        self.did = sdk.SKIPPED
+            return SKIPPED
+        self.did = SKIPPED
         self.is_between = True
         self.due = self.engine.time
         return self.proceed()
@@ -44,18 +45,18 @@ class RepeatTask(sdk.Task):
         """Continue with this round; the next one starts in another tick."""
         if self.is_between:
             if not self.engine.is_due(self.due):
-                return sdk.RUNNING
+                return RUNNING
             self.is_between = False
             self.due = self.engine.time + self.period
             self.forget()
         status = self.advance(self.body)
-        if status == sdk.RUNNING:
-            return sdk.RUNNING
+        if status == RUNNING:
+            return RUNNING
         self.engine.outcome = ""
-        if status == sdk.FAILURE:
-            return sdk.FAILURE
-        if status == sdk.SUCCESS:
-            self.did = sdk.SUCCESS
+        if status == FAILURE:
+            return FAILURE
+        if status == SUCCESS:
+            self.did = SUCCESS
         self.left -= 1
         until = self.step.until
         if self.left < 1 or (until is not None and sdk.holds(until, self.scope)):
@@ -63,7 +64,7 @@ class RepeatTask(sdk.Task):
         self.is_between = True
         if self.engine.is_due(self.due):
             self.engine.again(self)
-        return sdk.RUNNING
+        return RUNNING
 
 
 @sdk.kind("repeat", RepeatTask)

@@ -10,7 +10,7 @@ from rbxcompose.base.expressions.tree import Expression
 from rbxcompose.base.expressions.types import UNKNOWN
 from rbxcompose.base.findings import Finding, Related, Report, Span
 from rbxcompose.manifest.documents import misspelt_keys, with_keys
-from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode, children, count
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, SequenceNode, TreeNode, all_nodes, count
 from rbxcompose.missions import codes
 from rbxcompose.missions.analysis.held_nodes import ITEM, PathPattern, matching, pattern_of, with_held
 from rbxcompose.missions.analysis.uses import TOO_MUCH
@@ -65,13 +65,7 @@ def operators(scalar: ScalarNode) -> int:
 
 def _texts(root: TreeNode) -> Iterator[ScalarNode]:
     """Yield the texts of a tree, the keys of its maps excepted, in the order in which they are written."""
-    waiting = [root]
-    while waiting:
-        node = waiting.pop()
-        if isinstance(node, ScalarNode):
-            yield node
-        else:
-            waiting += reversed([child for _, child in children(node)])
+    return (node for node in all_nodes(root) if isinstance(node, ScalarNode))
 
 
 BODIES = ("do", "machine")

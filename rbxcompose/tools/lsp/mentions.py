@@ -25,7 +25,7 @@ from rbxcompose.compiler.sections.provides import provides
 from rbxcompose.manifest.registry import section_named
 from rbxcompose.manifest.section import Section
 from rbxcompose.manifest.test_file import STEP_KEYS
-from rbxcompose.manifest.tree import Entry, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode, at, children
+from rbxcompose.manifest.tree import Entry, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode, all_nodes, at
 from rbxcompose.missions.language.asked import Asked, WrittenArgument
 from rbxcompose.missions.language.grammar import Takes
 from rbxcompose.missions.language.keys import keys_taking
@@ -221,11 +221,8 @@ def is_placed(declared: TreeNode | None) -> bool:
 
 def leaves(node: TreeNode | None) -> Iterator[ScalarNode]:
     """Yield the words in a node, in lists and in the values of maps."""
-    if isinstance(node, ScalarNode):
-        yield node
-    elif node is not None:
-        for _, below in children(node):
-            yield from leaves(below)
+    found = all_nodes(node) if node is not None else ()
+    return (below for below in found if isinstance(below, ScalarNode))
 
 
 def _entries(node: TreeNode | None) -> list[tuple[str, Entry]]:
