@@ -12,7 +12,7 @@ from contextvars import ContextVar
 from dataclasses import field
 from enum import StrEnum
 from functools import lru_cache, wraps
-from typing import NamedTuple, ParamSpec, TypeVar, cast
+from typing import Generic, NamedTuple, ParamSpec, TypeVar, cast
 
 from rbxcompose.base.dataclass import dataclass
 
@@ -56,6 +56,19 @@ def once(function: Callable[P, T]) -> Callable[P, T]:
         return cast(T, memory.known[key])
 
     return remembered
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Itself(Generic[T]):
+    """A large value as an argument of a function that is called `once`: it is known again only as the same object."""
+
+    value: T
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Itself) and other.value is self.value
+
+    def __hash__(self) -> int:
+        return id(self.value)
 
 
 def may_guess(work: int = 0) -> bool:

@@ -1,7 +1,5 @@
 """The bus of one process: everything that its components declare, by component."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Sequence
 from typing import Any, TypeVar
 

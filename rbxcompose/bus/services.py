@@ -15,7 +15,7 @@ from rbxcompose.base.scheduler import ScheduledCallback
 from rbxcompose.bus.local import REQUESTS, Gate, Inbox, Participant, Registry, Witness, WitnessedCall
 from rbxcompose.bus.names import Attachment, decode_attachment
 from rbxcompose.bus.tokens import EntityKind, gid, session_of
-from rbxcompose.bus.transport import Closable, Question, TransportReply
+from rbxcompose.bus.transport import LONGEST_WAIT, Closable, Question, TransportReply
 from rbxcompose.bus.wire import SERVICE_QOS
 from rbxcompose.msgs.cdr import CdrLimitError, decode, encode
 from rbxcompose.msgs.types import Message, Service
@@ -250,8 +250,9 @@ class Client(Generic[Q, R]):
             local[0].ask(ServedRequest(request, self.gid, sequence, partial(self._answered, sequence)))
         elif self._servers:
             source = Attachment(sequence, self._process.clock.stamp(), self.gid)
+            replied = partial(self._answered_from_afar, sequence)
             waiting.remote = self._process.transport.ask(
-                self._key, encode(request), source.encode(), partial(self._answered_from_afar, sequence)
+                self._key, encode(request), source.encode(), replied, of_all=True, within=LONGEST_WAIT
             )
         else:
             self._answered(sequence, Reply(None, f"no server of {self.route[0]} is known"))

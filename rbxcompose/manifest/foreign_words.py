@@ -1,7 +1,5 @@
 """Words of other tools: keys, tags and launch substitutions, with what is written here instead."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Container, Mapping
 from typing import NamedTuple

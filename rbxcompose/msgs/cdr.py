@@ -5,8 +5,6 @@ worked out once, at its first use: neighbouring numbers, including those of nest
 Decoding trusts nothing: it checks each count against the available bytes before it allocates memory.
 """
 
-from __future__ import annotations
-
 import math
 import struct
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """Ports: what a component publishes and subscribes to, declared in its class so that `check` knows them."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 from enum import StrEnum
 from types import MappingProxyType

@@ -4,15 +4,12 @@ VALUE is a path as for --set (battery.runtime, missions.patrol.with.rounds), or 
 Exit codes: 0 fine, 1 the robot cannot be read or has no such path, 2 wrong usage.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 
 from rbxcompose.base.findings import Finding
 from rbxcompose.commands.console import FINDINGS, emit, refuse, write_report
-from rbxcompose.commands.targets import add_layer_options, layers_of, robot_path
-from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.commands.targets import add_layer_options, compiled, robot_path
 from rbxcompose.tools.inspection.why import why
 
 
@@ -28,10 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write what is known about a path; explain a robot with mistakes as far as it could be read."""
-    robot = robot_path(arguments.robot)
-    if robot is None:
-        return FINDINGS
-    compilation = compile_robot(robot, **layers_of(arguments))
+    compilation = compiled(robot_path(arguments.robot), arguments)
     if compilation.robot is None:
         write_report(compilation.report, compilation.sources)
         return FINDINGS

@@ -127,8 +127,8 @@ class Scene(Component[SceneConfig]):
         """Return the ports: its own, what sensors see, and a look at each frame outside of the body."""
         root = body_of(config.urdf).root
         seen = {
-            cloud: In(SceneObjects, f"scene/{cloud}", qos="latched", limits=SCENE_LIMITS).named(f"cloud_{cloud}")
-            for cloud in config.clouds
+            item: In(SceneObjects, f"scene/{item}", qos="latched", limits=SCENE_LIMITS).named(f"cloud_{item}")
+            for item in config.clouds
         }
         clouds = {port.name: port for port in seen.values()}
         looks = {_look(frame): Looks(source=frame, target=root).named(_look(frame)) for frame in config.frames}
