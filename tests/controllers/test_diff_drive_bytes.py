@@ -69,7 +69,8 @@ def test_a_base_drives_by_bytes_and_knows_where_it_is(model: str, tmp_path: Path
     line.servos[0].move_to(4000)  # so that it starts again at 0
     with FakePort(line, tmp_path / "servos") as port, DynamixelBus(str(port.path), known) as bus:
         list(prepare(bus, [drive.joint for drive in drives.values()], 0.0))
-        cycle, site = ServoCycle(bus, drives), Site(drives)
+        cycle = ServoCycle(bus, drives)
+        site: Any = Site(drives)
         setup: Any = config.controllers["base"].config
         base = DiffDriveController("base", setup, site)
         end, turned, still = time.monotonic() + MOST, False, 0

@@ -124,12 +124,7 @@ def _changed(
 def with_meshes(element: XmlElement, names: Mapping[str, str]) -> XmlElement:
     """Return an element with other names for its mesh files."""
     new = {"filename": names[element.attributes["filename"]]} if element.attributes.get("filename") in names else {}
-    return _changed(
-        element,
-        new if element.name == "mesh" else {},
-        element.text,
-        lambda xml_element: with_meshes(xml_element, names),
-    )
+    return _changed(element, new if element.name == "mesh" else {}, element.text, lambda item: with_meshes(item, names))
 
 
 def to_xml(root: XmlElement) -> str:

@@ -56,11 +56,7 @@ def _that_may_be(body: model.Body, joint: model.BodyJoint, role: str) -> dict[st
         taken, below = set(), [joint.child]
         while below:
             taken.add(link := below.pop())
-            below += [
-                body_joint.child
-                for body_joint in body.joints.values()
-                if body_joint.parent == link and body_joint.child not in taken
-            ]
+            below += [item.child for item in body.joints.values() if item.parent == link and item.child not in taken]
     return {name: link for name, link in body.links.items() if name not in taken} or dict(body.links)
 
 

@@ -145,8 +145,7 @@ class _Reader:
             help_text = "expand it first: 'xacro FILE.xacro -o FILE.urdf'"
             raise _RefusedError(NOT_URDF.at(self._tag(name), "xacro must expand this file first", help=help_text))
         if len(self.open) >= DEPTH:
-            message = f"elements are nested more than {DEPTH} levels deep"
-            raise _RefusedError(TOO_LARGE.at(self._tag(name), message))
+            raise _RefusedError(TOO_LARGE.at(self._tag(name), f"elements are nested more than {DEPTH} levels deep"))
         if self.elements > URDF_ELEMENTS:
             raise _RefusedError(TOO_LARGE.at(self._tag(name), f"more than {URDF_ELEMENTS:,} elements in one file"))
         place = attributes.pop(PLACE, None)

@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from rbxcompose import sdk
 from rbxcompose.base.geometry import Transform3, rotate
 from rbxcompose.domains.arms.motion.clouds import CloudError, SeenCells, SpaceFilter, points_of
 from rbxcompose.domains.arms.motion.collisions import readers_of
+from rbxcompose.domains.arms.motion.groups import Array
 from rbxcompose.domains.arms.motion.scene import PlacedObject
 from rbxcompose.domains.arms.motion.scene_messages import object_message, placed_object
 from rbxcompose.domains.body.model import Geometry
@@ -24,7 +24,6 @@ from rbxcompose.msgs.sensor_msgs import JointState, PointCloud2
 from rbxcompose.msgs.stamps import NANOSECONDS, to_nanoseconds
 from rbxcompose.sdk.updater import TaskStatus
 
-Array = NDArray[np.float64]
 CLOUD = "cloud"  # the port
 LARGEST = 64_000_000  # [bytes] of a cloud
 OLDEST, EARLIEST = 1.0, 0.2  # [s] by which the stamp of a cloud may be behind and ahead of now

@@ -204,9 +204,8 @@ class Head(sdk.Component[HeadConfig]):
     def fail(self, goal: LookGoal, failure: NoAim) -> None:
         """End the goal."""
         self.goal = None
-        goal.aborted(
-            f"{failure.reason}: {failure.text}", LookAtPoint.Result(outcome=failure.reason, message=failure.text)
-        )
+        result = LookAtPoint.Result(outcome=failure.reason, message=failure.text)
+        goal.aborted(f"{failure.reason}: {failure.text}", result)
 
     def let_go(self) -> None:
         """Let the head come to rest."""

@@ -117,9 +117,7 @@ class Scene(Component[SceneConfig]):
     def ports(cls, config: SceneConfig) -> dict[str, Port[Any]]:
         """Return the ports: its own, what sensors see, and a look at each frame outside of the body."""
         root = body_of(config.urdf).root
-        seen = {
-            cloud: In(SceneObjects, f"scene/{cloud}", qos="latched").named(f"cloud_{cloud}") for cloud in config.clouds
-        }
+        seen = {item: In(SceneObjects, f"scene/{item}", qos="latched").named(f"cloud_{item}") for item in config.clouds}
         clouds = {port.name: port for port in seen.values()}
         looks = {_look(frame): Looks(source=frame, target=root).named(_look(frame)) for frame in config.frames}
         seen = {name: port.named(name) for name, port in clouds.items()}

@@ -13,12 +13,12 @@ from types import MappingProxyType
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
-from rbxcompose.domains.arms.motion.groups import JointSpace, moved_links, solid_link
+from rbxcompose.domains.arms.motion.groups import Array, JointSpace, moved_links, solid_link
 from rbxcompose.domains.arms.motion.octree_files import read_cells
 from rbxcompose.domains.arms.motion.parametrisation import toppra
 from rbxcompose.domains.arms.motion.scene import PairDistance, PlacedObject
@@ -26,7 +26,6 @@ from rbxcompose.domains.body.link_pairs import LinkPair, pair_of
 from rbxcompose.domains.body.meshes import read_mesh
 from rbxcompose.domains.body.model import Body, Geometry
 
-Array = NDArray[np.float64]
 Coal = Any  # of an extra, without types
 STL = ".stl"
 """The ending of meshes that coal reads rightly; those of others may have pieces, whose corners it confuses."""
@@ -361,8 +360,7 @@ class MeshChecker:
         """Return the pairs of shapes that it examines, and how far they must be from each other [m]."""
         margins = (request.security_margin for request in self._data.collisionRequests)
         return [
-            (pair.first, pair.second, margin)
-            for pair, margin in zip(self._geometry.collisionPairs, margins, strict=True)
+            (pair.first, pair.second, item) for pair, item in zip(self._geometry.collisionPairs, margins, strict=True)
         ]
 
     def collides(self, values: Array, pairs: Iterable[int]) -> bool:

@@ -10,11 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbxcompose.base.geometry import Transform3, Vector3, rotate
-from rbxcompose.domains.arms.motion.groups import ArmGroup, leader_of
+from rbxcompose.domains.arms.motion.groups import ArmGroup, Array, leader_of
 from rbxcompose.domains.arms.motion.numba_cache import borrowed, compiled, inlined
 from rbxcompose.domains.body.model import Body
-
-Array = NDArray[np.float64]
 
 
 @inlined

@@ -71,9 +71,7 @@ class Transforms(Component[TransformsConfig]):
     def capabilities(cls, config: TransformsConfig) -> tuple[Capability, ...]:
         """Declare the frames that it writes."""
         body = body_of(config.urdf)
-        joints = [
-            WritesFrame(_port(joint), Setting(joint.parent), Setting(joint.child)) for joint in body.joints.values()
-        ]
+        joints = [WritesFrame(_port(item), Setting(item.parent), Setting(item.child)) for item in body.joints.values()]
         return (WritesFrame("tf_static", Setting(config.map, "map"), Setting(config.odom, "odom")), *joints)
 
     def configure(self) -> None:
@@ -103,11 +101,7 @@ class Transforms(Component[TransformsConfig]):
                 moved[name] = float(position)
         if moved:
             self.positions |= moved
-            affected = [
-                body_joint
-                for body_joint in self.moving
-                if (body_joint.mimic.joint if body_joint.mimic else body_joint.name) in moved
-            ]
+            affected = [item for item in self.moving if (item.mimic.joint if item.mimic else item.name) in moved]
             names, measured = [body_joint.name for body_joint in affected], to_nanoseconds(message.header.stamp)
             lag = self.stamp - measured if measured and abs(self.stamp - measured) <= MOST_LAG else 0
             self.reported.update(names)

@@ -60,16 +60,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_actions(
         parser,
-        (
-            Subcommand(name, about, do, (*shared, *own), f"{about[0].upper()}{about[1:]}.")
-            for name, about, do, own in table
-        ),
+        (Subcommand(name, item, do, (*shared, *own), f"{item[0].upper()}{item[1:]}.") for name, item, do, own in table),
     )
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Run the chosen action."""
-    return run_action(arguments)
+run = run_action
 
 
 Do = Callable[[argparse.Namespace], int]

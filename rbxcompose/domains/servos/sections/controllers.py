@@ -19,7 +19,7 @@ from rbxcompose.domains.servos.sections.joints import held_limits, joints, may_b
 from rbxcompose.manifest.arguments import decided_at
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading
-from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode, at, key_span, value_span
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode, at, key_span
 from rbxcompose.manifest.validate import MISSING_KEY, not_a_choice
 from rbxcompose.msgs.control_msgs import FollowJointTrajectory
 from rbxcompose.msgs.trajectory_msgs import JointTrajectory
@@ -118,7 +118,7 @@ def _mistakes(
     reading: Reading[ControllerConfig], name: str, config: ControllerConfig, owners: dict[str, tuple[str, Span]]
 ) -> Iterator[Finding]:
     root = reading.contents.root
-    here, cls = key_span(root, ("controllers", name)), controller_type(config.type)
+    here, cls = reading.key("controllers", name), controller_type(config.type)
     yield from _undriven(reading, name, config)
     yield from _following(reading, name, config)
     yield from _unfit(reading, name, config)
@@ -164,7 +164,7 @@ def _undriven(reading: Reading[ControllerConfig], name: str, config: ControllerC
             if servo.mode != wanted:
                 given, taken = _PLURAL[wanted], _PLURAL[servo.mode]
                 message = f"the controller '{name}' gives {given}, and the servos of '{joint}' take {taken}"
-                there = key_span(reading.contents.root, ("actuators", each))
+                there = reading.key("actuators", each)
                 first, other = (there, span) if there.file == span.file else (span, there)
                 related = [Related(other, "the controller" if first is there else "the actuator")]
                 yield NOT_DRIVEN.at(first, message, help=f"give '{each}' 'mode: {wanted}'", related=related)
@@ -211,9 +211,9 @@ def _blind(reading: Reading[ControllerConfig], name: str, config: ControllerConf
             message = (
                 f"'{name}' needs to know how far '{servo}' turns, and an {model.name} measures {degrees} of 360 deg"
             )
-            span = value_span(reading.contents.root, ("actuators", servo, "model"))
+            span = reading.value("actuators", servo, "model")
             help_text = "take a model that sees the whole turn, such as XL430-W250 or MX-28"
-            here = Related(key_span(reading.contents.root, ("controllers", name)), "the controller")
+            here = Related(reading.key("controllers", name), "the controller")
             yield NO_WHOLE_TURN.at(span, message, help=help_text, related=[here])
 
 
@@ -241,7 +241,7 @@ def _unknown_items(reading: Reading[ControllerConfig], name: str, config: Contro
         model = model_of(reading.contents, servos[used.actuator]) if used.actuator in servos else None
         valid = [item for item in model.items if item in OUTPUTS or not used.is_written] if model else []
         if model is not None and used.item not in valid:
-            span = value_span(reading.contents.root, ("controllers", name, used.field))
+            span = reading.value("controllers", name, used.field)
             is_there = used.item in model.items
             message = f"'{used.item}' cannot be switched" if is_there else f"{model.name} has no item '{used.item}'"
             what = "items that can be switched" if used.is_written else "its items"
@@ -267,7 +267,7 @@ def _place(reading: Reading[ControllerConfig], name: str, joint: str) -> Span:
         for item in items:
             if isinstance(item, ScalarNode) and item.text == joint and key != "type":
                 return item.span
-    return value_span(reading.contents.root, ("controllers", name))
+    return reading.value("controllers", name)
 
 
 def served_topic(name: str, config: ControllerConfig, action: type[Any]) -> str:
