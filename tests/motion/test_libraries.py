@@ -54,12 +54,12 @@ def kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Compiled:
     """Return the function above, in a library."""
     monkeypatch.setattr(numba_cache, "cache_folder", lambda: str(tmp_path))
     monkeypatch.setattr(numba_cache, "_made", [])
-    maker = Compiled(cast(Compiled, weighted)._function, is_kept=True)
+    maker = Compiled(cast(Compiled, weighted).function, is_kept=True)
     assert is_empty()
     asked(maker, np.ones((3, 2)))
     numba_cache.keep_libraries()
     assert not is_empty()
-    return Compiled(cast(Compiled, weighted)._function, is_kept=True)
+    return Compiled(cast(Compiled, weighted).function, is_kept=True)
 
 
 TABLE = np.array([[1.0, 2.0], [3.0, 5.0], [7.0, 11.0]])
@@ -96,7 +96,7 @@ def test_the_search_is_the_same_to_the_last_bit() -> None:
     assert path is not None
     assert path.is_file()
     answers = []
-    for called in (Compiled(function._function, is_kept=True), function.dispatcher):
+    for called in (Compiled(function.function, is_kept=True), function.dispatcher):
         found = np.zeros((4096, 2), dtype=np.int64)
         answers.append((called(checker._model, points, found, workspace(checker._model)), found.tolist()))
     assert answers[0] == answers[1]

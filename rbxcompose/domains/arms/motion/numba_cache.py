@@ -68,7 +68,7 @@ class Compiled:
     """A function for numba, or one of a library that it has made before."""
 
     def __init__(self, function: Callable[..., object], *, is_kept: bool = False, **options: bool) -> None:
-        self._function, self._is_kept, self._options = function, is_kept, options
+        self.function, self._is_kept, self._options = function, is_kept, options
         update_wrapper(self, function)
 
     def __call__(self, *arguments: Any) -> Any:
@@ -88,7 +88,7 @@ class Compiled:
         config.CACHE_DIR = folder  # which numba reads now, and only here: functions of others keep their own place
         cached = self._is_kept and bool(folder)
         try:
-            made = numba.njit(self._function, cache=cached, nogil=True, error_model="numpy", **self._options)
+            made = numba.njit(self.function, cache=cached, nogil=True, error_model="numpy", **self._options)
         finally:
             config.CACHE_DIR = before
         if self._is_kept:
@@ -100,7 +100,7 @@ class Compiled:
         """Return the file of its library, whether it is there or not; None if it is not kept."""
         if not (folder := cache_folder()) or not self._is_kept:
             return None
-        function = self._function
+        function = self.function
         return Path(folder, f"{function.__module__}.{function.__qualname__}-{_machine()}{LIBRARY}")
 
     @cached_property
