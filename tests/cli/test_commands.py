@@ -59,6 +59,43 @@ def test_an_unknown_command_is_wrong_usage_with_a_hint(capsys: pytest.CaptureFix
     assert "did you mean 'down'?" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("written", "usual"),
+    [
+        ("action", "action ls"),
+        ("arm", "arm ls"),
+        ("arm robots/mini --json", "arm ls robots/mini --json"),
+        ("body mini.urdf", "body show mini.urdf"),
+        ("controller", "controller ls"),
+        ("diag", "diag tree"),
+        ("diag -v", "diag tree -v"),
+        ("fleet", "fleet ls"),
+        ("mission --robot mini", "mission ls --robot mini"),
+        ("msg std_msgs/Bool", "msg show std_msgs/Bool"),
+        ("mux", "mux ls"),
+        ("param", "param ls"),
+        ("scene", "scene ls"),
+        ("security systems/two.yaml", "security audit systems/two.yaml"),
+        ("service", "service ls"),
+        ("servo --port /dev/ttyUSB0", "servo scan --port /dev/ttyUSB0"),
+        ("tf --timeout 1s", "tf tree --timeout 1s"),
+        ("topic -a", "topic ls -a"),
+        ("udev", "udev scan"),
+    ],
+)
+def test_without_an_action_the_most_common_one_is_meant(written: str, usual: str) -> None:
+    verb, *words = written.split()
+    parser = verbs.parser_of(verb, verbs.load(verb))
+    assert parser.parse_args(words) == parser.parse_args(usual.split()[1:])
+
+
+def test_a_misspelt_action_is_no_argument_of_the_usual_one(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as caught:
+        command.main(["diag", "treee"])
+    assert caught.value.code == 2
+    assert "invalid choice: 'treee' (choose from 'tree', 'watch'" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("verb", RUNNING)
 def test_without_a_robot_that_is_a_finding(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert command.main([verb]) == 1

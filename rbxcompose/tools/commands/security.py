@@ -41,9 +41,10 @@ SOON_EXPIRED = kind("RBX6144", Severity.WARNING)
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     actions = parser.add_subparsers(dest="action", metavar="init|audit", required=True)
+    parser.set_defaults(action="audit")
     for name, about in (
         ("init", "make certificates for all hosts"),
-        ("audit", "list what listens, and who may reach it"),
+        ("audit", "list what listens, and who may reach it (the default)"),
     ):
         action = actions.add_parser(name, help=about)
         action.add_argument("path", metavar="SYSTEM", help="the file of the system")
