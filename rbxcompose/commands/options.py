@@ -39,6 +39,11 @@ def argument(*names: str, **options: Any) -> Declare:
     return lambda parser: parser.add_argument(*names, **options)
 
 
+def out_option(words: str, *more: str, metavar: str = "FILE", **options: Any) -> Declare:
+    """Return what declares where the answer is written: `-o` and `--out`, and `more` names."""
+    return argument("-o", "--out", *more, metavar=metavar, help=words, **options)
+
+
 def deferred(module: str, function: str) -> Callable[..., int]:
     """Return what calls a function of a module that is imported only then, since it needs more than others do."""
     return lambda *arguments: int(getattr(import_module(module), function)(*arguments))

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import argparse
 import ast
 import json
 import os
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -87,6 +89,28 @@ def test_without_an_action_the_most_common_one_is_meant(written: str, usual: str
     verb, *words = written.split()
     parser = verbs.parser_of(verb, verbs.load(verb))
     assert parser.parse_args(words) == parser.parse_args(usual.split()[1:])
+
+
+def parsers() -> Iterator[argparse.ArgumentParser]:
+    """Yield the parsers of all verbs and actions."""
+    waiting: list[argparse.ArgumentParser] = [verbs.parser_of(verb, verbs.load(verb)) for verb in verbs.verbs()]
+    while waiting:
+        yield (parser := waiting.pop())
+        for action in parser._actions:
+            waiting += action.choices.values() if isinstance(action, argparse._SubParsersAction) else ()
+
+
+def test_where_an_answer_is_written_is_called_o_and_out_everywhere() -> None:
+    names = {"-o", "--out", "--output"}
+    found = {
+        parser.prog.removeprefix("rbxcompose "): {*action.option_strings}
+        for parser in parsers()
+        for action in parser._actions
+        if names & {*action.option_strings}
+    }
+    assert found.keys() >= {"record", "graph", "body picture", "import mux", "export", "mission show", "arm setup"}
+    assert found.pop("record") == names
+    assert {*map(frozenset, found.values())} == {frozenset({"-o", "--out"})}
 
 
 def test_a_misspelt_action_is_no_argument_of_the_usual_one(capsys: pytest.CaptureFixture[str]) -> None:

@@ -19,7 +19,7 @@ from pathlib import Path
 from rbxcompose import __version__
 from rbxcompose.base.findings import Finding, kind
 from rbxcompose.commands.console import FINDINGS, emit, refuse, write_report
-from rbxcompose.commands.options import is_system
+from rbxcompose.commands.options import is_system, out_option
 from rbxcompose.compiler.compile import Compilation, compile_robot
 from rbxcompose.compiler.systems.bundle import files_of
 from rbxcompose.compiler.systems.model import System
@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("program", choices=PROGRAMS, help="for which program")
     parser.add_argument("path", metavar="SYSTEM", help="the file of the system; for srdf a robot, for ros2 either")
-    parser.add_argument("--out", metavar="FOLDER", required=True, help="a new or empty folder")
+    out_option("a new or empty folder", metavar="FOLDER", required=True)(parser)
     parser.add_argument("--host", metavar="NAME", help="only what this host runs")
     parser.add_argument("--profile", action="append", default=[], metavar="P", help="apply this profile of the system")
     parser.add_argument("--real", action="store_true", help="use the real devices; without it, they are simulated")

@@ -12,6 +12,7 @@ from pathlib import Path
 from rbxcompose.base.files import replace_file
 from rbxcompose.commands.console import FINDINGS, emit, refuse, write_report
 from rbxcompose.commands.layout import NotDrawnError
+from rbxcompose.commands.options import out_option
 from rbxcompose.commands.targets import add_layer_options, add_path_argument, layers_of, robot_path
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.tools.inspection.diagram import diagram_of, dot, mermaid
@@ -26,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_path_argument(parser)
     add_layer_options(parser)
     parser.add_argument("--format", choices=list(FORMATS), default="mermaid", help="output format")
-    parser.add_argument("--out", metavar="FILE", help="write it to this file")
+    out_option("write it to this file")(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:

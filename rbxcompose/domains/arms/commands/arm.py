@@ -35,6 +35,7 @@ from rbxcompose.commands.options import (
     add_json_option,
     add_timeout_option,
     argument,
+    out_option,
     run_action,
 )
 from rbxcompose.commands.targets import add_layer_options, add_path_argument
@@ -534,7 +535,7 @@ class _ReachModel(Config):
 def add_reach_options(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `arm picture`."""
     parser.add_argument("what", choices=(REACH, EASE), help=f"{REACH}: of {DIRECTIONS} directions; {EASE}: Yoshikawa's")
-    parser.add_argument("--out", metavar="FILE", required=True, help="the picture, a PNG")
+    out_option("the picture, a PNG", required=True)(parser)
     words = "the layer that is shown, such as 'y: -10 cm' of the root, or 'all' (default: through the arm's base)"
     parser.add_argument("--layer", metavar="AXIS: AT", default="", help=words)
     parser.add_argument("--cell", metavar="LENGTH", default="4 cm", help="side of a cell (default: 4 cm)")
