@@ -20,7 +20,7 @@ from rbxcompose.base.units import example
 from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, misused, refuse, table, write_report
 from rbxcompose.commands.layout import NotDrawnError
 from rbxcompose.commands.lookup import answer_of, known_state, robots_up
-from rbxcompose.commands.targets import only_path
+from rbxcompose.commands.targets import only_path, put_robot_last
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.model.skills import python_skills
@@ -74,6 +74,7 @@ def _running_file() -> str | None:
 
 def show(arguments: argparse.Namespace) -> int:
     """Write the picture of a mission; without a path, that of the running robot, with the state of each node."""
+    put_robot_last(arguments, "name")
     try:
         picture, statuses = (None if arguments.path else _live(arguments.name)) or (None, ())
         if picture is None:
@@ -309,6 +310,7 @@ def _shown(records: Sequence[LogRecord]) -> str:
 
 def explore(arguments: argparse.Namespace) -> int:
     """Explore a mission and report the findings; the exit code is 1 if anything is wrong."""
+    put_robot_last(arguments, "name")
     robot = robot_of(arguments.path)
     if robot is None:
         return FINDINGS

@@ -38,7 +38,7 @@ from rbxcompose.commands.options import (
     out_option,
     run_action,
 )
-from rbxcompose.commands.targets import add_layer_options, add_path_argument
+from rbxcompose.commands.targets import add_layer_options, add_path_argument, put_robot_last
 from rbxcompose.domains.arms.arm_config import ArmWorks
 from rbxcompose.domains.arms.command_line import (
     NO_MOTION,
@@ -121,6 +121,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the chosen subcommand."""
+    for asked in ("goal", "target", "way"):
+        if asked in arguments and "path" in arguments:
+            put_robot_last(arguments, asked)
     return run_action(arguments)
 
 
