@@ -104,7 +104,7 @@ def run_share(path: str, arguments: argparse.Namespace, options: RunOptions) -> 
 
 def compiled_for(path: str, arguments: argparse.Namespace, verb: str) -> System | int:
     """Return a system without errors, with the layers of a `verb`; the exit code after telling what is wrong."""
-    for word, given in (("-f", arguments.overlays), ("--set", arguments.sets)):
+    for word, given in (("-f", arguments.overlays), ("--set or --no-mission", arguments.sets)):
         if given:
             return misused(verb, f"{word} is for a robot; a system says itself what its robots are")
     system = compile_system(path, environment=os.environ, real=arguments.real, profiles=arguments.profile)

@@ -27,8 +27,9 @@ from rbxcompose.manifest.registry import (
     sections,
     sections_in_use,
 )
+from rbxcompose.manifest.scalars import is_empty
 from rbxcompose.manifest.secrets import Secrets
-from rbxcompose.manifest.section import ROBOT, Contents, Section, is_empty
+from rbxcompose.manifest.section import ROBOT, Contents, Section
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, all_nodes, at, key_span
 from rbxcompose.manifest.validate import UNKNOWN_KEY
 from rbxcompose.manifest.yaml_nodes import is_moderate
