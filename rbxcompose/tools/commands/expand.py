@@ -15,6 +15,8 @@ from rbxcompose.commands.targets import add_layer_options, add_path_argument, la
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.tools.inspection.expand import expand, expand_data
 
+GROUP = "write"
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""

@@ -27,6 +27,7 @@ from rbxcompose.compiler.systems.reader import compile_system
 from rbxcompose.tools.exporting import compose, kubernetes, ros2, systemd
 from rbxcompose.tools.exporting.exported_share import shares
 
+GROUP = "system"
 NOT_EXPORTED = kind("RBX6115")
 SRDF, ROS2 = "srdf", "ros2"
 PROGRAMS = ("systemd", "compose", "k8s", ROS2, SRDF)

@@ -21,6 +21,7 @@ from rbxcompose.commands.lookup import NOT_UP
 from rbxcompose.commands.options import add_system_options
 from rbxcompose.missions.execution.requests import MISSION
 
+GROUP = "system"
 NO_LABEL = kind("RBX6130")
 _COLUMNS = ("robot", "host", "state", "mission", "battery")
 ShareFacts = tuple[

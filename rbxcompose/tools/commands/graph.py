@@ -18,6 +18,7 @@ from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.tools.inspection.diagram import diagram_of, dot, mermaid
 from rbxcompose.tools.inspection.graph_html import html
 
+GROUP = "look"
 USAGE = 2
 FORMATS = {"mermaid": mermaid, "dot": dot, "html": html}
 

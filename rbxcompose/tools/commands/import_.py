@@ -21,6 +21,7 @@ from rbxcompose.commands.new_files import EXISTS, AnswerError, name_like, read_n
 from rbxcompose.commands.options import add_json_option, out_option
 from rbxcompose.manifest.files import shown_name
 
+GROUP = "write"
 OTHERWISE = "imported"  # the name of a robot if the first file's has no letter
 
 

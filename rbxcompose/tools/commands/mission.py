@@ -17,6 +17,8 @@ from rbxcompose.commands.lookup import REFUSED, WHICH, add_asking_options, answe
 from rbxcompose.commands.options import Declare, Subcommand, add_actions, argument, deferred, out_option, run_action
 from rbxcompose.missions.execution import requests
 
+GROUP = "missions"
+IS_COMMON = True
 A = TypeVar("A")
 
 ON_SYSTEM = requests.MISSION

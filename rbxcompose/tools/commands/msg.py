@@ -17,6 +17,7 @@ from rbxcompose.manifest.files import shown_name
 from rbxcompose.msgs.definitions import Structures, type_hash
 from rbxcompose.msgs.packages import OWN, all_names, package_files, parts_of, short, whole_text
 
+GROUP = "data"
 LICENCE = "Apache-2.0"
 
 

@@ -18,6 +18,7 @@ from rbxcompose.commands.hosts import SystemCommand
 from rbxcompose.commands.lookup import add_bus_options
 from rbxcompose.tools.parameters.nodes import ParameterNodes
 
+GROUP = "data"
 ON_SYSTEM = options.BUS
 _WITH_FILES = ("load", "save", "diff", "reset")
 

@@ -31,6 +31,7 @@ from rbxcompose.runtime.recording.files import ENDING, Recorder, Split, recover_
 from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic, Selection, by_name, definition_of, topic_of
 from rbxcompose.sdk.ports import Qos
 
+GROUP = "data"
 _PAUSE = 0.02  # [s] between checks for messages
 _SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*([kMG])B")
 _TIMES = {"k": 1e3, "M": 1e6, "G": 1e9}

@@ -27,6 +27,7 @@ from rbxcompose.compiler.systems.audit import listeners, reachable_keys
 from rbxcompose.compiler.systems.model import System
 from rbxcompose.compiler.systems.reader import compile_system
 
+GROUP = "system"
 NOT_MADE = kind("RBX6116")
 _RECEIVE = """set -e; umask 077
 d="${XDG_CONFIG_HOME:-$HOME/.config}/rbxcompose/systems/NAME/HOST"

@@ -22,6 +22,8 @@ from rbxcompose.tools.live_rules import LiveRules
 from rbxcompose.tools.robot_changes import LiveReload
 from rbxcompose.tools.run_view import is_fit, run_plan
 
+GROUP = "run"
+IS_COMMON = True
 USAGE = 2
 
 

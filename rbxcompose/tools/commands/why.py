@@ -19,6 +19,7 @@ from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.manifest.files import find
 from rbxcompose.tools.inspection.why import why
 
+GROUP = "look"
 _USAGE = "write 'rbxcompose why VALUE [ROBOT]'"
 
 

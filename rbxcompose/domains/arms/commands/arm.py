@@ -83,6 +83,7 @@ from rbxcompose.manifest.fields import FramePose
 from rbxcompose.msgs.plain import from_plain
 from rbxcompose.msgs.rbxcompose_msgs import MoveArm, TraceArm
 
+GROUP = "bodies and arms"
 M = TypeVar("M", MoveArm.Goal, TraceArm.Goal)
 
 

@@ -30,6 +30,7 @@ from rbxcompose.domains.body.xml_reader import read_urdf
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.validate import validate
 
+GROUP = "bodies and arms"
 NO_PAIR = kind("RBX9426")
 ON_SYSTEM = scene_view.SCENE
 _SHOWN = "OBJECT"  # name of the object's text in findings

@@ -53,6 +53,7 @@ from rbxcompose.domains.body.text import (
 )
 from rbxcompose.manifest.files import find, shown_name
 
+GROUP = "bodies and arms"
 TEXT, PDF = "text", "pdf"
 _FAMILY = "RBX20"  # codes of findings about bodies
 WOULD_REPLACE = kind("RBX2017")

@@ -21,6 +21,7 @@ from rbxcompose.domains.servos.controller_manager import (
 )
 from rbxcompose.runtime.folder import RobotFolder
 
+GROUP = "drive"
 ON_SYSTEM = BUS
 
 
