@@ -68,9 +68,9 @@ def test_a_robot_that_is_not_there_is_a_finding(words: list[str], capsys: pytest
     ],
 )
 def test_a_robot_and_what_is_asked_of_it_are_understood_in_either_order(
-    words: tuple[str, str, str], capsys: pytest.CaptureFixture[str]
+    words: tuple[str, ...], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    verb, robot, asked, *more = words
+    (verb, robot, asked), more = words[:3], words[3:]
     code = command.main([*verb.split(), asked, robot, *more])
     usual = capsys.readouterr().out
     assert usual
