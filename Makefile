@@ -8,7 +8,7 @@ PYTEST ?= -n auto
 # Each command that a test starts would compile the package again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: up test lint types unit soak bench docs messages lock clean
+.PHONY: up test lint types unit soak bench docs site messages lock clean
 
 # What the robot needs beside rbxcompose, such as the planning libraries of an arm, in the versions of the lock file.
 up: $(VENV)/.up
@@ -29,7 +29,7 @@ types: messages
 unit: $(VENV)/.test  ## On all cores; `make unit PYTEST="-n 0 tests/bus"` runs some tests in one process
 	$(BIN)/python -m pytest -q $(PYTEST)
 
-soak: $(VENV)/.test  ## Try many more random manifests and expressions, and fuzz if atheris is installed
+soak: $(VENV)/.test $(VENV)/.site  ## Try many more random manifests and expressions, and fuzz if atheris is installed
 	$(BIN)/python -m pytest -q --soak -o faulthandler_timeout=0 -o timeout=1800 tests
 	$(BIN)/python docs/quality.py
 	$(BIN)/python docs/robots_tried.py
@@ -42,7 +42,12 @@ docs: $(VENV)/.test  ## Write the generated pages, tables and schemas, and the p
 	$(BIN)/python -m benchmarks.misconfig --write
 	$(BIN)/python docs/draw_patrol.py
 	$(BIN)/python docs/draw_screens.py
+	$(BIN)/python docs/draw_robots.py
 	$(BIN)/python -m rbxcompose.compiler.schema.documents schemas
+
+site: $(VENV)/.site  ## Build the searchable site of the documentation, build/site/html; a dead link is an error
+	$(BIN)/python -m docs.site
+	$(BIN)/zensical build --strict --config-file build/site/zensical.toml
 
 messages: $(VENV)/.test  ## Write the stubs of message classes, for mypy and editors, from the interface texts
 	$(BIN)/python -m rbxcompose.msgs.generate
@@ -51,6 +56,7 @@ lock: $(VENV)/.test  ## Choose newest versions for the lock files
 	$(BIN)/python -m pip install -q pip-tools
 	$(BIN)/pip-compile -q --upgrade --generate-hashes --strip-extras --no-emit-index-url --no-emit-find-links --no-header -o requirements.lock pyproject.toml
 	$(BIN)/pip-compile -q --upgrade --generate-hashes --strip-extras --no-emit-index-url --no-emit-find-links --no-header --extra test -o requirements-test.lock pyproject.toml
+	$(BIN)/pip-compile -q --upgrade --generate-hashes --strip-extras --no-emit-index-url --no-emit-find-links --no-header --extra docs -c requirements-test.lock -o requirements-docs.lock pyproject.toml
 
 # An editable install needs the build backend; what runs is locked with hashes.
 $(VENV)/bin/python:
@@ -65,6 +71,10 @@ $(VENV)/.up: requirements.lock pyproject.toml | $(VENV)/bin/python
 $(VENV)/.test: requirements-test.lock pyproject.toml | $(VENV)/bin/python
 	$(BIN)/python -m pip install -q --disable-pip-version-check --require-hashes -r requirements-test.lock
 	$(BIN)/python -m pip install -q --disable-pip-version-check --no-deps -e .
+	@touch $@
+
+$(VENV)/.site: requirements-docs.lock | $(VENV)/bin/python
+	$(BIN)/python -m pip install -q --disable-pip-version-check --require-hashes -r requirements-docs.lock
 	@touch $@
 
 clean:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from rbxcompose.base.geometry import Transform3, quaternion_from_rpy
 from rbxcompose.domains.arms.arm_config import ArmConfig, ArmJointConfig, ArmWorks, LinkPairsConfig
 from rbxcompose.domains.arms.motion.figures import MotionProblem, ended
-from rbxcompose.domains.arms.motion.inverse_kinematics import PoseTarget, solved
+from rbxcompose.domains.arms.motion.inverse_kinematics import PoseSearch, PoseTarget, solved
 from rbxcompose.domains.arms.motion.scene import PlacedObject
 from rbxcompose.domains.body.link_pairs import pair_of
 from rbxcompose.domains.body.model import Geometry
@@ -98,7 +98,9 @@ def problems(works: ArmWorks, count: int) -> Iterator[BoxProblem]:
             works.place_objects(problem.objects)
             is_free = works.planner.checker.is_free
             target = PoseTarget(Transform3(point, quaternion_from_rpy(roll, pitch, 0.0)))
-            search = solved(works.kinematics, works.space, target, problem.start, is_free, seed=seed, enough=1)
+            search = solved(
+                PoseSearch(works.kinematics, works.space, target, problem.start, is_free, seed=seed, enough=1)
+            )
             solutions = ended(search).free
             if solutions and is_free(problem.start):
                 found += 1

@@ -34,8 +34,11 @@ COLOURS = {"yellow": "#f2c230", "red": "#e0453a", "green": "#3fa35b", "blue": "#
 FRAME = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 900 420" width="900" height="420" role="img">
 <title>A patrol in YAML, and the way that the base drives</title>
 <style>text {{ font: 13px system-ui, "Segoe UI", "DejaVu Sans", sans-serif }}
-.code {{ font: 12px ui-monospace, Menlo, Consolas, "DejaVu Sans Mono", monospace }}</style>
-<rect x="0.5" y="0.5" width="899" height="419" rx="12" fill="#fbfaf7" stroke="#b8bfc7"/>
+.code {{ font: 12px ui-monospace, Menlo, Consolas, "DejaVu Sans Mono", monospace }}
+@media (prefers-color-scheme: dark) {{ .paper {{ fill: #151b23; stroke: #3d444d }}
+[stroke="{ink}"] {{ stroke: #dfe5ec }} text[fill="{ink}"] {{ fill: #dfe5ec }}
+text[fill="{faint}"] {{ fill: #a3afbb }} }}</style>
+<rect class="paper" x="0.5" y="0.5" width="899" height="419" rx="12" fill="#fbfaf7" stroke="#b8bfc7"/>
 <rect x="14" y="14" width="430" height="392" rx="8" fill="#1f2733"/>
 {inside}
 </svg>

@@ -133,7 +133,7 @@ class Run:
         picture = picture_from_data(executive.picture(ShowPicture(MISSION)))
         page = mission_html(picture, status_list(self._seen(), picture.count))
         body = page.partition("<body>")[2].partition("</body>")[0]
-        return PAGE_FRAME.format(style=STYLE.replace("@media(prefers-color-scheme:dark)", "@media not all"), body=body)
+        return PAGE_FRAME.format(style=STYLE, body=body)
 
     def top(self) -> list[str]:
         """Return the lines of `top`, without the loads of processes."""

@@ -19,15 +19,24 @@ from hypothesis import HealthCheck, settings
 from xdist.scheduler import LoadScopeScheduling
 
 from rbxcompose.testing.golden import Golden
-from tests.side_by_side import REAL_TIME, scope_of, turn_of
+from tests.side_by_side import OTHERS, group_of, scope_of, turn_of
 from tests.soak import Soak
 
 ROOT = Path(__file__).parents[1]
+collect_ignore = ["misconfig/wrong", "misconfig/right"]  # hundreds of manifests, in which there is no test
 
-
+LONGEST = 180.0  # [s] of a test of real processes, on a busy machine
 CACHES = "RBXCOMPOSE_TEST_CACHES"
 WITH_ARMS = tuple(
-    f"tests/{start}" for start in ("cli/test_arm", "components/", "interop/", "motion/", "robots/", "testing/")
+    f"tests/{start}"
+    for start in (
+        "cli/test_arm",
+        *(f"components/test_{start}" for start in ("arm", "cloud", "con", "fail", "head", "move", "pick", "s")),
+        "interop/",
+        "motion/",
+        "robots/",
+        "testing/",
+    )
 )
 
 
@@ -62,38 +71,54 @@ def pytest_collection_finish(session: pytest.Session) -> None:
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
-    """Wait for what is compiled outside of the time that a test has."""
+    """Wait for what is compiled outside of the time that a test has; leave those of real time the processors."""
+    if "PYTEST_XDIST_WORKER" in os.environ and not group_of(item.nodeid):
+        be_nice()
     if item.nodeid.startswith(WITH_ARMS):
         compile_for_arms()
     return (yield)
 
 
 @cache
+def be_nice() -> None:
+    """Let the tests of other workers go first."""
+    os.nice(OTHERS)
+
+
+@cache
 def compile_for_arms(flags: int = 0) -> None:
     """Compile what arms need, or take it from the worker that has."""
-    from tests.motion.toy_arm import fast_planner, kinematics
+    from rbxcompose.domains.arms.motion.numba_cache import keep_libraries
+    from tests.motion.toy_arm import compile_all
 
     with open(Path(os.environ[CACHES], "compiling"), "w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX | flags)
-        kinematics().hasten()
-        fast_planner()
+        compile_all()
+        keep_libraries()
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Begin with what takes longest; let tests of real processes try again, since a busy machine keeps no deadline."""
     if not config.getoption("--soak"):
-        rare = [item for item in items if item.get_closest_marker("soak")]
-        config.hook.pytest_deselected(items=rare)
-        items[:] = [item for item in items if item not in set(rare)]
+        config.hook.pytest_deselected(items=[item for item in items if item.get_closest_marker("soak")])
+        items[:] = [item for item in items if not item.get_closest_marker("soak")]
     items.sort(key=lambda item: turn_of(item.nodeid))
     for item in items:
-        if item.nodeid.startswith(REAL_TIME):
+        if group_of(item.nodeid):
             item.add_marker(pytest.mark.flaky(reruns=2))
+            if not item.get_closest_marker("timeout"):
+                item.add_marker(pytest.mark.timeout(LONGEST))  # what must be quick is asserted by the test itself
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--update-golden", action="store_true", help="write golden files")
     parser.addoption("--soak", action="store_true", help="try many more random examples, and keep the figures")
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int:
+    """Return how many workers `-n auto` starts: another beside each processor, since two of them mostly wait."""
+    return (os.cpu_count() or 1) + 1
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -1,42 +1,54 @@
-"""Which tests may run side by side: those of one file never do, nor do those with deadlines in real time."""
+"""Which tests may run side by side: those of one file never do, and those with deadlines in real time come first."""
 
 from __future__ import annotations
 
-REAL_TIME = (
-    "tests/actuation/test_bus_load",
-    "tests/actuation/test_dynamixel_bus",
-    "tests/actuation/test_recovery",
-    "tests/cli/test_servo",
-    "tests/controllers/test_diff_drive_bytes",
-    "tests/exposure/",
-    "tests/faults/",
-    "tests/net/",
-    "tests/robots/test_real_picking",
-    "tests/robots/test_three_levels",
-    "tests/runtime/test_apply_for_real",
-    "tests/runtime/test_changes_for_real",
-    "tests/runtime/test_external_clock",
-    "tests/runtime/test_lifeline",
-    "tests/runtime/test_real_processes",
-    "tests/systems/test_faults",
-    "tests/systems/test_shared_calls",
-    "tests/systems/test_three_hosts",
-    "tests/systems/test_two_hosts",
-    "tests/systems/test_two_robots",
+REAL_TIME = {
+    "servos and faults": (
+        "tests/actuation/test_bus_load",
+        "tests/actuation/test_dynamixel_bus",
+        "tests/actuation/test_recovery",
+        "tests/cli/test_servo",
+        "tests/controllers/test_diff_drive_bytes",
+        "tests/exposure/",
+        "tests/faults/",
+    ),
+    "robots and systems": (
+        "tests/net/",
+        "tests/robots/test_real_picking",
+        "tests/robots/test_three_levels",
+        "tests/runtime/test_apply_for_real",
+        "tests/runtime/test_changes_for_real",
+        "tests/runtime/test_external_clock",
+        "tests/runtime/test_lifeline",
+        "tests/runtime/test_real_processes",
+        "tests/systems/test_faults",
+        "tests/systems/test_shared_calls",
+        "tests/systems/test_three_hosts",
+        "tests/systems/test_two_hosts",
+        "tests/systems/test_two_robots",
+    ),
+}
+"""Tests of real processes with deadlines, which mostly wait. A worker runs each group, from the beginning on."""
+
+LONG = tuple(
+    f"tests/{folder}/"
+    for folder in ("mission_tests", "docs", "runtime", "systems", "robots", "motion", "components", "cli")
 )
-"""Tests of real processes with deadlines. One worker runs them all, so that they leave each other the processors."""
+OTHERS = 5  # how much nicer all other tests are to those, so that these have a processor when they need one
 
 
-LONG = tuple(f"tests/{folder}/" for folder in ("docs", "runtime", "systems", "robots", "motion", "components", "cli"))
+def group_of(nodeid: str) -> str | None:
+    """Return the group of a test with deadlines in real time."""
+    return next((group for group, starts in REAL_TIME.items() if nodeid.startswith(starts)), None)
 
 
 def turn_of(nodeid: str) -> int:
     """Return when a test has its turn: with the longest first, all workers end at about the same time."""
-    return 0 if nodeid.startswith(REAL_TIME) else 1 if nodeid.startswith(LONG) else 2
+    return 0 if group_of(nodeid) else 1 if nodeid.startswith(LONG) else 2
 
 
 def scope_of(nodeid: str) -> str:
     """Return what one worker runs together: tests of one file share what is costly to make."""
     file = nodeid.partition("::")[0]
     together = "tests/project/"  # they read all files of the package, once
-    return "real time" if file.startswith(REAL_TIME) else together if file.startswith(together) else file
+    return group_of(file) or (together if file.startswith(together) else file)

@@ -5,19 +5,38 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator
 
-from docs.generating.markdown import code, page, table
+from docs.generating.markdown import code, lowered, page, table
 from rbxcompose.commands.verbs import load, parser_of, verbs
 
 
 def whole_page() -> str:
     """Return the page."""
-    return page("Commands", *(of_command(parser, 2) for parser in parsers()))
+    return page("Commands", overview(), *(of_command(parser, 2) for parser in parsers()))
 
 
 def parsers() -> Iterator[argparse.ArgumentParser]:
     """Give the parser of each verb, as the command line makes it."""
     for name in verbs():
         yield parser_of(name, load(name))
+
+
+def overview() -> str:
+    """Return a table of all commands."""
+    return table(("command", "what it does"), (row for parser in parsers() for row in leaves(parser)))
+
+
+def leaves(parser: argparse.ArgumentParser, words: str = "") -> Iterator[tuple[str, str]]:
+    """Give the row of a command, or those of the commands below it."""
+    below = [one for one in parser._actions if isinstance(one, argparse._SubParsersAction)]
+    for action in below:
+        helps = {choice.dest: choice.help or "" for choice in action._choices_actions}
+        for name, inner in action.choices.items():
+            yield from leaves(inner, helps[name])
+    if not below:
+        values = [written(one).strip("`") for one in parser._actions if not one.option_strings]
+        name = " ".join([parser.prog.partition(" ")[2], *values])
+        does = words or (parser.description or "").strip().partition("\n")[0].rstrip(".")
+        yield f"[{code(name)}](#{parser.prog.replace(' ', '-')})", lowered(does)
 
 
 def of_command(parser: argparse.ArgumentParser, level: int, about: str = "") -> str:

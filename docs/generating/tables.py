@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import argparse
 import inspect
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
-from docs.generating.commands import parsers, written
 from docs.generating.families import families
 from docs.generating.markdown import about, code, lowered, table
 from docs.generating.missions import takes
@@ -60,25 +58,6 @@ def title(documented: object) -> str:
     return lowered(about(documented).partition("\n\n")[0]).rstrip(".")
 
 
-def commands() -> str:
-    """Return every command."""
-    return table(("command", "what it does"), (row for parser in parsers() for row in leaves(parser)))
-
-
-def leaves(parser: argparse.ArgumentParser, words: str = "") -> Iterator[tuple[str, str]]:
-    """Give the row of a command, or those of the commands below it."""
-    below = [one for one in parser._actions if isinstance(one, argparse._SubParsersAction)]
-    for action in below:
-        helps = {choice.dest: choice.help or "" for choice in action._choices_actions}
-        for name, inner in action.choices.items():
-            yield from leaves(inner, helps[name])
-    if not below:
-        values = [written(one).strip("`") for one in parser._actions if not one.option_strings]
-        name = " ".join([parser.prog.partition(" ")[2], *values])
-        does = words or (parser.description or "").strip().partition("\n")[0].rstrip(".")
-        yield f"[{code(name)}](reference/commands.md#{parser.prog.replace(' ', '-')})", lowered(does)
-
-
 def nodes() -> str:
     """Return every kind of mission node with its options."""
     return table(("kind", "takes", "options", "what it does"), map(of_node, kinds().values()))
@@ -107,7 +86,6 @@ def few_words(kind: StepType) -> str:
 
 
 TABLES: Mapping[str, Callable[[], str]] = {
-    "commands": commands,
     "components": components,
     "families": families,
     "nodes": nodes,

@@ -4,8 +4,6 @@ Robot time counts seconds from the start of the robot, on every host process ali
 nothing else; wall-clock stamps are data for people and other programs, never a deadline.
 """
 
-from __future__ import annotations
-
 import time
 from collections import deque
 from enum import Enum, auto

@@ -1,7 +1,5 @@
 """The base of every configuration: a closed model with quantities, names, references, docstrings of fields."""
 
-from __future__ import annotations
-
 import ast
 import inspect
 import sys

@@ -1,7 +1,5 @@
 """Files of users: opened only if they are regular, replaced completely or not at all."""
 
-from __future__ import annotations
-
 import os
 import stat
 import tempfile

@@ -12,7 +12,7 @@ from contextvars import ContextVar
 from dataclasses import field
 from enum import StrEnum
 from functools import lru_cache, wraps
-from typing import NamedTuple, ParamSpec, TypeVar, cast
+from typing import Generic, NamedTuple, ParamSpec, TypeVar, cast
 
 from rbxcompose.base.dataclass import dataclass
 
@@ -56,6 +56,19 @@ def once(function: Callable[P, T]) -> Callable[P, T]:
         return cast(T, memory.known[key])
 
     return remembered
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Itself(Generic[T]):
+    """A large value as an argument of a function that is called `once`: it is known again only as the same object."""
+
+    value: T
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Itself) and other.value is self.value
+
+    def __hash__(self) -> int:
+        return id(self.value)
 
 
 def may_guess(work: int = 0) -> bool:
@@ -287,6 +300,8 @@ def suggest(name: str, valid: Iterable[str], what: str = VALID) -> str:
 def _is_chance(name: str, near: str) -> bool:
     """Return whether two names are only somewhat alike, in no word: `wheel_separation` and `acceleration`."""
     words, others = _words(name), _words(near)
+    if not _shared(words, others) and _edits(name, near) > max(1, len(name) // 4):
+        return True
     if min(len(name), len(near)) >= _LONG and _similarity(name, near) < _ALIKE and not _shared(words, others):
         return not any(_is_slip(word, other) for word in words for other in others)
     if _is_slip(name, near) or _shared(words, others) or _similarity(name, near) >= _CHANCE:
@@ -422,6 +437,21 @@ def surely_meant(name: str, valid: Iterable[str]) -> str | None:
 
 def _similarity(text: str, other: str) -> float:
     return difflib.SequenceMatcher(None, text, other).ratio()
+
+
+def _edits(text: str, other: str) -> int:
+    """Return how many characters were changed, added, removed or swapped with their neighbour, at the least."""
+    before: list[int] = []
+    row = list(range(len(other) + 1))
+    for at, character in enumerate(text, 1):
+        above, row, older = row, [at], before
+        for to, wanted in enumerate(other, 1):
+            cost = min(above[to] + 1, row[-1] + 1, above[to - 1] + (character != wanted))
+            if at > 1 and to > 1 and character == other[to - 2] and wanted == text[at - 2]:
+                cost = min(cost, older[to - 2] + 1)
+            row.append(cost)
+        before = above
+    return row[-1]
 
 
 def _is_swap(name: str, meant: str) -> bool:

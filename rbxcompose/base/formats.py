@@ -3,8 +3,6 @@
 A file whose name would clash with one of Python's ends in an underscore, which is not part of the format's name.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import TypeVar
 

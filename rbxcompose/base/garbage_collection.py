@@ -1,14 +1,12 @@
 """Holding back Python's garbage collector where much is created and little dropped: it would traverse all in vain."""
 
-from __future__ import annotations
-
 import atexit
 import gc
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 _USUAL = gc.get_threshold()
-_NEW_OBJECTS = 150_000  # some 30 MB
+_NEW_OBJECTS = 300_000  # some 60 MB
 
 
 def collect_rarely() -> None:

@@ -1,7 +1,5 @@
 """Diagnostic levels, and their words."""
 
-from __future__ import annotations
-
 from enum import IntEnum
 
 

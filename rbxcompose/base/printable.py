@@ -1,7 +1,5 @@
 """Foreign text made fit for a terminal or a log line: nothing in it can move the cursor, hide or reorder text."""
 
-from __future__ import annotations
-
 import re
 import unicodedata
 

@@ -1,7 +1,5 @@
 """Fences around processes that evaluate strangers' texts, and processes that end with their parent."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import resource

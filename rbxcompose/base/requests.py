@@ -1,9 +1,8 @@
 """Requests to a running robot and other frozen dataclasses as plain data for JSON, and back."""
 
-from __future__ import annotations
-
 import inspect
 import json
+import shlex
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import MISSING, asdict, fields, is_dataclass
 from enum import Enum
@@ -185,10 +184,13 @@ class Request(Generic[A]):
         found = (argument for base in generics for argument in get_args(base) if not isinstance(argument, TypeVar))
         return next(found)
 
+    written: ClassVar[str] = ""
+    """How it is written on the command line, with fields in braces: `scene remove {0.object}`."""
+
     @property
     def words(self) -> str:
         """Return the request in a person's words, for the log."""
-        return type(self).__name__
+        return shlex.join(word.format(self) for word in self.written.split()) or type(self).__name__
 
 
 class Command(Request[str]):

@@ -5,8 +5,6 @@ Each room of the package, that is each package at its top and each domain, may h
 exception: all of them run, so a room has them in `checks.py` or in files of `checks/`, many in one, whatever its name.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from functools import cache

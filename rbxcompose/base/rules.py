@@ -4,8 +4,6 @@ The subject of a rule depends on its family: the checks in `checks/` examine a r
 mission.
 """
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable, Iterable
 from dataclasses import replace

@@ -9,8 +9,9 @@ from __future__ import annotations
 import heapq
 import math
 from collections.abc import Callable, Container
-from dataclasses import dataclass
 from itertools import count
+
+from rbxcompose.base.dataclass import dataclass
 
 Callback = Callable[[], None]
 OnError = Callable[[str, Exception], None]

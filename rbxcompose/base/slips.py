@@ -5,8 +5,6 @@ looks at a node at one place of its grammar and returns a `Repair`: the findings
 reader that follows sees no slips, only the grammar. A family of slips is a package with one `Slips` as decorator.
 """
 
-from __future__ import annotations
-
 import importlib
 import pkgutil
 from collections.abc import Callable, Iterable

@@ -1,7 +1,5 @@
 """The tree of frames: where each frame is in its parent, now and lately, and so where any frame is in another."""
 
-from __future__ import annotations
-
 import math
 from array import array
 from bisect import bisect_left
@@ -130,7 +128,14 @@ class PoseHistory:
             self._cut(len(stamps))
             self.add(stamp, pose)
         else:
-            self._insert(stamp, pose)
+            place = bisect_left(self._stamps, stamp)
+            start = end = place * _WIDTH
+            if self._stamps[place] == stamp:
+                end += _WIDTH
+            else:
+                self._stamps.insert(place, stamp)
+            self._numbers[start:end] = array("d", pose.translation + pose.rotation)
+            self._forget()
 
     def is_set_back(self, stamp: int) -> bool:
         """Return whether a stamp is too old to be that of a late message: the publisher's clock was set back."""
@@ -143,7 +148,8 @@ class PoseHistory:
         if after == len(stamps):
             return None
         if stamps[after] == stamp:
-            return self._pose(after)
+            x, y, z, qx, qy, qz, qw = self._numbers[after * _WIDTH : (after + 1) * _WIDTH]
+            return Transform3((x, y, z), (qx, qy, qz, qw))
         if after == self._first:
             return None
         start, end = stamps[after - 1], stamps[after]
@@ -152,16 +158,6 @@ class PoseHistory:
     def halve(self) -> None:
         """Forget the older half, but not the newest pose."""
         self._cut(len(self._stamps) // 2)
-
-    def _insert(self, stamp: int, pose: Transform3) -> None:
-        place = bisect_left(self._stamps, stamp)
-        start = end = place * _WIDTH
-        if self._stamps[place] == stamp:
-            end += _WIDTH
-        else:
-            self._stamps.insert(place, stamp)
-        self._numbers[start:end] = array("d", pose.translation + pose.rotation)
-        self._forget()
 
     def _forget(self) -> None:
         outdated = bisect_left(self._stamps, self._stamps[-1] - SPAN)
@@ -172,10 +168,6 @@ class PoseHistory:
     def _cut(self, count: int) -> None:
         del self._stamps[:count], self._numbers[: count * _WIDTH]
         self._first = max(0, self._first - count)
-
-    def _pose(self, index: int) -> Transform3:
-        x, y, z, qx, qy, qz, qw = self._numbers[index * _WIDTH : (index + 1) * _WIDTH]
-        return Transform3((x, y, z), (qx, qy, qz, qw))
 
     def _between(self, after: int, fraction: float) -> Transform3:
         numbers = self._numbers[(after - 1) * _WIDTH : (after + 1) * _WIDTH]

@@ -4,8 +4,6 @@ A host is known by the name in its certificate, which only TLS proves; programs 
 interface or by Unix sockets. Messages that are not allowed are dropped without a word, at the router that receives.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 
 from rbxcompose.base.dataclass import dataclass

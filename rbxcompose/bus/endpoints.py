@@ -1,7 +1,5 @@
 """Endpoints of the bus, in Zenoh's words: `tcp/127.0.0.1:7447`, `unixsock-stream//run/user/1000/...`."""
 
-from __future__ import annotations
-
 import errno
 import os
 import re

@@ -1,7 +1,5 @@
 """Pure core of an action server: its goals and their states, as ROS 2 defines them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from enum import IntEnum
 from typing import Generic, TypeVar

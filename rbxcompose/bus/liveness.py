@@ -1,7 +1,5 @@
 """Judging from probes and roll calls whether a session still carries data. Pure: time is an argument."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable
 from enum import Enum, auto

@@ -5,15 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeVar
 
-from rbxcompose.bus.transport import (
-    LONGEST_WAIT,
-    Arrival,
-    Closable,
-    Question,
-    RemotePublisher,
-    Transport,
-    TransportReply,
-)
+from rbxcompose.bus.transport import Arrival, Closable, OnReply, Question, RemotePublisher, Transport, TransportReply
 from rbxcompose.sdk.ports import Qos
 
 RENEWED = "the session on the bus was opened again"
@@ -79,14 +71,7 @@ class RenewableTransport:
         return self._keep(_Entry(self._entries, lambda transport: transport.serve(key, asked)))
 
     def ask(
-        self,
-        key: str,
-        payload: bytes,
-        attachment: bytes,
-        answered: Callable[[TransportReply], None],
-        *,
-        of_all: bool = True,
-        within: float = LONGEST_WAIT,
+        self, key: str, payload: bytes, attachment: bytes, answered: OnReply, *, of_all: bool, within: float
     ) -> Closable:
         """Send a request. It is never sent twice: if its session is replaced, it ends with an error."""
 
@@ -177,7 +162,7 @@ class _Publisher(_Entry):
 
 
 class _Request(_Entry):
-    def __init__(self, entries: Entries, declare: Declare, answered: Callable[[TransportReply], None]) -> None:
+    def __init__(self, entries: Entries, declare: Declare, answered: OnReply) -> None:
         super().__init__(entries, declare)
         self._answered = answered
 

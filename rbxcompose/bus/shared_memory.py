@@ -3,8 +3,6 @@
 Zenoh keeps it in files, each locked (`flock`) by its users; this module takes the same locks.
 """
 
-from __future__ import annotations
-
 import contextlib
 import fcntl
 import os

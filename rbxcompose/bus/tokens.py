@@ -1,7 +1,5 @@
 """Liveliness tokens: how ROS 2 participants find each other on Zenoh, and the GIDs that follow from them."""
 
-from __future__ import annotations
-
 from enum import StrEnum
 
 import xxhash

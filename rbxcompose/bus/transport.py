@@ -6,7 +6,7 @@ A transport calls its callbacks in its own threads: they may only put items into
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.sdk.ports import Qos
@@ -57,6 +57,9 @@ class TransportReply:
     error: str = ""
 
 
+OnReply: TypeAlias = Callable[[TransportReply], None]
+
+
 class RemotePublisher(Closable, Protocol):
     """Sends to the subscribers in other processes."""
 
@@ -96,14 +99,7 @@ class Transport(Protocol):
         ...
 
     def ask(
-        self,
-        key: str,
-        payload: bytes,
-        attachment: bytes,
-        answered: Callable[[TransportReply], None],
-        *,
-        of_all: bool = True,
-        within: float = LONGEST_WAIT,
+        self, key: str, payload: bytes, attachment: bytes, answered: OnReply, *, of_all: bool, within: float
     ) -> Closable:
         """Send a request. It ends with an answer, or with an error when the server is gone; closing forgets it.
 
@@ -149,14 +145,7 @@ class NoTransport:
         return self
 
     def ask(
-        self,
-        key: str,
-        payload: bytes,
-        attachment: bytes,
-        answered: Callable[[TransportReply], None],
-        *,
-        of_all: bool = True,
-        within: float = LONGEST_WAIT,
+        self, key: str, payload: bytes, attachment: bytes, answered: OnReply, *, of_all: bool, within: float
     ) -> NoTransport:
         """Refuse: no token of a server was ever seen."""
         raise RuntimeError(f"no server of {key} can be reached")

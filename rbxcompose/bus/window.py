@@ -6,8 +6,6 @@ A subscriber at the key receives updates, a query there returns the whole state.
 `missions/view/replica.py` is the other side.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """Wire profiles of ROS 2's distributions, and what a QoS class means for Zenoh."""
 
-from __future__ import annotations
-
 from dataclasses import field
 
 from rbxcompose.base.dataclass import dataclass

@@ -1,7 +1,5 @@
 """Zenoh sessions: one peer for each process of a robot, and the router that lets them find each other."""
 
-from __future__ import annotations
-
 import errno
 import itertools
 import json

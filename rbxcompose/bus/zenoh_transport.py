@@ -13,7 +13,7 @@ from zenoh import ext
 from zenoh.handlers import Callback
 
 from rbxcompose.bus.local import Post
-from rbxcompose.bus.transport import EXPIRED, LONGEST_WAIT, Arrival, Closable, Question, RemotePublisher, TransportReply
+from rbxcompose.bus.transport import EXPIRED, Arrival, Closable, OnReply, Question, RemotePublisher, TransportReply
 from rbxcompose.bus.wire import SERVICE_SENDING, Sending, sending
 from rbxcompose.sdk.ports import Qos
 
@@ -116,14 +116,7 @@ class ZenohTransport:
         return self._keep(self._session.declare_queryable, key, handler, complete=True, allowed_origin=remote)
 
     def ask(
-        self,
-        key: str,
-        payload: bytes,
-        attachment: bytes,
-        answered: Callable[[TransportReply], None],
-        *,
-        of_all: bool = True,
-        within: float = LONGEST_WAIT,
+        self, key: str, payload: bytes, attachment: bytes, answered: OnReply, *, of_all: bool, within: float
     ) -> Closable:
         """Send a request. It ends with an answer, or with an error when the server is gone; closing forgets it."""
         token = zenoh.CancellationToken()

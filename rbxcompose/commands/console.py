@@ -3,8 +3,6 @@
 With `--json`, stdout has JSON in any case: errors without an answer are one document, too, besides the text on stderr.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os
@@ -135,11 +133,19 @@ class Parser(argparse.ArgumentParser):
 
 
 class NotDoneError(Exception):
-    """Raised with the finding when it is unclear which robot is addressed, or none is up."""
+    """Raised with the finding that says why a verb cannot be carried out; `main` reports it."""
 
     def __init__(self, finding: Finding) -> None:
         super().__init__(finding.message)
         self.finding = finding
+
+
+class ReportedError(Exception):
+    """Raised with the exit code when a verb cannot be carried out, after the reasons have been written."""
+
+    def __init__(self, exit_code: int = FINDINGS) -> None:
+        super().__init__(exit_code)
+        self.exit_code = exit_code
 
 
 def table(rows: Sequence[Sequence[str]]) -> str:

@@ -1,7 +1,5 @@
 """The pages of the kinds of findings: what a code means, why it matters, a bad and a good example."""
 
-from __future__ import annotations
-
 import importlib
 import pkgutil
 import re

@@ -30,7 +30,7 @@ from rbxcompose.bus.transport import Arrival
 from rbxcompose.bus.zenoh_session import open_client, open_peer
 from rbxcompose.bus.zenoh_transport import ZenohTransport
 from rbxcompose.commands import options
-from rbxcompose.commands.console import NotDoneError, emit, refuse, table
+from rbxcompose.commands.console import NotDoneError, emit, table
 from rbxcompose.commands.lookup import BusPlace, add_bus_options, find_place
 from rbxcompose.runtime.process_group.connection import CallbackInbox
 from rbxcompose.sdk.ports import Qos
@@ -223,11 +223,8 @@ Do = Callable[[Guest, argparse.Namespace], int]
 
 def visit(arguments: argparse.Namespace, do: Callable[[Guest], int]) -> int:
     """Join the chosen bus, run `do` there, and return the exit code."""
-    try:
-        with Guest(find_place(arguments)) as guest:
-            return do(guest)
-    except NotDoneError as error:
-        return refuse(error.finding)
+    with Guest(find_place(arguments)) as guest:
+        return do(guest)
 
 
 def wanted(names: Sequence[GraphName], name: str, what: str) -> GraphName:

@@ -22,7 +22,7 @@ from rbxcompose import __version__
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, kind
 from rbxcompose.base.printable import plain
-from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, refuse, write_report
+from rbxcompose.commands.console import NotDoneError, ReportedError, emit, refuse, write_report
 from rbxcompose.commands.lookup import find_robot
 from rbxcompose.commands.options import BUS, EACH, system_and_robot
 
@@ -185,36 +185,47 @@ def shares_of(system: System, config: Path | None) -> Shares:
     return {(host, robot.name): remotes[host] for robot in system.robots.values() for host in hosts_of(system, robot)}
 
 
-def is_reachable(system: System) -> bool:
-    """Return whether each host can be distinguished from the others; if not, report why."""
+def require_reachable(system: System) -> None:
+    """Require that each host can be distinguished from the others.
+
+    Raises:
+        NotDoneError: if two could be this machine.
+    """
     here = [name for name, host in system.hosts.items() if host.ssh is None]
     if len(here) > 1:
         message = f"'{here[0]}' and '{here[1]}' have no 'ssh', and only one of them can be this machine"
-        refuse(UNREACHED.at(None, message, help=f"give the others 'ssh', or use --host {here[0]} where a verb has it"))
-    return len(here) <= 1
+        help_text = f"give the others 'ssh', or use --host {here[0]} where a verb has it"
+        raise NotDoneError(UNREACHED.at(None, message, help=help_text))
 
 
-def compiled(path: str, arguments: argparse.Namespace) -> System | None:
-    """Return a system without errors; None after telling them. Its warnings are for `check` and `up`."""
+def compiled(path: str, arguments: argparse.Namespace) -> System:
+    """Return a system. Its warnings are for `check` and `up`.
+
+    Raises:
+        ReportedError: if it has errors.
+    """
     from rbxcompose.compiler.systems.reader import compile_system
 
     system = compile_system(path, environment=os.environ, profiles=arguments.profile)
     if system.report.has_errors:
         write_report(system.report, system.sources)
-        return None
-    return system if is_reachable(system) else None
+        raise ReportedError
+    require_reachable(system)
+    return system
 
 
-def every_share(path: str, arguments: argparse.Namespace) -> Shares | None:
-    """Return where each share of a system runs; None after telling its errors."""
-    system = compiled(path, arguments)
-    return None if system is None else shares_of(system, arguments.ssh_config)
+def every_share(path: str, arguments: argparse.Namespace) -> Shares:
+    """Return where each share of a system runs."""
+    return shares_of(compiled(path, arguments), arguments.ssh_config)
 
 
-def reached(shares: Shares, bundle: Bundle, *, needs_all: bool = True) -> dict[str, str] | None:
-    """Bring the files to all hosts and return their folders there; None after telling which host has not got them.
+def reached(shares: Shares, bundle: Bundle, *, needs_all: bool = True) -> dict[str, str]:
+    """Bring the files to all hosts and return their folders there.
 
-    One that is `optional` is reported, and left out; so are all unless it `needs_all`.
+    A host that is `optional` is reported, and left out; so are all unless it `needs_all`.
+
+    Raises:
+        ReportedError: if a host did not get them.
     """
     folders, is_complete = dict[str, str](), True
     optional = {share.name for share in shares.values() if share.model.optional}
@@ -226,7 +237,9 @@ def reached(shares: Shares, bundle: Bundle, *, needs_all: bool = True) -> dict[s
         else:
             is_complete = False
             refuse(found)
-    return folders if is_complete or not needs_all else None
+    if needs_all and not is_complete:
+        raise ReportedError
+    return folders
 
 
 def label_of(shares: Shares, host: str, robot: str) -> str:
@@ -346,38 +359,35 @@ def forward(verb: object, written: str, where: str, words: Sequence[str], argume
     """Run the words of a command on the hosts that can answer it; `where` is the `ON_SYSTEM` of its verb."""
     path, name = system_and_robot(written) or (written, "")
     system = compiled(path, arguments)
-    if system is None:
-        return FINDINGS
     if name and name not in system.robots:
         return refuse(WHICH.misspelt(None, f"the system has no robot '{name}'", name, system.robots, "robots"))
     robots = [robot for robot in system.robots.values() if name in ("", robot.name)]
     chosen = choose(system, robots, where, arguments)
-    if isinstance(chosen, Finding):
-        return refuse(chosen)
     return SystemCommand(
         system, path, [robot.name for robot in robots], chosen, list(_for_there(words)), written, arguments
     ).run(verb)
 
 
-def choose(
-    system: System, robots: Sequence[PlacedRobot], where: str, arguments: argparse.Namespace
-) -> Shares | Finding:
-    """Return the shares of robots that can answer, for an `ON_SYSTEM`."""
+def choose(system: System, robots: Sequence[PlacedRobot], where: str, arguments: argparse.Namespace) -> Shares:
+    """Return the shares of robots that can answer, for an `ON_SYSTEM`.
+
+    Raises:
+        NotDoneError: if none can.
+    """
     from rbxcompose.compiler.systems.share import hosts_of
 
     every, chosen = shares_of(system, arguments.ssh_config), dict[tuple[str, str], Remote]()
     for robot in robots:
         hosts = hosts_of(system, robot)
         if where == BUS:
-            found = _reachable({host: every[host, robot.name] for host in hosts}, robot.name)
-            if isinstance(found, Finding):
-                return found
-            hosts = [found]
+            hosts = [_reachable({host: every[host, robot.name] for host in hosts}, robot.name)]
         elif where != EACH:
             hosts = answering(robot, where)
         chosen |= {(host, robot.name): every[host, robot.name] for host in hosts}
-    names = ", ".join(placed_robot.name for placed_robot in robots)
-    return chosen or NOBODY_THERE.at(None, f"{names}: no component of type '{where}'")
+    if not chosen:
+        names = ", ".join(placed_robot.name for placed_robot in robots)
+        raise NotDoneError(NOBODY_THERE.at(None, f"{names}: no component of type '{where}'"))
+    return chosen
 
 
 def answering(robot: PlacedRobot, about: str) -> list[str]:
@@ -392,7 +402,7 @@ def answering(robot: PlacedRobot, about: str) -> list[str]:
     )
 
 
-def _reachable(remotes: dict[str, Remote], robot: str) -> str | Finding:
+def _reachable(remotes: dict[str, Remote], robot: str) -> str:
     """Return a host that reaches the bus of a robot: this machine, else the first one that ssh reaches."""
     problems: list[str] = []
     for host, remote in sorted(remotes.items(), key=lambda item: not item[1].is_here):
@@ -409,7 +419,7 @@ def _reachable(remotes: dict[str, Remote], robot: str) -> str | Finding:
                 sys.stderr.write(f"{'; '.join(problems)}; asking '{host}'\n")
             return host
         problems.append(f"'{host}' cannot be reached: {done.stderr.strip()}")
-    return UNREACHED.at(None, "; ".join(problems))
+    raise NotDoneError(UNREACHED.at(None, "; ".join(problems)))
 
 
 def _run_there(remote: Remote, words: Sequence[str]) -> int:

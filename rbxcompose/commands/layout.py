@@ -3,15 +3,14 @@
 It gets sizes, not texts, so that the same graph gives the same picture whatever fonts a machine has.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
 from typing import Any
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.findings import Finding, kind
+from rbxcompose.base.findings import kind
+from rbxcompose.commands.console import NotDoneError
 
 MARGIN, GROUP_EDGE = 10.0, 26.0  # around the picture, and around a group's contents: room for its name [px]
 _INCH = 72.0  # [px]
@@ -26,12 +25,8 @@ MOST_EFFORT = 25_000  # takes about a second
 Edge = tuple[str, str]
 
 
-class NotDrawnError(Exception):
+class NotDrawnError(NotDoneError):
     """Raised if no picture could be drawn; the finding says why."""
-
-    def __init__(self, finding: Finding) -> None:
-        super().__init__(finding.message)
-        self.finding = finding
 
 
 @dataclass(frozen=True, slots=True)

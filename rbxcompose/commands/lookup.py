@@ -1,7 +1,5 @@
 """Find the robot that a command addresses, or its bus; ask it, and show its answer."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import os
@@ -12,7 +10,7 @@ from typing import TypeVar
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, kind, suggest
 from rbxcompose.base.requests import Command, Refused, Request
-from rbxcompose.commands.console import NotDoneError, emit, refuse
+from rbxcompose.commands.console import NotDoneError, emit
 from rbxcompose.commands.options import add_system_options
 from rbxcompose.runtime.control import ANSWER, NoAnswerError, ask
 from rbxcompose.runtime.folder import BrokenStateError, RobotFolder, RobotState, UnsafeFolderError, all_folders
@@ -40,7 +38,12 @@ def find_robot(wanted: str | None) -> RobotFolder:
     """
     found = {folder.path.name: folder for folder in robots_up()}
     if wanted is None:
-        return _only(found)
+        if not found:
+            raise NotDoneError(NOT_UP.at(None, "no robot is up", help="start one with 'rbxcompose up PATH'"))
+        if len(found) > 1:
+            names = ", ".join(found)
+            raise NotDoneError(WHICH.at(None, f"several robots are up: {names}", help="name one with '--robot NAME'"))
+        return next(iter(found.values()))
     if wanted in found:
         return found[wanted]
     files = {_file_of(folder): folder for folder in found.values()}
@@ -60,15 +63,6 @@ def robots_up() -> list[RobotFolder]:
         return all_folders()
     except UnsafeFolderError as error:
         raise NotDoneError(UNSAFE.at(None, str(error))) from error
-
-
-def _only(found: dict[str, RobotFolder]) -> RobotFolder:
-    if not found:
-        raise NotDoneError(NOT_UP.at(None, "no robot is up", help="start one with 'rbxcompose up PATH'"))
-    if len(found) > 1:
-        names = ", ".join(found)
-        raise NotDoneError(WHICH.at(None, f"several robots are up: {names}", help="name one with '--robot NAME'"))
-    return next(iter(found.values()))
 
 
 def _file_of(folder: RobotFolder) -> str:
@@ -170,11 +164,8 @@ def add_asking_options(parser: argparse.ArgumentParser) -> None:
 
 def pass_on(arguments: argparse.Namespace, command: Command) -> int:
     """Send a command, print the answer, return the exit code."""
-    try:
-        folder = find_robot(arguments.robot)
-        answer = answer_of(folder, command)
-    except NotDoneError as error:
-        return refuse(error.finding)
+    folder = find_robot(arguments.robot)
+    answer = answer_of(folder, command)
     show_answer(arguments, folder, answer)
     return 0
 

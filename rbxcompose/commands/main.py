@@ -4,17 +4,17 @@ A verb's module has `add_arguments(parser)` and `run(arguments) -> exit code`; t
 help. Only the verb in use is imported, and for help only what help needs.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from importlib import import_module
 from types import ModuleType
 from typing import Any, NoReturn
 
 import rbxcompose
+from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.garbage_collection import collect_rarely
 from rbxcompose.commands.verbs import about, in_groups, load, module_of, parser_of, verbs
 
@@ -51,29 +51,59 @@ def _interrupted(number: int, frame: object) -> NoReturn:
 
 
 def _run(name: str, words: Sequence[str]) -> int:
-    _leave_out_plugins_of_pydantic()
-    from rbxcompose.commands.console import answered
+    _import_pydantic()
+    from rbxcompose.commands.console import NotDoneError, ReportedError, answered, refuse
 
     try:
         verb = load(name)
         with answered(in_json="--json" in words):
-            arguments = parser_of(name, verb).parse_args(words)
-            if (where := getattr(verb, "ON_SYSTEM", "")) and (system := _system_of(arguments, where)):
-                from rbxcompose.commands.hosts import forward  # only needed for systems
+            try:
+                arguments = parser_of(name, verb).parse_args(words)
+                if (where := getattr(verb, "ON_SYSTEM", "")) and (system := _system_of(arguments, where)):
+                    from rbxcompose.commands.hosts import forward  # only needed for systems
 
-                return forward(verb, system, where, [name, *words], arguments)
-            return verb.run(arguments)
+                    return forward(verb, system, where, [name, *words], arguments)
+                return verb.run(arguments)
+            except NotDoneError as error:
+                return refuse(error.finding)
+            except ReportedError as error:
+                return error.exit_code
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # so that the flush at exit has somewhere to go
         return 1
 
 
-def _leave_out_plugins_of_pydantic() -> None:
-    """Have pydantic not search all packages for plugins, nor import what would: it takes longer than Python's start."""
+def _import_pydantic() -> None:
+    """Import pydantic in half the time, which is longer than Python's start.
+
+    It does not search all packages for plugins, nor import what would. Its dataclasses are made as ours. The typed
+    dictionaries of its core are annotations only, so a dictionary does.
+    """
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     loader: Any = ModuleType("pydantic.plugin._loader")
     loader.get_plugins = tuple
     sys.modules.setdefault(loader.__name__, loader)
+    with _replaced("dataclasses", dataclass=dataclass):
+        with _replaced("typing", TypedDict=_Plain), _replaced("typing_extensions", TypedDict=_Plain):
+            import_module("pydantic_core")
+        import_module("pydantic.main")
+
+
+class _Plain(dict[str, Any]):
+    def __init_subclass__(cls, total: bool = True) -> None:
+        """Take the option of a typed dictionary."""
+
+
+@contextmanager
+def _replaced(module: str, **others: Any) -> Iterator[None]:
+    """Have a module lend names to others for a while."""
+    there = vars(import_module(module))
+    own = {name: there[name] for name in others}
+    there.update(others)
+    try:
+        yield
+    finally:
+        there.update(own)
 
 
 def _system_of(arguments: Any, where: str) -> str:

@@ -1,7 +1,5 @@
 """Messages on the command line: read from YAML with places, shown as YAML or JSON, sent and received."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import math

@@ -1,7 +1,5 @@
 """Answers of people, and new files from them and from templates: all of them or none, never over an existing one."""
 
-from __future__ import annotations
-
 import json
 import os
 import re
@@ -18,7 +16,7 @@ from rbxcompose.base.config import Place
 from rbxcompose.base.findings import Finding, kind
 from rbxcompose.base.printable import FORBIDDEN, plain
 from rbxcompose.base.units import ANGLE, LENGTH, UnitError, format_quantity, to_si
-from rbxcompose.commands.console import refuse
+from rbxcompose.commands.console import NotDoneError, refuse
 from rbxcompose.manifest.files import ROBOT_FILE, shown_name
 
 LONGEST_NAME = 60  # characters
@@ -36,12 +34,8 @@ _PLAIN_TEXT = re.compile(r"[A-Za-z][A-Za-z0-9 ,.()/'-]*")
 _WORDS = frozenset({"true", "false", "null"})
 
 
-class AnswerError(Exception):
+class AnswerError(NotDoneError):
     """Raised with the finding on an answer that cannot be used."""
-
-    def __init__(self, finding: Finding) -> None:
-        super().__init__(finding.message)
-        self.finding = finding
 
 
 def read_name(text: str, what: str, taken: Collection[str] = ()) -> str:

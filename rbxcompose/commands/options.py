@@ -1,7 +1,5 @@
 """Options and arguments that verbs share; apart from what carries them out, which takes longer to import."""
 
-from __future__ import annotations
-
 import argparse
 import re
 from collections.abc import Callable, Iterable
@@ -12,7 +10,6 @@ from typing import Any
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import open_regular
 from rbxcompose.base.units import FREQUENCY, TIME, Dimension, UnitError, to_si
-from rbxcompose.commands.console import NotDoneError, refuse
 
 EACH, BUS = "each host", "bus"
 """What a verb may have as `ON_SYSTEM`: where it runs for a robot of a system. On each host of the robot, or on any one
@@ -70,10 +67,7 @@ def add_actions(
 def run_action(arguments: argparse.Namespace, *before: object) -> int:
     """Carry out the chosen subcommand with what stands `before` its arguments; return the exit code."""
     do: Callable[..., int] = arguments.do
-    try:
-        return do(*before, arguments)
-    except NotDoneError as error:
-        return refuse(error.finding)
+    return do(*before, arguments)
 
 
 def add_system_options(parser: argparse.ArgumentParser, *, has_profile: bool = False) -> None:

@@ -1,7 +1,5 @@
 """The story of a run for people: a line for each record, and a summary at the end."""
 
-from __future__ import annotations
-
 import zlib
 from collections import Counter
 from collections.abc import Iterable, Mapping

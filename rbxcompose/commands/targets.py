@@ -1,7 +1,5 @@
 """The robots that a verb is about: by file, by folder, or the only one here; and the layers put over them."""
 
-from __future__ import annotations
-
 import argparse
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -12,7 +10,7 @@ from typing import TypedDict
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, Severity, Span, kind
-from rbxcompose.commands.console import NotDoneError, refuse
+from rbxcompose.commands.console import NotDoneError
 from rbxcompose.commands.options import kind_of
 from rbxcompose.compiler.compile import Compilation, compile_robot
 from rbxcompose.compiler.model.robot import Robot
@@ -121,16 +119,26 @@ def add_path_argument(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("path", nargs="?", metavar="PATH", help=_ABOUT)
 
 
-def robot_path(written: str | None, *, may_run: bool = True) -> str | None:
-    """Return the path of the robot that is meant; None after telling that this is not clear.
+def robot_path(written: str | None, *, may_run: bool = True) -> str:
+    """Return the path of a robot: as written, or of the only robot here.
 
-    With `may_run`, the only robot that is up is meant if the folder has none.
+    With `may_run`, it is the only robot that is up if the folder has none.
+
+    Raises:
+        NotDoneError: if no path is written, and there is no robot or more than one.
     """
-    try:
-        return written if written is not None else only_path(may_run=may_run)
-    except NotDoneError as error:
-        refuse(error.finding)
-        return None
+    if written is not None:
+        return written
+    from rbxcompose.commands.lookup import find_robot, known_state, robots_up  # `check` asks no robot that runs
+
+    here = [ROBOT_FILE] if Path(ROBOT_FILE).is_file() else robots_below(Path())
+    if len(here) == 1:
+        return here[0]
+    if may_run and len(robots_up()) == 1 and (state := known_state(find_robot(None))) is not None:
+        return state.file
+    more = f" and {len(here) - _MOST} more" if len(here) > _MOST else ""
+    words = f"this folder has several robots: {', '.join(here[:_MOST])}{more}" if here else "this folder has no robot"
+    raise NotDoneError(UNNAMED.at(None, f"no robot is named, and {words}", help="give the path of one"))
 
 
 def put_robot_last(arguments: argparse.Namespace, asked: str, robot: str = "path") -> None:
@@ -143,24 +151,6 @@ def put_robot_last(arguments: argparse.Namespace, asked: str, robot: str = "path
 
 def _is_robot(word: str) -> bool:
     return "/" in word or isinstance(find(word), Path)
-
-
-def only_path(*, may_run: bool) -> str:
-    """Return the path of the only robot here.
-
-    Raises:
-        NotDoneError: if there is none or more than one.
-    """
-    from rbxcompose.commands.lookup import find_robot, known_state, robots_up  # `check` asks no robot that runs
-
-    here = [ROBOT_FILE] if Path(ROBOT_FILE).is_file() else robots_below(Path())
-    if len(here) == 1:
-        return here[0]
-    if may_run and len(robots_up()) == 1 and (state := known_state(find_robot(None))) is not None:
-        return state.file
-    more = f" and {len(here) - _MOST} more" if len(here) > _MOST else ""
-    words = f"this folder has several robots: {', '.join(here[:_MOST])}{more}" if here else "this folder has no robot"
-    raise NotDoneError(UNNAMED.at(None, f"no robot is named, and {words}", help="give the path of one"))
 
 
 class Layers(TypedDict):

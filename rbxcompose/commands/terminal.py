@@ -1,7 +1,5 @@
 """The terminal of a verb that shows something live, or reads keys; at the end it is as before, whatever happens."""
 
-from __future__ import annotations
-
 import os
 import select
 import shutil

@@ -1,7 +1,5 @@
 """Checks: rules about the whole robot, one file each in `checks/`, declared by one decorator."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterable
 from typing import Any
@@ -15,7 +13,7 @@ from rbxcompose.compiler.doubts import Doubts, doubts_of, half_read
 from rbxcompose.compiler.model.robot import NOTHING, Robot
 from rbxcompose.manifest.registry import PLUGINS as SECTIONS
 from rbxcompose.manifest.registry import section_named
-from rbxcompose.missions.analysis.check_runner import rule_findings
+from rbxcompose.missions.analysis.check_runner import mission_checks, rule_findings
 from rbxcompose.missions.analysis.examined import Examined
 
 Check = Rule[Robot]
@@ -114,8 +112,9 @@ def run_checks(robot: Robot, report: Report) -> None:
             return _turn(rule) == turn and not doubts.bar(rule.relies_on)
 
         found: list[tuple[Rule[Any], Finding]] = []
+        about_missions = [rule for rule in mission_checks() if reports(rule)]
         for mission in missions:
-            found += rule_findings(mission, reports)
+            found += rule_findings(mission, about_missions)
         found += [(one, finding) for one in checks if reports(one) for finding in _found(one, robot)]
         report.extend(finding for rule, finding in found if not doubts.touch(finding, rule.relies_on))
     report.extend(broken_checks())

@@ -1,7 +1,5 @@
 """The compiler: the only place that knows the order of the stages. It reads like a table of contents."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import field, replace
 from pathlib import Path
@@ -10,6 +8,7 @@ from types import MappingProxyType
 from rbxcompose.base.config import Config
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Related, Report, Severity, Span, kind, one_compile
+from rbxcompose.base.garbage_collection import paused_collection
 from rbxcompose.compiler.check_runner import run_checks
 from rbxcompose.compiler.composition.overlay import SET
 from rbxcompose.compiler.composition.robot_file import load_robot
@@ -39,6 +38,7 @@ class Compilation:
 
 
 @one_compile()
+@paused_collection()
 def compile_robot(
     path: str,
     *,

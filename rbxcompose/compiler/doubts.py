@@ -4,8 +4,6 @@ Where something has errors, or could not be read, rules must not report what may
 by what findings carry: their codes, their places, and the names that they are about.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field

@@ -1,7 +1,5 @@
 """Declared arguments and inputs: their types, limits and choices, and reading a value of one."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Any

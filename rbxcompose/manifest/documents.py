@@ -1,7 +1,5 @@
 """Reading the files of one robot: each once, and of the required kind."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 from dataclasses import field, replace
 from dataclasses import replace as changed

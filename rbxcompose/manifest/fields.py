@@ -1,7 +1,5 @@
 """Types of fields that several sections have."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from pydantic import StringConstraints

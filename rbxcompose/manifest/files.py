@@ -1,7 +1,5 @@
 """Paths written in manifests: relative to their file, inside the project or the shipped library."""
 
-from __future__ import annotations
-
 import os
 import re
 from itertools import islice

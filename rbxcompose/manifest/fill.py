@@ -1,7 +1,5 @@
 """Filling in `${...}` after composition: arguments, the robot's name, the environment, expressions."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import field, replace

@@ -1,7 +1,5 @@
 """Reading a manifest: bytes to text to a located tree, with every error as a finding."""
 
-from __future__ import annotations
-
 import errno
 import os
 import re

@@ -1,7 +1,5 @@
 """The sections of the manifest: each is one file in `sections/`, declared by one decorator, found by its name."""
 
-from __future__ import annotations
-
 import inspect
 import textwrap
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """As much of a value with mistakes as could be read, so that the rest of the robot can be checked with it."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Mapping

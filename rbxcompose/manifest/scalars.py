@@ -1,7 +1,5 @@
 """The core types of YAML 1.2: what a scalar without quotes means (`on`, `yes` and `12:30` are text)."""
 
-from __future__ import annotations
-
 import math
 import re
 

@@ -1,7 +1,5 @@
 """Secrets: text that a manifest refers to but never contains, `${secret.NAME}`."""
 
-from __future__ import annotations
-
 import errno
 import os
 import stat

@@ -22,7 +22,17 @@ from rbxcompose.manifest.fields import ComponentName, TopicName
 from rbxcompose.manifest.salvage import salvaged
 from rbxcompose.manifest.scalars import is_empty
 from rbxcompose.manifest.shapes import below, keys_at, kinds_of, with_references
-from rbxcompose.manifest.tree import Entry, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode, at
+from rbxcompose.manifest.tree import (
+    Entry,
+    KeyPath,
+    MappingNode,
+    ScalarNode,
+    SequenceNode,
+    TreeNode,
+    at,
+    key_span,
+    value_span,
+)
 from rbxcompose.manifest.validate import MISSING_KEY, UNKNOWN_KEY, WRONG_TYPE, is_broken, is_valid, label_of, validate
 
 
@@ -595,6 +605,14 @@ class Reading(Generic[M]):
     def writer(self, node: TreeNode) -> Path:
         """Return the file that a value was written in."""
         return self.contents.documents.writer(node.span, self.contents.file)
+
+    def key(self, *path: str | int) -> Span:
+        """Return the place of a key of the manifest, or of the nearest one above it."""
+        return key_span(self.contents.root, path)
+
+    def value(self, *path: str | int) -> Span:
+        """Return the place of a value of the manifest, or of the nearest one above it."""
+        return value_span(self.contents.root, path)
 
     def named(self) -> Iterator[tuple[str, Entry]]:
         """Yield the entries by name, after a finding for each bad name, and for sections that were indented too far."""

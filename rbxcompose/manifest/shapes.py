@@ -1,7 +1,5 @@
 """What a model accepts at a place below it: keys, quantities, names of something."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cache

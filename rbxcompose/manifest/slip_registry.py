@@ -1,7 +1,5 @@
 """The slips of manifests: in their text, and in values that a model refuses."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """The keys of a system's file, and the models of its sections."""
 
-from __future__ import annotations
-
 import re
 from typing import Annotated, Any, Literal
 

@@ -1,7 +1,5 @@
 """The file of a test as types: the shape of its contents; what the names mean depends on the robot."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, Field, StringConstraints

@@ -1,7 +1,5 @@
 """Validation of a located tree against a model: pydantic's errors, at their places and in plain words."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace

@@ -3,8 +3,6 @@
 The tree is at most `DEPTH` levels deep, aliases included, so that all later code may recurse.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Collection, Iterable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Values as a person would write them: with units, reading gives the same value."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """Errors of the YAML parser, in plain words and with the fix."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 

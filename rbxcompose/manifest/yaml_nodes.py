@@ -1,7 +1,5 @@
 """YAML text -> PyYAML's node tree, by its C parser, with limits enforced while the tree is being built."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import yaml

@@ -3,8 +3,6 @@
 Findings that need the whole mission come from rules, in `missions/checks`.
 """
 
-from __future__ import annotations
-
 from rbxcompose.base.findings import Finding, Related, Span, kind
 
 UNKNOWN_KEY = kind("RBX4101", is_fixable=True)

@@ -1,7 +1,5 @@
 """Where on the bus to find the values and skills that a mission names."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from enum import StrEnum
 

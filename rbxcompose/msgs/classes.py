@@ -1,7 +1,5 @@
 """Make the Python classes of interfaces from their definitions."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Container, Mapping
 from dataclasses import field
 from functools import partial

@@ -1,7 +1,5 @@
 """Interface definitions: the ROS 2 text of a message, service or action as data, and its type hash."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import keyword

@@ -1,7 +1,5 @@
 """Events of services: the message in which ROS 2 reports a request or a reply, on `SERVICE/_service_event`."""
 
-from __future__ import annotations
-
 from dataclasses import field, make_dataclass
 from functools import cache
 from typing import Any

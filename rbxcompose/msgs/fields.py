@@ -1,7 +1,5 @@
 """Fields of messages: their paths, what they measure, parallel arrays as maps, finite numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Mapping
 from math import isfinite
 from operator import attrgetter

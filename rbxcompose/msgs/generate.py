@@ -3,8 +3,6 @@
 `python -m rbxcompose.msgs.generate` writes the stubs of all interfaces in `interfaces/`, which are not committed.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path

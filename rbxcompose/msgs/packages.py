@@ -1,7 +1,5 @@
 """Interface texts for export: one with all messages inside it, as in MCAP, or a package for a ROS 2 workspace."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from pathlib import Path
 

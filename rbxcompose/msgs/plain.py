@@ -3,8 +3,6 @@
 Bytes are lists of numbers here. Omitted fields keep their defaults.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Mapping
 from dataclasses import field
@@ -112,7 +110,19 @@ class _Reading(Generic[M]):
 
     def _value(self, type_: FieldType, value: object, path: KeyPath) -> Any:
         if type_.shape is not FieldShape.SINGLE:
-            return self._list(type_, value, path)
+            if not isinstance(value, list | tuple):
+                return self._wrong(path, f"expected a list ({type_})")
+            count, length = len(value), type_.length
+            if (type_.shape is FieldShape.ARRAY and count != length) or (
+                type_.shape is FieldShape.BOUNDED and count > length
+            ):
+                most = "at most " if type_.shape is FieldShape.BOUNDED else ""
+                return self._wrong(path, f"{most}{length} values are expected, not {count}")
+            single = FieldType(type_.base, text_limit=type_.text_limit)
+            values = [self._value(single, one, (*path, index)) for index, one in enumerate(value)]
+            if self.findings:
+                return None
+            return bytes(values) if type_.base in OCTETS else tuple(values)
         if type_.is_message:
             nested: type[Any] = registry.message(type_.base)
             return self.message(nested, value, path)
@@ -121,21 +131,6 @@ class _Reading(Generic[M]):
         if type_.base == "bool":
             return value if isinstance(value, bool) else self._wrong(path, "expected true or false")
         return self._number(type_.base, value, path)
-
-    def _list(self, type_: FieldType, value: object, path: KeyPath) -> Any:
-        if not isinstance(value, list | tuple):
-            return self._wrong(path, f"expected a list ({type_})")
-        count, length = len(value), type_.length
-        if (type_.shape is FieldShape.ARRAY and count != length) or (
-            type_.shape is FieldShape.BOUNDED and count > length
-        ):
-            most = "at most " if type_.shape is FieldShape.BOUNDED else ""
-            return self._wrong(path, f"{most}{length} values are expected, not {count}")
-        single = FieldType(type_.base, text_limit=type_.text_limit)
-        values = [self._value(single, one, (*path, index)) for index, one in enumerate(value)]
-        if self.findings:
-            return None
-        return bytes(values) if type_.base in OCTETS else tuple(values)
 
     def _text(self, type_: FieldType, value: object, path: KeyPath) -> Any:
         if not isinstance(value, str):

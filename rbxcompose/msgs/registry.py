@@ -4,8 +4,6 @@
 other packages are found by name, too, once they have been imported.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import cache
 from importlib.machinery import ModuleSpec

@@ -1,7 +1,5 @@
 """Times in messages: `builtin_interfaces` from and to nanoseconds and seconds."""
 
-from __future__ import annotations
-
 from rbxcompose.msgs.builtin_interfaces import Duration, Time
 
 NANOSECONDS = 1_000_000_000

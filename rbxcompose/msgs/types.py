@@ -4,8 +4,6 @@ A function for any service reads `def call(service: type[Service[Q, R]], request
 knows that `call(SetBool, SetBool.Request(data=True))` returns a `SetBool.Response`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, ClassVar, Generic, TypeVar
 

@@ -1,7 +1,5 @@
 """The channel between the supervisor and a process group: typed messages as lines of JSON over a socket pair."""
 
-from __future__ import annotations
-
 import contextlib
 import socket
 from dataclasses import field

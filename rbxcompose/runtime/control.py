@@ -4,8 +4,6 @@ A request is a line of JSON as `Family` of `typed_json` writes it; the answer is
 request's answer type, or `{"refused": "why"}`.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import selectors

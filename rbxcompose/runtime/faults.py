@@ -1,7 +1,5 @@
 """The consequences of a fault: how it is reported, and when the component that raised it may retry."""
 
-from __future__ import annotations
-
 import traceback
 from collections import deque
 from pathlib import Path

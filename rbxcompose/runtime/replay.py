@@ -1,7 +1,5 @@
 """Runs one component of a recorded robot again from its recorded inputs, and compares what it sends."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections import deque
@@ -18,7 +16,7 @@ from rbxcompose.bus.bus import Bus
 from rbxcompose.bus.names import ActionNames, Attachment, data_key, decode_attachment
 from rbxcompose.bus.tokens import EntityKind, mangle
 from rbxcompose.bus.topics import Publisher
-from rbxcompose.bus.transport import LONGEST_WAIT, Arrival, NoTransport, Question, TransportReply
+from rbxcompose.bus.transport import Arrival, NoTransport, OnReply, Question, TransportReply
 from rbxcompose.bus.wire import WIRE_PROFILES
 from rbxcompose.compiler.plan.model import Instance, Plan
 from rbxcompose.msgs import registry
@@ -137,7 +135,7 @@ class ReplayStage(NoTransport):
     session: str = "0"
     subscribers: dict[str, list[Callable[[Arrival], None]]] = field(default_factory=dict)
     servers: dict[str, Callable[[Question], None]] = field(default_factory=dict)
-    waiting: dict[tuple[str, bytes, int], Callable[[TransportReply], None]] = field(default_factory=dict)
+    waiting: dict[tuple[str, bytes, int], OnReply] = field(default_factory=dict)
 
     def wake(self, owner: str, callback: Callable[[], None]) -> None:
         """Let the scheduler run the callback at this instant."""
@@ -156,14 +154,7 @@ class ReplayStage(NoTransport):
         return self
 
     def ask(
-        self,
-        key: str,
-        payload: bytes,
-        attachment: bytes,
-        answered: Callable[[TransportReply], None],
-        *,
-        of_all: bool = True,
-        within: float = LONGEST_WAIT,
+        self, key: str, payload: bytes, attachment: bytes, answered: OnReply, *, of_all: bool, within: float
     ) -> NoTransport:
         """Wait for the recorded reply."""
         source = decode_attachment(attachment)
@@ -268,7 +259,15 @@ class RunComparison:
             self._aliases.learn(recorded, now)
         if recorded.payload == (payload := self._aliases.outwards(now.payload)):
             return None
-        return _in_a_field(recorded, payload)
+        try:
+            cls = registry.message(recorded.topic.type)
+            pairs = zip(
+                _leaves(to_plain(decode(cls, recorded.payload))), _leaves(to_plain(decode(cls, payload))), strict=False
+            )
+            field, before, after = next((text, a, b) for (text, a), (other, b) in pairs if (text, a) != (other, b))
+        except (KeyError, CdrError, StopIteration):  # a type that is not installed, or bytes that belong to no field
+            return _whole(recorded, f"{len(recorded.payload)} bytes", f"{len(payload)} other bytes")
+        return RunDifference(recorded.log_time / NANOSECONDS, recorded.topic.name, field, f"{before}", f"{after}")
 
 
 def _at(record: Recorded) -> str:
@@ -277,18 +276,6 @@ def _at(record: Recorded) -> str:
 
 def _whole(record: Recorded, recorded: str, now: str) -> RunDifference:
     return RunDifference(record.log_time / NANOSECONDS, record.topic.name, "", recorded, now)
-
-
-def _in_a_field(record: Recorded, payload: bytes) -> RunDifference:
-    try:
-        cls = registry.message(record.topic.type)
-        pairs = zip(
-            _leaves(to_plain(decode(cls, record.payload))), _leaves(to_plain(decode(cls, payload))), strict=False
-        )
-        field, before, after = next((text, a, b) for (text, a), (other, b) in pairs if (text, a) != (other, b))
-    except (KeyError, CdrError, StopIteration):  # a type that is not installed, or bytes that belong to no field
-        return _whole(record, f"{len(record.payload)} bytes", f"{len(payload)} other bytes")
-    return RunDifference(record.log_time / NANOSECONDS, record.topic.name, field, f"{before}", f"{after}")
 
 
 def _leaves(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:

@@ -1,7 +1,5 @@
 """Requests of people and tools to a supervisor."""
 
-from __future__ import annotations
-
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.requests import Command, Query
 from rbxcompose.runtime.folder import RobotState

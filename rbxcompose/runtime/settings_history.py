@@ -1,7 +1,5 @@
 """The changes of parameters while the robot runs: who changed what, when, and from which value."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import field

@@ -1,7 +1,5 @@
 """The ports of a running component: the runtime binds them to the bus, tests to whatever they like."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from enum import StrEnum
 from typing import Generic, Protocol, TypeVar

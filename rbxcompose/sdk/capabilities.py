@@ -4,8 +4,6 @@ No rule identifies a component by the name of its type: a battery, base or drive
 text in a capability is the name of a port of the component; everything else is a `Setting`. Quantities are in SI.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields, replace
 from typing import Any, Generic, TypeVar

@@ -1,7 +1,5 @@
 """The contract of a component: configuration, ports, lifecycle, one step at a time."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Mapping, Sequence
 from functools import cache

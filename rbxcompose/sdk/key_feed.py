@@ -4,8 +4,6 @@ An update is `{"whole": bool, "changed": {...}, "gone": [...]}`; a whole one rep
 around them are those of `bus/window.py`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, Protocol
 

@@ -1,7 +1,5 @@
 """Names of message types, and of their fields, in configurations."""
 
-from __future__ import annotations
-
 import re
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """The fields of a configuration as parameters of ROS 2: types, descriptions, values as messages, changes."""
 
-from __future__ import annotations
-
 import math
 from base64 import b64decode, b64encode
 from collections import Counter

@@ -1,7 +1,5 @@
 """Component types by name; only the types that a manifest uses are imported."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable
 from typing import Any, TypeVar

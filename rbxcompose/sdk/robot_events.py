@@ -1,7 +1,5 @@
 """Events that a component reports to its supervisor because they concern the whole robot."""
 
-from __future__ import annotations
-
 from rbxcompose.base.dataclass import dataclass
 
 

@@ -4,8 +4,6 @@ The tasks do what those of ROS's `diagnostic_updater` do, with its figures as de
 and asked once a second, with the time since robot start [s].
 """
 
-from __future__ import annotations
-
 import math
 from collections import deque
 from collections.abc import Callable, Mapping

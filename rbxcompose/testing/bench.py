@@ -1,7 +1,5 @@
 """A bench for components and for whole robots: virtual time, an in-process bus, no waiting."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 

@@ -1,7 +1,5 @@
 """Finds where a source file reads a clock itself: components are given their time, or no run could be repeated."""
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Golden files: output for users, kept as text beside the tests and compared exactly."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from rbxcompose.base.dataclass import dataclass

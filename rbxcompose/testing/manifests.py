@@ -1,7 +1,5 @@
 """Manifests and missions written in a test."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path

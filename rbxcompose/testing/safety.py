@@ -1,7 +1,5 @@
 """What *safe* means: laws that each run of a robot keeps, whatever fails, checked against its plan and story."""
 
-from __future__ import annotations
-
 import math
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence

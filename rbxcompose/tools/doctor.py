@@ -1,7 +1,5 @@
 """Examinations of this machine: how they are declared, the data they use, and reading it."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import re

@@ -1,7 +1,5 @@
 """Missions in files: their pictures, the skills that they may use, their logs again, and their exploration."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import os
@@ -17,10 +15,9 @@ from rbxcompose.base.files import TooLargeError, read_regular
 from rbxcompose.base.findings import Span, kind, suggest
 from rbxcompose.base.requests import Refused
 from rbxcompose.base.units import example
-from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, misused, refuse, table, write_report
-from rbxcompose.commands.layout import NotDrawnError
+from rbxcompose.commands.console import FINDINGS, NotDoneError, ReportedError, emit, misused, table, write_report
 from rbxcompose.commands.lookup import answer_of, known_state, robots_up
-from rbxcompose.commands.targets import only_path, put_robot_last
+from rbxcompose.commands.targets import put_robot_last, robot_path
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.model.skills import python_skills
@@ -51,19 +48,22 @@ _OWN = ("mission", "run")  # keys of a record that identify its run
 NO_LOG = kind("RBX9041")
 
 
-def robot_of(path: str | None) -> Robot | None:
-    """Compile a robot; if it has mistakes, report them and return None.
+def robot_of(path: str | None) -> Robot:
+    """Compile a robot, and report its findings.
 
     Without a path it is the running one, else the only one of this folder.
 
     Raises:
         NotDoneError: if no path is given and it is not clear which robot to use.
+        ReportedError: if it has errors.
     """
     if path is None:
-        path = _running_file() or only_path(may_run=False)
+        path = _running_file() or robot_path(None, may_run=False)
     out = compile_robot(path, environment=os.environ)
     write_report(out.report, out.sources)
-    return None if out.report.has_errors else out.robot
+    if out.report.has_errors or out.robot is None:
+        raise ReportedError
+    return out.robot
 
 
 def _running_file() -> str | None:
@@ -75,16 +75,11 @@ def _running_file() -> str | None:
 def show(arguments: argparse.Namespace) -> int:
     """Write the picture of a mission; without a path, that of the running robot, with the state of each node."""
     put_robot_last(arguments, "name")
-    try:
-        picture, statuses = (None if arguments.path else _live(arguments.name)) or (None, ())
-        if picture is None:
-            robot = robot_of(arguments.path)
-            if robot is None:
-                return FINDINGS
-            picture = picture_of(mission_in(robot, arguments.name), robot.names)
-        text = FORMATS[arguments.format](picture, statuses)
-    except (NotDoneError, NotDrawnError) as error:
-        return refuse(error.finding)
+    picture, statuses = (None if arguments.path else _live(arguments.name)) or (None, ())
+    if picture is None:
+        robot = robot_of(arguments.path)
+        picture = picture_of(mission_in(robot, arguments.name), robot.names)
+    text = FORMATS[arguments.format](picture, statuses)
     if arguments.out is None:
         emit(text.rstrip("\n"))
         return 0
@@ -122,12 +117,7 @@ def mission_in(robot: Robot, name: str) -> Any:
 
 def skills(arguments: argparse.Namespace) -> int:
     """List all skills that a robot's missions may use."""
-    try:
-        robot = robot_of(arguments.path)
-    except NotDoneError as error:
-        return refuse(error.finding)
-    if robot is None:
-        return FINDINGS
+    robot = robot_of(arguments.path)
     found = dict(
         sorted(
             {
@@ -213,8 +203,6 @@ def replay_log(arguments: argparse.Namespace) -> int:
     """
     runs = runs_in(arguments.log)
     robot = robot_of(arguments.path)
-    if robot is None:
-        return FINDINGS
     differs, budget = False, ReplayBudget()
     for (name, number), run in runs.items():
         found = difference(run, name, robot, arguments.log, budget)
@@ -312,8 +300,6 @@ def explore(arguments: argparse.Namespace) -> int:
     """Explore a mission and report the findings; the exit code is 1 if anything is wrong."""
     put_robot_last(arguments, "name")
     robot = robot_of(arguments.path)
-    if robot is None:
-        return FINDINGS
     program = mission_in(robot, arguments.name)
     try:
         inputs = _inputs(robot, arguments.name, settings(arguments.sets))

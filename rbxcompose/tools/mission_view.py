@@ -1,7 +1,5 @@
 """A running mission, live: its nodes with their states, its data, its last transitions."""
 
-from __future__ import annotations
-
 import json
 import sys
 import time

@@ -1,7 +1,5 @@
 """Run a plan and show the run: follow the log as `logs -f` does; the supervisor reports the rest."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterable, Mapping
 

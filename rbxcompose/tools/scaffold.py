@@ -1,7 +1,5 @@
 """New robots, parts, missions and components from templates."""
 
-from __future__ import annotations
-
 import importlib.util
 import keyword
 import math

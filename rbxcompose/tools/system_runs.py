@@ -1,28 +1,16 @@
 """`up SYSTEM` and `apply SYSTEM`: all hosts, or the share of one, `--host NAME`."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import os
 import socket
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from rbxcompose.base.findings import Finding, Report, kind
-from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, misused, refuse, write_report
-from rbxcompose.commands.hosts import (
-    Running,
-    Shares,
-    follow_commands,
-    is_reachable,
-    label_of,
-    on_all,
-    reached,
-    shares_of,
-)
+from rbxcompose.commands import hosts
+from rbxcompose.commands.console import FINDINGS, NotDoneError, ReportedError, emit, misused, refuse, write_report
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.compiler.systems.bundle import bundle_of
@@ -39,7 +27,6 @@ from rbxcompose.tools.live_rules import LiveRules
 from rbxcompose.tools.robot_changes import Proposal, carry_out, unsure
 from rbxcompose.tools.run_view import is_fit, run_plan
 
-USAGE = 2
 WHICH_HOST = kind("RBX6110")
 OTHER_MACHINE = kind("RBX6111")
 WHICH_ROBOT = kind("RBX6112")
@@ -48,13 +35,10 @@ REFUSED_THERE = kind("RBX6128")
 
 def up_everywhere(path: str, system: System, arguments: argparse.Namespace) -> int:
     """Bring the files to all hosts, start all shares, and show what they write until the robots are down."""
-    if not is_reachable(system):
-        return FINDINGS
-    shares = shares_of(system, arguments.ssh_config)
+    hosts.require_reachable(system)
+    shares = hosts.shares_of(system, arguments.ssh_config)
     bundle = bundle_of(system)
-    folders = reached(shares, bundle)
-    if folders is None:
-        return FINDINGS
+    folders = hosts.reached(shares, bundle)
     shares = {key: share for key, share in shares.items() if share.is_here or share.name in folders}
     options = [*(["-d"] if arguments.detach else []), *(["--real"] if arguments.real else [])]
     options += [word for name in system.profiles for word in ("--profile", name)]
@@ -64,25 +48,22 @@ def up_everywhere(path: str, system: System, arguments: argparse.Namespace) -> i
         file = path if remote.is_here else bundle.system
         words = ["up", file, "--host", host, "--robot", robot, *options]
         folder = folders.get(host, "")
-        commands[label_of(shares, host, robot)] = remote.rbxcompose(
+        commands[hosts.label_of(shares, host, robot)] = remote.rbxcompose(
             words, folder=folder, has_terminal=not arguments.detach
         )
-    return follow_commands(commands, [label_of(shares, *key) for key, share in shares.items() if share.model.optional])
+    return hosts.follow_commands(
+        commands, [hosts.label_of(shares, *key) for key, share in shares.items() if share.model.optional]
+    )
 
 
 def run_share(path: str, arguments: argparse.Namespace, options: RunOptions) -> int:
     """Compile a system and run what one host of it runs; return the exit code."""
     if options.is_stepped or arguments.watch:
-        sys.stderr.write("rbxcompose up: a system runs in real time, without --rate and --watch\n")
-        return USAGE
+        return misused("up", "a system runs in real time, without --rate and --watch")
     system = compiled_for(path, arguments, "up")
-    if isinstance(system, int):
-        return system
     if arguments.host is None and any(host.ssh for host in system.hosts.values()):
         return up_everywhere(path, system, arguments)
     chosen = chosen_robots(system, arguments)
-    if isinstance(chosen, Finding):
-        return refuse(chosen)
     if len(chosen) > 1 and not arguments.detach:
         names = ", ".join(one.name for one in chosen)
         message = f"'{arguments.host}' runs several robots: {names}"
@@ -102,14 +83,20 @@ def run_share(path: str, arguments: argparse.Namespace, options: RunOptions) -> 
     return 0
 
 
-def compiled_for(path: str, arguments: argparse.Namespace, verb: str) -> System | int:
-    """Return a system without errors, with the layers of a `verb`; the exit code after telling what is wrong."""
+def compiled_for(path: str, arguments: argparse.Namespace, verb: str) -> System:
+    """Return a system without errors, with the layers of a `verb`.
+
+    Raises:
+        ReportedError: if it has errors, or an option is not for systems.
+    """
     for word, given in (("-f", arguments.overlays), ("--set or --no-mission", arguments.sets)):
         if given:
-            return misused(verb, f"{word} is for a robot; a system says itself what its robots are")
+            raise ReportedError(misused(verb, f"{word} is for a robot; a system says itself what its robots are"))
     system = compile_system(path, environment=os.environ, real=arguments.real, profiles=arguments.profile)
     write_report(system.report, system.sources)
-    return FINDINGS if system.report.has_errors else system
+    if system.report.has_errors:
+        raise ReportedError
+    return system
 
 
 def layers_of(system: System, robot: PlacedRobot, *, real: bool) -> ChosenLayers:
@@ -120,18 +107,23 @@ def layers_of(system: System, robot: PlacedRobot, *, real: bool) -> ChosenLayers
     return replace(layers, system=str(system.path.resolve()), system_profiles=system.profiles, member=robot.name)
 
 
-def chosen_robots(system: System, arguments: argparse.Namespace) -> list[PlacedRobot] | Finding:
-    """Return the robots to run on this host."""
+def chosen_robots(system: System, arguments: argparse.Namespace) -> list[PlacedRobot]:
+    """Return the robots to run on this host.
+
+    Raises:
+        NotDoneError: if it is not clear which host this is, or it runs nothing of the robot.
+    """
     host = arguments.host
     if host is None:
         message = "no host is named, and none of the system has 'ssh', by which all could be started from here"
-        return WHICH_HOST.at(None, message, help=f"--host {' or --host '.join(system.hosts)}")
+        raise NotDoneError(WHICH_HOST.at(None, message, help=f"--host {' or --host '.join(system.hosts)}"))
     if host not in system.hosts:
-        return WHICH_HOST.misspelt(None, f"the system has no host '{host}'", host, system.hosts, "hosts")
+        message = f"the system has no host '{host}'"
+        raise NotDoneError(WHICH_HOST.misspelt(None, message, host, system.hosts, "hosts"))
     there = [robot for robot in robots_on(system, host) if arguments.robot in (None, robot.name)]
     if not there:
         what = f"'{arguments.robot}'" if arguments.robot else "any robot"
-        return WHICH_HOST.at(None, f"'{host}' does not run anything of {what}")
+        raise NotDoneError(WHICH_HOST.at(None, f"'{host}' does not run anything of {what}"))
     return there
 
 
@@ -181,13 +173,10 @@ def apply_system(path: str, arguments: argparse.Namespace) -> int:
     if arguments.undo is not None:
         return misused("apply", "--undo is for a robot that runs on this machine, by its name")
     system = compiled_for(path, arguments, "apply")
-    if isinstance(system, int):
-        return system
     if arguments.host is not None:
         return _apply_here(system, arguments)
-    if not is_reachable(system):
-        return FINDINGS
-    shares = shares_of(system, arguments.ssh_config)
+    hosts.require_reachable(system)
+    shares = hosts.shares_of(system, arguments.ssh_config)
     shares = {key: share for key, share in shares.items() if arguments.robot in (None, key[1])}
     change = _SystemChange(path, system, shares, arguments)
     return change.run()
@@ -195,36 +184,28 @@ def apply_system(path: str, arguments: argparse.Namespace) -> int:
 
 def _apply_here(system: System, arguments: argparse.Namespace) -> int:
     """Change what this machine runs as a host of the system."""
-    chosen = chosen_robots(system, arguments)
-    if isinstance(chosen, Finding):
-        return refuse(chosen)
-    try:
-        for robot in chosen:
-            plan, layers = planned(system, robot, arguments.host), layers_of(system, robot, real=arguments.real)
-            proposal = Proposal.of(plan, robot.robot, layers)
-            emit(json.dumps(proposal.data) if arguments.json else proposal.text())
-            if exit_code := carry_out(proposal, arguments):
-                return exit_code
-    except NotDoneError as error:
-        return refuse(error.finding)
+    for robot in chosen_robots(system, arguments):
+        plan, layers = planned(system, robot, arguments.host), layers_of(system, robot, real=arguments.real)
+        proposal = Proposal.of(plan, robot.robot, layers)
+        emit(json.dumps(proposal.data) if arguments.json else proposal.text())
+        if exit_code := carry_out(proposal, arguments):
+            return exit_code
     return 0
 
 
 class _SystemChange:
     """A change of several hosts: all of them, or none."""
 
-    def __init__(self, path: str, system: System, shares: Shares, arguments: argparse.Namespace) -> None:
+    def __init__(self, path: str, system: System, shares: hosts.Shares, arguments: argparse.Namespace) -> None:
         self._path, self._system, self._shares, self._arguments = path, system, shares, arguments
 
     def run(self) -> int:
         """Ask all hosts, then a person, then change one host after another."""
         bundle, arguments = bundle_of(self._system), self._arguments
-        folders = reached(self._shares, bundle, needs_all=not arguments.partial)
-        if folders is None:
-            return FINDINGS
-        self._folders, self._file = folders, bundle.system
+        self._folders = hosts.reached(self._shares, bundle, needs_all=not arguments.partial)
+        self._file = bundle.system
         usable = {key: share for key, share in self._shares.items() if share.is_here or share.name in self._folders}
-        asked = on_all({" ".join(key): self._command(key, "--dry-run") for key in usable})
+        asked = hosts.on_all({" ".join(key): self._command(key, "--dry-run") for key in usable})
         found = {key: _answer(asked[" ".join(key)]) for key in usable}
         lacks = any(key not in usable and not share.model.optional for key, share in self._shares.items())
         problems = [_refusal(key, entry) for key, entry in found.items() if isinstance(entry, str)]
@@ -261,7 +242,7 @@ class _SystemChange:
         done: list[Key] = []
         for key, generation in generations.items():
             label = " ".join(key)
-            problem = _answer(on_all({label: self._command(key, "--yes")})[label])
+            problem = _answer(hosts.on_all({label: self._command(key, "--yes")})[label])
             if isinstance(problem, str):
                 refuse(_refusal(key, problem))
                 if not self._arguments.partial:
@@ -278,7 +259,7 @@ class _SystemChange:
         """Take the change of a share in this generation back, and report it."""
         words = ["apply", key[1], "--undo", str(generation), "--yes", "--json"]
         label = " ".join(key)
-        answer = _answer(on_all({label: self._shares[key].rbxcompose(words)})[label])
+        answer = _answer(hosts.on_all({label: self._shares[key].rbxcompose(words)})[label])
         if not isinstance(answer, str):
             self._tell(f"{label}: as before")
         elif not may_be_unchanged:
@@ -301,7 +282,7 @@ def _refusal(key: Key, why: str) -> Finding:
     return REFUSED_THERE.at(None, f"'{key[0]}' does not change '{key[1]}': {why}")
 
 
-def _answer(running: Running) -> Any:
+def _answer(running: hosts.Running) -> Any:
     """Return the answer of a host as data, or a text: why it did not do it."""
     exit_code, answer = running.wait(), running.answer
     if exit_code == 0 and isinstance(answer, dict):

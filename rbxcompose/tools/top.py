@@ -1,7 +1,5 @@
 """What `top` shows of a robot and of a whole system: sampled from state file, processes, log and bus; and its lines."""
 
-from __future__ import annotations
-
 import json
 from collections import Counter, deque
 from collections.abc import Iterable, Mapping, Sequence
@@ -13,10 +11,10 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.levels import Level, level_of
 from rbxcompose.base.printable import columns, fitted, plain
 from rbxcompose.base.units import UNITS
-from rbxcompose.bus.graph import Graph, GraphEnd, GraphName
+from rbxcompose.bus.graph import Graph, GraphName
 from rbxcompose.bus.local import Inbox
 from rbxcompose.bus.names import admin_key
-from rbxcompose.bus.transport import TransportReply
+from rbxcompose.bus.transport import LONGEST_WAIT, TransportReply
 from rbxcompose.bus.window import SCHEMA
 from rbxcompose.commands.guest import LONGEST_QUEUE, Guest, ReceivedMessage
 from rbxcompose.commands.guest import NAME as VISITOR
@@ -131,7 +129,13 @@ def lines_of(picture: RobotPicture, width: int, height: int, *, colour: bool = F
 
     Missions get the room that all else leaves; components go last.
     """
-    head = _head(picture)
+    supervisor = "" if picture.is_supervised else "; its supervisor is dead, 'rbxcompose down' ends what is left"
+    lines = [PictureLine(f"{plain(picture.robot)}: router {plain(picture.router or 'none')}{supervisor}", BOLD)]
+    if picture.mission:
+        lines.append(PictureLine(f"mission: {plain(picture.mission)}"))
+    if picture.batteries:
+        lines.append(PictureLine(_GAP.join(f"{plain(name)}: {plain(text)}" for name, text in picture.batteries)))
+    head = [*lines, PictureLine("")]
     loads = [PictureLine(""), *_loads(picture.loads)]
     tail = [*_health(picture.health), *_warnings(picture.warnings)]
     room = max(2, height - len(head) - len(loads) - len(tail))
@@ -139,16 +143,6 @@ def lines_of(picture: RobotPicture, width: int, height: int, *, colour: bool = F
     left = height - len(head) - len(components) - len(loads) - len(tail)
     shown = [*head, *components, *loads, *_trees(picture.trees, left), *tail][:height]
     return [painted(line, width, colour) for line in shown]
-
-
-def _head(picture: RobotPicture) -> list[PictureLine]:
-    supervisor = "" if picture.is_supervised else "; its supervisor is dead, 'rbxcompose down' ends what is left"
-    lines = [PictureLine(f"{plain(picture.robot)}: router {plain(picture.router or 'none')}{supervisor}", BOLD)]
-    if picture.mission:
-        lines.append(PictureLine(f"mission: {plain(picture.mission)}"))
-    if picture.batteries:
-        lines.append(PictureLine(_GAP.join(f"{plain(name)}: {plain(text)}" for name, text in picture.batteries)))
-    return [*lines, PictureLine("")]
 
 
 def _components(components: Sequence[ComponentPicture]) -> list[PictureLine]:
@@ -371,16 +365,13 @@ class Sampler:
         self._then = now
         graph = self._guest.graph()
         self._gauges = {battery.topic: battery for battery in state.batteries.values()}
-        self._listen(graph)
-        self._warnings.extend(record for record in self._follower.read() if record.level is not Level.OK)
-        return self._picture(state, self._rates(graph, elapsed), self._loads(state, elapsed))
-
-    def _listen(self, graph: Graph) -> None:
         for topic in graph.topics:
             is_wanted = topic.name == _HEALTH or topic.name in self._gauges or _is_light(topic)
             if topic.name not in self._listened and topic.givers and is_wanted:
                 self._listened.add(topic.name)
                 self._guest.listen(topic, partial(self._receive, topic.name))
+        self._warnings.extend(record for record in self._follower.read() if record.level is not Level.OK)
+        return self._picture(state, self._rates(graph, elapsed), self._loads(state, elapsed))
 
     def _trees(self, state: RobotState) -> list[Tree]:
         """Follow the missions, if the robot has any, and return the running ones while their process lives."""
@@ -416,7 +407,7 @@ class Sampler:
             return {}
         rates: dict[str, float] = {}
         for end in (end for topic in graph.topics if topic.name in self._listened for end in topic.givers):
-            name = _component(end)
+            name = end.node.rpartition("/")[2]
             rates[name] = rates.get(name, 0.0) + self._counts[end.gid] / elapsed
         self._counts.clear()
         return rates
@@ -465,10 +456,6 @@ class Sampler:
 
 def _is_light(topic: GraphName) -> bool:
     return all(end.qos is not None and end.qos.is_reliable and not end.qos.is_transient_local for end in topic.givers)
-
-
-def _component(end: GraphEnd) -> str:
-    return end.node.rpartition("/")[2]
 
 
 def _charge(gauge: Gauge, received: ReceivedMessage) -> float | None:
@@ -539,7 +526,8 @@ class MissionsSeen:
         self._asked.add(path)
         transport, answers = self._guest.transport, _Answers(self, path)
         inbox: Inbox[TransportReply] = Inbox(VISITOR, None, answers.take, self._guest.scheduler.post)
-        transport.ask(admin_key(self._robot, path), b"", b"", lambda answer: inbox.put(answer, transport.wake))
+        take, key = lambda answer: inbox.put(answer, transport.wake), admin_key(self._robot, path)
+        transport.ask(key, b"", b"", take, of_all=True, within=LONGEST_WAIT)
 
     def answered(self, path: str, answer: TransportReply) -> None:
         """Apply the first answer to a query."""

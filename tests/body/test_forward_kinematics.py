@@ -38,7 +38,7 @@ def bodies() -> dict[str, Description]:
 
 @pytest.mark.timeout(600)
 def test_three_libraries_agree_on_every_link_of_the_shipped_robots(soak: Soak) -> None:
-    examples = soak.examples(20, 1000)
+    examples = soak.examples(4, 1000)
     found = bodies()
     for name, description in found.items():
         _agree(name, Three(description), examples)
@@ -58,7 +58,7 @@ def _agree(name: str, three: Three, examples: int) -> None:
 
 @pytest.mark.timeout(600)
 def test_three_libraries_agree_on_every_link_of_a_random_body(soak: Soak) -> None:
-    examples = soak.examples(40, 1000)
+    examples = soak.examples(15, 1000)
     links: list[int] = []
 
     @settings(max_examples=examples, database=None, suppress_health_check=list(HealthCheck))

@@ -17,7 +17,7 @@ from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.bus import Bus
 from rbxcompose.bus.names import Attachment, decode_attachment
 from rbxcompose.bus.tokens import gid
-from rbxcompose.bus.transport import EXPIRED, LONGEST_WAIT, Arrival, TransportReply
+from rbxcompose.bus.transport import EXPIRED, Arrival, OnReply, TransportReply
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.msgs import rcl_interfaces as rcl
 from rbxcompose.msgs.action_msgs import CancelGoal, GoalInfo
@@ -75,7 +75,7 @@ class Wire:
     session: str = "aac3178e146ba6f1fc6e6a4085e77f21"
     lines: list[str] = field(default_factory=list)
     servers: dict[str, Callable[[Question], None]] = field(default_factory=dict)
-    asked: dict[str, Callable[[TransportReply], None]] = field(default_factory=dict)
+    asked: dict[str, OnReply] = field(default_factory=dict)
     watchers: list[tuple[str, Callable[[str, bool], None]]] = field(default_factory=list)
     scheduler: Scheduler = field(default_factory=Scheduler)
     clock: SteppedClock = field(default_factory=lambda: SteppedClock(1.5))
@@ -126,14 +126,7 @@ class Wire:
         return Declared(self, key)
 
     def ask(
-        self,
-        key: str,
-        payload: bytes,
-        attachment: bytes,
-        answered: Callable[[TransportReply], None],
-        *,
-        of_all: bool = True,
-        within: float = LONGEST_WAIT,
+        self, key: str, payload: bytes, attachment: bytes, answered: OnReply, *, of_all: bool, within: float
     ) -> Declared:
         self.note("ask", key, payload, attachment)
         self.asked[key] = answered

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import pytest
 
 from rbxcompose.bus.renewal import RENEWED, RenewableTransport
-from rbxcompose.bus.transport import LONGEST_WAIT, Arrival, Closable, Question, TransportReply
+from rbxcompose.bus.transport import LONGEST_WAIT, Arrival, Closable, OnReply, Question, TransportReply
 from rbxcompose.sdk.ports import Qos
 
 
@@ -35,14 +35,7 @@ class Link:
         return self._declare(f"serve {key}")
 
     def ask(
-        self,
-        key: str,
-        payload: bytes,
-        attachment: bytes,
-        answered: Callable[[TransportReply], None],
-        *,
-        of_all: bool = True,
-        within: float = LONGEST_WAIT,
+        self, key: str, payload: bytes, attachment: bytes, answered: OnReply, *, of_all: bool, within: float
     ) -> Closable:
         return self._declare(f"ask {key}")
 
@@ -120,9 +113,9 @@ def test_a_latched_message_is_there_again_and_others_are_dropped_in_between(link
 def test_a_request_is_never_sent_twice_and_ends_with_an_error(links: Links) -> None:
     first, second, transport = links
     answers: list[TransportReply] = []
-    transport.ask("before", b"", b"", answers.append)
+    transport.ask("before", b"", b"", answers.append, of_all=True, within=LONGEST_WAIT)
     transport.detach()
-    transport.ask("between", b"", b"", answers.append)
+    transport.ask("between", b"", b"", answers.append, of_all=True, within=LONGEST_WAIT)
     transport.attach(second)
     assert answers == [TransportReply(error=RENEWED)] * 2
     assert (first.done, second.done) == (["ask before"], [])

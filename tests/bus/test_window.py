@@ -9,7 +9,7 @@ import pytest
 
 from rbxcompose.base.requests import Refused
 from rbxcompose.bus.names import admin_key
-from rbxcompose.bus.transport import TransportReply
+from rbxcompose.bus.transport import LONGEST_WAIT, TransportReply
 from rbxcompose.bus.window import GRACE, Window
 from rbxcompose.sdk.ports import Qos
 from tests.bus.conftest import Alone, Connected, Network
@@ -28,7 +28,7 @@ def _ask(by: Connected, found: list[TransportReply]) -> bool:
     """Ask again until the server answers: it may not be known yet."""
     if not found or found[0].error == "the server is gone":
         found.clear()
-        by.transport.ask(KEY, b"", b"", found.append)
+        by.transport.ask(KEY, b"", b"", found.append, of_all=True, within=LONGEST_WAIT)
         by.turn()
     return bool(found) and found[0].error != "the server is gone"
 
@@ -61,7 +61,9 @@ def test_who_asks_gets_the_whole_and_who_listens_the_news(network: Network) -> N
     listening.close()
     network.until(lambda: not window._remote.has_match)
     one.bus.close_owner("mission")
-    other.transport.ask(KEY, b"", b"", lambda answer: heard.append(answer.error.encode()))
+    other.transport.ask(
+        KEY, b"", b"", lambda answer: heard.append(answer.error.encode()), of_all=True, within=LONGEST_WAIT
+    )
     network.until(lambda: heard[-1] == b"the server is gone")
 
 

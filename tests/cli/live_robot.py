@@ -15,6 +15,7 @@ from typing import Any, Self
 
 from rbxcompose.commands.lookup import BusPlace, find_place
 from tests.conftest import ROOT
+from tests.forked import run_command
 
 PATIENCE = 20.0  # [s]
 
@@ -31,6 +32,8 @@ class Robot:
         return [sys.executable, "-m", "rbxcompose", *words]
 
     def do(self, *words: str) -> subprocess.CompletedProcess[str]:
+        if words[0] != "up":
+            return run_command(words, self.environment, PATIENCE)
         return subprocess.run(
             self.command(*words), env=self.environment, capture_output=True, text=True, timeout=PATIENCE, cwd=ROOT
         )

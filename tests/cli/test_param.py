@@ -17,6 +17,7 @@ import pytest
 
 from rbxcompose.sdk.parameters import from_message
 from rbxcompose.tools.parameters.changes import value_of
+from tests.forked import run_command
 
 ROOT = Path(__file__).parents[2]
 PATIENCE = 20.0  # [s]
@@ -58,6 +59,8 @@ def do(base: Path) -> Iterator[Do]:
     (base / "robot.yaml").write_text(MANIFEST, encoding="utf-8")
 
     def run(*words: str) -> subprocess.CompletedProcess[str]:
+        if words[0] != "up":
+            return run_command(words, environment, PATIENCE)
         command = [sys.executable, "-m", "rbxcompose", *words]
         return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=PATIENCE, cwd=ROOT)
 

@@ -12,7 +12,7 @@ import pytest
 
 from rbxcompose.commands import main as command
 from rbxcompose.commands.console import NotDoneError
-from rbxcompose.commands.targets import only_path
+from rbxcompose.commands.targets import robot_path
 from rbxcompose.runtime.folder import RobotFolder, RobotState
 from rbxcompose.runtime.processes import Process, boot_id
 from tests.conftest import ROOT
@@ -47,30 +47,30 @@ def start(name: str, file: Path) -> None:
 def test_the_only_robot_of_the_folder_is_meant(file: str, folder: Path) -> None:
     add_robot(folder / file)
     start("other", folder / "elsewhere.yaml")
-    assert only_path(may_run=True) == file
+    assert robot_path(None, may_run=True) == file
 
 
 def test_the_robot_of_the_folder_itself_comes_before_those_below_it(folder: Path) -> None:
     add_robot(folder / "robot.yaml")
     add_robot(folder / "old/robot.yaml")
-    assert only_path(may_run=False) == "robot.yaml"
+    assert robot_path(None, may_run=False) == "robot.yaml"
 
 
 def test_of_a_folder_without_robots_the_only_one_that_is_up_is_meant_but_not_to_start_it(folder: Path) -> None:
     start("one", folder / "far/robot.yaml")
-    assert only_path(may_run=True) == str(folder / "far/robot.yaml")
+    assert robot_path(None, may_run=True) == str(folder / "far/robot.yaml")
     with pytest.raises(NotDoneError, match="no robot is named, and this folder has no robot"):
-        only_path(may_run=False)
+        robot_path(None, may_run=False)
     start("two", folder / "two/robot.yaml")
     with pytest.raises(NotDoneError):
-        only_path(may_run=True)
+        robot_path(None, may_run=True)
 
 
 def test_several_robots_are_named(folder: Path) -> None:
     for name in ("a", "b"):
         add_robot(folder / f"robots/{name}/robot.yaml")
     with pytest.raises(NotDoneError, match=r"several robots: robots/a/robot\.yaml, robots/b/robot\.yaml"):
-        only_path(may_run=False)
+        robot_path(None, may_run=False)
 
 
 @pytest.mark.parametrize(

@@ -72,7 +72,7 @@ def test_a_run_that_would_never_end_is_refused(tmp_path: Path, capsys: pytest.Ca
     robot.write_text(
         "rbx: 1\nkind: Robot\nname: idle\ncomponents:\n  base:\n    type: diff_drive_sim\n", encoding="utf-8"
     )
-    assert up.run(parse_robot(str(robot), "--rate", "max")) == up.USAGE
+    assert up.run(parse_robot(str(robot), "--rate", "max")) == 2
     assert "give --for" in capsys.readouterr().err
 
 

@@ -6,19 +6,17 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.msgs.rbxcompose_msgs import LocateArm, MoveArm
 from rbxcompose.sdk.bound import Outcome
 from rbxcompose.testing import Bench
-from tests.conftest import ROOT
+from tests.shipped import robot_and_plan
 
 TYPES = ("arm", "scene", "servo_bus")
 
 
 @pytest.fixture
 def bench() -> Bench:
-    plan = compile_robot(str(ROOT / "robots/pi_robot"), environment={}).plan
-    assert plan
+    _, plan = robot_and_plan("pi_robot")
     found = Bench(*(instance for instance in plan.instances if instance.type in TYPES))
     found.advance(0.5)
     return found

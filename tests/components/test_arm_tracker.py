@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.compiler.plan.model import Instance
 from rbxcompose.msgs.geometry_msgs import Point, PointStamped
 from rbxcompose.msgs.rbxcompose_msgs import FollowPoint, MoveArm
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.sdk.bound import Outcome
 from rbxcompose.testing import Bench
-from tests.conftest import ROOT
+from tests.shipped import robot_and_plan
+from tests.soak import rare
 
 TYPES = ("arm", "head", "arm_tracker", "scene", "servo_bus", "transforms")
 BASE = "right_arm_base_link"  # the frame of all points here
@@ -26,8 +26,7 @@ Place = tuple[float, float, float]
 
 @cache
 def parts_of(robot: str) -> list[Instance]:
-    plan = compile_robot(str(ROOT / "robots" / robot), profiles=["tracking"], environment={}).plan
-    assert plan
+    _, plan = robot_and_plan(robot, "tracking")
     return [instance for instance in plan.instances if instance.type in TYPES]
 
 
@@ -69,7 +68,7 @@ class Chased:
         return found
 
 
-@pytest.mark.parametrize("robot", AHEAD)
+@pytest.mark.parametrize("robot", ["pi_robot", *rare("pedestal_pi", "porter")])
 def test_the_tip_and_the_head_follow_until_the_point_is_lost(robot: str) -> None:
     chased, ahead = Chased(parts_of(robot)), AHEAD[robot]
     there = (ahead, 0.01, -0.05)
@@ -88,7 +87,7 @@ def test_the_tip_and_the_head_follow_until_the_point_is_lost(robot: str) -> None
     assert "no point has come on 'target'" in chased.ends[0].result.message
 
 
-@pytest.mark.parametrize("robot", AHEAD)
+@pytest.mark.parametrize("robot", ["pi_robot", *rare("pedestal_pi", "porter")])
 def test_a_point_that_hardly_moves_is_where_it_was(robot: str) -> None:
     chased, ahead = Chased(parts_of(robot)), AHEAD[robot]
     there = (ahead, 0.01, -0.05)
@@ -101,7 +100,7 @@ def test_a_point_that_hardly_moves_is_where_it_was(robot: str) -> None:
     assert math.dist(chased.tip, moved) < 0.03
 
 
-@pytest.mark.parametrize("robot", AHEAD)
+@pytest.mark.parametrize("robot", ["pi_robot", *rare("pedestal_pi", "porter")])
 def test_far_points_are_reached_for_and_very_far_ones_let_the_arm_rest_until_they_are_back(robot: str) -> None:
     chased, ahead = Chased(parts_of(robot)), AHEAD[robot]
     follows: Any = chased.bench.component("chase").config

@@ -9,15 +9,14 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.domains.arms.hand import MOST, numbered, picture_of_failure
 from rbxcompose.domains.arms.reasons import GraspReason, MotionReason, StageFailure
 from rbxcompose.msgs.rbxcompose_msgs import PickObject
 from rbxcompose.sdk.bound import Outcome
 from rbxcompose.testing import Bench
-from tests.conftest import ROOT
 from tests.motion.pi_hand import HandBench
 from tests.parts.project import Project
+from tests.shipped import robot_and_plan
 
 FAILURE = StageFailure("lift", MotionReason.PATH_IN_COLLISION, "'box1' and 'target'")
 
@@ -32,8 +31,7 @@ def size_of(file: Path) -> tuple[int, int]:
 
 @pytest.mark.timeout(120)
 def test_the_text_of_a_failed_goal_names_its_picture(tmp_path: Path) -> None:
-    plan = compile_robot(str(ROOT / "robots/pi_robot"), profiles=["table"], environment={}).plan
-    assert plan
+    _, plan = robot_and_plan("pi_robot", "table")
     instances: dict[str, Any] = {
         instance.type: instance for instance in plan.instances if instance.type in ("arm", "servo_bus", "scene")
     }

@@ -8,7 +8,6 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.compiler.plan.model import Instance
 from rbxcompose.domains.arms.motion.gaze import past
 from rbxcompose.msgs.geometry_msgs import Point, PointStamped
@@ -16,15 +15,14 @@ from rbxcompose.msgs.rbxcompose_msgs import LookAtPoint
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.sdk.bound import Outcome
 from rbxcompose.testing import Bench
-from tests.conftest import ROOT
+from tests.shipped import robot_and_plan
 
 TYPES = ("head", "servo_bus", "scene", "transforms")
 
 
 @pytest.fixture(scope="module")
 def parts() -> dict[str, Instance]:
-    plan = compile_robot(str(ROOT / "robots/pi_robot"), profiles=["table"], environment={}).plan
-    assert plan
+    _, plan = robot_and_plan("pi_robot", "table")
     return {instance.type: instance for instance in plan.instances if instance.type in TYPES}
 
 

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from rbxcompose.base.geometry import Transform3
-from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.domains.arms.motion.inverse_kinematics import PoseTarget
 from rbxcompose.domains.arms.motion.scene_messages import pose_message
@@ -44,7 +43,7 @@ from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.sdk.bound import Outcome
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench
-from tests.conftest import ROOT
+from tests.shipped import robot_and_plan
 
 pytestmark = pytest.mark.timeout(180)  # the libraries of arms are slow to import
 TYPES = ("arm", "servo_bus", "scene", "move_group")
@@ -55,9 +54,7 @@ NOTHING = PlanningScene(is_diff=True, robot_state=RobotState(is_diff=True))  # a
 
 @pytest.fixture(scope="module")
 def plan() -> Plan:
-    found = compile_robot(str(ROOT / "robots/pi_robot"), environment={}).plan
-    assert found
-    return found
+    return robot_and_plan("pi_robot")[1]
 
 
 class Client:

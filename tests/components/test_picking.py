@@ -7,12 +7,11 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.msgs.rbxcompose_msgs import AttachObject, DetachObject, PickObject, PlaceObject
 from rbxcompose.sdk.bound import Outcome
 from rbxcompose.testing import Bench
-from tests.conftest import ROOT
+from tests.shipped import robot_and_plan
 from tests.soak import Soak
 
 SEEDS = 20
@@ -21,9 +20,7 @@ TYPES = ("arm", "servo_bus", "scene")
 
 @pytest.fixture(scope="module")
 def plan() -> Plan:
-    found = compile_robot(str(ROOT / "robots/pi_robot"), profiles=["table"], environment={}).plan
-    assert found
-    return found
+    return robot_and_plan("pi_robot", "table")[1]
 
 
 def robot(plan: Plan, seed: int) -> Bench:

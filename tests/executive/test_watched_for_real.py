@@ -19,6 +19,7 @@ import pytest
 from rbxcompose.commands.guest import Guest
 from rbxcompose.commands.lookup import BusPlace
 from rbxcompose.tools.top import MissionsSeen
+from tests.forked import run_command
 
 ROOT = Path(__file__).parents[2]
 PATIENCE = 20.0  # [s]
@@ -55,14 +56,11 @@ class Robot:
         (base / "count.yaml").write_text(MISSION, encoding="utf-8")
 
     def do(self, *words: str) -> str:
-        done = subprocess.run(
-            [sys.executable, "-m", "rbxcompose", *words],
-            env=self.environment,
-            capture_output=True,
-            text=True,
-            timeout=PATIENCE,
-            cwd=ROOT,
-        )
+        command = [sys.executable, "-m", "rbxcompose", *words]
+        if words[0] == "up":
+            done = subprocess.run(command, env=self.environment, capture_output=True, text=True, cwd=ROOT)
+        else:
+            done = run_command(words, self.environment, PATIENCE)
         assert done.returncode == 0, done.stdout + done.stderr
         return done.stdout
 

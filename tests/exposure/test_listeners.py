@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.bus.liveness import probe_key
-from rbxcompose.bus.transport import TransportReply
+from rbxcompose.bus.transport import LONGEST_WAIT, TransportReply
 from rbxcompose.bus.zenoh_session import open_client
 from rbxcompose.bus.zenoh_transport import ZenohTransport
 from rbxcompose.runtime import control
@@ -163,10 +163,10 @@ def answers(endpoint: str, name: str) -> bool:
         transport = ZenohTransport(open_client(endpoint), lambda owner, callback: None)
     except OSError:
         return False
-    transport.ask(probe_key(name), b"", b"", heard.append)
+    transport.ask(probe_key(name), b"", b"", heard.append, of_all=True, within=LONGEST_WAIT)
     deadline = time.monotonic() + 0.5
     while not any(not reply.error for reply in heard) and time.monotonic() < deadline:
-        os.sched_yield()
+        time.sleep(0.005)
     transport.close()
     return any(not reply.error for reply in heard)
 

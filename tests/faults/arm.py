@@ -15,10 +15,11 @@ from typing import Self
 from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.runtime.processes import Process
 from rbxcompose.testing import FakeLine, FakePort, FakeServo
+from tests.commands import command
 from tests.conftest import ROOT
 
 NAME = f"arm_with_faults_{os.getpid()}"
-PATIENCE = 20.0  # [s]
+PATIENCE = 60.0  # [s]
 LIMIT = '<limit lower="-2" upper="2" effort="1" velocity="2"/>'
 BODY = f"""<robot name="arm">
   <link name="base"/><link name="upper"/><link name="lower"/>
@@ -66,7 +67,9 @@ class Arm:
         self.state = RobotFolder(folder / "rbxcompose" / NAME)
         self.line = FakeLine([FakeServo("XL430-W250", id_) for id_ in (1, 2)], time.monotonic)
         self.port = FakePort(self.line, path)
-        self.do("up", "robot.yaml", "--real", "-d")
+        words = [sys.executable, "-m", "rbxcompose", "up", "robot.yaml", "--real", "-d"]
+        ran = subprocess.run(words, cwd=folder, env=self.environment, capture_output=True, text=True, timeout=60)
+        assert ran.returncode == 0, ran.stdout + ran.stderr
 
     def __enter__(self) -> Self:
         return self
@@ -77,15 +80,7 @@ class Arm:
 
     def do(self, *words: str) -> str:
         """Run a command to its end and return what it said."""
-        ran = subprocess.run(
-            [sys.executable, "-m", "rbxcompose", *words],
-            cwd=self._folder,
-            env=self.environment,
-            capture_output=True,
-            text=True,
-            timeout=60,
-            check=False,
-        )
+        ran = command(*words, environment=self.environment, folder=self._folder)
         return ran.stdout + ran.stderr
 
     def command(self, joint: str, position: float) -> None:

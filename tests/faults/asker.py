@@ -13,7 +13,7 @@ from typing import Any
 
 from rbxcompose.bus.names import ActionNames, Attachment, data_key, dds_type
 from rbxcompose.bus.tokens import EntityKind, NodeToken
-from rbxcompose.bus.transport import Closable, TransportReply
+from rbxcompose.bus.transport import LONGEST_WAIT, Closable, TransportReply
 from rbxcompose.bus.wire import WIRE_PROFILES, ros_qos
 from rbxcompose.bus.zenoh_session import open_peer
 from rbxcompose.bus.zenoh_transport import ZenohTransport
@@ -87,7 +87,9 @@ def ask(transport: ZenohTransport, until: float, what: str) -> int:
         asked += 1
         waiting.add(asked)
         key, payload = question(what, asked)
-        transport.ask(key, payload, Attachment(asked, 0, GID).encode(), partial(ended, asked))
+        transport.ask(
+            key, payload, Attachment(asked, 0, GID).encode(), partial(ended, asked), of_all=True, within=LONGEST_WAIT
+        )
     return asked
 
 

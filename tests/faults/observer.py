@@ -18,7 +18,7 @@ from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing.safety import PlanarVelocity, SentVelocity
 
 COMMAND, MOTION = "cmd_vel", "odom"
-PATIENCE = 20.0  # [s]
+PATIENCE = 60.0  # [s]
 LOOK = 0.005  # [s] between two looks at what has come
 TURNING = 0.1  # [rad/s]
 ROLLING = 0.05  # [m/s]; more of either is motion

@@ -20,6 +20,7 @@ from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.runtime.log import NAME as LOG
 from rbxcompose.runtime.processes import Process, titled, wait_until_ended
 from rbxcompose.testing.safety import Base, Laws, violations
+from tests.commands import command
 from tests.conftest import ROOT
 from tests.faults.observer import COMMAND, LOOK, MOTION, PATIENCE, Observer
 
@@ -97,9 +98,9 @@ class Patrol:
 
     def do(self, *words: str) -> str:
         """Run a command on it and return what that printed."""
-        process = self.start(*words)
-        output, _ = process.communicate(timeout=PATIENCE)
-        assert process.returncode == 0, output
+        done = command(*words, environment=self.environment, folder=self._folder)
+        output = done.stdout + done.stderr
+        assert done.returncode == 0, output
         return output
 
     @property

@@ -5,12 +5,9 @@ from __future__ import annotations
 import signal
 from pathlib import Path
 
-import pytest
-
 from tests.faults.arm import Arm
 
 UP = 2048 + 652  # [ticks] of 1 rad
-pytestmark = pytest.mark.timeout(90)
 
 
 def lifted(arm: Arm) -> None:
@@ -23,13 +20,6 @@ def killed(arm: Arm, process: str = "servos") -> None:
     """Kill a process, and wait until it has come back."""
     before = arm.send(process, signal.SIGKILL)
     assert arm.wait_for(lambda: arm.process(process) not in (None, before))
-
-
-def test_a_driver_that_is_killed_leaves_joints_that_the_next_one_relaxes(tmp_path: Path) -> None:
-    with Arm(tmp_path) as arm:
-        lifted(arm)
-        killed(arm)
-        assert arm.wait_for(lambda: arm.torque() == [0, 0])
 
 
 def test_joints_that_are_to_hold_hold_while_their_driver_comes_back(tmp_path: Path) -> None:
@@ -55,7 +45,9 @@ def test_joints_are_parked_before_they_are_relaxed_at_the_end_and_when_the_super
         assert arm.tick(2) == 2048  # it had no torque
 
 
-def test_a_cable_that_is_pulled_and_plugged_in_again_needs_nobody(tmp_path: Path) -> None:
+def test_a_cable_is_plugged_in_again_and_a_killed_driver_leaves_joints_that_the_next_one_relaxes(
+    tmp_path: Path,
+) -> None:
     with Arm(tmp_path) as arm:
         lifted(arm)
         driver = arm.process("servos")
@@ -65,6 +57,9 @@ def test_a_cable_that_is_pulled_and_plugged_in_again_needs_nobody(tmp_path: Path
         assert arm.wait_for(lambda: arm.torque() == [0, 0])
         assert arm.process("servos") == driver
         assert arm.moves("lift_joint", 0.5, lambda: abs(arm.tick() - (2048 + 326)) <= 1)
+        assert arm.torque() == [1, 0]
+        killed(arm)
+        assert arm.wait_for(lambda: arm.torque() == [0, 0])
 
 
 def test_servos_stop_by_themselves_when_their_driver_hangs(tmp_path: Path) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from itertools import pairwise
-from pathlib import Path
 
 import pytest
 
@@ -19,12 +19,24 @@ from tests.faults.patrol import Patrol
 from tests.soak import Soak, rare
 
 RATE = 175_000  # [Hz]; beyond what a machine can send, it sends what it can
-QUICK, MANY = 3, 600  # [s]
+QUICK, MANY = 2, 600  # [s]
 FEW = 30  # [s] of tokens: each costs Zenoh as much as many messages, so that a longer flood takes the whole machine
 ROUNDS = 300  # of the patrol, more than there is time for
 LONGEST_GAP = 1.0  # [s] between two odometries, on a machine that has nothing left to give
 TOLD = 0.8  # of the seconds at least, in each of which diagnostics report
 MOVING = 0.8  # of the time at least
+
+
+@pytest.fixture(scope="module")
+def patrol(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Patrol]:
+    """A robot that each flood leaves on its way."""
+    with Patrol(tmp_path_factory.mktemp("patrol"), times=ROUNDS, hears_commands=False) as made:
+        yield made
+
+
+def lines_of(patrol: Patrol) -> int:
+    """Return how long its log is."""
+    return (patrol.state.path / LOG).read_text(encoding="utf-8").count("\n")
 
 
 class Health:
@@ -46,25 +58,24 @@ class Health:
 
 
 @pytest.mark.timeout(MANY + 60)
-def test_a_flood_is_refused_and_told_while_the_patrol_goes_on(soak: Soak, tmp_path: Path) -> None:
+def test_a_flood_is_refused_and_told_while_the_patrol_goes_on(soak: Soak, patrol: Patrol) -> None:
     seconds = soak.examples(QUICK, MANY)
-    with Patrol(tmp_path, times=ROUNDS, hears_commands=False) as patrol:
-        observer = patrol.observer
-        health = Health(observer)
-        assert observer.wait_until_it_moves(time.monotonic(), lambda: patrol.is_up)
-        before = set(patrol.running())
-        words = [sys.executable, "-m", "tests.faults.flooder", observer.router, COMMAND, str(RATE), str(seconds)]
-        with subprocess.Popen(words, env=patrol.environment, cwd=ROOT, stdout=subprocess.PIPE, text=True) as flooder:
-            assert flooder.stdout is not None
-            flooder.stdout.readline()  # it begins
-            began = time.monotonic()
-            sent = int(flooder.stdout.readline())
-            ended = time.monotonic()
-        motion = [
-            velocity for velocity in list(observer.story) if velocity.topic == MOTION and began < velocity.time < ended
-        ]
-        assert patrol.wait_for(lambda: bool(health.refused) and health.refused[-1][0] > ended)
-        assert set(patrol.running()) == before
+    observer = patrol.observer
+    health = Health(observer)
+    assert observer.wait_until_it_moves(time.monotonic(), lambda: patrol.is_up)
+    before = set(patrol.running())
+    words = [sys.executable, "-m", "tests.faults.flooder", observer.router, COMMAND, str(RATE), str(seconds)]
+    with subprocess.Popen(words, env=patrol.environment, cwd=ROOT, stdout=subprocess.PIPE, text=True) as flooder:
+        assert flooder.stdout is not None
+        flooder.stdout.readline()  # it begins
+        began = time.monotonic()
+        sent = int(flooder.stdout.readline())
+        ended = time.monotonic()
+    motion = [
+        velocity for velocity in list(observer.story) if velocity.topic == MOTION and began < velocity.time < ended
+    ]
+    assert patrol.wait_for(lambda: bool(health.refused) and health.refused[-1][0] > ended)
+    assert set(patrol.running()) == before
     moving = sum(not velocity.is_rest for velocity in motion) / len(motion)
     gap = max(after.time - before.time for before, after in pairwise(motion))
     told = {number for at, number in health.refused if began < at}
@@ -83,25 +94,24 @@ def test_a_flood_is_refused_and_told_while_the_patrol_goes_on(soak: Soak, tmp_pa
 
 @pytest.mark.timeout(MANY + 60)
 @pytest.mark.parametrize("what", ["requests", *rare("goals", "queries", "tokens")])
-def test_a_flood_of_questions_is_refused_while_the_patrol_goes_on(what: str, soak: Soak, tmp_path: Path) -> None:
+def test_a_flood_of_questions_is_refused_while_the_patrol_goes_on(what: str, soak: Soak, patrol: Patrol) -> None:
     seconds = soak.examples(QUICK, FEW if what == "tokens" else MANY)
-    with Patrol(tmp_path, times=ROUNDS, hears_commands=False) as patrol:
-        observer = patrol.observer
-        assert observer.wait_until_it_moves(time.monotonic(), lambda: patrol.is_up)
-        before = set(patrol.running())
-        words = [sys.executable, "-m", "tests.faults.asker", observer.router, what, str(seconds)]
-        with subprocess.Popen(words, env=patrol.environment, cwd=ROOT, stdout=subprocess.PIPE, text=True) as asker:
-            assert asker.stdout is not None
-            asker.stdout.readline()  # it begins
-            began = time.monotonic()
-            asked = int(asker.stdout.readline())
-            ended = time.monotonic()
-            asker.communicate()
-        motion = [
-            velocity for velocity in list(observer.story) if velocity.topic == MOTION and began < velocity.time < ended
-        ]
-        assert set(patrol.running()) == before
-        lines = (patrol.state.path / LOG).read_text(encoding="utf-8").count("\n")
+    observer, lines = patrol.observer, lines_of(patrol)
+    assert observer.wait_until_it_moves(time.monotonic(), lambda: patrol.is_up)
+    before = set(patrol.running())
+    words = [sys.executable, "-m", "tests.faults.asker", observer.router, what, str(seconds)]
+    with subprocess.Popen(words, env=patrol.environment, cwd=ROOT, stdout=subprocess.PIPE, text=True) as asker:
+        assert asker.stdout is not None
+        asker.stdout.readline()  # it begins
+        began = time.monotonic()
+        asked = int(asker.stdout.readline())
+        ended = time.monotonic()
+        asker.communicate()
+    motion = [
+        velocity for velocity in list(observer.story) if velocity.topic == MOTION and began < velocity.time < ended
+    ]
+    assert set(patrol.running()) == before
+    lines = lines_of(patrol) - lines
     moving = sum(not velocity.is_rest for velocity in motion) / len(motion)
     gap = max(after.time - before.time for before, after in pairwise(motion))
     text = f"{asked / seconds:,.0f} {what} a second; it moved for {moving:.0%} of the time, gaps of {gap:.2f} s at most"

@@ -19,7 +19,6 @@ __all__ = ["robot"]
 CALLERS = 4
 
 
-@pytest.mark.timeout(40)
 def test_of_many_that_start_it_at_once_one_does(robot: Robot) -> None:
     started = [robot.up("-d") for _ in range(CALLERS)]
     ends = [(process.communicate(timeout=PATIENCE)[0], process.returncode) for process in started]
@@ -30,7 +29,6 @@ def test_of_many_that_start_it_at_once_one_does(robot: Robot) -> None:
     assert robot.do("down").returncode == 0
 
 
-@pytest.mark.timeout(40)
 @pytest.mark.parametrize("removed", ["*", *rare("state.json", "control.sock", "lock")])
 def test_a_robot_whose_files_were_removed_is_found_and_restores_them(robot: Robot, removed: str) -> None:
     robot.up_detached()
@@ -47,7 +45,6 @@ def test_a_robot_whose_files_were_removed_is_found_and_restores_them(robot: Robo
     assert robot.processes() == []
 
 
-@pytest.mark.timeout(40)
 @pytest.mark.parametrize("is_suspended", [True, *rare(False)])
 def test_stop_and_down_find_a_robot_at_once_whose_state_was_removed(robot: Robot, is_suspended: bool) -> None:
     robot.up_detached()
@@ -61,7 +58,6 @@ def test_stop_and_down_find_a_robot_at_once_whose_state_was_removed(robot: Robot
     assert robot.processes() == []
 
 
-@pytest.mark.timeout(40)
 def test_a_state_that_cannot_be_written_is_told_and_the_robot_goes_on(robot: Robot) -> None:
     robot.up_detached()
     state = robot.folder.path / STATE

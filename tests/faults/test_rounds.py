@@ -24,7 +24,6 @@ def rounds(folder: Path, faults: list[Fault], findings: Findings, names: count[i
             faults = run(patrol, faults, findings)
 
 
-@pytest.mark.timeout(90)
 def test_what_died_or_hung_comes_back_and_the_mission_succeeds(tmp_path: Path) -> None:
     findings = Findings()
     faults = [Fault(MISSION, signal.SIGKILL), Fault(ROBOT, signal.SIGSTOP), Fault(ROUTER, signal.SIGSTOP)]
@@ -33,7 +32,6 @@ def test_what_died_or_hung_comes_back_and_the_mission_succeeds(tmp_path: Path) -
     assert findings.stops
 
 
-@pytest.mark.timeout(60)
 @pytest.mark.parametrize("fault", [Fault(WORLD, signal.SIGSTOP), *rare(Fault(PARENT, signal.SIGSTOP))], ids=str)
 def test_without_what_cannot_come_back_the_robot_comes_to_rest_and_ends(fault: Fault, tmp_path: Path) -> None:
     findings = Findings()

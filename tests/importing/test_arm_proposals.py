@@ -15,13 +15,13 @@ from tests.conftest import ROOT
 from tests.importing.imports import EXAMPLES
 from tests.motion.test_inverse_kinematics import six_joints
 from tests.motion.toy_arm import urdf
+from tests.shipped import robot_and_plan
 
 LIFTER = (EXAMPLES / "srdf/lifter.urdf").read_text()
 
 
 def pi_robot() -> str:
-    robot = compile_robot(str(ROOT / "robots/pi_robot"), environment={}).robot
-    assert robot is not None
+    robot, _ = robot_and_plan("pi_robot")
     return described(robot.manifest).text
 
 

@@ -14,6 +14,7 @@ from rbxcompose.domains.body.link_pairs import digest_of
 from rbxcompose.domains.body.srdf import Semantics
 from rbxcompose.testing.golden import Golden
 from rbxcompose.tools.exporting.srdf import exported, semantics_of
+from tests import shipped
 from tests.body.described import described
 from tests.conftest import ROOT
 from tests.importing.imports import EXAMPLES, Imported, import_files
@@ -53,7 +54,7 @@ def test_what_is_exported_is_imported_as_the_same(robot: str, tmp_path: Path) ->
     if robot == "lifter":
         first = compiled(tmp_path / "one", import_files(LIFTER, "lifter", "srdf"), LIFTER[1])
     else:
-        first = compile_robot(str(ROOT / "robots/pi_robot"), environment={})
+        first = shipped.compiled(str(ROOT / "robots/pi_robot"), environment={})
     assert first.robot is not None
     for name, text in exported(first.robot.manifest.contents, robot).items():
         (tmp_path / name).write_text(text)

@@ -18,6 +18,7 @@ from rbxcompose.testing import Golden, check_text
 from rbxcompose.tools.inspection.diagram import BoxShape, Diagram, WireContent, diagram_of, dot, mermaid
 from rbxcompose.tools.inspection.graph_html import html
 from tests.conftest import ROOT
+from tests.shipped import robot_and_plan
 
 ROBOTS = ("turtlebot", "twins")
 NAMESPACE = {"svg": "http://www.w3.org/2000/svg"}
@@ -25,9 +26,7 @@ NAMESPACE = {"svg": "http://www.w3.org/2000/svg"}
 
 @cache
 def diagram(name: str) -> Diagram:
-    robot = compile_robot(str(ROOT / "robots" / name), environment={}).robot
-    assert robot
-    return diagram_of(robot)
+    return diagram_of(robot_and_plan(name)[0])
 
 
 @pytest.mark.parametrize("name", ROBOTS)

@@ -7,7 +7,6 @@ from functools import cache
 from typing import Any
 
 from rbxcompose.base.geometry import Quaternion, Transform3
-from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.domains.arms.arm_config import ArmConfig, ArmWorks
 from rbxcompose.domains.arms.goals import goal_of
 from rbxcompose.domains.arms.hand import hand_task
@@ -18,7 +17,7 @@ from rbxcompose.domains.arms.motion.scene import PlacedObject, PlanningScene
 from rbxcompose.domains.arms.sections.scene import scene
 from rbxcompose.msgs.rbxcompose_msgs import MoveArm, PickObject, PlaceObject
 from tests.body.described import described
-from tests.conftest import ROOT
+from tests.shipped import robot_and_plan
 
 FINGER = "right_gripper_finger_joint"
 
@@ -26,12 +25,10 @@ FINGER = "right_gripper_finger_joint"
 @cache
 def made() -> tuple[ArmConfig, tuple[PlacedObject, ...], ArmWorks]:
     """Return the configuration of the arm, the objects on its table, and what plans for it."""
-    compiled = compile_robot(str(ROOT / "robots/pi_robot"), profiles=["table"], environment={})
-    assert compiled.plan
-    assert compiled.robot
-    description = described(compiled.robot.manifest)
-    configs: dict[str, Any] = {instance.type: instance.config for instance in compiled.plan.instances}
-    objects = compiled.robot.manifest.contents.of(scene).on(description.body)
+    robot, plan = robot_and_plan("pi_robot", "table")
+    description = described(robot.manifest)
+    configs: dict[str, Any] = {instance.type: instance.config for instance in plan.instances}
+    objects = robot.manifest.contents.of(scene).on(description.body)
     return configs["arm"], objects, ArmWorks(configs["arm"], lambda: 0.0)
 
 

@@ -26,6 +26,13 @@ def gap(points: Array, between: Array, kind: int, size: Array, others: Array, ax
     return hull_gap(points, between, kind, size, others, LEAST, axis, work)
 
 
+def compile_gap() -> None:
+    """Compile it, or read what was compiled before."""
+    gap(
+        np.zeros((4, 3)), np.eye(3, 4), TREE, np.zeros(4), np.ones((8, 3)), np.array((1.0, 0.0, 0.0, 0.0)), hull_work(1)
+    )
+
+
 def frame(rng: np.random.Generator, spread: float) -> Array:
     turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
     turn[:, 0] *= np.linalg.det(turn)

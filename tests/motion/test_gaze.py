@@ -9,12 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.domains.arms.motion.gaze import ENOUGH, Gaze
 from rbxcompose.domains.body.model import Body
 from rbxcompose.domains.servos.limits import MotionLimits
 from tests.body.described import described
-from tests.conftest import ROOT
+from tests.shipped import robot_and_plan
 
 PAN, TILT, CAMERA = "head_pan_joint", "head_tilt_joint", "camera_depth_frame"
 LIMITS = {PAN: MotionLimits(-2.53, 2.53), TILT: MotionLimits(-1.57, 1.57)}
@@ -24,9 +23,7 @@ PANS, TILTS = st.floats(-2.5, 2.5), st.floats(-1.5, 1.5)
 
 @cache
 def body() -> Body:
-    out = compile_robot(str(ROOT / "robots/pi_robot"), environment={})
-    assert out.robot
-    return described(out.robot.manifest).body
+    return described(robot_and_plan("pi_robot")[0].manifest).body
 
 
 def gaze(limits: dict[str, MotionLimits] = LIMITS) -> Gaze:
@@ -64,8 +61,7 @@ def test_what_keeps_it_from_looking_at_a_point_is_named() -> None:
 
 
 def test_joints_that_carry_the_head_count_where_they_are() -> None:
-    tall = compile_robot(str(ROOT / "robots/porter"), environment={}).robot
-    assert tall
+    tall, _ = robot_and_plan("porter")
     tilts = [
         Gaze(described(tall.manifest).body, CAMERA, LIMITS).aimed(AHEAD, {"torso_joint": lift}).positions[TILT]
         for lift in (0.0, 0.3)

@@ -12,7 +12,14 @@ from hypothesis import strategies as st
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.groups import ArmJoint, JointSpace, chain
-from rbxcompose.domains.arms.motion.inverse_kinematics import EDGE, PoseSolutions, PoseTarget, descended, solved
+from rbxcompose.domains.arms.motion.inverse_kinematics import (
+    EDGE,
+    PoseSearch,
+    PoseSolutions,
+    PoseTarget,
+    descended,
+    solved,
+)
 from rbxcompose.domains.servos.limits import MotionLimits
 from tests.body.kinematics import Three, description_of, matrix
 from tests.motion.toy_arm import ended
@@ -66,7 +73,7 @@ def arm(request: pytest.FixtureRequest) -> ArmKinematics:
 
 
 def solve(arm: ArmKinematics, target: PoseTarget, free: bool = True) -> PoseSolutions:
-    return ended(solved(arm, SPACE, target, np.zeros(6), lambda values: free, seed=1))
+    return ended(solved(PoseSearch(arm, SPACE, target, np.zeros(6), lambda values: free, seed=1)))
 
 
 @given(st.integers(0, 2**31))
@@ -180,7 +187,7 @@ def test_a_search_ends_with_its_restarts_or_its_time(arm: ArmKinematics) -> None
     far = PoseTarget(Transform3((9.0, 0.0, 0.0)))
     start = np.zeros(6)
     for restarts in (0, 3):
-        found = ended(solved(arm, SPACE, far, start, lambda values: True, seed=1, restarts=restarts))
+        found = ended(solved(PoseSearch(arm, SPACE, far, start, lambda values: True, seed=1, restarts=restarts)))
         assert found.attempts == restarts + 1
-    late = ended(solved(arm, SPACE, far, start, lambda values: True, seed=1, is_late=lambda: True))
+    late = ended(solved(PoseSearch(arm, SPACE, far, start, lambda values: True, seed=1, is_late=lambda: True)))
     assert late.attempts == 1

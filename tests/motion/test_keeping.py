@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbxcompose.base.geometry import Transform3
-from rbxcompose.domains.arms.motion.inverse_kinematics import PoseSolutions, PoseTarget
+from rbxcompose.domains.arms.motion.inverse_kinematics import PoseSearch, PoseSolutions, PoseTarget
 from rbxcompose.domains.arms.motion.path_constraints import Keep, KeptTip
 from rbxcompose.domains.arms.motion.planner import MotionPlan, MotionPlanner, MotionRequest, PlannerSettings
 from rbxcompose.domains.arms.motion.pose_search import Posture, kept_solutions
@@ -86,13 +86,13 @@ def test_positions_that_bring_the_tip_to_a_point_keep_it_upright() -> None:
     start = frame_of(READY)
     wanted = Transform3((start[0, 3] - 0.05, start[1, 3] + 0.05, start[2, 3]))
     target = PoseTarget(wanted, any_orientation=True)
-    found = ended(kept_solutions(ARM, SPACE, target, UPRIGHT, READY, READY, Free(), seed=1))
+    found = ended(kept_solutions(PoseSearch(ARM, SPACE, target, READY, Free().is_free, 1), UPRIGHT, READY, Free()))
     assert found.free
     for array in found.free:
         assert np.allclose(frame_of(array)[:3, 3], wanted.translation, atol=1e-3)
         assert tilt(start, frame_of(array)) < math.sqrt(2) * TILT
     far = PoseTarget(Transform3((9.0, 0.0, 0.0)), any_orientation=True)
-    none = ended(kept_solutions(ARM, SPACE, far, UPRIGHT, READY, READY, Free(), seed=1))
+    none = ended(kept_solutions(PoseSearch(ARM, SPACE, far, READY, Free().is_free, 1), UPRIGHT, READY, Free()))
     assert not none.free
     assert 7.0 < none.nearest[0] < 9.0
 
@@ -139,7 +139,9 @@ def test_what_is_kept_leaves_room_for_a_posture() -> None:
     space, keep = UPRIGHT.narrowed(SPACE), UPRIGHT
 
     def found(liked: Posture | None) -> PoseSolutions:
-        return ended(kept_solutions(ARM, space, target, keep, READY, READY, Free(), seed=1, posture=liked))
+        return ended(
+            kept_solutions(PoseSearch(ARM, space, target, READY, Free().is_free, 1), keep, READY, Free(), liked)
+        )
 
     without, preferred = found(None).free, found(posture).free
     ways = [posture.distance(SPACE, array) for array in preferred]

@@ -22,6 +22,7 @@ from rbxcompose.runtime.processes import Process, wait_until_ended
 from tests.motion.pi_hand import made
 from tests.motion.test_ways_ahead import CONFINED, cluttered, outcome, planning
 from tests.motion.toy_arm import ended
+from tests.soak import rare
 
 pytestmark = pytest.mark.timeout(200)  # each takes seconds to start
 TIMELESS = float  # a clock that stands still: so many positions are the limit, on any machine
@@ -50,16 +51,25 @@ def wait_for(process: PlanningProcess) -> None:
         os.sched_yield()
 
 
+@pytest.fixture(autouse=True)
+def _asked_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ways_ahead, "ALONE", 0)
+
+
 @pytest.fixture
 def warned() -> list[str]:
     return []
 
 
-@pytest.fixture
-def pair(warned: list[str], monkeypatch: pytest.MonkeyPatch) -> Iterator[list[PlanningProcess]]:
-    """Return two processes that are asked at once."""
-    monkeypatch.setattr(ways_ahead, "ALONE", 0)
-    both = [started(warned) for _ in range(2)]
+@pytest.fixture(scope="module")
+def pair_warned() -> list[str]:
+    return []
+
+
+@pytest.fixture(scope="module")
+def pair(pair_warned: list[str]) -> Iterator[list[PlanningProcess]]:
+    """Return two processes that nothing happens to."""
+    both = [started(pair_warned) for _ in range(2)]
     for process in both:
         wait_for(process)
     yield both
@@ -67,11 +77,13 @@ def pair(warned: list[str], monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Pl
         process.close()
 
 
-def test_one_two_and_three_processes_come_to_the_same(pair: list[PlanningProcess], warned: list[str]) -> None:
-    for seed in SCENES:
-        alone = outcome(seed, (), TIME)
-        assert [outcome(seed, pair[:count], TIME) for count in (1, 2)] == [alone, alone]
-    assert warned == []
+@pytest.mark.parametrize("seed", [SCENES[0], *rare(*SCENES[1:])])
+def test_one_two_and_three_processes_come_to_the_same(
+    pair: list[PlanningProcess], pair_warned: list[str], seed: int
+) -> None:
+    alone = outcome(seed, (), TIME)
+    assert [outcome(seed, pair[:count], TIME) for count in (1, 2)] == [alone, alone]
+    assert pair_warned == []
 
 
 def test_what_a_process_plans_is_what_is_planned_here(pair: list[PlanningProcess]) -> None:
@@ -111,12 +123,14 @@ def answer(process: PlanningProcess, job: PlanJob) -> Planned:
 def test_a_goal_goes_on_without_one_that_is_killed_or_hangs(
     pair: list[PlanningProcess], warned: list[str], number: signal.Signals, told: str
 ) -> None:
-    alone = outcome(CONFINED, (), TIME)
-    os.kill(pair[0].pid, number)
-    assert outcome(CONFINED, pair, TIME) == alone
-    pair[0].patience = 0.0
-    assert outcome(CONFINED, pair[:1], TIME) == alone
-    assert not pair[0].is_idle
+    alone, lost = outcome(CONFINED, (), TIME), started(warned)
+    wait_for(lost)
+    os.kill(lost.pid, number)
+    assert outcome(CONFINED, [lost, pair[1]], TIME) == alone
+    lost.patience = 0.0
+    assert outcome(CONFINED, [lost], TIME) == alone
+    assert not lost.is_idle
+    lost.close()
     assert warned == [f"a process that plans for 'right_arm' {told}: there is one less until the arm starts again"]
 
 

@@ -12,7 +12,14 @@ from hypothesis import strategies as st
 
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
-from rbxcompose.domains.arms.motion.inverse_kinematics import EDGE, PoseSolutions, PoseTarget, descended, solved
+from rbxcompose.domains.arms.motion.inverse_kinematics import (
+    EDGE,
+    PoseSearch,
+    PoseSolutions,
+    PoseTarget,
+    descended,
+    solved,
+)
 from rbxcompose.domains.arms.motion.pose_search import Posture, searched
 from tests.body.kinematics import Three, matrix
 from tests.motion.test_inverse_kinematics import ARM, DESCRIPTION, GROUP, SPACE
@@ -40,7 +47,7 @@ def fast() -> ArmKinematics:
 
 def search(arm: ArmKinematics, target: PoseTarget, posture: Posture | None = None, most: float = 9.0) -> PoseSolutions:
     return ended(
-        searched(arm, SPACE, target, np.zeros(6), lambda values: bool(values[0] < most), seed=1, posture=posture)
+        searched(PoseSearch(arm, SPACE, target, np.zeros(6), lambda values: bool(values[0] < most), 1), posture)
     )
 
 
@@ -192,5 +199,5 @@ def test_solutions_that_slide_together_count_once() -> None:
     found = search(ARM, target, liked).free
     for number, array in enumerate(found):
         assert all(float(np.abs(array - other).max()) > 0.01 for other in found[:number])
-    plain = ended(solved(ARM, SPACE, target, np.zeros(6), lambda values: True, seed=1))
+    plain = ended(solved(PoseSearch(ARM, SPACE, target, np.zeros(6), lambda values: True, seed=1)))
     assert len(found) <= len(plain.free) + 1

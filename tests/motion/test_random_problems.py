@@ -12,7 +12,6 @@ import pytest
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3, quaternion_from_rpy
-from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.domains.arms.arm_config import ArmConfig, ArmPlannerConfig, ArmWorks
 from rbxcompose.domains.arms.motion.figures import ended
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory
@@ -21,8 +20,8 @@ from rbxcompose.domains.arms.motion.scene import PlacedObject
 from rbxcompose.domains.arms.motion.second_checker import sampled
 from rbxcompose.domains.arms.reasons import MotionFailure, MotionReason
 from rbxcompose.domains.body.model import Geometry
-from tests.conftest import ROOT
 from tests.motion.toy_arm import Array
+from tests.shipped import robot_and_plan
 from tests.soak import Soak
 
 QUICK, MANY = 10, 250  # problems for each robot and way of searching
@@ -52,8 +51,7 @@ class Problem:
 
 @cache
 def works_of(robot: str, is_fast: bool) -> ArmWorks:
-    plan = compile_robot(str(ROOT / "robots" / robot), environment={}).plan
-    assert plan
+    _, plan = robot_and_plan(robot)
     [config] = (instance.config for instance in plan.instances if instance.type == "arm")
     assert isinstance(config, ArmConfig)
     return ArmWorks(config.model_copy(update={"planner": ArmPlannerConfig(time=TIME)}), lambda: 0.0, is_fast=is_fast)

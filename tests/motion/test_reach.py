@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rbxcompose.domains.arms.motion.inverse_kinematics import PoseTarget, solved
+from rbxcompose.domains.arms.motion.inverse_kinematics import PoseSearch, PoseTarget, solved
 from rbxcompose.domains.arms.motion.picture import ArmPicture
 from rbxcompose.domains.arms.motion.reach import (
     DIRECTIONS,
@@ -47,7 +47,9 @@ def test_inverse_kinematics_reaches_each_cell_that_is_told_as_reached(seed: int)
         assert not PLANNER.space.outside(reached_cell.values)
         target = PoseTarget(TOY.tip_pose(reached_cell.values), any_orientation=True)
         answer = ended(
-            solved(TOY, PLANNER.space, target, reached_cell.values, PLANNER.checker.is_free, seed=1, enough=1)
+            solved(
+                PoseSearch(TOY, PLANNER.space, target, reached_cell.values, PLANNER.checker.is_free, seed=1, enough=1)
+            )
         )
         assert answer.free
         assert there.cell_of(np.array(TOY.tip_pose(reached_cell.values).translation)) == cell

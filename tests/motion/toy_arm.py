@@ -85,6 +85,18 @@ def fast_planner(
     return made
 
 
+def compile_all() -> None:
+    """Compile what tests call of compiled code, or read what was compiled before."""
+    from rbxcompose.domains.arms.motion.compiled_collisions import chain_of, link_frames
+    from tests.motion.test_compiled_convex import compile_gap
+
+    arm = kinematics()
+    arm.hasten()
+    fast_planner()
+    link_frames(chain_of(arm.body, arm.group, {}, ("tip",))[0], np.zeros(len(arm.group.joints)))
+    compile_gap()
+
+
 def _limits(body: Body, name: str) -> MotionLimits:
     limits = body.joints[name].limits
     assert limits is not None

@@ -15,7 +15,7 @@ from tests.mutate.project import Found, Project
 from tests.soak import Soak
 
 FOUND = Path(__file__).parent / "found"
-QUICK, MANY = 40, 20_000
+QUICK, MANY = 15, 20_000
 
 
 def try_seeds(seeds: range) -> Found:
@@ -40,10 +40,15 @@ def keep(found: Found) -> None:
         path.write_bytes(one.data)
 
 
+@pytest.fixture(scope="module")
+def project(tmp_path_factory: pytest.TempPathFactory) -> Project:
+    return Project(tmp_path_factory.mktemp("project"))
+
+
 @pytest.mark.timeout(0)
-def test_a_mutant_is_refused_with_a_place_or_is_a_robot(soak: Soak) -> None:
+def test_a_mutant_is_refused_with_a_place_or_is_a_robot(project: Project, soak: Soak) -> None:
     count = soak.examples(QUICK, MANY)
-    found = try_on_all_cores(count) if soak.is_on else try_seeds(range(count))
+    found = try_on_all_cores(count) if soak.is_on else project.try_all(range(count))
     keep(found)
     soak.tell(
         "mutants of manifests", found.examples, len(found.failures), f"{found.refused:,} refused, the rest robots"
@@ -58,11 +63,8 @@ KEPT = sorted(path for path in FOUND.iterdir() if path.is_dir()) if FOUND.exists
 
 
 @pytest.mark.parametrize("folder", KEPT, ids=lambda path: path.name)
-def test_what_once_failed_does_not_any_more(folder: Path, tmp_path: Path) -> None:
-    files = {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-    project = Project(tmp_path)
-    project.files = {**files, **project.files}
-    project.judge(files)
+def test_what_once_failed_does_not_any_more(folder: Path, project: Project) -> None:
+    project.judge({str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()})
 
 
 def test_a_seed_gives_the_same_mutant_again() -> None:
@@ -70,6 +72,5 @@ def test_a_seed_gives_the_same_mutant_again() -> None:
     assert [mutant(seed, files) for seed in range(20)] == [mutant(seed, files) for seed in range(20)]
 
 
-def test_what_is_not_changed_has_no_finding(tmp_path: Path) -> None:
-    project = Project(tmp_path)
+def test_what_is_not_changed_has_no_finding(project: Project) -> None:
     assert [list(out.report) for out in map(project.compile, project.robots)] == [[]] * len(project.robots)

@@ -60,10 +60,10 @@ def test_it_picks_and_places_with_every_seed(soak: Soak) -> None:
 
 
 @pytest.mark.timeout(300)
-def test_it_fetches_and_carries_with_ideal_servos_too() -> None:
-    plan = compiled("tables").plan
+def test_it_picks_and_places_with_ideal_servos_too() -> None:
+    plan = compiled("table").plan
     assert plan
-    run = ran(plan, "fetch_and_carry", 1, "ideal")  # a test of the mission does it with servos like real ones
+    run = ran(plan, "pick_and_place", 1, "ideal")  # tests of missions run with servos like real ones
     assert run.outcome == "success", run.log
 
 

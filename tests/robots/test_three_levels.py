@@ -22,6 +22,7 @@ from rbxcompose.msgs.std_msgs import Float64
 from rbxcompose.msgs.std_srvs import SetBool, Trigger
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench
+from tests.commands import command
 from tests.conftest import ROOT
 
 PAN, LIFT = "head_pan_joint", "right_arm_shoulder_lift_joint"
@@ -57,8 +58,8 @@ class Stage(ABC):
         """Move a joint; return whether it arrives. On a loaded machine so many replies may be lost that it stops."""
         for _ in range(TRIES):
             self.command(joint, position)
-            for _ in range(4):
-                self.wait(1.0)
+            for _ in range(16):
+                self.wait(0.25)
                 if abs(self.at(joint) - position) < TICK:
                     return True
         return False
@@ -116,14 +117,14 @@ class Spoken(Stage):
         (folder / "temporary").mkdir()
         own = {"XDG_RUNTIME_DIR": str(folder), "TMPDIR": str(folder / "temporary"), "PYTHONPATH": str(ROOT)}
         self.environment = {**os.environ, **own, "NO_COLOR": "1"}
-        self.told = self.do("up", "-d", "--set", "buses.servos.sim=pty", "--set", f"bus.port={port}", "robots/pi_robot")
+        up = [sys.executable, "-m", "rbxcompose", "up", "-d", "robots/pi_robot"]
+        up += ["--set", "buses.servos.sim=pty", "--set", f"bus.port={port}"]
+        ran = subprocess.run(up, cwd=ROOT, env=self.environment, capture_output=True, text=True, timeout=60)
+        self.told = ran.stdout
 
     def do(self, *words: str) -> str:
         """Run a command to its end and return what it said."""
-        command = [sys.executable, "-m", "rbxcompose", *words]
-        ran = subprocess.run(
-            command, cwd=ROOT, env=self.environment, capture_output=True, text=True, timeout=60, check=False
-        )
+        ran = command(*words, environment=self.environment, folder=ROOT)
         return ran.stdout + ran.stderr
 
     def command(self, joint: str, position: float) -> None:
@@ -136,7 +137,7 @@ class Spoken(Stage):
         assert "success: true" in self.do("service", "call", f"{joint}/relax")
 
     def wait(self, seconds: float) -> None:
-        time.sleep(seconds / 2)  # asking takes as long
+        time.sleep(seconds)
 
     def at(self, joint: str) -> float:
         told = json.loads(self.do("topic", "echo", "joint_states", "--count", "1", "--json").splitlines()[0])

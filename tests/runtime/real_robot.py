@@ -14,12 +14,13 @@ from typing import Any
 from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.runtime.log import NAME, PREVIOUS, read_log
 from rbxcompose.runtime.processes import Process, titled
+from tests.commands import command
 
 ROOT = Path(__file__).parents[2]
 TOY = [sys.executable, str(Path(__file__).with_name("toy_robot.py"))]
 COMMAND = [sys.executable, "-m", "rbxcompose"]
 LOG_FILES = {NAME, PREVIOUS}
-PATIENCE = 10.0  # [s]
+PATIENCE = 60.0  # [s]; how long things may take is for their tests to say
 
 
 def eventually(holds: Callable[[], bool]) -> None:
@@ -57,9 +58,7 @@ class Robot:
 
     def do(self, *words: str) -> subprocess.CompletedProcess[str]:
         """Run a command on it."""
-        return subprocess.run(
-            [*COMMAND, *words], env=self.environment, capture_output=True, text=True, timeout=PATIENCE, cwd=ROOT
-        )
+        return command(*words, environment=self.environment, folder=ROOT)
 
     def ps(self) -> dict[str, Any]:
         found: dict[str, Any] = json.loads(self.do("ps", "--json").stdout)

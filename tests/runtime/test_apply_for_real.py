@@ -15,9 +15,10 @@ from typing import Any
 import pytest
 
 from rbxcompose.runtime.processes import titled
+from tests.commands import command
 from tests.conftest import ROOT
 
-PATIENCE = 20.0  # [s]
+PATIENCE = 60.0  # [s]
 NAME = "turtlebot_that_changes"
 TEXT = (ROOT / "robots/turtlebot/robot.yaml").read_text(encoding="utf-8").replace("name: turtlebot", f"name: {NAME}")
 
@@ -44,10 +45,11 @@ class Changing:
         os.replace(new_file, self.file)
 
     def plain(self, *words: str) -> subprocess.CompletedProcess[str]:
-        command = [sys.executable, "-m", "rbxcompose", *words]
-        return subprocess.run(
-            command, env=self.environment, cwd=self.folder, capture_output=True, text=True, timeout=PATIENCE
-        )
+        return command(*words, environment=self.environment, folder=self.folder)
+
+    def up(self) -> None:
+        words = [sys.executable, "-m", "rbxcompose", "up", "-d", "robots/turtlebot"]
+        subprocess.run(words, env=self.environment, cwd=self.folder, timeout=PATIENCE, check=True)
 
     def do(self, *words: str, code: int = 0) -> str:
         done = self.plain(*words)
@@ -82,10 +84,9 @@ AT_REST = ("start: patrol\n", "")
 BODY = ("  urdf: rbx:robots/turtlebot/turtlebot.urdf\n", "  urdf: large.urdf\n")
 
 
-@pytest.mark.timeout(60)
 def test_only_what_has_changed_restarts(robot: Changing) -> None:
     robot.edit(AT_REST)
-    robot.do("up", "-d", "robots/turtlebot")
+    robot.up()
     before = robot.ps()
     robot.edit(AT_REST, ("default: 0.3 m/s", "default: 0.4 m/s"), ("priority: 100", "priority: 90"), LAMP)
     assert "  added         lamp" in robot.do("apply", "robots/turtlebot", "--dry-run")
@@ -111,12 +112,11 @@ def test_only_what_has_changed_restarts(robot: Changing) -> None:
     assert len([process for process in titled(f"rbxcompose {NAME}: ") if process.is_running]) == 6
 
 
-@pytest.mark.timeout(60)
 def test_what_is_longer_than_a_socket_holds_reaches_a_process_that_runs(robot: Changing) -> None:
     urdf = robot.file.parent / "large.urdf"
     urdf.write_text(f"<robot>{LINK}{'<!---->' * 75_000}</robot>", encoding="utf-8")
     robot.edit(AT_REST, BODY)
-    robot.do("up", "-d", "robots/turtlebot")
+    robot.up()
     urdf.write_text(f"<robot>{LINK}{'<thing/>' * 60_000}</robot>", encoding="utf-8")
     shown = robot.do("apply", "robots/turtlebot", "--yes")
     assert "urdf: 525,044 characters, " in shown
@@ -124,9 +124,8 @@ def test_what_is_longer_than_a_socket_holds_reaches_a_process_that_runs(robot: C
     assert robot.ps()["robot_description"]["state"] == "active"
 
 
-@pytest.mark.timeout(60)
 def test_mistakes_simulated_truth_and_what_is_unsafe_change_nothing(robot: Changing) -> None:
-    robot.do("up", "-d", "robots/turtlebot")
+    robot.up()
     before = robot.ps()
     robot.edit(("reach: 20 cm", "raech: 20 cm"))
     assert "RBX1001" in robot.do("apply", "robots/turtlebot", "--yes", code=1)
@@ -147,10 +146,9 @@ def test_mistakes_simulated_truth_and_what_is_unsafe_change_nothing(robot: Chang
     robot.eventually(lambda: "'base' moves" in robot.why_not())  # through the new mux
 
 
-@pytest.mark.timeout(60)
 def test_who_needs_what_has_failed_for_good_is_blocked_until_the_next_apply(robot: Changing) -> None:
     robot.edit(AT_REST, ("    type: go_to\n", "    type: go_to\n    process: legs\n    restart: never\n"))
-    robot.do("up", "-d", "robots/turtlebot")
+    robot.up()
     os.kill(robot.ps()["go_to"]["pid"], signal.SIGKILL)
     robot.eventually(lambda: robot.ps()["mission"]["state"] == "blocked")
     shown = robot.ps()
@@ -166,7 +164,6 @@ def test_who_needs_what_has_failed_for_good_is_blocked_until_the_next_apply(robo
     assert robot.ps() == after  # from the state file, which is as new as the last change
 
 
-@pytest.mark.timeout(60)
 def test_up_watch_takes_what_the_files_say(robot: Changing) -> None:
     words = [sys.executable, "-m", "rbxcompose", "up", "--watch", "robots/turtlebot"]
     with subprocess.Popen(

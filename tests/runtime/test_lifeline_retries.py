@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
 
 from rbxcompose.bus.liveness import MISSES
 from rbxcompose.bus.renewal import RenewableTransport
-from rbxcompose.bus.transport import LONGEST_WAIT, NoTransport, Transport, TransportReply
+from rbxcompose.bus.transport import NoTransport, OnReply, Transport
 from rbxcompose.runtime.process_group.connection import BEAT, FIRST_PAUSE, LIFELINE_BEATS, LONGEST_PAUSE, Lifeline
 
 OPENED_ANEW = "the session on the bus no longer carries anything; opening it again"
@@ -17,14 +16,7 @@ class Deaf(NoTransport):
     """A session on which no question is ever answered."""
 
     def ask(
-        self,
-        key: str,
-        payload: bytes,
-        attachment: bytes,
-        answered: Callable[[TransportReply], None],
-        *,
-        of_all: bool = True,
-        within: float = LONGEST_WAIT,
+        self, key: str, payload: bytes, attachment: bytes, answered: OnReply, *, of_all: bool, within: float
     ) -> Deaf:
         return self
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from rbxcompose.commands.new_files import write_new
+from rbxcompose.domains.servos.command_actions import NewServo, ServoRobotAnswers, servo_robot_files
 from rbxcompose.domains.servos.models import servo_models
-from rbxcompose.domains.servos.new_robot import NewServo, ServoRobotAnswers, servo_robot_files
 from rbxcompose.testing import check_file
 from tests.loops import for_all
 

@@ -10,7 +10,7 @@ from typing import Protocol, TypeVar
 
 from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.local import Post
-from rbxcompose.bus.transport import LONGEST_WAIT, Arrival, Question, TransportReply
+from rbxcompose.bus.transport import Arrival, OnReply, Question, TransportReply
 from rbxcompose.bus.zenoh_transport import GONE
 from rbxcompose.sdk.ports import Qos
 
@@ -223,7 +223,7 @@ class _Asked:
     """A request that waits for those that serve it."""
 
     transport: SimulatedTransport
-    answered: Callable[[TransportReply], None]
+    answered: OnReply
     servers: list[str] = field(default_factory=list)  # sessions that have not answered
 
     def take(self, session: str, answer: TransportReply) -> None:
@@ -334,14 +334,7 @@ class SimulatedTransport:
         return self.servers[-1]
 
     def ask(
-        self,
-        key: str,
-        payload: bytes,
-        attachment: bytes,
-        answered: Callable[[TransportReply], None],
-        *,
-        of_all: bool = True,
-        within: float = LONGEST_WAIT,
+        self, key: str, payload: bytes, attachment: bytes, answered: OnReply, *, of_all: bool, within: float
     ) -> _Asked:
         asked = _Asked(self, answered)
         self.asked.append(asked)

@@ -54,8 +54,8 @@ def applied(folder: Path, monkeypatch: pytest.MonkeyPatch, hosts: Sequence[_Host
     shares = {(host.name, "r"): host for host in hosts}
     system = System(Path("s.yaml"), "s", hosts={host.name: host.model for host in hosts})
     monkeypatch.setattr(system_runs, "compiled_for", lambda path, arguments, verb: system)
-    monkeypatch.setattr(system_runs, "is_reachable", lambda system: True)
-    monkeypatch.setattr(system_runs, "shares_of", lambda system, config: shares)
+    monkeypatch.setattr("rbxcompose.commands.hosts.require_reachable", lambda system: None)
+    monkeypatch.setattr("rbxcompose.commands.hosts.shares_of", lambda system, config: shares)
     monkeypatch.setattr(system_runs, "bundle_of", lambda system: argparse.Namespace(system="s.yaml"))
     given = {"undo": None, "host": None, "robot": None, "partial": False, "json": False, "dry_run": False}
     given |= {"yes": True, "real": False, "ssh_config": None, **options}

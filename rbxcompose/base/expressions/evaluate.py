@@ -3,32 +3,12 @@
 A tree becomes a function of the scope at its first use: missions evaluate the same conditions again and again.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Mapping
 from operator import add, ge, gt, le, lt, mul, sub, truediv
 from typing import TypeAlias
 
+from rbxcompose.base.expressions import tree as syntax
 from rbxcompose.base.expressions.functions import FUNCTIONS, items
-from rbxcompose.base.expressions.tree import (
-    Arithmetic,
-    Comparison,
-    Expression,
-    ExpressionNode,
-    FieldAccess,
-    Flag,
-    FunctionCall,
-    Index,
-    Items,
-    Junction,
-    Membership,
-    Minus,
-    Not,
-    Number,
-    Text,
-    Variable,
-    Word,
-)
 from rbxcompose.base.expressions.values import (
     LONGEST_TEXT,
     MOST_IN_ALL,
@@ -53,7 +33,7 @@ _ORDERS: Mapping[str, Callable[[float, float], bool]] = {"<": lt, "<=": le, ">":
 _OPERATIONS: Mapping[str, Callable[[float, float], float]] = {"+": add, "-": sub, "*": mul, "/": truediv}
 
 
-def evaluate(expression: Expression, scope: Scope) -> Value:
+def evaluate(expression: syntax.Expression, scope: Scope) -> Value:
     """Return the value of an expression: a float in SI, a flag, a text, a list, a map or something opaque.
 
     Raises:
@@ -70,7 +50,7 @@ def evaluate(expression: Expression, scope: Scope) -> Value:
     return _limited_within(_limited(value, tree), tree)
 
 
-def holds(expression: Expression, scope: Scope) -> bool:
+def holds(expression: syntax.Expression, scope: Scope) -> bool:
     """Return whether a condition holds, evaluating it from left to right until it is decided.
 
     A condition that reaches a value that has not arrived yet does not hold, not even under `not`.
@@ -87,45 +67,45 @@ def holds(expression: Expression, scope: Scope) -> bool:
         return False
 
 
-def _run(node: ExpressionNode) -> Evaluate:
+def _run(node: syntax.ExpressionNode) -> Evaluate:
     """Return a function that computes the value of a part of an expression."""
     match node:
-        case Variable():
+        case syntax.Variable():
             return _variable(node)
-        case Number(value=value) | Text(value=value):
+        case syntax.Number(value=value) | syntax.Text(value=value):
             return lambda scope: value
-        case Flag() | Comparison() | Junction() | Not() | Membership():
+        case syntax.Flag() | syntax.Comparison() | syntax.Junction() | syntax.Not() | syntax.Membership():
             return _ask(node)
-        case Word(name=name):
+        case syntax.Word(name=name):
             return lambda scope: _known(scope.word, name, name, node)
-        case FieldAccess() | Index():
+        case syntax.FieldAccess() | syntax.Index():
             return _part(node)
-        case FunctionCall():
+        case syntax.FunctionCall():
             return _called(node)
-        case Arithmetic():
+        case syntax.Arithmetic():
             return _computed(node)
-        case Minus(operand=operand):
+        case syntax.Minus(operand=operand):
             measure = _measure(operand)
             return lambda scope: -measure(scope)
-        case Items(items=nodes):
+        case syntax.Items(items=nodes):
             runs = [_run(item) for item in nodes]
             return lambda scope: [run(scope) for run in runs]
 
 
-def _ask(node: ExpressionNode) -> Predicate:
+def _ask(node: syntax.ExpressionNode) -> Predicate:
     """Return a function that evaluates a part of an expression that must be true or false."""
     match node:
-        case Flag(value=flag):
+        case syntax.Flag(value=flag):
             return lambda scope: flag
-        case Comparison():
+        case syntax.Comparison():
             return _compared(node)
-        case Junction(operator=operator, operands=operands):
+        case syntax.Junction(operator=operator, operands=operands):
             wanted, asks = operator == "or", [_ask(operand) for operand in operands]
             return lambda scope: any(ask(scope) is wanted for ask in asks) is wanted
-        case Not(operand=operand):
+        case syntax.Not(operand=operand):
             inner = _ask(operand)
             return lambda scope: not inner(scope)
-        case Membership(item=item, group=group):
+        case syntax.Membership(item=item, group=group):
             sought, among = _run(item), _run(group)
             return lambda scope: _is_among(sought(scope), _items(among(scope), group))
     run = _run(node)
@@ -143,9 +123,9 @@ def _is_among(sought: Value, group: list[Value]) -> bool:
     return any(is_same(sought, each) for each in group)
 
 
-def _measure(node: ExpressionNode) -> Measure:
+def _measure(node: syntax.ExpressionNode) -> Measure:
     """Return a function that computes a part of an expression that must be a number."""
-    if isinstance(node, Number):
+    if isinstance(node, syntax.Number):
         number = node.value
         return lambda scope: number
     run = _run(node)
@@ -158,7 +138,7 @@ def _measure(node: ExpressionNode) -> Measure:
     return measure
 
 
-def _variable(node: Variable) -> Evaluate:
+def _variable(node: syntax.Variable) -> Evaluate:
     name = node.name
 
     def run(scope: Scope) -> Value:
@@ -173,14 +153,14 @@ def _variable(node: Variable) -> Evaluate:
     return run
 
 
-def _known(look_up: Callable[[str], Value], name: str, shown: str, node: ExpressionNode) -> Value:
+def _known(look_up: Callable[[str], Value], name: str, shown: str, node: syntax.ExpressionNode) -> Value:
     try:
         return look_up(name)
     except KeyError:
         raise EvaluationError(f"unknown name '{shown}'", node.start, node.end) from None
 
 
-def _number(value: Value, node: ExpressionNode) -> float:
+def _number(value: Value, node: syntax.ExpressionNode) -> float:
     # Every comparison with NaN is false, so `not` would make it true.
     if isinstance(value, float) and value == value:
         return value
@@ -189,13 +169,13 @@ def _number(value: Value, node: ExpressionNode) -> float:
     raise EvaluationError("this is not a number", node.start, node.end)
 
 
-def _moderate(value: float, node: ExpressionNode) -> float:
+def _moderate(value: float, node: syntax.ExpressionNode) -> float:
     if not abs(value) < MOST:
         raise EvaluationError("the result is not finite or not below 1e15", node.start, node.end)
     return value
 
 
-def _limited(value: Value, node: ExpressionNode) -> Value:
+def _limited(value: Value, node: syntax.ExpressionNode) -> Value:
     if isinstance(value, str) and len(value) > LONGEST_TEXT:
         raise EvaluationError(f"the text has more than {LONGEST_TEXT:,} characters", node.start, node.end)
     if isinstance(value, list | tuple | Mapping) and len(value) > MOST_ITEMS:
@@ -203,7 +183,7 @@ def _limited(value: Value, node: ExpressionNode) -> Value:
     return value
 
 
-def _limited_within(value: Value, node: ExpressionNode) -> Value:
+def _limited_within(value: Value, node: syntax.ExpressionNode) -> Value:
     """Return a value within the limits; this stops one that a mission grows in each round, such as `[$x, $x]`."""
     level, left = [value], MOST_IN_ALL
     for _ in range(MOST_LEVELS):
@@ -222,14 +202,14 @@ def _inside(value: Value) -> Collection[Value]:
     return value if isinstance(value, list | tuple) else ()
 
 
-def _items(value: Value, node: ExpressionNode) -> list[Value]:
+def _items(value: Value, node: syntax.ExpressionNode) -> list[Value]:
     try:
         return items(value)
     except ValueError as error:
         raise EvaluationError(f"'in' {error}", node.start, node.end) from None
 
 
-def _compared(node: Comparison) -> Predicate:
+def _compared(node: syntax.Comparison) -> Predicate:
     if order := _ORDERS.get(node.operator):
         measure, other = _measure(node.left), _measure(node.right)
         return lambda scope: order(measure(scope), other(scope))
@@ -245,7 +225,7 @@ def _compared(node: Comparison) -> Predicate:
     return ask
 
 
-def _computed(node: Arithmetic) -> Evaluate:
+def _computed(node: syntax.Arithmetic) -> Evaluate:
     left, right, operation = _run(node.left), _run(node.right), _OPERATIONS[node.operator]
 
     def run(scope: Scope) -> Value:
@@ -263,23 +243,23 @@ def _computed(node: Arithmetic) -> Evaluate:
     return run
 
 
-def _part(node: FieldAccess | Index) -> Evaluate:
+def _part(node: syntax.FieldAccess | syntax.Index) -> Evaluate:
     of = _run(node.of)
-    if isinstance(node, FieldAccess):
+    if isinstance(node, syntax.FieldAccess):
         name = node.name
         return lambda scope: _entry(of(scope), name, node)
     index = _run(node.index)
     return lambda scope: _entry(of(scope), index(scope), node)
 
 
-def _entry(whole: Value, key: Value, node: FieldAccess | Index) -> Value:
+def _entry(whole: Value, key: Value, node: syntax.FieldAccess | syntax.Index) -> Value:
     if not isinstance(key, str) and is_named_pose(key):
         key = key.name
     if isinstance(whole, Mapping):
         if isinstance(key, str) and key in whole:
             return whole[key]
         raise EvaluationError(f"there is no entry '{key}'", node.start, node.end)
-    if isinstance(node, FieldAccess) or not isinstance(whole, list | tuple):
+    if isinstance(node, syntax.FieldAccess) or not isinstance(whole, list | tuple):
         raise EvaluationError("this has no entries", node.of.start, node.of.end)
     position = _number(key, node.index)
     if not (position.is_integer() and 0 <= position < len(whole)):
@@ -288,7 +268,7 @@ def _entry(whole: Value, key: Value, node: FieldAccess | Index) -> Value:
     return whole[int(position)]
 
 
-def _called(node: FunctionCall) -> Evaluate:
+def _called(node: syntax.FunctionCall) -> Evaluate:
     function, name = FUNCTIONS[node.function], node.function
     compute, wrong = function.compute, function.wrong_count(len(node.arguments))
     if compute is None or wrong:
@@ -310,12 +290,12 @@ def _called(node: FunctionCall) -> Evaluate:
     return run
 
 
-def _asked(node: FunctionCall, scope: Scope, wrong: str) -> Value:
+def _asked(node: syntax.FunctionCall, scope: Scope, wrong: str) -> Value:
     """Return what only the scope knows about a `$name`."""
     if wrong:
         raise EvaluationError(f"{node.function}() {wrong}", node.start, node.end)
     argument = node.arguments[0]
-    if not isinstance(argument, Variable):
+    if not isinstance(argument, syntax.Variable):
         raise EvaluationError(f"{node.function}() needs a name with '$'", argument.start, argument.end)
     ask = scope.age if node.function == "age" else scope.is_new
     value = _known(ask, argument.name, f"${argument.name}", argument)

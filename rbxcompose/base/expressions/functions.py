@@ -1,7 +1,5 @@
 """The functions of the expression language: all of them, with their number of arguments and what they compute."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 

@@ -1,35 +1,13 @@
 """Text to tokens, and tokens to a tree, by binding strength."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Sequence
 from enum import Enum, auto
 from functools import lru_cache
 
 from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.expressions import tree as syntax
 from rbxcompose.base.expressions.functions import FOREIGN, FUNCTIONS
-from rbxcompose.base.expressions.tree import (
-    Arithmetic,
-    Comparison,
-    Expression,
-    ExpressionError,
-    ExpressionNode,
-    FieldAccess,
-    Flag,
-    FunctionCall,
-    Index,
-    Items,
-    Junction,
-    Membership,
-    Minus,
-    Not,
-    Number,
-    Text,
-    Variable,
-    Word,
-    walk,
-)
 from rbxcompose.base.findings import suggest
 from rbxcompose.base.units import NUMBER_TEXT, UNITS, Quantity, UnitError, quantity, unit_help
 
@@ -109,7 +87,8 @@ def tokens(text: str) -> Iterator[Token]:
     position = 0
     kind = None
     while kind is not TokenKind.END:
-        start = _space_end(text, position)
+        space = _SPACE.match(text, position)
+        start = space.end() if space else position
         match = _TOKEN.match(text, start)
         if not match or not match.lastgroup:
             raise _unreadable(text, start)
@@ -120,11 +99,6 @@ def tokens(text: str) -> Iterator[Token]:
         yield Token(kind, match[match.lastgroup], start, position, read)
 
 
-def _space_end(text: str, position: int) -> int:
-    space = _SPACE.match(text, position)
-    return space.end() if space else position
-
-
 def _with_unit(text: str, start: int, end: int) -> tuple[Quantity, int]:
     """Return the quantity whose number stands at `start` to `end`, and where its unit ends."""
     number = text[start:end]
@@ -132,22 +106,24 @@ def _with_unit(text: str, start: int, end: int) -> tuple[Quantity, int]:
     if unit and unit[1] == "in" and _VALUE.match(text, unit.end()):
         unit = None
     elif not unit and (wrong := _NO_UNIT.match(text, end)):
-        raise ExpressionError(f"unknown unit '{wrong[1]}'", wrong.start(1), wrong.end(1), unit_help(wrong[1], number))
+        raise syntax.ExpressionError(
+            f"unknown unit '{wrong[1]}'", wrong.start(1), wrong.end(1), unit_help(wrong[1], number)
+        )
     if unit:
         end = unit.end()
     try:
         return quantity(number, UNITS[unit[1]] if unit else None), end
     except UnitError as error:
-        raise ExpressionError(error.message, start, end) from None
+        raise syntax.ExpressionError(error.message, start, end) from None
 
 
-def _unreadable(text: str, start: int) -> ExpressionError:
+def _unreadable(text: str, start: int) -> syntax.ExpressionError:
     foreign = next((symbol for symbol in _FOREIGN if text.startswith(symbol, start)), None)
     shown = foreign or text[start]
     fix = _FOREIGN[foreign] if foreign else ""
     if braces := _IN_BRACES.match(text, start):
         fix = f"write '${braces[1]}'"
-    return ExpressionError(f"{shown!r} means nothing in an expression", start, start + len(shown), fix)
+    return syntax.ExpressionError(f"{shown!r} means nothing in an expression", start, start + len(shown), fix)
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,7 +179,7 @@ _PARSER_FOREIGN = {
 
 
 @lru_cache(_REMEMBERED)
-def parse(text: str) -> Expression:
+def parse(text: str) -> syntax.Expression:
     """Read a condition, a value or an argument, in which `$name` is looked up while the robot runs.
 
     Raises:
@@ -212,7 +188,7 @@ def parse(text: str) -> Expression:
     return _parse(text, running=True)
 
 
-def parse_fill(text: str) -> Expression:
+def parse_fill(text: str) -> syntax.Expression:
     """Read the text between `${` and `}`, which is filled in when the files are composed: it allows no `$name`.
 
     Raises:
@@ -221,22 +197,22 @@ def parse_fill(text: str) -> Expression:
     return _parse(text, running=False)
 
 
-def _parse(text: str, *, running: bool) -> Expression:
+def _parse(text: str, *, running: bool) -> syntax.Expression:
     if len(text) > LONGEST:
         message = f"an expression may have {LONGEST:,} characters; this one has {len(text):,}"
-        raise ExpressionError(message, LONGEST, len(text))
+        raise syntax.ExpressionError(message, LONGEST, len(text))
     parser = _Parser(tokens(text), running)
     tree = parser.expression()
     parser.end()
-    for steps, (node, level) in enumerate(walk(tree), start=1):
+    for steps, (node, level) in enumerate(syntax.walk(tree), start=1):
         if level > LEVELS or steps > STEPS:
             raise _too_much(node.start, node.end)
-    return Expression(text, tree)
+    return syntax.Expression(text, tree)
 
 
-def _too_much(start: int, end: int) -> ExpressionError:
+def _too_much(start: int, end: int) -> syntax.ExpressionError:
     limits = f"an expression may have {LEVELS} levels and {STEPS} parts"
-    return ExpressionError(limits, start, end, "compute a part of it with 'set' first")
+    return syntax.ExpressionError(limits, start, end, "compute a part of it with 'set' first")
 
 
 class _Parser:
@@ -259,7 +235,9 @@ class _Parser:
     def close(self, symbol: str, opened: Token) -> Token:
         """Take the bracket that closes `opened`."""
         if self.now.kind is TokenKind.END:
-            raise ExpressionError(f"'{opened.text}' is not closed", opened.start, opened.end, f"write '{symbol}'")
+            raise syntax.ExpressionError(
+                f"'{opened.text}' is not closed", opened.start, opened.end, f"write '{symbol}'"
+            )
         if not self.at(symbol):
             raise self.unexpected()
         return self.take()
@@ -268,15 +246,15 @@ class _Parser:
         if self.now.kind is not TokenKind.END:
             raise self.unexpected()
 
-    def unexpected(self) -> ExpressionError:
+    def unexpected(self) -> syntax.ExpressionError:
         """Return what is wrong with a token in the place of an operator."""
         token = self.now
         if token.kind is TokenKind.SYMBOL:
-            return ExpressionError(f"'{token.text}' does not belong here", token.start, token.end)
+            return syntax.ExpressionError(f"'{token.text}' does not belong here", token.start, token.end)
         message = f"an operator is missing before '{token.text}'"
-        return ExpressionError(message, token.start, token.end, _PARSER_FOREIGN.get(token.text, ""))
+        return syntax.ExpressionError(message, token.start, token.end, _PARSER_FOREIGN.get(token.text, ""))
 
-    def expression(self, binding: int = 0) -> ExpressionNode:
+    def expression(self, binding: int = 0) -> syntax.ExpressionNode:
         """Read operands and all operators between them that bind tighter than `binding`."""
         self.level += 1
         if self.level > LEVELS:
@@ -286,20 +264,20 @@ class _Parser:
         while self.now.kind is TokenKind.SYMBOL and (strength := _BINDING.get(self.now.text, 0)) > binding:
             if compared and strength == _COMPARED:
                 help_text = "write 'a < b and b < c'"
-                raise ExpressionError("comparisons cannot be chained", self.now.start, self.now.end, help_text)
+                raise syntax.ExpressionError("comparisons cannot be chained", self.now.start, self.now.end, help_text)
             compared = strength == _COMPARED
             left = self.operation(left, strength)
         self.level -= 1
         return left
 
-    def operation(self, left: ExpressionNode, strength: int) -> ExpressionNode:
+    def operation(self, left: syntax.ExpressionNode, strength: int) -> syntax.ExpressionNode:
         operator = self.take()
         if operator.text in ("and", "or"):
             operands = [left, self.expression(strength)]
             while self.at(operator.text):
                 self.take()
                 operands.append(self.expression(strength))
-            return Junction(left.start, operands[-1].end, operator.text, tuple(operands))
+            return syntax.Junction(left.start, operands[-1].end, operator.text, tuple(operands))
         if operator.text == "not":
             if not self.at("in"):
                 raise self.unexpected()
@@ -308,71 +286,75 @@ class _Parser:
         start, end = left.start, right.end
         match operator.text:
             case "in":
-                return Membership(start, end, left, right)
+                return syntax.Membership(start, end, left, right)
             case "not":
-                return Not(start, end, Membership(start, end, left, right))
+                return syntax.Not(start, end, syntax.Membership(start, end, left, right))
             case "+" | "-" | "*" | "/":
-                return Arithmetic(start, end, operator.text, left, right)
+                return syntax.Arithmetic(start, end, operator.text, left, right)
             case _:
-                return Comparison(start, end, operator.text, left, right)
+                return syntax.Comparison(start, end, operator.text, left, right)
 
-    def operand(self) -> ExpressionNode:
+    def operand(self) -> syntax.ExpressionNode:
         token = self.take()
         match token.kind:
             case TokenKind.NUMBER if token.quantity:
-                return Number(token.start, token.end, token.quantity.value, token.quantity.dimension)
+                return syntax.Number(token.start, token.end, token.quantity.value, token.quantity.dimension)
             case TokenKind.TEXT:
-                return Text(token.start, token.end, token.text[1:-1])
+                return syntax.Text(token.start, token.end, token.text[1:-1])
             case TokenKind.VARIABLE:
                 return self.parts(self.variable(token))
             case TokenKind.WORD:
                 return self.call(token) if self.at("(") else self.parts(self.word(token))
             case TokenKind.SYMBOL:
                 return self.symbol(token)
-        raise ExpressionError("a value is missing at the end", token.start, token.end)
+        raise syntax.ExpressionError("a value is missing at the end", token.start, token.end)
 
-    def symbol(self, token: Token) -> ExpressionNode:
+    def symbol(self, token: Token) -> syntax.ExpressionNode:
         match token.text:
             case "true" | "false":
-                return Flag(token.start, token.end, token.text == "true")
+                return syntax.Flag(token.start, token.end, token.text == "true")
             case "-":
                 operand = self.expression(_MINUS)
-                return Minus(token.start, operand.end, operand)
+                return syntax.Minus(token.start, operand.end, operand)
             case "not":
                 operand = self.expression(_NOT)
-                return Not(token.start, operand.end, operand)
+                return syntax.Not(token.start, operand.end, operand)
             case "(":
                 inner = self.expression()
                 self.close(")", token)
-                return self.parts(inner) if isinstance(inner, Variable | Word | FieldAccess | Index) else inner
+                return (
+                    self.parts(inner)
+                    if isinstance(inner, syntax.Variable | syntax.Word | syntax.FieldAccess | syntax.Index)
+                    else inner
+                )
             case "[":
                 items, end = self.items("]", token)
-                return Items(token.start, end, items)
-        raise ExpressionError(f"a value is missing before '{token.text}'", token.start, token.end)
+                return syntax.Items(token.start, end, items)
+        raise syntax.ExpressionError(f"a value is missing before '{token.text}'", token.start, token.end)
 
-    def variable(self, token: Token) -> Variable:
+    def variable(self, token: Token) -> syntax.Variable:
         if not self.running:
             message = f"'${token.text}' is known only while the robot runs"
             help_text = "'${...}' is filled in earlier: write a name without '$', such as 'args.speed'"
-            raise ExpressionError(message, token.start, token.end, help_text)
-        return Variable(token.start, token.end, token.text)
+            raise syntax.ExpressionError(message, token.start, token.end, help_text)
+        return syntax.Variable(token.start, token.end, token.text)
 
-    def word(self, token: Token) -> Word:
+    def word(self, token: Token) -> syntax.Word:
         if token.text in _PARSER_FOREIGN:
             message = f"'{token.text}' means nothing in an expression"
-            raise ExpressionError(message, token.start, token.end, _PARSER_FOREIGN[token.text])
-        return Word(token.start, token.end, token.text)
+            raise syntax.ExpressionError(message, token.start, token.end, _PARSER_FOREIGN[token.text])
+        return syntax.Word(token.start, token.end, token.text)
 
-    def call(self, name: Token) -> FunctionCall:
+    def call(self, name: Token) -> syntax.FunctionCall:
         if name.text not in FUNCTIONS:
             help_text = FOREIGN.get(name.text) or suggest(name.text, FUNCTIONS, "the functions are")
-            raise ExpressionError(f"unknown function '{name.text}'", name.start, name.end, help_text)
+            raise syntax.ExpressionError(f"unknown function '{name.text}'", name.start, name.end, help_text)
         arguments, end = self.items(")", self.take())
-        return FunctionCall(name.start, end, name.text, arguments)
+        return syntax.FunctionCall(name.start, end, name.text, arguments)
 
-    def items(self, closing: str, opened: Token) -> tuple[tuple[ExpressionNode, ...], int]:
+    def items(self, closing: str, opened: Token) -> tuple[tuple[syntax.ExpressionNode, ...], int]:
         """Read comma-separated values up to the closing bracket; return them and its end."""
-        read: list[ExpressionNode] = []
+        read: list[syntax.ExpressionNode] = []
         if not self.at(closing):
             read.append(self.expression())
             while self.at(","):
@@ -380,19 +362,19 @@ class _Parser:
                 read.append(self.expression())
         return tuple(read), self.close(closing, opened).end
 
-    def parts(self, node: ExpressionNode) -> ExpressionNode:
+    def parts(self, node: syntax.ExpressionNode) -> syntax.ExpressionNode:
         """Read the fields and indices that follow a value."""
         while self.at(".", "["):
             opened = self.take()
             if opened.text == "[":
                 index = self.expression()
-                node = Index(node.start, self.close("]", opened).end, node, index)
+                node = syntax.Index(node.start, self.close("]", opened).end, node, index)
                 continue
             names = self.take()
             if names.kind is not TokenKind.WORD and names.text not in KEYWORDS:
-                raise ExpressionError("a field's name is missing after '.'", opened.start, names.end)
+                raise syntax.ExpressionError("a field's name is missing after '.'", opened.start, names.end)
             end = names.start - 1
             for name in names.text.split("."):
                 end += 1 + len(name)
-                node = FieldAccess(node.start, end, node, name)
+                node = syntax.FieldAccess(node.start, end, node, name)
         return node

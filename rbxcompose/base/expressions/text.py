@@ -1,7 +1,5 @@
 """Text arguments: `$name` and `$name.field` are filled in, `$$` is a dollar, everything else is text."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Mapping
 from typing import TypeAlias

@@ -1,7 +1,5 @@
 """Data of an evaluation: values, the scope that has them, and the errors that may end it."""
 
-from __future__ import annotations
-
 from enum import Enum
 from typing import Final, Protocol, TypeAlias, TypeGuard, runtime_checkable
 

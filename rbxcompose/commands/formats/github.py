@@ -1,7 +1,5 @@
 """Findings as GitHub workflow commands; GitHub shows each next to its line of the change."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from rbxcompose.base.findings import Finding, Report, Sources, Span

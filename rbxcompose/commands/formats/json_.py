@@ -1,7 +1,5 @@
 """Findings as JSON, with all that is known of each."""
 
-from __future__ import annotations
-
 import json
 
 from rbxcompose.base.findings import Finding, Fix, Report, Sources, Span

@@ -1,7 +1,5 @@
 """Findings as SARIF 2.1.0, the interchange format of static analysis; code scanning and editors read it."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable
 from pathlib import Path, PurePath

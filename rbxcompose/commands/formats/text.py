@@ -1,7 +1,5 @@
 """Findings for people: the message, the place, the line with a caret, what to do."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from rbxcompose.base.findings import Finding, Related, Report, Severity, Sources, Span

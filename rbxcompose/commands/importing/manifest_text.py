@@ -1,7 +1,5 @@
 """The text of a manifest with a comment behind each line, that says where its values came from."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Files of ROS parameters, and their values as values of a manifest."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import PurePath
 

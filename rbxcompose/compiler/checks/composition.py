@@ -1,7 +1,5 @@
 """Rules about layers and parts of a robot."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from itertools import pairwise
 from typing import Any

@@ -1,24 +1,10 @@
 """Rules about missions that need the whole robot."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Iterator
 from pathlib import Path
 
 from rbxcompose.base.config import MISSION as MISSION_NAME
-from rbxcompose.base.expressions.tree import (
-    Expression,
-    ExpressionError,
-    ExpressionNode,
-    FunctionCall,
-    Index,
-    Junction,
-    Not,
-    Number,
-    Variable,
-    new_names,
-    walk,
-)
+from rbxcompose.base.expressions import tree as syntax
 from rbxcompose.base.expressions.types import FLAG, TypeKind
 from rbxcompose.base.expressions.values import Value
 from rbxcompose.base.findings import Finding, Related, Severity, Span, suggest
@@ -55,9 +41,9 @@ def never_holds(robot: Robot) -> Iterator[Finding]:
         yield never_holds.at(span, message, help=_cure(asked.expression), related=related)
 
 
-def _cure(expression: Expression) -> str:
+def _cure(expression: syntax.Expression) -> str:
     tree = expression.tree
-    is_contrary = isinstance(tree, Junction) and all(truth(operand, {}) is None for operand in tree.operands)
+    is_contrary = isinstance(tree, syntax.Junction) and all(truth(operand, {}) is None for operand in tree.operands)
     contrary = "its parts contradict each other: join them by 'or', or change a limit"
     return contrary if is_contrary else "compare with a level that can be reached"
 
@@ -68,11 +54,14 @@ def beyond_list(robot: Robot) -> Iterator[Finding]:
     for mission in robot.missions.values():
         known = constants(mission)
         for scalar, expression in _expressions(mission.program):
-            if any(isinstance(tree, FunctionCall) and tree.function == "count" for tree, _ in walk(expression.tree)):
+            if any(
+                isinstance(tree, syntax.FunctionCall) and tree.function == "count"
+                for tree, _ in syntax.walk(expression.tree)
+            ):
                 continue  # the expression checks how long the list is before it takes the item
-            for tree, _ in walk(expression.tree):
+            for tree, _ in syntax.walk(expression.tree):
                 match tree:
-                    case Index(of=Variable(name=name), index=Number(value=index)):
+                    case syntax.Index(of=syntax.Variable(name=name), index=syntax.Number(value=index)):
                         items, datum = known.get(name), mission.program.data.get(name)
                         if datum and isinstance(items, list | tuple) and index >= len(items):
                             yield beyond_list.at(
@@ -84,7 +73,7 @@ def beyond_list(robot: Robot) -> Iterator[Finding]:
                             )
 
 
-def _expressions(program: Program) -> Iterator[tuple[ScalarNode, Expression]]:
+def _expressions(program: Program) -> Iterator[tuple[ScalarNode, syntax.Expression]]:
     """Yield all expressions of a mission, the arguments of its skills included."""
     yield from ((asked.scalar, asked.expression) for _, asked in program.asked())
     for node in program.nodes:
@@ -92,7 +81,7 @@ def _expressions(program: Program) -> Iterator[tuple[ScalarNode, Expression]]:
             if isinstance(argument.value, ScalarNode):
                 try:
                     yield argument.value, expression_of(argument.value)
-                except ExpressionError:
+                except syntax.ExpressionError:
                     continue  # reported where missions are read
 
 
@@ -150,9 +139,9 @@ def _goals(robot: Robot, program: Program) -> Iterator[tuple[MissionNode, str]]:
                 continue
             try:
                 tree = expression_of(argument.value).tree
-            except ExpressionError:
+            except syntax.ExpressionError:
                 continue
-            if isinstance(tree, Variable):
+            if isinstance(tree, syntax.Variable):
                 yield node, tree.name
 
 
@@ -163,7 +152,7 @@ def _texts(program: Program, node: MissionNode, name: str, known: Constants) -> 
         above = program.nodes[above.parent]
         if above.item == name:
             items = above.step.items or ()
-            listed = items.tree.name if not isinstance(items, tuple) and isinstance(items.tree, Variable) else ""
+            listed = items.tree.name if not isinstance(items, tuple) and isinstance(items.tree, syntax.Variable) else ""
             found = known.get(listed)
             texts = found if isinstance(found, list | tuple | dict) else ()
             yield from ((text, listed) for text in texts if isinstance(text, str))
@@ -210,23 +199,23 @@ def _keeps_out(robot: Robot, program: Program, earlier: Interrupt, later: Interr
     return (takes_time or earlier.afterwards == END) and implies(other, expression, known)
 
 
-def _is_its_own(robot: Robot, expression: Expression) -> bool:
-    calls = (part for part, _ in walk(expression.tree) if isinstance(part, FunctionCall))
+def _is_its_own(robot: Robot, expression: syntax.Expression) -> bool:
+    calls = (part for part, _ in syntax.walk(expression.tree) if isinstance(part, syntax.FunctionCall))
     names = {name.name for name in expression.names}
     return any(call.function in _ITS_OWN for call in calls) or bool(names & robot.names.events)
 
 
-def implies(narrow: Expression, wide: Expression, known: Known) -> bool:
+def implies(narrow: syntax.Expression, wide: syntax.Expression, known: Known) -> bool:
     """Return whether one condition surely holds whenever another one does."""
     all_of, any_of = _parts(narrow.tree, "and"), _parts(wide.tree, "or")
     if {narrow.text[node.start : node.end] for node in all_of} & {wide.text[node.start : node.end] for node in any_of}:
         return True
     start, end = narrow.tree.start, narrow.tree.end
-    return truth(Junction(start, end, "and", (*all_of, Not(start, end, wide.tree))), known) is False
+    return truth(syntax.Junction(start, end, "and", (*all_of, syntax.Not(start, end, wide.tree))), known) is False
 
 
-def _parts(tree: ExpressionNode, operator: str) -> tuple[ExpressionNode, ...]:
-    return tree.operands if isinstance(tree, Junction) and tree.operator == operator else (tree,)
+def _parts(tree: syntax.ExpressionNode, operator: str) -> tuple[syntax.ExpressionNode, ...]:
+    return tree.operands if isinstance(tree, syntax.Junction) and tree.operator == operator else (tree,)
 
 
 @check("RBX4181", Severity.WARNING, closed=(WIRING,))
@@ -253,11 +242,11 @@ def _may_be_stale(robot: Robot, name: str) -> bool:
     return is_outside and source.type == FLAG and entry.event is None
 
 
-def _wanted(condition: Expression) -> list[str]:
+def _wanted(condition: syntax.Expression) -> list[str]:
     """Return the flags whose last messages may make a condition hold."""
-    tree, fresh = condition.tree, new_names(condition)
-    operands = tree.operands if isinstance(tree, Junction) else (tree,)
-    return [operand.name for operand in operands if isinstance(operand, Variable) and operand.name not in fresh]
+    tree, fresh = condition.tree, syntax.new_names(condition)
+    operands = tree.operands if isinstance(tree, syntax.Junction) else (tree,)
+    return [operand.name for operand in operands if isinstance(operand, syntax.Variable) and operand.name not in fresh]
 
 
 _ENDING = ".yaml"

@@ -1,7 +1,5 @@
 """Rules about places and the ways between them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from itertools import combinations

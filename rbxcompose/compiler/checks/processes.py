@@ -1,7 +1,5 @@
 """Rules about processes, restarts, simulation and access."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from rbxcompose.base.findings import Finding, Related, Severity

@@ -1,7 +1,5 @@
 """Rules about settings that missions change."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 

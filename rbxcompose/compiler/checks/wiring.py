@@ -1,7 +1,5 @@
 """Rules about wires: ports, topics, types, servers, and the order in which components start."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from rbxcompose.base.findings import Finding, Related, Severity, suggest

@@ -1,7 +1,5 @@
 """A composed robot as YAML that reads back as the same robot."""
 
-from __future__ import annotations
-
 import json
 import math
 import os

@@ -1,7 +1,5 @@
 """The layers of a robot, bottom to top: parts, robot, profiles, overlays, `--set`."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field, replace
 from itertools import islice

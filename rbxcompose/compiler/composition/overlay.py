@@ -3,8 +3,6 @@
 Maps merge by key, all else is replaced; each value keeps its place, and a `History` keeps what it replaced.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import replace
 from operator import is_

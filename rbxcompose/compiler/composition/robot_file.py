@@ -1,7 +1,5 @@
 """A robot's file from text to `RobotManifest`, section by section."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -16,17 +14,10 @@ from rbxcompose.compiler.composition.layers import Chosen, Composed, compose_rob
 from rbxcompose.compiler.composition.robot_manifest import RobotManifest
 from rbxcompose.compiler.composition.scopes import fill_scopes
 from rbxcompose.compiler.doubts import has_a_section_twice, without_half_entries
+from rbxcompose.manifest import registry
 from rbxcompose.manifest.documents import Documents, ManifestHeader
 from rbxcompose.manifest.files import find, project_of, shown_name
 from rbxcompose.manifest.fill import SHOWN_SECRET, fill, names_of
-from rbxcompose.manifest.registry import (
-    broken_sections,
-    model_for,
-    naming_in_use,
-    section_named,
-    sections,
-    sections_in_use,
-)
 from rbxcompose.manifest.scalars import is_empty
 from rbxcompose.manifest.secrets import Secrets
 from rbxcompose.manifest.section import ROBOT, Contents, Section
@@ -40,14 +31,14 @@ def without_strayed(root: MappingNode, keys: Container[str], report: Report) -> 
     left = dict(root.entries)
     empty = [
         section
-        for section in sections_in_use(ROBOT)
+        for section in registry.sections_in_use(ROBOT)
         if section.names and (node := root.get(section.name)) and is_empty(node)
     ]
     for name, entry in root.entries.items():
         home = (
             None
             if name in keys
-            else next((section for section in sections_in_use(ROBOT) if name in section.names_in(root)), None)
+            else next((section for section in registry.sections_in_use(ROBOT) if name in section.names_in(root)), None)
         )
         if name not in keys and home is None and len(empty) == 1 and isinstance(entry.value, MappingNode):
             home = empty[0]
@@ -95,19 +86,19 @@ def read_sections(
 
     The tree is not whole if one of the robot's parts could not be read.
     """
-    documents.report.extend([*broken_sections(), *_shown_secrets(root)])
+    documents.report.extend([*registry.broken_sections(), *_shown_secrets(root)])
     contents = Contents(
         root,
         file,
         documents,
-        sections_in_use(),
-        others=sections,
-        named=section_named,
+        registry.sections_in_use(),
+        others=registry.sections,
+        named=registry.section_named,
         is_simulated=sim,
         is_whole=is_whole,
     )
     documents.report.extend(_taken_names(contents))
-    for section in sections_in_use(ROBOT):
+    for section in registry.sections_in_use(ROBOT):
         if section.is_composed:
             contents.of(section)
     return RobotManifest(
@@ -131,7 +122,7 @@ def _shown_secrets(root: MappingNode) -> Iterator[Finding]:
 def _taken_names(contents: Contents) -> Iterator[Finding]:
     """Yield a finding for each name of something that runs that is already taken."""
     root = contents.root
-    running = list(naming_in_use(COMPONENT))
+    running = list(registry.naming_in_use(COMPONENT))
     for index, section in enumerate(running):
         for name in () if section.has_topics else _placed_names(contents, section):
             span = key_span(root, (section.name, *section.at, name))
@@ -152,7 +143,7 @@ def _placed_names(contents: Contents, section: Section[Any, Any]) -> Iterator[st
 
 def _own_name(name: str, section: Section[Any, Any]) -> str:
     """Return why a user must not use a name, or nothing."""
-    if name in RESERVED or ((other := section_named(name)) is not None and ROBOT in other.files):
+    if name in RESERVED or ((other := registry.section_named(name)) is not None and ROBOT in other.files):
         return f"a {section.entry} cannot be named like the section '{name}'"
     return f"every robot already runs a component '{name}'" if name in ALWAYS_THERE else ""
 
@@ -161,7 +152,7 @@ def _other_owner(
     root: MappingNode, name: str, section: Section[Any, Any], others: list[Section[Any, Any]]
 ) -> tuple[str, str, tuple[str, ...]] | None:
     """Return the other owner of a name: a message, a label, and its path."""
-    for one in sections_in_use(ROBOT):
+    for one in registry.sections_in_use(ROBOT):
         if name in one.brings and one.name in root:
             return f"the {one.name} already brings a component '{name}'", f"the {one.name}", (one.name,)
     for other in others:
@@ -199,7 +190,7 @@ def load_robot(
     root = documents.read(file, ROBOT)
     if root is None:
         return None
-    root = documents.meant(model_for(ROBOT, root), root)
+    root = documents.meant(registry.model_for(ROBOT, root), root)
     composed = compose_robot(root, file, Chosen(profiles, overlays, sets), documents)
     manifest = _manifest(composed, file, sim, environment or {}, documents)
     if manifest is not None:
@@ -216,7 +207,7 @@ def load_robot(
 def _manifest(
     composed: Composed, file: Path, sim: bool, environment: Mapping[str, str], documents: Documents
 ) -> RobotManifest | None:
-    keys = model_for(ROBOT, composed.root)
+    keys = registry.model_for(ROBOT, composed.root)
     documents.check(keys, without_strayed(composed.root, keys.model_fields, documents.report))
     names = names_of(_name(composed.root), sim, environment, Secrets(project_of(file), environment))
     filled = fill_scopes(composed, names)

@@ -1,7 +1,5 @@
 """The robot as the front end returns it."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import field, replace

@@ -1,7 +1,5 @@
 """Arguments of the robot and of the instances of parts, and filling in references to them, each in its own scope."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 

@@ -4,8 +4,6 @@ A value is written in the layer in effect: the robot's file, `with:` of a part, 
 an argument is written where that argument gets its value. One that no file writes is added to its component.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -47,7 +45,14 @@ def edit_of(
         if argument is None:
             reason = f"it is computed: '{written.text}'"
             raise UnsavableError(reason, "change what it is computed from, or write the value itself", written.span)
-        return _argument_edit(manifest, sources, written, argument, value, dimension)
+        scope = written.scope
+        if not scope:
+            return edit_of(manifest, sources, ("args", argument, "default"), value, dimension)
+        above: KeyPath = ("include", scope, "with")
+        if at(manifest.include, (*above, argument)) is None and at(manifest.include, above) is None:
+            reason = f"the part '{scope}' has its own default for the argument '{argument}'"
+            raise UnsavableError(reason, f"give it to the part: 'with: {{{argument}: ...}}'", written.span)
+        return edit_of(manifest, sources, (*above, argument), value, dimension)
     if written is None:
         return _added(manifest, sources, path, value, dimension)
     return _replaced(manifest, sources, path, written, value, dimension)
@@ -78,25 +83,6 @@ def _joined(there: str, text: str) -> str:
         return there + text
     before, _, end = there.rpartition("}")
     return f"{before}, {inner[: inner.rindex('}')]}}}{end}"
-
-
-def _argument_edit(
-    manifest: RobotManifest,
-    sources: Sources,
-    written: ScalarNode,
-    argument: str,
-    value: object,
-    dimension: Dimension | None,
-) -> Edit:
-    """Return the edit of an argument: of its default in the robot's file, or of what a part is given."""
-    scope = written.scope
-    if not scope:
-        return edit_of(manifest, sources, ("args", argument, "default"), value, dimension)
-    above: KeyPath = ("include", scope, "with")
-    if at(manifest.include, (*above, argument)) is None and at(manifest.include, above) is None:
-        reason = f"the part '{scope}' has its own default for the argument '{argument}'"
-        raise UnsavableError(reason, f"give it to the part: 'with: {{{argument}: ...}}'", written.span)
-    return edit_of(manifest, sources, (*above, argument), value, dimension)
 
 
 def _replaced(

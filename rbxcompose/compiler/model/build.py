@@ -1,14 +1,12 @@
 """From the manifest to the robot: sections become components, ports become ends of wires, actions become skills."""
 
-from __future__ import annotations
-
 from bisect import bisect_left, insort
 from collections.abc import Collection, Mapping
 from dataclasses import field, replace
 
 from rbxcompose.base.config import Config, is_live, key_of, leaves
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.findings import Report
+from rbxcompose.base.findings import Finding, Itself, Report, once
 from rbxcompose.base.levels import LOG_LEVELS
 from rbxcompose.compiler.composition.robot_file import read_mission
 from rbxcompose.compiler.composition.robot_manifest import RobotManifest
@@ -27,11 +25,12 @@ from rbxcompose.compiler.model.values import value_of
 from rbxcompose.compiler.sections.missions import missions
 from rbxcompose.manifest.registry import sections_in_use
 from rbxcompose.manifest.section import ROBOT, Contents, WantedComponent
-from rbxcompose.manifest.tree import at
+from rbxcompose.manifest.tree import MappingNode, at
 from rbxcompose.missions.analysis.effects import sent_by, settings_of
 from rbxcompose.missions.analysis.uses import Using
 from rbxcompose.missions.engine.inputs import bind_inputs
 from rbxcompose.missions.language.reader import Budget, read_program
+from rbxcompose.missions.program.program import Program
 from rbxcompose.missions.sources import ValueSource
 from rbxcompose.sdk.capabilities import Drives, require_declared
 from rbxcompose.sdk.ports import In, Out
@@ -58,7 +57,7 @@ def read_missions(
     `skills` are the names of all existing skills.
     """
     found: dict[str, RobotMission] = {}
-    budget = Budget()
+    budget, there = Budget(), frozenset(skills)
     for name, entry in manifest.missions.items():
         root = read_mission(
             entry.path,
@@ -69,7 +68,10 @@ def read_missions(
             environment=environment,
             span=entry.span,
         )
-        program = read_program(root, report, skills, budget) if root else None
+        if root is None:
+            continue
+        program, findings, budget = _program(Itself(root), there, budget.held, budget.written)
+        report.extend(findings)
         if program is not None:
             gone = manifest.history.removed("places")
             given, is_begun = entry.with_.entries, name == manifest.start and entry.is_sound
@@ -81,6 +83,15 @@ def read_missions(
     report.extend(using.findings)
     written = frozenset(missions.names_in(manifest.root))
     return ReadMissions(found, frozenset((written - found.keys()) | using.broken))
+
+
+@once  # a profile rarely changes a mission
+def _program(
+    root: Itself[MappingNode], skills: frozenset[str], held: int, written: int
+) -> tuple[Program | None, list[Finding], Budget]:
+    """Return a mission's program, what was found in it, and what is left of a budget."""
+    report, left = Report(), Budget(held, written)
+    return read_program(root.value, report, skills, left), report.findings, left
 
 
 MISSION = "mission"
@@ -111,7 +122,7 @@ def build_robot(
     }
     robot = Robot(manifest, components, values, skills, missions.read, missions.unread, topics, services, outside)
     if manifest.missions:
-        components[MISSION] = mission_component(robot)
+        return replace(robot, components={**components, MISSION: mission_component(robot)})
     return robot
 
 

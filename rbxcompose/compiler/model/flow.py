@@ -1,7 +1,5 @@
 """How messages flow: publishers and subscribers of a topic, which commands reach which base."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator
 
 from rbxcompose.base.dataclass import dataclass

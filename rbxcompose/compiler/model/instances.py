@@ -1,7 +1,5 @@
 """Order and overlap of components: what starts after what, what two instances of a part share."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from graphlib import CycleError, TopologicalSorter
 

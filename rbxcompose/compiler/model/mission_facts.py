@@ -1,7 +1,5 @@
 """What a robot's missions know of its driving, its levels and conditions."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 

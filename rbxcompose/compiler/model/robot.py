@@ -1,7 +1,5 @@
 """The typed model of a whole robot: its components with their wires, its skills, values and missions."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import field
 from functools import cached_property
@@ -219,7 +217,17 @@ class Robot:
 
     def declared(self, kind: type[K]) -> list[tuple[RobotComponent, K]]:
         """Return the capabilities of a kind, each with the component that declares it."""
-        return [(component, one) for component in self.components.values() for one in component.declared(kind)]
+        if kind not in self._by_capability:
+            components = self.components.values()
+            self._by_capability[kind] = [
+                (component, one) for component in components for one in component.declared(kind)
+            ]
+        return [*self._by_capability[kind]]
+
+    @cached_property
+    def _by_capability(self) -> dict[type, list[tuple[RobotComponent, Any]]]:
+        """Return what `declared` has found so far: many rules ask for the same."""
+        return {}
 
     def key(self, *path: str | int) -> Span:
         """Return the place of a key of the composed manifest, or of the nearest one above it."""

@@ -1,7 +1,5 @@
 """What missions can use of the robot: skills, topics to publish on, services to call."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from typing import Any
 

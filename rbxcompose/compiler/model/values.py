@@ -1,7 +1,5 @@
 """Values: the field of a message that a `$name` of the missions refers to, and what it measures."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from rbxcompose.base.expressions.types import TYPES, UNKNOWN, Type, TypeKind, choice_of, quantity_of

@@ -1,7 +1,5 @@
 """From a checked robot to its plan."""
 
-from __future__ import annotations
-
 from rbxcompose.compiler.model.instances import start_order
 from rbxcompose.compiler.model.robot import Robot, RobotComponent
 from rbxcompose.compiler.plan.model import BusPlan, Instance, Plan, Wire

@@ -1,7 +1,5 @@
 """The difference between two plans, and which processes of a running robot it affects."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import fields, is_dataclass

@@ -5,8 +5,6 @@ that loading a file creates nothing but plans. Configurations are validated agai
 located tree. Maps are sorted by key, so that equal plans give equal texts, unless their order must be kept.
 """
 
-from __future__ import annotations
-
 import json
 import types
 from collections.abc import Callable, Iterable, Mapping

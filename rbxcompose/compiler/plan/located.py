@@ -1,7 +1,5 @@
 """The located tree as data for JSON, and back: a plan keeps a mission as the tree that it was read from."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from rbxcompose.base.findings import Span

@@ -3,8 +3,6 @@
 `python -m rbxcompose.compiler.schema.documents FOLDER` writes them; a test fails when one is out of date.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 from collections.abc import Callable, Iterable, Mapping

@@ -1,7 +1,5 @@
 """Schemas of entries that name their type, such as components: one per type, from its configuration."""
 
-from __future__ import annotations
-
 import inspect
 import textwrap
 from collections.abc import Iterable, Mapping

@@ -1,7 +1,5 @@
 """Schema of a mission file: nodes by kind, modifiers, and the skills of the known component types."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Iterable, Iterator, Mapping
 from types import MappingProxyType

@@ -4,8 +4,6 @@ A definition describes changes, and `whole_` before its name what is complete: i
 must be there. So each key is described once.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """Schemas of the files that consist of sections: robots, the parts they include, and their overlays."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Schemas of single scalars: quantities with units, expressions, names, and `${...}` in place of any."""
 
-from __future__ import annotations
-
 import re
 from functools import cache
 from typing import Annotated, Any

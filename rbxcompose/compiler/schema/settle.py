@@ -1,7 +1,5 @@
 """From pydantic's JSON Schema to that of a manifest: draft 7, quantities with units, `${...}` where a scalar is."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, Literal
 

@@ -1,7 +1,5 @@
 """The section `args`: what a user of a robot or part may want to set."""
 
-from __future__ import annotations
-
 from rbxcompose.base.config import ARGUMENT
 from rbxcompose.base.findings import Span
 from rbxcompose.manifest.arguments import ArgumentModel, DeclaredArgument, read_argument

@@ -1,7 +1,5 @@
 """The section `bus`: how messages travel."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator

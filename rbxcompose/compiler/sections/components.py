@@ -1,7 +1,5 @@
 """The section `components`: each entry's type, options and configuration."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Iterator, Mapping, Set
 from dataclasses import replace
 from difflib import get_close_matches

@@ -1,7 +1,5 @@
 """The section `include`: the parts of a robot."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Annotated, Any
 

@@ -1,7 +1,5 @@
 """The section `missions`: what the robot can do."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any

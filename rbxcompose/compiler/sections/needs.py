@@ -1,7 +1,5 @@
 """The section `needs`: what must exist outside a part."""
 
-from __future__ import annotations
-
 from rbxcompose.base.config import Config
 from rbxcompose.manifest.fields import InterfaceName, TopicName
 from rbxcompose.manifest.registry import section

@@ -1,7 +1,5 @@
 """The section `places`: named poses."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from rbxcompose.base.config import PLACE, Angle, Config, Length, Place

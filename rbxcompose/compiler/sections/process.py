@@ -1,7 +1,5 @@
 """The section `process`: the process group of a robot that has a single one."""
 
-from __future__ import annotations
-
 from rbxcompose.base.config import Name
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import OVERLAY, ROBOT, Reading

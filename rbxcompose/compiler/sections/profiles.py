@@ -1,7 +1,5 @@
 """The section `profiles`: changes to the robot that are applied on request."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from rbxcompose.base.config import Name

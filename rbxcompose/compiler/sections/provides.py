@@ -1,7 +1,5 @@
 """The section `provides`: what a part offers to the rest of the robot."""
 
-from __future__ import annotations
-
 from rbxcompose.base.config import Config, Name
 from rbxcompose.manifest.fields import InterfaceName, TopicName
 from rbxcompose.manifest.registry import section

@@ -1,7 +1,5 @@
 """The section `start`: the mission that runs first."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from rbxcompose.base.config import MISSION, Name, Refers

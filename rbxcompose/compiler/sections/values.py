@@ -1,7 +1,5 @@
 """The section `values`: short names for data."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """What others can reach of a system: where it listens, and who may write or call what. Pure."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from rbxcompose.base.dataclass import dataclass

@@ -1,7 +1,5 @@
 """The files of a system as one archive, named by its content: what travels to the hosts. Data only, and no links."""
 
-from __future__ import annotations
-
 import hashlib
 import io
 import tarfile

@@ -4,8 +4,6 @@ They are kept in a folder of the user, apart from the manifests: `~/.config/rbxc
 its own three files; the key of the authority stays where `security init` ran.
 """
 
-from __future__ import annotations
-
 import contextlib
 import ipaddress
 import os

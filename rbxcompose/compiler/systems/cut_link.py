@@ -5,8 +5,6 @@ cycles in which it notices, and braking from its limits. A goal is cancelled onc
 lease of the link, and what it moved commands nothing from then on. So the lease is what is left of the time allowed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from rbxcompose.base.dataclass import dataclass

@@ -4,8 +4,6 @@ The host of who publishes or serves it offers it at a port of its own. The host 
 takes it fetches it from there, and gives it to the bus of its robot.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any, TypeVar

@@ -1,7 +1,5 @@
 """A system after reading: its hosts, its robots with the host of each component, and why."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import field

@@ -1,7 +1,5 @@
 """Compiles a system: reads its file, compiles its robots, places their components, and checks the whole."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field, replace

@@ -1,7 +1,5 @@
 """What cannot work, or works badly, because it is on several hosts or shared between robots."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Iterator
 
 from rbxcompose.base.findings import Finding, Related, Severity, Span, kind

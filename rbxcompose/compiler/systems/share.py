@@ -1,7 +1,5 @@
 """The share of a host: the plan with what it runs, its links, and what other hosts may do at its router."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace

@@ -4,8 +4,6 @@ Bandwidths are estimates from declared rates and from the encoded size of a mess
 they are lower bounds for messages with lists.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 

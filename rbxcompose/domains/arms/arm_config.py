@@ -8,7 +8,6 @@ from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from rbxcompose.base.config import Config
@@ -16,10 +15,10 @@ from rbxcompose.base.geometry import Vector3
 from rbxcompose.base.units import ANGLE, LENGTH, Dimension
 from rbxcompose.domains.arms.motion import collisions
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
-from rbxcompose.domains.arms.motion.groups import ArmGroup, ArmJoint, JointSpace, interpolated
+from rbxcompose.domains.arms.motion.groups import ArmGroup, ArmJoint, Array, JointSpace, interpolated
 from rbxcompose.domains.arms.motion.hand_task import PlanningHelper
 from rbxcompose.domains.arms.motion.inverse_kinematics import ANGLE_TOLERANCE, RESTARTS, TOLERANCE, SolverSettings
-from rbxcompose.domains.arms.motion.numba_cache import is_installed
+from rbxcompose.domains.arms.motion.numba_cache import is_installed, keep_libraries
 from rbxcompose.domains.arms.motion.planner import MotionPlanner, PlannerSettings
 from rbxcompose.domains.arms.motion.scene import PairDistance, PlacedObject
 from rbxcompose.domains.arms.motion.second_checker import SecondChecker
@@ -139,17 +138,12 @@ def dimensions_of(config: ArmConfig) -> dict[str, Dimension]:
 
 def space_of(config: ArmConfig) -> JointSpace:
     """Return the joints of an arm."""
-    return JointSpace(
-        tuple(
-            ArmJoint(
-                name,
-                MotionLimits(joint.lower, joint.upper, joint.velocity, joint.acceleration, jerk=joint.jerk),
-                joint.is_continuous,
-                joint.slides,
-            )
-            for name, joint in config.joints.items()
-        )
-    )
+    limits = {
+        name: MotionLimits(item.lower, item.upper, item.velocity, item.acceleration, jerk=item.jerk)
+        for name, item in config.joints.items()
+    }
+    joints = config.joints.items()
+    return JointSpace(tuple(ArmJoint(name, limits[name], item.is_continuous, item.slides) for name, item in joints))
 
 
 def description_of(config: ArmConfig) -> Description:
@@ -185,7 +179,9 @@ class ArmWorks:
             ModuleNotFoundError: if the extra `arm` is not installed, or `fast` for a planner that needs it.
             ValueError: if a mesh cannot be read.
         """
-        collisions.load_libraries()
+        type_ = config.planner.type
+        is_compiled = type_ == FAST or (type_ == AUTOMATIC and is_fast and is_installed())
+        collisions.load_libraries(with_ompl=not is_compiled)
         self.space, self._description = space_of(config), description_of(config)
         self.kinematics = ArmKinematics(self._description, ArmGroup(self.space.names, config.base, config.tip))
         if is_fast:
@@ -202,23 +198,18 @@ class ArmWorks:
         self.paddings = paddings
         """By which links keep away from them [m]."""
         self._checker = self._checker_among(self.objects)
-        type_ = config.planner.type
-        is_compiled = type_ == FAST or (type_ == AUTOMATIC and is_fast and is_installed())
         self.helpers: Sequence[PlanningHelper] = ()
         """Those that plan elsewhere meanwhile."""
-        self._fast = _hastened() if is_compiled else _as_it_is
-        unlikely = frozenset(pairs.unlikely if pairs is not None else ())
-        self.solver, planner_config = config.kinematics.settings, config.planner
-        settings = PlannerSettings(
-            planner_config.type,
-            planner_config.time,
-            planner_config.attempts,
-            planner_config.seed,
-            planner_config.simplify,
+        self._fast: Callable[[collisions.MeshChecker], collisions.Checker] = (
+            _hastened() if is_compiled else lambda same: same
         )
+        unlikely = frozenset(pairs.unlikely if pairs is not None else ())
+        self.solver, own = config.kinematics.settings, config.planner
+        settings = PlannerSettings(own.type, own.time, own.attempts, own.seed, own.simplify)
         self.planner = MotionPlanner(self.space, self._fast(self._checker), settings, now, unlikely)
         if isinstance(self.planner.checker, collisions.SearchingChecker):
             self.planner.checker.prepare(self.space)
+        keep_libraries()
 
     def place_objects(
         self, objects: Iterable[PlacedObject], paddings: Mapping[str, float] = MappingProxyType({})
@@ -264,7 +255,7 @@ class ArmWorks:
         """Return the distances of pairs at positions of its joints, as `MeshChecker.pairs` does."""
         return self._checker.pairs(np.array([positions[name] for name in self.space.names]), between)
 
-    def way(self, points: NDArray[np.float64]) -> tuple[Vector3, ...]:
+    def way(self, points: Array) -> tuple[Vector3, ...]:
         """Return where its tip is in the root's frame [m] on straight lines between points of shape (m, n)."""
         dense = interpolated(points, WAY_STEP)
         some = dense[np.linspace(0, len(dense) - 1, min(len(dense), MOST_OF_WAY)).astype(int)]

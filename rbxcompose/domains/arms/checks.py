@@ -14,9 +14,8 @@ from rbxcompose.base.rules import MISSIONS, NAMES, WIRING
 from rbxcompose.base.units import LENGTH, format_quantity
 from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.model.mission_facts import constants
-from rbxcompose.compiler.model.robot import Robot
-from rbxcompose.domains.arms.mission_goals import WrittenReach, first_joint_in, length_of, word_of, written_reaches
-from rbxcompose.domains.arms.motion.grasps import grasps_of, least_width, reach_of, solid_of
+from rbxcompose.compiler.model.robot import Robot, RobotMission
+from rbxcompose.domains.arms.motion.grasps import least_width, reach_of, solid_of, widths_of
 from rbxcompose.domains.arms.motion.scene import PlacedObject, settled
 from rbxcompose.domains.arms.section_models import SpotModel
 from rbxcompose.domains.arms.sections.arms import ArmOfRobot, arms, hand_in
@@ -25,13 +24,88 @@ from rbxcompose.domains.arms.sections.scene import scene
 from rbxcompose.domains.body.model import Body, BodyJoint, Geometry
 from rbxcompose.domains.body.sections.body import body
 from rbxcompose.domains.servos.checks import known_value
+from rbxcompose.domains.servos.sections.joints import limits_in
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, TreeNode
 from rbxcompose.missions.analysis.facts import Constants
 from rbxcompose.missions.language.asked import WrittenArgument
+from rbxcompose.missions.program.answers import NodeFlow
 from rbxcompose.missions.program.program import MissionNode
 from rbxcompose.msgs.moveit_msgs import CollisionObject
 from rbxcompose.sdk.capabilities import Drives, PutsThings, WritesFrame
 from rbxcompose.sdk.ports import Out
+
+
+@dataclass(frozen=True, slots=True)
+class WrittenReach:
+    """A step of a mission that brings the tip of an arm to a pose, or to a thing."""
+
+    mission: RobotMission
+    node: MissionNode
+    name: str
+    arm: ArmOfRobot
+    arguments: Mapping[str, WrittenArgument]
+
+    @property
+    def may_fail(self) -> bool:
+        """Return whether something else follows a failure, so that it may be meant."""
+        node: MissionNode | None = self.node
+        while node is not None:
+            above = None if node.parent is None else self.mission.program.nodes[node.parent]
+            if node.is_forgiven or (above is not None and above.step.flow in (NodeFlow.ONE_OF, NodeFlow.OPEN)):
+                return True
+            node = above
+        return False
+
+
+def written_reaches(robot: Robot, verb: str = "reach") -> Iterator[WrittenReach]:
+    """Yield the steps of all missions that bring the tip of an arm to a pose; or that `pick`, or `place`."""
+    skills = {f"{verb}_{name}": (name, arm) for name, arm in robot.manifest.contents.of(arms).items()}
+    for mission in robot.missions.values() if skills else ():
+        for node in mission.program.nodes:
+            if node.skill in skills and node.skill in robot.skills:
+                main = robot.skills[node.skill].skill.main
+                arguments = {argument.name or main: argument for argument in node.step.arguments}
+                yield WrittenReach(mission, node, *skills[node.skill], arguments)
+
+
+def word_of(reach: WrittenReach, argument: str) -> tuple[str, Span]:
+    """Return the word that an argument is, and its place; nothing if it is not there or known only later."""
+    written = reach.arguments.get(argument)
+    if written is None or not isinstance(written.value, ScalarNode) or "$" in written.value.text:
+        return "", reach.node.span
+    return written.value.text, written.value.span
+
+
+def length_of(robot: Robot, body: Body, arm: ArmOfRobot) -> float:
+    """Return how far a tip can be from the first joint of its arm [m]: all links stretched out; infinite if unlimited.
+
+    No place farther away can be reached, whatever the directions of the joints are.
+    """
+    total, link = 0.0, arm.group.tip
+    while True:
+        joint = body.joint_above[link]
+        if joint.slides:
+            limits = limits_in(robot.manifest.contents, joint)
+            ends = (limits.lower, limits.upper)
+            total += max(math.inf if end is None else abs(end) for end in ends)
+        if joint.name == arm.group.joints[0]:
+            return total
+        total += math.hypot(*joint.origin.translation)
+        link = joint.parent
+
+
+def first_joint_in(body: Body, arm: ArmOfRobot, frame: str) -> Vector3 | None:
+    """Return where the first joint of an arm is in the frame of a link [m]; None if other joints move one of them."""
+    first = body.joints[arm.group.joints[0]]
+    if _movers(body, first.parent) != _movers(body, frame):
+        return None
+    poses = body.poses({})
+    return poses[frame].inverse().apply(poses[first.parent].apply(first.origin.translation))
+
+
+def _movers(body: Body, link: str) -> set[str]:
+    """Return the joints that move a link in the frame of the root."""
+    return {joint.name for joint in body.joints_above(link) if joint.kind != "fixed"}
 
 
 @check("RBX2379", Severity.WARNING, closed=(WIRING, NAMES, "scene"))
@@ -149,10 +223,7 @@ def look_frame(robot: Robot) -> Iterator[Finding]:
         return
     skills = {"look_at" if len(found) == 1 else f"look_at_{name}": name for name in found}
     for node in (node for mission in robot.missions.values() for node in mission.program.nodes if node.skill in skills):
-        head, written = (
-            skills[node.skill],
-            next((argument for argument in node.step.arguments if argument.name == "frame"), None),
-        )
+        head, written = (skills[node.skill], next((item for item in node.step.arguments if item.name == "frame"), None))
         frames = (*found[head].model.frames, *contents.of(scene).frames)
         if written is None or not isinstance(written.value, ScalarNode) or "$" in written.value.text:
             continue
@@ -469,9 +540,7 @@ class _Reaches:
         """Yield that a place of a mission is out of reach."""
         (name, span), model = word_of(place, "spot"), place.arm.model
         known = constants(place.mission)
-        numbers = {
-            number: known_value(place.arguments[number], known) for number in _NUMBERS if number in place.arguments
-        }
+        numbers = {item: known_value(place.arguments[item], known) for item in _NUMBERS if item in place.arguments}
         if any(number is None for number in numbers.values()):
             return
         at = {one: number for one, number in numbers.items() if number is not None}
@@ -535,9 +604,7 @@ class _Reaches:
         length = length_of(self.robot, self.body, robot) + math.hypot(*fingers)
         if away <= length + slack + 0.001:
             return
-        shown, most = (
-            format_quantity(round(value, 3), LENGTH, "m" if value >= 1.0 else "cm") for value in (away, length)
-        )
+        shown, most = (format_quantity(round(item, 3), LENGTH, "m" if item >= 1.0 else "cm") for item in (away, length))
         is_unit = away > _TIMES * length
         yield too_far.at(
             span,
@@ -633,13 +700,9 @@ def _width(
         return least_width(solid.shape), widest
     if thing.link != body.root:
         return None, widest  # nobody knows how it will be turned
-    at = thing.pose.compose(solid.pose)
-
-    def held(limit: float) -> list[float]:
-        turns = (math.tau * index / _BEARINGS for index in range(_BEARINGS))
-        return [grasp.width for turn in turns for grasp in grasps_of(solid.shape, at, turn, limit)]
-
-    return (None if held(widest) else min(held(math.inf), default=None)), widest
+    at, turns = thing.pose.compose(solid.pose), (math.tau * index / _BEARINGS for index in range(_BEARINGS))
+    width = min((width for turn in turns for width in widths_of(solid.shape, at, turn)), default=None)
+    return (None if width is not None and width < widest else width), widest
 
 
 _COUNTS = {"any_position": ("x", "y", "z", "tolerance"), "any_orientation": ("roll", "pitch", "yaw", "angle_tolerance")}

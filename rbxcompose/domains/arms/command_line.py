@@ -9,7 +9,6 @@ from time import perf_counter
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbxcompose.base.config import Angle, Config, Length, Ratio, Speed
 from rbxcompose.base.files import replace_file
@@ -19,6 +18,7 @@ from rbxcompose.commands.console import NotDoneError, misused, refuse, write_rep
 from rbxcompose.commands.targets import compiled, missing_extras, robot_path
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.domains.arms.arm_config import ArmConfig, ArmWorks
+from rbxcompose.domains.arms.motion.groups import Array
 from rbxcompose.domains.arms.sections.arms import ArmOfRobot, arms
 from rbxcompose.domains.arms.sections.scene import scene
 from rbxcompose.domains.body.description import Description
@@ -156,8 +156,6 @@ class KeepModel(Config):
 def chosen_robot(arguments: argparse.Namespace) -> Robot | None:
     """Return the robot; None after its errors."""
     path = robot_path(arguments.path)
-    if path is None:
-        return None
     compilation = compiled(path, arguments)
     report = Report()
     report.extend(finding for finding in compilation.report if finding.severity.value == "error")
@@ -229,7 +227,7 @@ def read_joints(written: str, dimensions: Mapping[str, Dimension]) -> dict[str, 
     return {name: position.value for name, position in read.items()}
 
 
-def values_of(works: ArmWorks, robot: ArmOfRobot, written: str) -> NDArray[np.float64]:
+def values_of(works: ArmWorks, robot: ArmOfRobot, written: str) -> Array:
     """Return all joints at a goal, of shape (n,); those that it does not name are at rest. Raises as `positions_in`."""
     at = positions_in(works, robot, written)
     rest = {name: works.kinematics.body.joints[name].rest for name in works.space.names}

@@ -13,45 +13,31 @@ from rbxcompose.domains.arms.motion.inverse_kinematics import SOLVER, PoseTarget
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory
 from rbxcompose.domains.arms.motion.path_constraints import ANGLE as SIGHT_ANGLE
 from rbxcompose.domains.arms.motion.path_constraints import RADIUS, Keep, KeptSight
+from rbxcompose.domains.arms.motion.scene_messages import joint_trajectory
 from rbxcompose.domains.arms.motion.trace_planner import ANY_SPEED, TraceWish, WayPoint
+from rbxcompose.msgs import rbxcompose_msgs
 from rbxcompose.msgs.control_msgs import FollowJointTrajectory
 from rbxcompose.msgs.fields import Measures
 from rbxcompose.msgs.moveit_msgs import ExecuteTrajectory, MoveGroup
-from rbxcompose.msgs.rbxcompose_msgs import (
-    MoveArm,
-    PathConstraints,
-    PickObject,
-    PlaceObject,
-    ReachPose,
-    Sight,
-    TipPoint,
-    TraceArm,
-)
-from rbxcompose.msgs.stamps import to_duration
-from rbxcompose.msgs.trajectory_msgs import JointTrajectory, JointTrajectoryPoint
 
 POSE_MEASURES = {**dict.fromkeys(("x", "y", "z"), LENGTH), **dict.fromkeys(("roll", "pitch", "yaw"), ANGLE)}
 SIGHT_MEASURES: Measures = {**dict.fromkeys(("x", "y", "z", "radius"), LENGTH), "angle": ANGLE}
 KEEP_MEASURES: Measures = {**POSE_MEASURES, "joints": {"lower": None, "upper": None}, "sight": SIGHT_MEASURES}
 SHARES = {"speed": RATIO, "acceleration": RATIO}
 MOVE_MEASURES: Measures = {**SHARES, "tolerance": ANGLE, "keep": KEEP_MEASURES}
-REACH_MEASURES: Measures = {
-    **POSE_MEASURES,
-    **SHARES,
-    "tolerance": LENGTH,
-    "angle_tolerance": ANGLE,
-    "keep": KEEP_MEASURES,
-}
-TRACE_MEASURES: Measures = {
-    "points": POSE_MEASURES,
-    "speed": SPEED,
-    "acceleration": RATIO,
-    "blend": LENGTH,
-    "least": RATIO,
-}
-ACTIONS = (MoveArm, ReachPose, TraceArm, PickObject, PlaceObject, MoveGroup, ExecuteTrajectory)
+REACH_MEASURES: Measures = {**POSE_MEASURES, **MOVE_MEASURES, "tolerance": LENGTH, "angle_tolerance": ANGLE}
+TRACE_MEASURES: Measures = {**SHARES, "points": POSE_MEASURES, "speed": SPEED, "blend": LENGTH, "least": RATIO}
+ACTIONS = (
+    rbxcompose_msgs.MoveArm,
+    rbxcompose_msgs.ReachPose,
+    rbxcompose_msgs.TraceArm,
+    rbxcompose_msgs.PickObject,
+    rbxcompose_msgs.PlaceObject,
+    MoveGroup,
+    ExecuteTrajectory,
+)
 STATES = {"planning": "PLANNING", "moving": "MONITOR"}  # as clients of MoveIt know stages
-ArmMessage = MoveArm.Goal | ReachPose.Goal | TraceArm.Goal
+ArmMessage = rbxcompose_msgs.MoveArm.Goal | rbxcompose_msgs.ReachPose.Goal | rbxcompose_msgs.TraceArm.Goal
 
 
 def action_of(message: Any) -> Any:
@@ -69,18 +55,13 @@ def feedback_of(message: Any, stage: str) -> Any:
 
 def follow_goal(names: tuple[str, ...], trajectory: Trajectory) -> FollowJointTrajectory.Goal:
     """Return a trajectory as its controller takes it; where the arm is now is not among its points."""
-    rows = zip(trajectory.times[1:].tolist(), trajectory.positions[1:], trajectory.velocities[1:], strict=True)
-    points = tuple(
-        JointTrajectoryPoint(positions=positions, velocities=velocities, time_from_start=to_duration(time))
-        for time, positions, velocities in rows
-    )
-    return FollowJointTrajectory.Goal(trajectory=JointTrajectory(joint_names=names, points=points))
+    return FollowJointTrajectory.Goal(trajectory=joint_trajectory(names, trajectory))
 
 
 def goal_of(message: ArmMessage, solver: SolverSettings = SOLVER) -> ArmGoal:
     """Return a goal as the task takes it: a share, a speed or a tolerance of 0 is the usual one, that of the solver."""
     acceleration = message.acceleration or 1.0
-    if isinstance(message, TraceArm.Goal):
+    if isinstance(message, rbxcompose_msgs.TraceArm.Goal):
         wish = TraceWish(
             tuple(map(_point, message.points)),
             message.relative,
@@ -95,7 +76,7 @@ def goal_of(message: ArmMessage, solver: SolverSettings = SOLVER) -> ArmGoal:
     ask = partial(
         ArmGoal, speed=message.speed or 1.0, acceleration=acceleration, keep=_keep(message.keep), replans=message.replan
     )
-    if isinstance(message, MoveArm.Goal):
+    if isinstance(message, rbxcompose_msgs.MoveArm.Goal):
         positions = dict(zip(message.joints, message.positions.tolist(), strict=False))
         return ask(message.remembered or message.pose, positions, tolerance=message.tolerance)
     target = PoseTarget(
@@ -113,24 +94,24 @@ def ended_as(message: Any, task: ArmTask) -> Any:
     """Return the result of a goal, whose action is one of those that such a task carries out."""
     failed, missed = task.failure, task.missed
     words: dict[str, Any] = {"outcome": failed.reason, "message": failed.text} if failed is not None else {}
-    if isinstance(message, TraceArm.Goal):
+    if isinstance(message, rbxcompose_msgs.TraceArm.Goal):
         words["fraction"] = task.share
-    if isinstance(message, ReachPose.Goal) and failed is None and missed is not None:
+    if isinstance(message, rbxcompose_msgs.ReachPose.Goal) and failed is None and missed is not None:
         text = f"approximate: the tip is {missed[0] * 100:.1f} cm and {math.degrees(missed[1]):.1f} deg from the pose"
         words = {"message": text, "approximate": True, "away": missed[0], "angle": missed[1]}
     return action_of(message).Result(**words)
 
 
-def _keep(message: PathConstraints) -> Keep:
+def _keep(message: rbxcompose_msgs.PathConstraints) -> Keep:
     x, y, z = (_range(one.tolist()) for one in (message.x, message.y, message.z))
     joints = {joint.name: (joint.lower, joint.upper) for joint in message.joints}
     sight = _sight(message.sight)
     return Keep((message.roll, message.pitch, message.yaw), (x, y, z), joints, message.frame, sight)
 
 
-def _sight(message: Sight) -> KeptSight | None:
+def _sight(message: rbxcompose_msgs.Sight) -> KeptSight | None:
     """Return what is to be seen; None if nothing is asked for."""
-    if message == Sight():
+    if message == rbxcompose_msgs.Sight():
         return None
     return KeptSight(
         message.sensor,
@@ -148,9 +129,9 @@ def _range(numbers: list[float]) -> tuple[float, float] | None:
     return None if not numbers else (numbers[0], numbers[1]) if len(numbers) == 2 else (math.nan, math.nan)
 
 
-def _point(message: TipPoint) -> WayPoint:
+def _point(message: rbxcompose_msgs.TipPoint) -> WayPoint:
     return WayPoint(Transform3((message.x, message.y, message.z), _turn(message)), message.via)
 
 
-def _turn(message: ReachPose.Goal | TipPoint) -> Quaternion:
+def _turn(message: rbxcompose_msgs.ReachPose.Goal | rbxcompose_msgs.TipPoint) -> Quaternion:
     return quaternion_from_rpy(message.roll, message.pitch, message.yaw)

@@ -38,22 +38,16 @@ def picture_of_failure(
     Return the words about it for the failure's text: where the picture is, or why there is none.
     """
     names = set(QUOTED.findall(failure.text))
-    shown = ArmPicture(
-        works.kinematics.body,
-        works.meshes,
-        positions,
-        works.objects,
-        colliding=names,
-        caption=f"{arm}: {failure.stage}",
-        problem=f"{failure.reason}: {failure.text}",
-    )
+    caption, problem = f"{arm}: {failure.stage}", f"{failure.reason}: {failure.text}"
+    known = works.kinematics.body, works.meshes, positions, works.objects
+    shown = ArmPicture(*known, colliding=names, caption=caption, problem=problem)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        known = numbered(folder, arm)
-        file = folder / f"{arm}-{max(known, default=0) + 1:04}-{failure.stage}-{failure.reason}.png"
+        there = numbered(folder, arm)
+        file = folder / f"{arm}-{max(there, default=0) + 1:04}-{failure.stage}-{failure.reason}.png"
         replace_file(file, draw_arm(shown))
-        for number in sorted(known)[: max(0, len(known) + 1 - MOST)]:
-            known[number].unlink()
+        for number in sorted(there)[: max(0, len(there) + 1 - MOST)]:
+            there[number].unlink()
     except MissingLibraryError as error:
         return f"no picture: {error.finding.message}"
     except (OSError, ValueError) as error:
@@ -75,23 +69,18 @@ def hand_ports(config: ArmConfig) -> dict[str, Port[Any]]:
     """Return the ports of an arm with a gripper; none without."""
     if config.hand is None:
         return {}
-    outcomes = dict.fromkeys(GRASP_REASONS, "failure")
+    shared: Any = {"claims": config.controller, "outcomes": dict.fromkeys(GRASP_REASONS, "failure")}
+    lengths = dict.fromkeys(("approach", "lift", "opening", "squeeze"), LENGTH) | SHARES
     pick: ServesAction[Any, Any, Any] = ServesAction(
-        PickObject,
-        f"{config.name}/pick",
-        claims=config.controller,
-        skill=f"pick_{config.name}",
-        outcomes=outcomes,
-        measures=dict.fromkeys(("approach", "lift", "opening", "squeeze"), LENGTH) | SHARES,
+        PickObject, f"{config.name}/pick", skill=f"pick_{config.name}", measures=lengths, **shared
     )
     place: ServesAction[Any, Any, Any] = ServesAction(
         PlaceObject,
         f"{config.name}/place",
-        claims=config.controller,
         skill=f"place_{config.name}",
-        outcomes=outcomes,
         measures=dict.fromkeys(("x", "y", "z", "tolerance", "approach", "retreat"), LENGTH) | SHARES,
         choices={"spot": tuple(config.hand.spots)} if config.hand.spots else {},
+        **shared,
     )
     return {
         PICK: pick.named(PICK),
@@ -119,8 +108,6 @@ class PicksAndPlaces:
             return result
         if failure.reason is MotionReason.INTERRUPTED:
             return result
-        pass
-
         positions = {joint: at for joint, (at, _) in self.measured.items()}
         said = picture_of_failure(Path(hand.pictures), name, self.works, positions, failure)
         return replace(result, message=f"{result.message}; {said}")
@@ -175,16 +162,8 @@ def hand_task(
     hand = hand_of(config, works)
     pace = ArmGoal(speed=message.speed or 1.0, acceleration=message.acceleration or 1.0)
     if isinstance(message, PickObject.Goal):
-        pick_goal = message
-        given = tuple(map(_grasp, config.grasps.get(pick_goal.object, ())))
-        goal = hand_tasks.PickGoal(
-            pick_goal.object,
-            pick_goal.approach,
-            pick_goal.lift,
-            pick_goal.opening,
-            pick_goal.squeeze or config.squeeze,
-            given,
-        )
+        given, squeeze = tuple(map(_grasp, config.grasps.get(message.object, ()))), message.squeeze or config.squeeze
+        goal = hand_tasks.PickGoal(message.object, message.approach, message.lift, message.opening, squeeze, given)
         return hand_tasks.PickTask(site, works, hand, goal, pace)
     if message.spot and message.spot not in config.spots:
         unknown = f"there is no spot '{message.spot}'; the spots of this arm: {', '.join(config.spots) or 'none'}"

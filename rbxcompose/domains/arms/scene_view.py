@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Iterable, Mapping
 from dataclasses import fields
 from typing import Any
@@ -82,12 +81,8 @@ class AddToScene(Command):
     """Put an object into the scene; without a link it stands in the frame of the body's root."""
 
     about = SCENE
+    written = "scene add {0.entry.name}"
     entry: PlacedObject
-
-    @property
-    def words(self) -> str:
-        """Return it as written on the command line."""
-        return shlex.join(["scene", "add", self.entry.name])
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,14 +93,10 @@ class LoadScene(Command):
     """
 
     about = SCENE
+    written = "scene load {0.file}"
     text: str
     file: str
     link: str = ""
-
-    @property
-    def words(self) -> str:
-        """Return it as written on the command line."""
-        return shlex.join(["scene", "load", self.file])
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,12 +104,8 @@ class RemoveFromScene(Command):
     """Take an object out of the scene."""
 
     about = SCENE
+    written = "scene remove {0.object}"
     object: str
-
-    @property
-    def words(self) -> str:
-        """Return it as written on the command line."""
-        return shlex.join(["scene", "remove", self.object])
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,14 +113,10 @@ class AttachInScene(Command):
     """Let an object move with a link; without `touches`, it may touch the link and all that the link carries."""
 
     about = SCENE
+    written = "scene attach {0.object} {0.link}"
     object: str
     link: str
     touches: tuple[str, ...] = ()
-
-    @property
-    def words(self) -> str:
-        """Return it as written on the command line."""
-        return shlex.join(["scene", "attach", self.object, self.link])
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,12 +124,8 @@ class DetachInScene(Command):
     """Let an object stay where it is."""
 
     about = SCENE
+    written = "scene detach {0.object}"
     object: str
-
-    @property
-    def words(self) -> str:
-        """Return it as written on the command line."""
-        return shlex.join(["scene", "detach", self.object])
 
 
 SCENE_WINDOW, ARM_WINDOW = "scene", "arms"  # paths; that of an arm has its name behind

@@ -57,8 +57,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run_setup(arguments: argparse.Namespace) -> int:
     """Try positions and write the file."""
     path = robot_path(arguments.path, may_run=False)
-    if path is None:
-        return 1
     if arguments.propose or is_description(path):
         return _propose(path, arguments)
     compilation = compiled(path, arguments)

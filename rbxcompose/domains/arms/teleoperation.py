@@ -7,19 +7,19 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbxcompose.base.geometry import Transform3, conjugate, multiply, rotate
 from rbxcompose.domains.arms.arm_config import ArmConfig, ArmWorks
+from rbxcompose.domains.arms.motion.groups import Array
 from rbxcompose.domains.arms.motion.inverse_kinematics import PoseTarget
-from rbxcompose.domains.arms.motion.tip_servo import ServoMotion, TipServo, Wish
+from rbxcompose.domains.arms.motion.scene_messages import joint_trajectory
+from rbxcompose.domains.arms.motion.tip_servo import TipServo, Wish
 from rbxcompose.msgs.geometry_msgs import PoseStamped, TwistStamped
-from rbxcompose.msgs.stamps import to_duration, to_nanoseconds, to_time
-from rbxcompose.msgs.std_msgs import Header, String
-from rbxcompose.msgs.trajectory_msgs import JointTrajectory, JointTrajectoryPoint
+from rbxcompose.msgs.stamps import to_nanoseconds
+from rbxcompose.msgs.std_msgs import String
+from rbxcompose.msgs.trajectory_msgs import JointTrajectory
 from rbxcompose.sdk import In, Out, Port
 
-Array = NDArray[np.float64]
 FrameAt = Callable[[Array], Transform3]
 
 TWIST, POSE, STATUS, STREAM = "servo_twist", "servo_pose", "servo_status", "stream"  # its ports
@@ -87,7 +87,8 @@ class ArmServo:
             self._wish = None
         found = self.core.next(now, measured, self._wish)
         if found is not None:
-            self._bound[STREAM](_message(found, self._names, stamp + round((found.begin - now) * 1e9)))
+            begin = stamp + round((found.begin - now) * 1e9)
+            self._bound[STREAM](joint_trajectory(self._names, found.way, stamp=begin))
         self.publish_state()
         return self.is_wanted
 
@@ -140,13 +141,3 @@ def _pose_wish(message: PoseStamped, frame_at: FrameAt, tip_at: FrameAt) -> Wish
         return GAIN * np.concatenate((away, axis * angle)) / slower
 
     return wish
-
-
-def _message(motion: ServoMotion, names: tuple[str, ...], begin: int) -> JointTrajectory:
-    made = motion.way
-    rows = zip(made.times[1:].tolist(), made.positions[1:], made.velocities[1:], strict=True)
-    points = tuple(
-        JointTrajectoryPoint(positions=positions, velocities=velocities, time_from_start=to_duration(time))
-        for time, positions, velocities in rows
-    )
-    return JointTrajectory(header=Header(stamp=to_time(begin)), joint_names=names, points=points)

@@ -7,21 +7,88 @@ from collections.abc import Iterator, Mapping
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, FindingKind, Related, Severity
+from rbxcompose.base.geometry import Vector3, rotate
 from rbxcompose.base.rules import NAMES, WIRING
 from rbxcompose.base.units import ANGULAR_SPEED, LENGTH, SPEED, TIME, Dimension, format_quantity
 from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.model.flow import OTHER_TYPE, Drive, MessageFlow, is_written, period_of, setting_span
 from rbxcompose.compiler.model.mission_facts import constants
-from rbxcompose.compiler.model.robot import PortEnd, Robot
-from rbxcompose.domains.bases.body_wheels import BodyWheel, differs, rolling_bases
+from rbxcompose.compiler.model.robot import PortEnd, Robot, RobotComponent
+from rbxcompose.domains.body.model import Body, BodyJoint
 from rbxcompose.domains.body.sections.body import body
-from rbxcompose.domains.servos.sections.joints import joints
 from rbxcompose.missions.analysis.effects import published
 from rbxcompose.missions.analysis.facts import number_of
 from rbxcompose.missions.program.machines import TemplateShape, WrittenValue
 from rbxcompose.msgs.geometry_msgs import Twist
-from rbxcompose.sdk.capabilities import Drives, Setting, WritesFrame
+from rbxcompose.sdk.capabilities import Drives, RollsOn, Setting, WritesFrame
 from rbxcompose.sdk.ports import Looks
+
+TOLERANCE = 0.02  # of a length, within which two count as the same
+
+
+@dataclass(frozen=True, slots=True)
+class BodyWheel:
+    """A wheel of the body: its middle [m] and its axis in the frame of the base, and its radius [m], if it has one."""
+
+    joint: BodyJoint
+    setting: Setting[str]
+    centre: Vector3
+    axis: Vector3
+    radius: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class RollingBase:
+    """A base, and its wheels as the body has them."""
+
+    component: RobotComponent
+    rolls: RollsOn
+    left: BodyWheel
+    right: BodyWheel
+
+    @property
+    def wheels(self) -> tuple[BodyWheel, BodyWheel]:
+        """Return both."""
+        return self.left, self.right
+
+    @property
+    def wheel_distance(self) -> float:
+        """Return how far the wheels are apart [m], to the left."""
+        return self.left.centre[1] - self.right.centre[1]
+
+    @property
+    def has_other_radius(self) -> bool:
+        """Return whether its wheels have another radius than those of the body."""
+        radius = self.left.radius
+        return self.rolls.wheel_radius is not None and radius is not None and differs(self.rolls.wheel_radius, radius)
+
+
+def differs(setting: Setting[float], length: float) -> bool:
+    """Return whether a length is another one than that of the body."""
+    return abs(setting.value - length) > TOLERANCE * max(setting.value, length)
+
+
+def rolling_bases(robot: Robot) -> Iterator[RollingBase]:
+    """Yield the bases whose wheels are joints of the body."""
+    description = robot.manifest.contents.of(body)
+    shape = description.body if description else Body("")
+    for component, rolls in robot.declared(RollsOn):
+        link = rolls.link.value if rolls.link else ""
+        found = [_wheel(shape, setting, link) for setting in (rolls.left, rolls.right) if setting.value in shape.joints]
+        if len(found) == len((rolls.left, rolls.right)):
+            yield RollingBase(component, rolls, *found)
+
+
+def _wheel(body: Body, setting: Setting[str], link: str) -> BodyWheel:
+    joint, poses = body.joints[setting.value], body.poses({})
+    there = poses[joint.child] if link not in poses else poses[link].inverse().compose(poses[joint.child])
+    child = body.links[joint.child]
+    round_ones = [item for item in (*child.collisions, *child.visuals) if item.geometry.kind in ("cylinder", "sphere")]
+    shape = next(iter(round_ones), None)
+    centre = there.apply(shape.origin.translation) if shape else there.translation
+    radius = shape.geometry.size[0] if shape else None
+    return BodyWheel(joint, setting, centre, rotate(there.rotation, joint.axis), radius)
+
 
 LONGEST = 10.0  # [s]: commands come many times a second
 FARTHEST = 2.0  # [m] driven blind; the usual 0.5 s are that far at 4 m/s only
@@ -185,6 +252,8 @@ def wheel_speed(robot: Robot) -> Iterator[Finding]:
 
 def _limit(robot: Robot, wheel: BodyWheel) -> float:
     """Return how fast a wheel may turn [rad/s], infinite if nothing limits it."""
+    from rbxcompose.domains.servos.sections.joints import joints  # few robots have bases whose wheels are joints
+
     driven, limits = robot.manifest.contents.of(joints).get(wheel.joint.name), wheel.joint.limits
     own = driven.limits.velocity.value if driven and driven.limits.velocity else math.inf
     return min(own, limits.velocity if limits and limits.velocity is not None else math.inf)
@@ -286,7 +355,7 @@ def dropped_message(robot: Robot) -> Iterator[Finding]:
             topic = robot.topics.get(message.target.text)
             for (outer, inner), limit in limits.items() if topic and topic.message == Twist.TYPE else ():
                 written = _at(_at(message.body, outer), inner)
-                value = _number(written, constants(mission))
+                value = number_of(written.expression, constants(mission)) if isinstance(written, WrittenValue) else None
                 if isinstance(written, WrittenValue) and value is not None and abs(value) > limit:
                     _, dimension, unit = _FIELDS[outer, inner]
                     most, is_turn = format_quantity(limit, dimension, unit), dimension is ANGULAR_SPEED
@@ -308,10 +377,6 @@ def _dropped_above(robot: Robot, name: str) -> float:
 
 def _at(shape: TemplateShape | None, key: str) -> TemplateShape | None:
     return shape.get(key) if isinstance(shape, Mapping) else None
-
-
-def _number(shape: TemplateShape | None, known: Mapping[str, object]) -> float | None:
-    return number_of(shape.expression, known) if isinstance(shape, WrittenValue) else None
 
 
 @check("RBX3504")

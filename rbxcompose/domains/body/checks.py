@@ -25,11 +25,7 @@ def frame_of_body(robot: Robot) -> Iterator[Finding]:
     if description is None or not description.body.links:
         return
     shape = description.body
-    placed = {
-        frame
-        for _, writes_frame in robot.declared(WritesFrame)
-        for frame in (writes_frame.parent.value, writes_frame.child.value)
-    }
+    placed = {frame for _, item in robot.declared(WritesFrame) for frame in (item.parent.value, item.child.value)}
     placed |= {description.virtual.frame} if description.virtual else set()  # RBX2352
     for component in robot.components.values():
         for frame in component.declared(WritesFrame) if component.declared(Drives) else ():
@@ -44,8 +40,7 @@ def frame_of_body(robot: Robot) -> Iterator[Finding]:
                 if name not in placed and name not in shape.links:
                     message = f"'{component.name}' looks up the frame '{name}', which no component publishes"
                     help_text = suggest(name, shape.links, "its links")
-                    place = robot.entry_span(component.name)
-                    yield _finding(shape, place, message, help_text, (component.name, name))
+                    yield _finding(shape, robot.entry_span(component.name), message, help_text, (component.name, name))
 
 
 def _other_root(body: Body, moved: Setting[str]) -> str:

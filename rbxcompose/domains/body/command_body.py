@@ -29,9 +29,7 @@ def described(guest: Guest, wanted: str | None) -> GraphName:
     """
     given = [topic for topic in guest.graph().topics if topic.givers and String.TYPE in topic.types]
     names = (
-        [f"/{wanted.lstrip('/')}"]
-        if wanted
-        else [topic.name for topic in given if topic.name.endswith(f"/{DESCRIPTION}")]
+        [f"/{wanted.lstrip('/')}"] if wanted else [item.name for item in given if item.name.endswith(f"/{DESCRIPTION}")]
     )
     if len(names) == 1 and (found := find(given, names[0])):
         return found

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Literal
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.findings import Finding, Related, Span, kind
+from rbxcompose.base.findings import Finding, Related, Span, kind, once
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.base.printable import plain
 from rbxcompose.domains.body.files import PACKAGE, BodyFile, ReadFile, mesh_mistakes, read_files
@@ -17,7 +17,7 @@ from rbxcompose.domains.body.link_pairs import CollisionMatrix
 from rbxcompose.domains.body.lint import lint, orientations
 from rbxcompose.domains.body.model import Body, BodyJoint, BodyLink
 from rbxcompose.domains.body.urdf import read_body
-from rbxcompose.domains.body.xml_reader import XmlElement, read_urdf
+from rbxcompose.domains.body.xml_reader import XmlElement, escaped, quoted, read_urdf
 from rbxcompose.manifest.fields import PieceAttachment
 
 NOT_ATTACHED = kind("RBX2016", is_fixable=True)
@@ -124,12 +124,7 @@ def _changed(
 def with_meshes(element: XmlElement, names: Mapping[str, str]) -> XmlElement:
     """Return an element with other names for its mesh files."""
     new = {"filename": names[element.attributes["filename"]]} if element.attributes.get("filename") in names else {}
-    return _changed(
-        element,
-        new if element.name == "mesh" else {},
-        element.text,
-        lambda xml_element: with_meshes(xml_element, names),
-    )
+    return _changed(element, new if element.name == "mesh" else {}, element.text, lambda item: with_meshes(item, names))
 
 
 def to_xml(root: XmlElement) -> str:
@@ -138,10 +133,8 @@ def to_xml(root: XmlElement) -> str:
 
 
 def _lines(element: XmlElement, indent: str) -> Iterator[str]:
-    from xml.sax.saxutils import escape, quoteattr  # imports much of the network's modules; most bodies are one text
-
-    attributes = "".join(f" {name}={quoteattr(value)}" for name, value in element.attributes.items())
-    text = escape(element.text.strip())
+    attributes = "".join(f" {name}={quoted(value)}" for name, value in element.attributes.items())
+    text = escaped(element.text.strip())
     if not element.children:
         yield f"{indent}<{element.name}{attributes}{f'>{text}</{element.name}>' if text else '/>'}"
         return
@@ -263,6 +256,14 @@ def describe(
     if findings := [one for one in read if isinstance(one, Finding)]:
         return None, findings
     files = [one for one in read if isinstance(one, ReadFile)]
+    return _described(name, home, tuple(parts), tuple(files), covers_visuals)
+
+
+@once  # a profile rarely changes the body
+def _described(
+    name: str, home: Path, parts: tuple[BodyPart, ...], files: tuple[ReadFile, ...], covers_visuals: bool
+) -> tuple[Description | None, list[Finding]]:
+    """Return what `describe` does, of the files of its parts as they were read."""
     notes = [note for one in files for note in one.notes]
     meshes = [part.file.meshes(one.root) for part, one in zip(parts, files, strict=True)]
     respelt = {

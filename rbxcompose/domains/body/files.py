@@ -108,9 +108,9 @@ class BodyFile:
     path: Path
     span: Span
     is_xacro: bool = False
-    arguments: Mapping[str, str] = field(default_factory=dict)
-    packages: Mapping[str, Path] = field(default_factory=dict)
-    spans: Mapping[str, Span] = field(default_factory=dict)
+    arguments: Mapping[str, str] = field(default_factory=dict, hash=False)
+    packages: Mapping[str, Path] = field(default_factory=dict, hash=False)
+    spans: Mapping[str, Span] = field(default_factory=dict, hash=False)
     """Places of the arguments."""
 
     @property
@@ -163,9 +163,9 @@ class BodyFile:
 class ReadFile:
     """The root and the text of a URDF, and what is to be said about the files that it was made of."""
 
-    root: XmlElement
+    root: XmlElement = field(hash=False)
     text: str
-    notes: tuple[Finding, ...] = ()
+    notes: tuple[Finding, ...] = field(default=(), hash=False)
 
 
 def read_files(files: Sequence[BodyFile], sources: MutableMapping[str, str]) -> list[ReadFile | Finding]:

@@ -63,9 +63,7 @@ class CollisionMatrix:
 
     def text(self) -> str:
         """Return it as a file."""
-        rows = "".join(
-            f"- [{_name(text)}, {_name(other)}, {self.pairs[text, other]}]\n" for text, other in _sorted(self)
-        )
+        rows = "".join(f"- [{_name(text)}, {_name(item)}, {self.pairs[text, item]}]\n" for text, item in _sorted(self))
         head = f"{_HEAD}body: {json.dumps(self.digest)}\nsamples: {self.samples}\nseed: {self.seed}\n"
         return f"{head}pairs:\n{rows}" if rows else f"{head}pairs: []\n"
 

@@ -72,11 +72,8 @@ def about(point: Vector3, at: Transform3, mass: float, own: Tensor) -> Tensor:
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = _turned(own, at)
     x, y, z = (place - origin for place, origin in zip(at.translation, point, strict=True))
     xy, xz, yz = xy - mass * x * y, xz - mass * x * z, yz - mass * y * z
-    return (
-        (xx + mass * (y * y + z * z), xy, xz),
-        (xy, yy + mass * (x * x + z * z), yz),
-        (xz, yz, zz + mass * (x * x + y * y)),
-    )
+    xx, yy, zz = xx + mass * (y * y + z * z), yy + mass * (x * x + z * z), zz + mass * (x * x + y * y)
+    return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
 
 
 def _turned(tensor: Tensor, at: Transform3) -> Tensor:
@@ -242,7 +239,7 @@ def _limits(joint: BodyJoint, limits: JointLimits) -> Iterator[Finding]:
         message = f"the limits of joint '{name}' lack the {' and the '.join(missing)}"
         yield NO_MOTION.at(limits.span, message, help="write what the motor can do; ROS refuses a URDF without it")
     elif stuck := list(_stuck(joint, limits)):
-        message = f"the {' and the '.join(stuck)} of joint '{name}' {_be(stuck)} zero"
+        message = f"the {' and the '.join(stuck)} of joint '{name}' {('is' if len(stuck) == 1 else 'are')} zero"
         yield NO_MOTION.at(limits.span, message, help=_UNWRITTEN if stuck == ["range"] else _WRITE)
     elif joint.kind == "revolute" and limits.may_be_degrees:
         lower, upper = (math.radians(value or 0.0) for value in (limits.lower, limits.upper))
@@ -261,10 +258,6 @@ def _stuck(joint: BodyJoint, limits: JointLimits) -> Iterator[str]:
         yield "velocity"
         if limits.effort == 0.0:
             yield "effort"
-
-
-def _be(words: list[str]) -> str:
-    return "is" if len(words) == 1 else "are"
 
 
 def _shapes(link: BodyLink, meshes: Collection[str], respelt: Mapping[str, str]) -> Iterator[Finding]:

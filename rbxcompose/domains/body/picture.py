@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Iterator, Mapping
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,15 @@ _FIELD = math.radians(30)  # of view
 _MARGIN = 1.08
 _FARTHEST = 1e6  # [m] from the root: more is no robot, and rays are computed with few digits
 _NEEDED = ("trimesh", "embreex", "PIL")
+# Of links whose shapes have no material, in turn: calm, and none like what a picture of an arm marks.
+_CALM = (
+    (0.40, 0.53, 0.66),  # slate blue
+    (0.86, 0.80, 0.70),  # cream
+    (0.50, 0.66, 0.62),  # sea green
+    (0.74, 0.56, 0.50),  # clay
+    (0.62, 0.58, 0.72),  # lavender
+    (0.70, 0.73, 0.76),  # silver
+)
 
 
 def solid_of(body: Body, positions: Mapping[str, float], meshes: Mapping[str, Path]) -> Solid | None:
@@ -40,14 +50,19 @@ def solid_of(body: Body, positions: Mapping[str, float], meshes: Mapping[str, Pa
 
 
 def solids_of_links(body: Body, positions: Mapping[str, float], meshes: Mapping[str, Path]) -> dict[str, list[Solid]]:
-    """Return what is visible of each link, in the frame of the root; raises as `solid_of` does."""
+    """Return what is visible of each link, in the frame of the root; raises as `solid_of` does.
+
+    What has no colour of its own has that of its link, so that neighbours can be told apart.
+    """
     poses, found = body.poses(positions), dict[str, list[Solid]]()
-    for name, link in body.links.items():
-        for shape in link.visuals or link.collisions:
+    seen = {name: link.visuals or link.collisions for name, link in body.links.items()}
+    calm = dict(zip((name for name, shapes in seen.items() if shapes), cycle(_CALM), strict=False))
+    for name, shapes in seen.items():
+        for shape in shapes:
             at = poses[name].compose(shape.origin)
-            found.setdefault(name, []).extend(
-                placed(solid, at, shape.colour) for solid in solids_of(shape.geometry, meshes)
-            )
+            for solid in solids_of(shape.geometry, meshes):
+                colour = shape.colour or (calm[name] if np.all(solid.colours == GREY) else None)
+                found.setdefault(name, []).append(placed(solid, at, colour))
     return found
 
 
@@ -159,13 +174,20 @@ def rendered(solid: Solid, bounds: Array) -> Array:
 
 
 def _camera(bounds: Array, side: int) -> tuple[Array, Array]:
-    """Return the eye and the directions of `side` x `side` rays, row by row, that see all within `bounds`."""
+    """Return the eye and the directions of `side` x `side` rays, row by row, that see all within `bounds` and no more.
+
+    The eye is where all of the sphere around `bounds` is in the field of view; the rays cover only their corners.
+    """
     middle, radius = bounds.mean(0), float(np.linalg.norm(bounds[1] - bounds[0])) / 2
     back = np.array(_VIEW) / np.linalg.norm(_VIEW)
     right = np.cross((0.0, 0.0, 1.0), back)
     right /= np.linalg.norm(right)
     up = np.cross(back, right)
-    eye = middle + back * radius * _MARGIN / math.sin(_FIELD / 2)
-    span = math.tan(_FIELD / 2) * (np.arange(side) + 0.5 - side / 2) / (side / 2)
-    rays = -back + span[None, :, None] * right - span[:, None, None] * up
+    eye = middle + back * radius / math.sin(_FIELD / 2)
+    corners = np.stack(np.meshgrid(*bounds.T), -1).reshape(-1, 3) - eye
+    seen = corners @ np.stack((right, up)).T / -(corners @ back)[:, None]
+    half = _MARGIN * float(np.ptp(seen, axis=0).max()) / 2
+    span = half * (np.arange(side) + 0.5 - side / 2) / (side / 2)
+    across, above = (seen.min(0) + seen.max(0)) / 2
+    rays = -back + (across + span)[None, :, None] * right + (above - span)[:, None, None] * up
     return eye, np.ascontiguousarray(rays.reshape(-1, 3))

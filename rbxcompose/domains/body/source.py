@@ -152,8 +152,6 @@ def reading(do: Read) -> Do:
 def read(arguments: argparse.Namespace, do: Read) -> int:
     """Do something with what was read at PATH; return the exit code."""
     arguments.path = robot_path(arguments.path)
-    if arguments.path is None:
-        return FINDINGS
     try:
         found = described(arguments)
     except MisuseError as error:

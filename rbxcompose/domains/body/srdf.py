@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import field
-from xml.sax.saxutils import quoteattr
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Span
 from rbxcompose.domains.body.link_pairs import REASONS, LinkPair, PairReason, pair_of
-from rbxcompose.domains.body.xml_reader import XmlElement
+from rbxcompose.domains.body.xml_reader import XmlElement, quoted
 
 Poses = Mapping[str, Mapping[str, float]]
 
@@ -144,31 +143,31 @@ def to_srdf(said: Semantics) -> str:
 
 
 def _lines(said: Semantics) -> Iterator[str]:
-    yield f"<robot name={quoteattr(said.robot)}>"
+    yield f"<robot name={quoted(said.robot)}>"
     for group in said.groups.values():
-        yield f"    <group name={quoteattr(group.name)}>"
+        yield f"    <group name={quoted(group.name)}>"
         for base, tip in group.chains:
-            yield f"        <chain base_link={quoteattr(base)} tip_link={quoteattr(tip)}/>"
+            yield f"        <chain base_link={quoted(base)} tip_link={quoted(tip)}/>"
         for key, names in (("joint", group.joints), ("link", group.links), ("group", group.groups)):
             for name in names:
-                yield f"        <{key} name={quoteattr(name)}/>"
+                yield f"        <{key} name={quoted(name)}/>"
         yield "    </group>"
     for owner, poses in said.poses.items():
         for pose, positions in poses.items():
-            yield f"    <group_state name={quoteattr(pose)} group={quoteattr(owner)}>"
+            yield f"    <group_state name={quoted(pose)} group={quoted(owner)}>"
             for joint, value in positions.items():
-                yield f'        <joint name={quoteattr(joint)} value="{value!r}"/>'
+                yield f'        <joint name={quoted(joint)} value="{value!r}"/>'
             yield "    </group_state>"
     for one in said.effectors:
-        parent = f" parent_group={quoteattr(one.parent_group)}" if one.parent_group else ""
-        words = f"name={quoteattr(one.name)} parent_link={quoteattr(one.parent_link)} group={quoteattr(one.group)}"
+        parent = f" parent_group={quoted(one.parent_group)}" if one.parent_group else ""
+        words = f"name={quoted(one.name)} parent_link={quoted(one.parent_link)} group={quoted(one.group)}"
         yield f"    <end_effector {words}{parent}/>"
     for each in said.outer:
-        words = f"name={quoteattr(each.name)} type={quoteattr(each.kind)} parent_frame={quoteattr(each.frame)}"
-        yield f"    <virtual_joint {words} child_link={quoteattr(each.child)}/>"
+        words = f"name={quoted(each.name)} type={quoted(each.kind)} parent_frame={quoted(each.frame)}"
+        yield f"    <virtual_joint {words} child_link={quoted(each.child)}/>"
     for joint in said.passive:
-        yield f"    <passive_joint name={quoteattr(joint)}/>"
+        yield f"    <passive_joint name={quoted(joint)}/>"
     for first, second in sorted(said.pairs):
-        words = f"link1={quoteattr(first)} link2={quoteattr(second)}"
+        words = f"link1={quoted(first)} link2={quoted(second)}"
         yield f'    <disable_collisions {words} reason="{said.pairs[first, second].capitalize()}"/>'
     yield "</robot>"

@@ -56,11 +56,7 @@ def _that_may_be(body: model.Body, joint: model.BodyJoint, role: str) -> dict[st
         taken, below = set(), [joint.child]
         while below:
             taken.add(link := below.pop())
-            below += [
-                body_joint.child
-                for body_joint in body.joints.values()
-                if body_joint.parent == link and body_joint.child not in taken
-            ]
+            below += [item.child for item in body.joints.values() if item.parent == link and item.child not in taken]
     return {name: link for name, link in body.links.items() if name not in taken} or dict(body.links)
 
 
@@ -122,8 +118,8 @@ def read_body(root: XmlElement) -> tuple[model.Body, list[Finding]]:
 
 
 @lru_cache(maxsize=4)  # components are asked for their ports many times, which follow from the body
-def body_of(urdf: str) -> model.Body:
-    """Return the body that a URDF of a plan describes.
+def read_text(urdf: str) -> tuple[model.Body, list[Finding]]:
+    """Return the body that the text of a URDF describes, and what is wrong with it, see `read_body`.
 
     Raises:
         ValueError: if it is not XML.
@@ -131,7 +127,16 @@ def body_of(urdf: str) -> model.Body:
     root = read_urdf(urdf, "urdf")
     if not isinstance(root, XmlElement):
         raise ValueError(root.message)
-    return read_body(root)[0]
+    return read_body(root)
+
+
+def body_of(urdf: str) -> model.Body:
+    """Return the body that a URDF of a plan describes.
+
+    Raises:
+        ValueError: if it is not XML.
+    """
+    return read_text(urdf)[0]
 
 
 class _MistakeError(Exception):

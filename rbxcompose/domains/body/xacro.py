@@ -186,9 +186,7 @@ def _asked(requests: Sequence[XacroRequest]) -> list[XacroAnswer | None]:
         start_new_session=True,
     ) as process:
         try:
-            output, _ = process.communicate(
-                f"[{','.join(request.text for request in requests)}]".encode(), timeout=DEADLINE
-            )
+            output, _ = process.communicate(f"[{','.join(item.text for item in requests)}]".encode(), timeout=DEADLINE)
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)
             output = b""
@@ -246,8 +244,7 @@ class XacroFile:
 def expand_all(xacros: Sequence[XacroFile]) -> list[tuple[Expanded | Finding, Sequence[Path]]]:
     """Expand xacro files, or return why that is impossible; each with the files below its roots that were read."""
     return [
-        _result(xacro, answer)
-        for xacro, answer in zip(xacros, answers([xacro.request for xacro in xacros]), strict=True)
+        _result(xacro, item) for xacro, item in zip(xacros, answers([xacro.request for xacro in xacros]), strict=True)
     ]
 
 

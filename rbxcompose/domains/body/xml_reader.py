@@ -34,6 +34,24 @@ PLACE = "rbx-place"  # an attribute that an expanded xacro has: where its elemen
 _SHOWN = 60  # characters of a name in a message
 
 
+_IN_TEXT = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;"})
+_IN_QUOTES = _IN_TEXT | str.maketrans({"\n": "&#10;", "\r": "&#13;", "\t": "&#9;"})
+
+
+def escaped(text: str) -> str:
+    """Return a text as it stands in an element: as `xml.sax.saxutils` does, which imports the network's modules."""
+    return text.translate(_IN_TEXT)
+
+
+def quoted(value: str) -> str:
+    """Return the value of an attribute in quotes."""
+    text = value.translate(_IN_QUOTES)
+    if '"' in text and "'" not in text:
+        return f"'{text}'"
+    inside = text.replace('"', "&quot;")
+    return f'"{inside}"'
+
+
 def span_of_place(place: str) -> Span:
     """Return the span that `PLACE` holds: file, line, first column and length, with `|` between them."""
     file, line, column, length = place.rsplit("|", 3)
@@ -127,8 +145,7 @@ class _Reader:
             help_text = "expand it first: 'xacro FILE.xacro -o FILE.urdf'"
             raise _RefusedError(NOT_URDF.at(self._tag(name), "xacro must expand this file first", help=help_text))
         if len(self.open) >= DEPTH:
-            message = f"elements are nested more than {DEPTH} levels deep"
-            raise _RefusedError(TOO_LARGE.at(self._tag(name), message))
+            raise _RefusedError(TOO_LARGE.at(self._tag(name), f"elements are nested more than {DEPTH} levels deep"))
         if self.elements > URDF_ELEMENTS:
             raise _RefusedError(TOO_LARGE.at(self._tag(name), f"more than {URDF_ELEMENTS:,} elements in one file"))
         place = attributes.pop(PLACE, None)

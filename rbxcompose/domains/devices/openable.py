@@ -12,17 +12,7 @@ from rbxcompose.base.findings import Finding, Span
 from rbxcompose.base.printable import plain
 from rbxcompose.compiler.model.flow import setting_span
 from rbxcompose.compiler.model.robot import Robot
-from rbxcompose.domains.devices.serial_ports import (
-    FORBIDDEN,
-    NO_PORT,
-    UNFIT,
-    PortError,
-    SerialPort,
-    connected,
-    latency_of,
-    port_of,
-    slow_adapter,
-)
+from rbxcompose.domains.devices import serial_ports
 from rbxcompose.domains.devices.usb import UsbDevice
 from rbxcompose.sdk.capabilities import OpensPort
 
@@ -41,30 +31,33 @@ class PortFile:
 LookAt = Callable[[str], PortFile]
 
 
-def port_findings(robot: Robot, ports: Sequence[SerialPort], look: LookAt) -> Iterator[Finding]:
+def port_findings(robot: Robot, ports: Sequence[serial_ports.SerialPort], look: LookAt) -> Iterator[Finding]:
     """Yield what is wrong with the ports that components open, given those that are connected."""
     for component, opens in robot.declared(OpensPort):
-        span = setting_span(robot, (component, opens.port.field))
-        yield from _of_port(opens.port.value, ports, look, span)
+        yield from _of_port(opens.port.value, ports, look, setting_span(robot, (component, opens.port.field)))
 
 
-def _of_port(name: str, ports: Sequence[SerialPort], look: LookAt, span: Span) -> Iterator[Finding]:
+def _of_port(name: str, ports: Sequence[serial_ports.SerialPort], look: LookAt, span: Span) -> Iterator[Finding]:
     path = name
     if wanted := UsbDevice.of(name):
         try:
-            path = port_of(wanted, ports).path
-        except PortError as error:
+            path = serial_ports.port_of(wanted, ports).path
+        except serial_ports.PortError as error:
             yield error.finding(span)
             return
     file, shown = look(path), plain(path)
     if not file.exists:
-        yield NO_PORT.at(span, f"{shown} does not exist", help=connected(ports, "serial port"))
+        yield serial_ports.NO_PORT.at(
+            span, f"{shown} does not exist", help=serial_ports.connected(ports, "serial port")
+        )
     elif not file.is_device:
-        yield UNFIT.at(span, f"{shown} is not a serial port", help=connected(ports, "serial port"))
+        yield serial_ports.UNFIT.at(
+            span, f"{shown} is not a serial port", help=serial_ports.connected(ports, "serial port")
+        )
     elif not file.may_open:
         todo = f"sudo usermod -aG {file.group or 'dialout'} $USER, then log in again"
-        yield FORBIDDEN.at(span, f"{shown} may not be opened by this user", help=todo)
-    elif warning := slow_adapter(path, file.latency, span):
+        yield serial_ports.FORBIDDEN.at(span, f"{shown} may not be opened by this user", help=todo)
+    elif warning := serial_ports.slow_adapter(path, file.latency, span):
         yield warning
 
 
@@ -75,7 +68,9 @@ def look_at(path: str) -> PortFile:
         group = _group_name(file.stat().st_gid)
     except OSError:
         return PortFile(exists=False)
-    return PortFile(True, file.is_char_device(), os.access(file, os.R_OK | os.W_OK), group, latency_of(path))
+    return PortFile(
+        True, file.is_char_device(), os.access(file, os.R_OK | os.W_OK), group, serial_ports.latency_of(path)
+    )
 
 
 def _group_name(number: int) -> str:

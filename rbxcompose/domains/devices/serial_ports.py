@@ -130,9 +130,7 @@ class SerialPort:
 
     def is_linked(self, name: str) -> bool:
         """Tell whether a link of this name leads to it, such as the one that a udev rule makes for a device."""
-        return any(
-            PurePath(candidate).parent.name == "dev" and PurePath(candidate).name == name for candidate in self.names
-        )
+        return any(PurePath(item).parent.name == "dev" and PurePath(item).name == name for item in self.names)
 
 
 def serial_ports(root: Path = ROOT) -> list[SerialPort]:

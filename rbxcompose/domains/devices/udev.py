@@ -155,8 +155,7 @@ def device_answers(
         file = look(port.path)
         if file.exists and not file.may_open:
             todo = f"sudo usermod -aG {file.group or 'dialout'} $USER, then log in again"
-            words = f"'{name}' is {plain(port.path)}, which may not be opened by this user"
-            yield FORBIDDEN.at(span, words, help=todo)
+            yield FORBIDDEN.at(span, f"'{name}' is {plain(port.path)}, which may not be opened by this user", help=todo)
     for group in same_serials(ports):
         places = ", ".join(serial_port.path for serial_port in group)
         serial = group[0].device.serial if group[0].device else ""

@@ -288,9 +288,7 @@ def unmatched_analyzer(robot: Robot) -> Iterator[Finding]:
     }  # names that are reported where they stand
     compared = 0
     for path, analyzer in each_analyzer(robot.manifest.contents.of(diagnostics).analyzers):
-        patterns = [
-            (index, condition) for index, condition in enumerate(analyzer.conditions) if isinstance(condition, str)
-        ]
+        patterns = [(index, item) for index, item in enumerate(analyzer.conditions) if isinstance(item, str)]
         for index, pattern in patterns:
             place = robot.value("diagnostics", "analyzers", *path, "match", index)
             if compared > _MOST_COMPARED:
@@ -322,15 +320,9 @@ def unseen_component(robot: Robot) -> Iterator[Finding]:
     named_elsewhere = (
         name for name, step in lost.items() if isinstance(step.node, SequenceNode) and step.node.tag == REPLACE
     )
-    named = {
-        *dropped(robot),
-        *named_elsewhere,
-        *(condition for condition in named_conditions if isinstance(condition, str)),
-    }
+    named = {*dropped(robot), *named_elsewhere, *(item for item in named_conditions if isinstance(item, str))}
     for name in robot.written - named if groups else ():
-        is_left = not any(fits(condition, name) for condition in settings.ignore) and not any(
-            matches(g, name) for g in groups
-        )
+        is_left = not any(fits(item, name) for item in settings.ignore) and not any(matches(g, name) for g in groups)
         if name in robot.components and is_left and not any(group.kind == "other" for group in groups):
             here, step = robot.component_span(name), lost.get(name)
             by = f": {step.layer} has replaced the list that did" if step else ""

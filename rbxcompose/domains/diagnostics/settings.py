@@ -208,9 +208,6 @@ class AnalyzerModel(Config):
         return None if self.count is None else (self.count, self.count)
 
 
-AnalyzerModel.model_rebuild()
-
-
 class DiagnosticsModel(Config):
     """How the states of components are grouped."""
 

@@ -186,9 +186,7 @@ def _stops(entry: MuxModel) -> Iterator[tuple[str, ...]]:
     for key, ending in (("on_idle", entry.on_idle), ("on_lock", entry.on_lock)):
         if ending not in (None, "none"):
             yield (key,)
-    yield from (
-        ("inputs", name, "zero_releases") for name, mux_input in entry.inputs.items() if mux_input.zero_releases
-    )
+    yield from (("inputs", name, "zero_releases") for name, item in entry.inputs.items() if item.zero_releases)
 
 
 @check("RBX3003", is_fixable=True, closed=(NAMES,))
@@ -318,9 +316,7 @@ def _meaningless(entry: MuxModel) -> Iterator[tuple[str, ...]]:
     if entry.works_by != "select":
         yield from ((key,) for key in ("initial", "lazy") if key in entry.model_fields_set)
     if not entry.has_priorities:
-        yield from (
-            ("inputs", name, "priority") for name, mux_input in entry.inputs.items() if mux_input.priority is not None
-        )
+        yield from (("inputs", name, "priority") for name, item in entry.inputs.items() if item.priority is not None)
         yield from (("locks", name, "priority") for name, lock in entry.locks.items() if lock.priority is not None)
 
 

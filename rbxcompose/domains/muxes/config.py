@@ -9,24 +9,7 @@ from typing import Any
 from pydantic import Field
 
 from rbxcompose.base.config import Config, Frequency, Time
-from rbxcompose.domains.muxes.core import (
-    NEVER,
-    RAMPS,
-    VELOCITIES,
-    Arbiter,
-    AsTwistMux,
-    AsYocs,
-    ByLatest,
-    ByPriority,
-    BySelection,
-    LockSource,
-    MuxCore,
-    MuxEndings,
-    MuxSource,
-    Ramp,
-    is_zeroed,
-    rest_of,
-)
+from rbxcompose.domains.muxes import core
 from rbxcompose.domains.muxes.requests import NONE
 from rbxcompose.domains.muxes.words import HIGHEST, HandoverLimits, HoldFirst, MuxEnding, MuxMode, MuxProfile
 from rbxcompose.msgs import registry
@@ -99,7 +82,7 @@ class MuxConfig(Config):
     @property
     def has_rest(self) -> bool:
         """Return whether a message of zeros commands rest."""
-        return self.message in VELOCITIES if self.zero_stops is None else self.zero_stops
+        return self.message in core.VELOCITIES if self.zero_stops is None else self.zero_stops
 
     @property
     def announced(self) -> str:
@@ -112,33 +95,35 @@ class MuxConfig(Config):
         return (config.topic if config else None) or f"{self.output}/{name}"
 
 
-def core_of(config: MuxConfig, *, is_stopped: bool = False) -> MuxCore[Message]:
+def core_of(config: MuxConfig, *, is_stopped: bool = False) -> core.MuxCore[Message]:
     """Return the core of a mux."""
     message = registry.message(config.message)
-    rest: dict[str, Any] = {"zero": rest_of(message), "is_zero": is_zeroed} if config.has_rest else {"zero": None}
-    return MuxCore(
+    rest: dict[str, Any] = (
+        {"zero": core.rest_of(message), "is_zero": core.is_zeroed} if config.has_rest else {"zero": None}
+    )
+    return core.MuxCore(
         {name: source_of(input_config, config) for name, input_config in config.inputs.items()},
         arbiter=arbiter_of(config),
         locks={name: _lock(lock, config) for name, lock in config.locks.items()},
-        endings=MuxEndings(_wait(config.on_idle, config.profile), _wait(config.on_lock, config.profile)),
+        endings=core.MuxEndings(_wait(config.on_idle, config.profile), _wait(config.on_lock, config.profile)),
         handover=_ramp(config),
         stopped=is_stopped,
         **rest,
     )
 
 
-def arbiter_of(config: MuxConfig) -> Arbiter:
+def arbiter_of(config: MuxConfig) -> core.Arbiter:
     """Return the rule by which the output is given."""
     if config.mode == "select":
         first = next(iter(config.inputs), None)
-        return BySelection(first if config.initial is None else None if config.initial == NONE else config.initial)
+        return core.BySelection(first if config.initial is None else None if config.initial == NONE else config.initial)
     if config.mode == "latest":
-        return ByLatest()
-    made: Mapping[MuxProfile, Callable[[], Arbiter]] = {"twist_mux": AsTwistMux, "yocs": AsYocs}
-    return made.get(config.profile, ByPriority)()
+        return core.ByLatest()
+    made: Mapping[MuxProfile, Callable[[], core.Arbiter]] = {"twist_mux": core.AsTwistMux, "yocs": core.AsYocs}
+    return made.get(config.profile, core.ByPriority)()
 
 
-def source_of(input_config: MuxInputConfig, config: MuxConfig) -> MuxSource:
+def source_of(input_config: MuxInputConfig, config: MuxConfig) -> core.MuxSource:
     """Return an input as the core knows it.
 
     In `twist_mux` an input with the timeout 0 never expires, and masks others before its first message. What is
@@ -146,19 +131,19 @@ def source_of(input_config: MuxInputConfig, config: MuxConfig) -> MuxSource:
     """
     never_ends = input_config.timeout is None or (input_config.timeout == 0 and config.profile == "twist_mux")
     starts_live = never_ends and (config.mode == "select" or config.profile == "twist_mux")
-    return MuxSource(
+    return core.MuxSource(
         _priority(input_config.priority, config) if config.has_priorities else 0,
-        NEVER if never_ends or input_config.timeout is None else input_config.timeout,
+        core.NEVER if never_ends or input_config.timeout is None else input_config.timeout,
         input_config.zero_releases and config.has_rest,
         starts_live,
     )
 
 
-def _lock(lock_config: MuxLockConfig, config: MuxConfig) -> LockSource:
+def _lock(lock_config: MuxLockConfig, config: MuxConfig) -> core.LockSource:
     counts = config.has_priorities and lock_config.priority is not None
-    return LockSource(
-        _priority(lock_config.priority or 0, config) if counts else NEVER,
-        lock_config.timeout or NEVER,
+    return core.LockSource(
+        _priority(lock_config.priority or 0, config) if counts else core.NEVER,
+        lock_config.timeout or core.NEVER,
         is_flag=bool(lock_config.topic),
     )
 
@@ -173,13 +158,13 @@ def _wait(ending: MuxEnding | None, profile: MuxProfile) -> float:
         case HoldFirst(hold=time):
             return time
         case None:
-            return 0.0 if profile == "default" else NEVER
+            return 0.0 if profile == "default" else core.NEVER
         case _:
-            return 0.0 if ending == "stop" else NEVER
+            return 0.0 if ending == "stop" else core.NEVER
 
 
-def _ramp(config: MuxConfig) -> Ramp[Any] | None:
-    made = RAMPS.get(config.message)
+def _ramp(config: MuxConfig) -> core.Ramp[Any] | None:
+    made = core.RAMPS.get(config.message)
     return None if made is None or config.handover is None else made(*handover_limits(config.handover))
 
 

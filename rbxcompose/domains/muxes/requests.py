@@ -90,13 +90,9 @@ class SelectMuxInput(Command):
     """Let one input of a mux through, whose inputs are selected; `__none` for none."""
 
     about = MUX
+    written = "mux select {0.component} {0.input}"
     component: str
     input: str
-
-    @property
-    def words(self) -> str:
-        """Return it as written on the command line."""
-        return shlex.join(["mux", "select", self.component, self.input])
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,13 +120,9 @@ class DeleteMuxInput(Command):
     """Remove an input from a mux until the robot goes down."""
 
     about = MUX
+    written = "mux delete {0.component} {0.input}"
     component: str
     input: str
-
-    @property
-    def words(self) -> str:
-        """Return it as written on the command line."""
-        return shlex.join(["mux", "delete", self.component, self.input])
 
 
 @dataclass(frozen=True, slots=True)

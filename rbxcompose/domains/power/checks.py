@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
+from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions.tree import Comparison, Variable
 from rbxcompose.base.findings import Finding, Related, Severity
 from rbxcompose.base.rules import MISSIONS, OWN, WIRING
@@ -12,16 +13,47 @@ from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.checks.missions import bounds_of, implies
 from rbxcompose.compiler.checks.places import far_places
 from rbxcompose.compiler.model.flow import OTHER_TYPE, is_written, setting_span
-from rbxcompose.compiler.model.mission_facts import batteries, blamed, constants, navigator_of, ways_of
+from rbxcompose.compiler.model.mission_facts import batteries, blamed, constants, is_served, navigator_of, ways_of
 from rbxcompose.compiler.model.robot import Robot, RobotComponent, RobotMission
-from rbxcompose.domains.power.charge import ChargeInterrupt, calls, charger_of
 from rbxcompose.missions.analysis.bounds import truth
-from rbxcompose.missions.analysis.facts import goal_place
+from rbxcompose.missions.analysis.facts import goal_place, number_in
 from rbxcompose.missions.analysis.travel_times import Ways, distance, too_short
 from rbxcompose.missions.language.asked import Asked
 from rbxcompose.missions.program.answers import NodeFlow
 from rbxcompose.missions.program.program import Interrupt, MissionNode, Program
 from rbxcompose.sdk.capabilities import Charges, Drains, Navigates, Setting, Warns
+
+
+@dataclass(frozen=True, slots=True)
+class ChargeInterrupt:
+    """An interrupt that charges the battery when its level is below `level` (a ratio)."""
+
+    interrupt: Interrupt
+    reaction: tuple[MissionNode, ...]
+    battery: RobotComponent
+    drains: Drains
+    charges: Charges
+    level: float
+
+
+def calls(robot: Robot, mission: RobotMission) -> Iterator[ChargeInterrupt]:
+    """Yield the interrupts that charge when the battery is low."""
+    known, constant = batteries(robot), constants(mission)
+    for interrupt in mission.program.interrupts:
+        match interrupt.when.expression.tree:
+            case Comparison(operator="<" | "<=", left=Variable(name=name), right=limit) if name in known:
+                level = number_in(limit, constant)
+                reaction = () if interrupt.root is None else mission.program.below(interrupt.root)
+                found = [charger for node in reaction if (charger := charger_of(robot, node.skill))]
+                if level is not None and found:
+                    yield ChargeInterrupt(interrupt, reaction, *known[name], found[0][1], level)
+
+
+def charger_of(robot: Robot, skill: str) -> tuple[RobotComponent, Charges] | None:
+    """Return the component at which a skill charges, None if it does not charge."""
+    found = (pair for pair in robot.declared(Charges) if is_served(robot, skill, pair[0], pair[1].goals))
+    return next(found, None)
+
 
 _ABSURD = 1.0  # [m] of a tolerance, which is then what is wrong
 _LASTS = "how long a full battery lasts"
@@ -158,9 +190,7 @@ def _ends_of_loops(program: Program, call: ChargeInterrupt) -> Iterator[Asked]:
 @check("RBX3505", Severity.WARNING, closed=())
 def charger_reach(robot: Robot) -> Iterator[Finding]:
     """The robot may stop too far from its dock to be charged."""
-    drivers = [
-        (component, navigates.tolerance) for component, navigates in robot.declared(Navigates) if navigates.tolerance
-    ]
+    drivers = [(item, navigates.tolerance) for item, navigates in robot.declared(Navigates) if navigates.tolerance]
     if not drivers:
         return
     driver, tolerance = min(drivers, key=lambda one: one[1].value)

@@ -210,9 +210,7 @@ def drives_of(config: ServoBusConfig) -> dict[str, JointDrive]:
 def mimics_of(joints: Mapping[str, DrivenJointConfig]) -> dict[str, JointMimic]:
     """Return the joints that follow others."""
     return {
-        name: JointMimic(joint.mimic, joint.multiplier, joint.mimic_offset)
-        for name, joint in joints.items()
-        if joint.mimic
+        name: JointMimic(item.mimic, item.multiplier, item.mimic_offset) for name, item in joints.items() if item.mimic
     }
 
 

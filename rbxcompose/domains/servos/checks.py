@@ -11,20 +11,33 @@ from rbxcompose.base.expressions.tree import Expression, ExpressionError, Expres
 from rbxcompose.base.expressions.types import Type
 from rbxcompose.base.findings import Finding, Related, Severity, Span
 from rbxcompose.base.rules import NAMES, WIRING
-from rbxcompose.base.units import ANGLE, BIT_RATE, FREQUENCY, LENGTH, TIME, UNITS, Quantity, format_quantity
+from rbxcompose.base.units import (
+    ANGLE,
+    ANGULAR_SPEED,
+    BIT_RATE,
+    FREQUENCY,
+    LENGTH,
+    SPEED,
+    TIME,
+    UNITS,
+    Quantity,
+    format_quantity,
+)
 from rbxcompose.compiler.check_runner import check
 from rbxcompose.compiler.model.flow import setting_span
 from rbxcompose.compiler.model.mission_facts import constants, is_served
 from rbxcompose.compiler.model.robot import PortEnd, Robot, RobotMission
-from rbxcompose.domains.servos.bus import FACTORY_DELAY
-from rbxcompose.domains.servos.driven_joints import BUSES, ROUNDED, DrivenBus, DrivenJoint, driven_buses, driven_joints
-from rbxcompose.domains.servos.models import COMMON_BAUDS, model_named, stall_torque
+from rbxcompose.domains.body.model import BodyJoint
+from rbxcompose.domains.body.sections.body import body
+from rbxcompose.domains.servos.bus import DYNAMIXEL, FACTORY_DELAY
+from rbxcompose.domains.servos.joint_drive import ServoJoint
+from rbxcompose.domains.servos.models import COMMON_BAUDS, ServoModel, model_named, stall_torque
 from rbxcompose.domains.servos.sections.actuators import actuators, model_of
 from rbxcompose.domains.servos.sections.controllers import controllers
-from rbxcompose.domains.servos.sections.joints import effort_of, joints, limits_of
+from rbxcompose.domains.servos.sections.joints import JointModel, effort_of, joints, limits_of
 from rbxcompose.domains.servos.sections.safety import safety
 from rbxcompose.domains.servos.transfers import BusLoad, cycle_load
-from rbxcompose.manifest.tree import ScalarNode, at, value_span
+from rbxcompose.manifest.tree import KeyPath, ScalarNode, at, value_span
 from rbxcompose.missions.analysis.facts import Constants, number_in
 from rbxcompose.missions.engine.value_text import show
 from rbxcompose.missions.language.asked import WrittenArgument, expression_of
@@ -32,6 +45,89 @@ from rbxcompose.missions.program.answers import NodeFlow
 from rbxcompose.missions.program.program import MissionNode
 from rbxcompose.sdk.capabilities import BoundsGoals, LocksInSilence
 from rbxcompose.sdk.ports import In, ServesAction
+
+BUSES = ("buses",)
+ROUNDED = 0.002
+"""Of a limit, by which two that mean the same may differ: 145 deg and 2.53 rad."""
+
+
+@dataclass(frozen=True, slots=True)
+class DrivenJoint:
+    """A joint of a bus: as it is written, in the body (None without one), and as it is driven."""
+
+    robot: Robot
+    bus: str
+    written: JointModel
+    body: BodyJoint | None
+    joint: ServoJoint
+    mimics: str
+    """The joint that it follows, empty if it takes commands."""
+
+    @property
+    def name(self) -> str:
+        """Return its name."""
+        return self.joint.name
+
+    def key(self, *path: str | int) -> Span:
+        """Return the place of a key of its entry, or of the nearest one above it."""
+        return self.robot.key("joints", self.name, *path)
+
+    def value(self, *path: str | int) -> Span:
+        """Return the place of a value of its entry, or of the nearest one above it."""
+        return self.robot.value("joints", self.name, *path)
+
+    @property
+    def slides(self) -> bool:
+        """Return whether its positions are lengths."""
+        return self.body is not None and self.body.slides
+
+    def position(self, value: float) -> str:
+        """Write a position for people."""
+        return format_quantity(value, LENGTH, "cm") if self.slides else format_quantity(value, ANGLE)
+
+    def speed(self, value: float) -> str:
+        """Write a speed for people."""
+        return format_quantity(value, SPEED) if self.slides else format_quantity(value, ANGULAR_SPEED)
+
+
+@dataclass(frozen=True, slots=True)
+class DrivenBus:
+    """A bus of servos: their models and modes by id, its rates [bit/s, Hz] and the pause before a reply [s], if set."""
+
+    name: str
+    path: KeyPath
+    baud: int
+    rate: float
+    delay: float | None
+    servos: Mapping[int, tuple[ServoModel, str]]
+
+
+def driven_buses(robot: Robot) -> Iterator[DrivenBus]:
+    """Yield each bus of Dynamixel servos whose joints are driven."""
+    for component in robot.components.values():
+        bus: Any = component.config
+        if component.path[:1] == BUSES and bus.kind == DYNAMIXEL:
+            servos = {
+                servo.id: (bus.model(servo.model), item.mode) for item in bus.joints.values() for servo in item.servos
+            }
+            yield DrivenBus(bus.name, component.path, bus.baud, bus.rate, bus.return_delay, servos)
+
+
+def driven_joints(robot: Robot) -> Iterator[DrivenJoint]:
+    """Yield all joints that servos drive."""
+    written = robot.manifest.contents.of(joints)
+    description = robot.manifest.contents.of(body)
+    known = description.body.joints if description else {}
+    for component in robot.components.values():
+        if component.path[:1] == BUSES:
+            from rbxcompose.domains.servos.bus_config import drives_of  # slow to import, and most robots need none
+
+            bus: Any = component.config
+            for name, drive in drives_of(bus).items():
+                if name in written:
+                    yield DrivenJoint(
+                        robot, bus.name, written[name], known.get(name), drive.joint, bus.joints[name].mimic
+                    )
 
 
 @check("RBX2227")
@@ -44,9 +140,7 @@ def baud_of_servo(robot: Robot) -> Iterator[Finding]:
         unfit = [name for name, model in models.items() if model.code_of(bus.baud) is None]
         if unfit:
             names = sorted({models[name].name for name in unfit})
-            common = [
-                baud for baud in COMMON_BAUDS if all(model.code_of(baud) is not None for model in models.values())
-            ]
+            common = [baud for baud in COMMON_BAUDS if all(item.code_of(baud) is not None for item in models.values())]
             yield baud_of_servo.at(
                 robot.value(*bus.path, "baud"),
                 f"{' and '.join(names)} cannot listen at {format_quantity(bus.baud, BIT_RATE)}",
@@ -186,9 +280,8 @@ def _beyond_reach(driven: DrivenJoint) -> Iterator[Finding]:
     if body and not driven.slides and body.may_be_degrees:
         return  # reported as RBX2021
     if body and not is_free and (intended := _in_degrees(driven)):
-        yield out_of_reach.at(
-            body.span, message, help=f"limits in a URDF are in radians: for degrees, write {intended}"
-        )
+        help_text = f"limits in a URDF are in radians: for degrees, write {intended}"
+        yield out_of_reach.at(body.span, message, help=help_text)
         return
     yield out_of_reach.at(
         _place(driven, is_shifted=limits.least > last or limits.greatest < first),
@@ -282,11 +375,7 @@ def no_speed_limit(robot: Robot) -> Iterator[Finding]:
 @check("RBX2245", Severity.WARNING, closed=(WIRING,))
 def speed_of_joint(robot: Robot) -> Iterator[Finding]:
     """A controller is to be faster than its joint."""
-    declared = [
-        (robot_component, bounds)
-        for robot_component, bounds in robot.declared(BoundsGoals)
-        if bounds.speed and bounds.joints
-    ]
+    declared = [(item, bounds) for item, bounds in robot.declared(BoundsGoals) if bounds.speed and bounds.joints]
     led = {joint.name: joint for joint in driven_joints(robot)} if declared else {}
     for component, bounds in declared:
         for name in bounds.joints.value.values() if bounds.joints else ():
@@ -578,11 +667,7 @@ def hasty_motion(robot: Robot) -> Iterator[Finding]:
 
 
 def _movers(robot: Robot) -> dict[str, JointMover]:
-    declared = [
-        (robot_component, bounds)
-        for robot_component, bounds in robot.declared(BoundsGoals)
-        if bounds.duration and bounds.joints
-    ]
+    declared = [(item, bounds) for item, bounds in robot.declared(BoundsGoals) if bounds.duration and bounds.joints]
     led = {joint.name: joint for joint in driven_joints(robot)} if declared else {}
     found = dict[str, JointMover]()
     for component, bounds in declared:
@@ -613,11 +698,7 @@ def _leaves_joints(node: MissionNode) -> bool:
 
 def _after(node: MissionNode, mover: JointMover, known: Constants, before: Positions) -> Positions:
     """Return where the joints are after a step, as far as that is known."""
-    given = {
-        argument.name: (mover.goal(argument, known), argument)
-        for argument in node.step.arguments
-        if argument.name in mover.joints
-    }
+    given = {item.name: (mover.goal(item, known), item) for item in node.step.arguments if item.name in mover.joints}
     stay = {name: pair for name, pair in before.items() if name not in given}
     return stay | {name: (value, argument) for name, (value, argument) in given.items() if value is not None}
 

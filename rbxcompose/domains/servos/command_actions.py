@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import os
+import re
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -14,13 +16,83 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Finding, Report
 from rbxcompose.base.printable import plain
 from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, refuse, table, write_report
-from rbxcompose.commands.new_files import AnswerError, read_name, taken, write_new
+from rbxcompose.commands.new_files import read_name, render, taken, write_new, yaml_text
 from rbxcompose.domains.devices.serial_ports import port_path, serial_ports, slow_adapter
 from rbxcompose.domains.servos.bus import ID_TAKEN, NO_ITEM, OTHER_RATE, REFUSED, SILENT, UNKNOWN_MODEL, FoundServo
 from rbxcompose.domains.servos.dynamixel_bus import DynamixelBus, change_id
-from rbxcompose.domains.servos.models import ServoModel, hardware_errors
-from rbxcompose.domains.servos.new_robot import NewServo, ServoRobotAnswers, servo_robot_files, servo_robot_paths
+from rbxcompose.domains.servos.models import ServoModel, hardware_errors, stall_torque
+from rbxcompose.domains.servos.transfers import cycle_load
 from rbxcompose.manifest.files import shown_name
+
+_PLAIN_PATH = re.compile(r"/[\w./:-]*\w")
+_STEP = 1e-4  # [rad], to which limits are rounded
+_APART = 0.1  # [m] between the joints of the drawing
+_USUAL = 100  # [Hz] of a bus
+
+
+@dataclass(frozen=True, slots=True)
+class NewServo:
+    """A servo of a new robot."""
+
+    id: int
+    model: ServoModel
+
+    @property
+    def lower(self) -> float:
+        """Return the least position of its joint [rad]."""
+        centre = self.model.family.centre or self.model.family.ticks // 2
+        return -_within(centre * self.model.per_tick)
+
+    @property
+    def upper(self) -> float:
+        """Return the greatest position of its joint [rad]."""
+        centre = self.model.family.centre or self.model.family.ticks // 2
+        return _within((self.model.family.ticks - 1 - centre) * self.model.per_tick)
+
+    @property
+    def effort(self) -> float:
+        """Return the greatest torque of its joint [Nm]: all that its servo has, 0 if that is not known."""
+        return stall_torque(self.model) or 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class ServoRobotAnswers:
+    """What must be known about a new robot made of servos: `baud` in bits per second."""
+
+    name: str
+    port: str
+    baud: int
+    servos: Sequence[NewServo]
+
+    @property
+    def rate(self) -> int:
+        """Return how often all of them can be read and written [Hz], 100 at most."""
+        load = cycle_load({servo.id: (servo.model, "position") for servo in self.servos})
+        return max(1, min(_USUAL, math.floor(1.0 / load.time(self.baud))))
+
+
+def servo_robot_paths(name: str) -> tuple[str, str]:
+    """Return the paths of the robot's file and of its body."""
+    return f"robots/{name}/robot.yaml", f"robots/{name}/{name}.urdf"
+
+
+def servo_robot_files(answers: ServoRobotAnswers) -> dict[str, str]:
+    """Return the texts of the robot's file and of its body, by path."""
+    robot, body = servo_robot_paths(answers.name)
+    port = answers.port if _PLAIN_PATH.fullmatch(answers.port) else yaml_text(answers.port)
+    placed = [(servo, f"{index * _APART:.2f}") for index, servo in enumerate(answers.servos)]
+    width = f"{len(placed) * _APART:.2f}"
+    middle = f"{(len(placed) - 1) * _APART / 2:.2f}"
+    values = {"name": answers.name, "port": port, "baud": answers.baud, "rate": answers.rate, "servos": answers.servos}
+    return {
+        robot: render("servo_robot.yaml.j2", **values),
+        body: render("servo_robot.urdf.j2", name=answers.name, placed=placed, width=width, middle=middle),
+    }
+
+
+def _within(angle: float) -> float:
+    """Return an angle with few digits that is not beyond."""
+    return round(math.floor(angle / _STEP) * _STEP, 4)
 
 
 @contextmanager
@@ -288,10 +360,7 @@ def _moved(found: FoundServo, baud: int, taken: set[int], port: str) -> str:
 
 def new_robot(arguments: argparse.Namespace) -> int:
     """Look for servos, and write a robot of those at the rate that most have."""
-    try:
-        name = read_name(arguments.name, "the robot")
-    except AnswerError as error:
-        return refuse(error.finding)
+    name = read_name(arguments.name, "the robot")
     if finding := taken(arguments.into, servo_robot_paths(name)):
         return refuse(finding)
     choice = choose({baud: _surveyed(arguments, baud) for baud in dict.fromkeys(arguments.baud)}, arguments.port)
@@ -393,14 +462,12 @@ def _show_values(bus: DynamixelBus, found: FoundServo, items: list[str], argumen
         return refuse(SILENT.at(None, words, help="connect one alone"))
     values = {name: shown(bus.servos[found.id], name, reading.values[name]) for name in items}
     if arguments.json:
-        shown_values = {
-            name: {"raw": reading.values[name], "value": value, "unit": u} for name, (value, u) in values.items()
-        }
+        raws = reading.values
+        shown_values = {name: {"raw": raws[name], "value": value, "unit": u} for name, (value, u) in values.items()}
         emit(json.dumps({"id": found.id, "model": found.name, "values": shown_values}))
         return 0
     rows = [
-        (name, str(reading.values[name]), f"{value:.6g} {unit}" if unit else "")
-        for name, (value, unit) in values.items()
+        (name, str(reading.values[name]), f"{item:.6g} {unit}" if unit else "") for name, (item, unit) in values.items()
     ]
     emit(f"{found.name}, id {found.id}, protocol {found.protocol}.0")
     emit(table([("item", "raw", "value"), *rows]))

@@ -117,8 +117,10 @@ class ItemOfServo(Protocol):
         """Write a raw value in one of the next cycles; a newer one replaces it."""
 
 
-class ControllerSite(Protocol):
-    """What a controller uses of the component that runs it."""
+class ControllerHost(Protocol):
+    """The component that runs controllers, as their sites see it."""
+
+    bound: dict[str, Any]
 
     @property
     def now(self) -> float:
@@ -128,28 +130,57 @@ class ControllerSite(Protocol):
     def stamp(self) -> int:
         """Return the time for message headers [ns]."""
 
+    def warn(self, text: str) -> None:
+        """Log something that a person should look at."""
+
+    def objection(self, controller: str) -> str:
+        """Return why a controller may command nothing now, or nothing."""
+
+    def item(self, actuator: str, name: str, *, is_read: bool, setup: Mapping[str, int]) -> ItemOfServo:
+        """Return an item of a servo."""
+
+
+class ControllerSite:
+    """What a controller uses of the component that runs it."""
+
+    def __init__(self, bus: ControllerHost, name: str, joints: Mapping[str, ControlledJoint]) -> None:
+        self._bus, self._name, self.joints = bus, name, joints
+
     @property
-    def joints(self) -> Mapping[str, ControlledJoint]:
-        """Return its joints by name."""
+    def now(self) -> float:
+        """Return robot time [s]."""
+        return self._bus.now
+
+    @property
+    def stamp(self) -> int:
+        """Return the time for message headers [ns]."""
+        return self._bus.stamp
 
     @property
     def refusal(self) -> str:
-        """Return why nothing may be commanded now; empty if it may."""
+        """Return why nothing may be commanded now, or nothing."""
+        return self._bus.objection(self._name)
 
     def item(self, actuator: str, name: str, *, is_read: bool, setup: Mapping[str, int]) -> ItemOfServo:
         """Return an item of a servo; what it needs in other items is written before. Only `prepare` may ask."""
+        return self._bus.item(actuator, name, is_read=is_read, setup=setup)
 
     def action(self, port: str) -> ActionServer[Any, Any, Any]:
-        """Return the action at one of its ports."""
+        """Return the action at one of the controller's ports."""
+        server: ActionServer[Any, Any, Any] = self._bus.bound[f"{self._name}_{port}"]
+        return server
 
     def goal(self, port: str) -> ServedGoal[Any, Any, Any] | None:
-        """Return the current goal at one of its ports."""
+        """Return the current goal at one of the controller's ports."""
+        return self.action(port).current
 
     def send(self, port: str, message: Any) -> None:
-        """Publish at one of its ports."""
+        """Publish at one of the controller's ports."""
+        self._bus.bound[f"{self._name}_{port}"](message)
 
     def warn(self, text: str) -> None:
         """Log something that a person should look at."""
+        self._bus.warn(f"controller '{self._name}': {text}")
 
 
 class Controller(ABC, Generic[C]):

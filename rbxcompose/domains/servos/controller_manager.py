@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, Protocol
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.requests import Command, Query, Refused
-from rbxcompose.domains.servos.controller import ControlledJoint, Controller, ControllerConfig, ItemOfServo
-from rbxcompose.sdk.bound import ActionServer, ServedGoal
+from rbxcompose.domains.servos.controller import Controller, ControllerConfig
 
 BUS = "servo_bus"
 
@@ -53,14 +51,10 @@ class ScaleMotion(Command):
     """Let a controller follow its goals at a share of their speed from now on, also the one on its way; 0 holds it."""
 
     about = BUS
+    written = "controller speed {0.controller} {0.share:.4g}"
     component: str
     controller: str
     share: float
-
-    @property
-    def words(self) -> str:
-        """Return it as written on the command line."""
-        return shlex.join(["controller", "speed", self.controller, f"{self.share:.4g}"])
 
 
 class ControllerManager:
@@ -94,10 +88,7 @@ class ControllerManager:
 
     def leader(self, joint: str) -> str:
         """Return the active controller that moves a joint now, or nothing."""
-        return next(
-            (controller.name for controller in self.leading if joint in controller.config.claimed and controller.leads),
-            "",
-        )
+        return next((item.name for item in self.leading if joint in item.config.claimed and item.leads), "")
 
     def let_go(self, joint: str, now: float, reason: str) -> None:
         """Have a joint left alone, which has lost its torque."""
@@ -154,70 +145,3 @@ class ControllerManager:
         if problem := self.controllers[name].set_pace(share):
             raise Refused(problem)
         return f"'{name}' follows goals at {share:.0%} of the speed" if share else f"'{name}' holds: the speed is 0 %"
-
-
-class ControllerHost(Protocol):
-    """The component that runs controllers, as their seats see it."""
-
-    bound: dict[str, Any]
-
-    @property
-    def now(self) -> float:
-        """Return robot time [s]."""
-
-    @property
-    def stamp(self) -> int:
-        """Return the time for message headers [ns]."""
-
-    def warn(self, text: str) -> None:
-        """Log something that a person should look at."""
-
-    def objection(self, controller: str) -> str:
-        """Return why a controller may command nothing now, or nothing."""
-
-    def item(self, actuator: str, name: str, *, is_read: bool, setup: Mapping[str, int]) -> ItemOfServo:
-        """Return an item of a servo."""
-
-
-class ControllerSeat:
-    """What a controller uses of its bus: see `ControllerSite`."""
-
-    def __init__(self, bus: ControllerHost, name: str, joints: Mapping[str, ControlledJoint]) -> None:
-        self._bus, self._name = bus, name
-        self.joints = joints
-
-    @property
-    def now(self) -> float:
-        """Return robot time [s]."""
-        return self._bus.now
-
-    @property
-    def stamp(self) -> int:
-        """Return the time for message headers [ns]."""
-        return self._bus.stamp
-
-    @property
-    def refusal(self) -> str:
-        """Return why nothing may be commanded now, or nothing."""
-        return self._bus.objection(self._name)
-
-    def item(self, actuator: str, name: str, *, is_read: bool, setup: Mapping[str, int]) -> ItemOfServo:
-        """Return an item of a servo, which the cycle reads or writes."""
-        return self._bus.item(actuator, name, is_read=is_read, setup=setup)
-
-    def action(self, port: str) -> ActionServer[Any, Any, Any]:
-        """Return the action at one of the controller's ports."""
-        server: ActionServer[Any, Any, Any] = self._bus.bound[f"{self._name}_{port}"]
-        return server
-
-    def goal(self, port: str) -> ServedGoal[Any, Any, Any] | None:
-        """Return the current goal at one of the controller's ports."""
-        return self.action(port).current
-
-    def send(self, port: str, message: Any) -> None:
-        """Publish at one of the controller's ports."""
-        self._bus.bound[f"{self._name}_{port}"](message)
-
-    def warn(self, text: str) -> None:
-        """Log something that a person should look at."""
-        self._bus.warn(f"controller '{self._name}': {text}")

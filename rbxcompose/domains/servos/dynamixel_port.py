@@ -276,11 +276,7 @@ class PacketsTwo(Protocol2PacketHandler):  # type: ignore[misc]  # the SDK has n
             ids = list(wanted)
             result = self.syncReadTx(port, first.address, first.length, ids, len(ids), is_fast)
             return bool(result == COMM_SUCCESS)
-        given = [
-            byte
-            for servo, stretch in wanted.items()
-            for byte in (servo, *_word(stretch.address), *_word(stretch.length))
-        ]
+        given = [byte for servo, item in wanted.items() for byte in (servo, *_word(item.address), *_word(item.length))]
         return bool(self.bulkReadTx(port, given, len(given), False) == COMM_SUCCESS)
 
     def write_group(self, port: BlockingPort, at: Stretch, data: Mapping[int, bytes]) -> bool:

@@ -173,7 +173,7 @@ class Limiter:
         inside = self.limits.clamped(self._wanted)
         clamped = ["position"] if inside != self._wanted else []
         wished = self._velocity_towards(inside, dt)
-        velocity = _clamp(wished, self.limits.speed)
+        velocity = max(-self.limits.speed, min(self.limits.speed, wished))
         clamped += ["velocity"] if velocity != wished else []
         reachable = self._reachable(velocity, dt)
         clamped += ["acceleration"] if reachable != velocity else []
@@ -207,10 +207,6 @@ class Limiter:
         # Rounding must not carry it over a limit; where it was put outside, it stays allowed to be.
         least, greatest = min(self.limits.least, before), max(self.limits.greatest, before)
         self.position = max(least, min(greatest, before + velocity * dt))
-
-
-def _clamp(value: float, limit: float) -> float:
-    return max(-limit, min(limit, value))
 
 
 def _smaller(first: float | None, second: float | None) -> float | None:

@@ -372,7 +372,8 @@ class ServoModel:
 
     def code_of(self, baud: int) -> int | None:
         """Return the code of a baud rate [bit/s], None if the model does not have it within 3 %."""
-        near = min(range(256), key=lambda code: abs((self.baud_of(code) or 0) - baud))
+        codes = range(256 if self.protocol == 1 else len(_TWO_BAUDS))
+        near = min(codes, key=lambda code: abs((self.baud_of(code) or 0) - baud))
         return near if abs((self.baud_of(near) or 0) - baud) <= _BAUD_TOLERANCE * baud else None
 
 

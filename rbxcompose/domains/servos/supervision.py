@@ -192,10 +192,8 @@ def joint_report(
     drives: Mapping[str, JointDrive], controllers: Mapping[str, str], periods: Periods, *, is_lost: bool
 ) -> ServoReport:
     """Return how the joints are, with the notes of controllers."""
-    notes = {name: drive.condition.note or drive.refused or drive.clamped for name, drive in drives.items()} | dict(
-        controllers
-    )
-    notes = {name: words for name, words in notes.items() if words}
+    own = {name: drive.condition.note or drive.refused or drive.clamped for name, drive in drives.items()}
+    notes = {name: words for name, words in {**own, **controllers}.items() if words}
     bad = [name for name, drive in drives.items() if drive.mode in (JointMode.FAULT, JointMode.RESTING)]
     level = Level.ERROR if bad or is_lost else Level.WARN if notes else Level.OK
     message = "; ".join(f"{name}: {words}" for name, words in notes.items()) or f"{len(drives)} joints"

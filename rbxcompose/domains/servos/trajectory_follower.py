@@ -285,9 +285,8 @@ class TrajectoryFollower:
             error = self._error(name, desired[name], measured[name])
             if tolerance is not None and not abs(error) <= tolerance:
                 message = f"joint '{name}' is {abs(error):.3g} from its path, more than {tolerance:.3g}"
-                return TrajectoryOutcome(
-                    TrajectoryCode.PATH_TOLERANCE_VIOLATED, message, name, abs(error), tolerance, time
-                )
+                code = TrajectoryCode.PATH_TOLERANCE_VIOLATED
+                return TrajectoryOutcome(code, message, name, abs(error), tolerance, time)
         return None
 
     def _not_arrived(
@@ -304,9 +303,8 @@ class TrajectoryFollower:
             for words, error, limit in checks:
                 if limit is not None and not abs(error) <= limit:
                     message = f"joint '{name}' is {abs(error):.3g} {words}, more than {limit:.3g}"
-                    return TrajectoryOutcome(
-                        TrajectoryCode.GOAL_TOLERANCE_VIOLATED, message, name, abs(error), limit, time
-                    )
+                    code = TrajectoryCode.GOAL_TOLERANCE_VIOLATED
+                    return TrajectoryOutcome(code, message, name, abs(error), limit, time)
         return None
 
     def _tolerance(self, run: _Run, joint: str) -> TrajectoryTolerance:

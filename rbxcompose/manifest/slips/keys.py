@@ -1,7 +1,5 @@
 """Slips in keys: those of other tools, and those at the wrong level."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from rbxcompose.base.findings import DID_YOU_MEAN, replacement

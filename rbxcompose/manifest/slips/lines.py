@@ -1,7 +1,5 @@
 """Slips in lines: indentation, colons, first lines, lines that are not YAML."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 

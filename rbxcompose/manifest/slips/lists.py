@@ -1,7 +1,5 @@
 """Slips in lists: brackets and dashes that are missing or misplaced, items without names."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """What is known about a condition before it is evaluated: whether it holds always, never, or sometimes."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 

@@ -1,7 +1,5 @@
 """Checks of a mission on a robot before it runs: rules in the modules of `missions/checks`."""
 
-from __future__ import annotations
-
 import importlib
 import pkgutil
 from collections.abc import Callable, Iterable, Iterator
@@ -56,16 +54,13 @@ def mission_checks() -> tuple[MissionCheck, ...]:
 
 def check_program(program: Program, robot: RobotNames) -> list[Finding]:
     """Return all findings about a mission on this robot, in the order of the text."""
-    return sorted((finding for _, finding in rule_findings(Examined(program, robot))), key=_place)
+    return sorted((finding for _, finding in rule_findings(Examined(program, robot), mission_checks())), key=_place)
 
 
-def rule_findings(
-    mission: Examined, reports: Callable[[MissionCheck], bool] = lambda rule: True
-) -> Iterator[tuple[MissionCheck, Finding]]:
-    """Yield the findings of some rules about a mission, each with its rule."""
-    for check in mission_checks():
-        if reports(check):
-            yield from ((check, finding) for finding in check(mission))
+def rule_findings(mission: Examined, rules: Iterable[MissionCheck]) -> Iterator[tuple[MissionCheck, Finding]]:
+    """Yield the findings of rules about a mission, each with its rule."""
+    for check in rules:
+        yield from ((check, finding) for finding in check(mission))
 
 
 def _place(finding: Finding) -> tuple[str, int, int]:

@@ -1,9 +1,8 @@
 """What nodes set, publish and call, by themselves or in their hooks."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 
+from rbxcompose.base.findings import Itself, once
 from rbxcompose.missions.language.asked import Assignment
 from rbxcompose.missions.program.answers import Deeds, WrittenSetting
 from rbxcompose.missions.program.machines import MessageTemplate
@@ -37,8 +36,13 @@ def replaced(program: Program) -> frozenset[str]:
 
 def written(program: Program) -> frozenset[str]:
     """Return the names of all data that change while a mission runs, including those that only lose items."""
-    shortened = (node.step.effects.shortened for node in program.nodes)
-    return replaced(program).union(name for name in shortened if name)
+    return _written(Itself(program))
+
+
+@once  # many rules ask
+def _written(program: Itself[Program]) -> frozenset[str]:
+    shortened = (node.step.effects.shortened for node in program.value.nodes)
+    return replaced(program.value).union(name for name in shortened if name)
 
 
 def sent_by(programs: Iterable[Program]) -> tuple[set[str], set[str]]:

@@ -1,7 +1,5 @@
 """A mission on a robot as the checks see it: its nodes with their scopes, how each may end, what it claims."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 from itertools import takewhile

@@ -1,22 +1,9 @@
 """What a mission will do, as far as its text shows: constants, steps that cannot fail, steps that never end."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 
 from rbxcompose.base.config import Place
-from rbxcompose.base.expressions.tree import (
-    Arithmetic,
-    Expression,
-    ExpressionError,
-    ExpressionNode,
-    FieldAccess,
-    Index,
-    Number,
-    Variable,
-    Word,
-    walk,
-)
+from rbxcompose.base.expressions import tree as syntax
 from rbxcompose.base.expressions.values import Value
 from rbxcompose.base.findings import Span
 from rbxcompose.manifest.tree import ScalarNode
@@ -34,28 +21,28 @@ def constants_of(program: Program, inputs: Constants) -> dict[str, Value]:
     return {**{name: datum.value for name, datum in program.data.items() if name not in changed}, **inputs}
 
 
-def number_of(expression: Expression | None, constants: Constants) -> float | None:
+def number_of(expression: syntax.Expression | None, constants: Constants) -> float | None:
     """Return the number that an option of a node always gives, if it is present and simple enough."""
     return number_in(expression.tree, constants) if expression else None
 
 
-def number_in(tree: ExpressionNode, constants: Constants) -> float | None:
+def number_in(tree: syntax.ExpressionNode, constants: Constants) -> float | None:
     """Return the number that a part of an expression always gives, if it is simple enough."""
     match tree:
-        case Number(value=value):
+        case syntax.Number(value=value):
             return value
-        case Variable(name=name):
+        case syntax.Variable(name=name):
             found = constants.get(name)
             return float(found) if isinstance(found, int | float) and not isinstance(found, bool) else None
     return None
 
 
-def place_of(expression: Expression, constants: Constants, places: Mapping[str, Place]) -> Place | None:
+def place_of(expression: syntax.Expression, constants: Constants, places: Mapping[str, Place]) -> Place | None:
     """Return the place that an expression always gives, if it is simple enough."""
     match expression.tree:
-        case Word(name=name):
+        case syntax.Word(name=name):
             return places.get(name)
-        case Variable(name=name):
+        case syntax.Variable(name=name):
             found = constants.get(name)
             return found if isinstance(found, Place) else places.get(str(found))
     return None
@@ -67,7 +54,7 @@ def goal_place(node: MissionNode, main: str, constants: Constants, places: Mappi
         if argument.name in ("", main) and isinstance(argument.value, ScalarNode):
             try:
                 return place_of(expression_of(argument.value), constants, places)
-            except ExpressionError:
+            except syntax.ExpressionError:
                 return None
     return None
 
@@ -80,7 +67,7 @@ def items_of(node: MissionNode, constants: Constants, places: Mapping[str, Place
     if isinstance(items, tuple):
         found = [place_of(item, constants, places) for item in items]
     else:
-        listed = constants.get(items.tree.name) if isinstance(items.tree, Variable) else None
+        listed = constants.get(items.tree.name) if isinstance(items.tree, syntax.Variable) else None
         found = _known_places(listed, places) if isinstance(listed, list | tuple) else [None]
     return [place for place in found if place] if all(found) else None
 
@@ -108,7 +95,11 @@ def is_simple(node: MissionNode) -> bool:
     """Return whether the conditions of a node can always be evaluated."""
     # A missing item or a division by zero would be a failure.
     trees = (asked.expression.tree for asked in node.asked)
-    return not any(isinstance(part, Index | FieldAccess | Arithmetic) for tree in trees for part, _ in walk(tree))
+    return not any(
+        isinstance(part, syntax.Index | syntax.FieldAccess | syntax.Arithmetic)
+        for tree in trees
+        for part, _ in syntax.walk(tree)
+    )
 
 
 def is_sure(node: MissionNode, program: Program, robot: RobotNames) -> bool:
@@ -118,19 +109,19 @@ def is_sure(node: MissionNode, program: Program, robot: RobotNames) -> bool:
     others = read - program.inputs.keys() - program.data.keys() - states
     if not others <= program.items:
         return False
-    parts = (part for asked in node.asked for part, _ in walk(asked.expression.tree))
-    return not any(isinstance(part, Index | FieldAccess) or _divides(part) for part in parts)
+    parts = (part for asked in node.asked for part, _ in syntax.walk(asked.expression.tree))
+    return not any(isinstance(part, syntax.Index | syntax.FieldAccess) or _divides(part) for part in parts)
 
 
-def _divides(part: ExpressionNode) -> bool:
-    return isinstance(part, Arithmetic) and part.operator == "/"
+def _divides(part: syntax.ExpressionNode) -> bool:
+    return isinstance(part, syntax.Arithmetic) and part.operator == "/"
 
 
-def takes_time(pause: Expression | None) -> bool:
+def takes_time(pause: syntax.Expression | None) -> bool:
     """Return whether there is a duration that is not a literal zero."""
-    return pause is not None and not (isinstance(pause.tree, Number) and pause.tree.value == 0)
+    return pause is not None and not (isinstance(pause.tree, syntax.Number) and pause.tree.value == 0)
 
 
-def place_in_text(node: MissionNode, expression: Expression | None) -> Span:
+def place_in_text(node: MissionNode, expression: syntax.Expression | None) -> Span:
     """Return the span of an expression of a node."""
     return next((asked.scalar.span for asked in node.asked if asked.expression is expression), node.span)

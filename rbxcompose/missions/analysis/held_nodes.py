@@ -1,7 +1,5 @@
 """Nodes in a mission's data: which ones a `run` may get, and the values that represent them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 
 from rbxcompose.base.dataclass import dataclass

@@ -1,7 +1,5 @@
 """The scope of a node before the mission runs: the types of all names in it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from dataclasses import field, replace
 

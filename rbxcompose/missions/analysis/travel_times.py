@@ -1,7 +1,5 @@
 """The least time that the steps of a mission take: for driving between places, and for waits."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import field

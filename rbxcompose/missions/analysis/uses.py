@@ -1,7 +1,5 @@
 """Which missions use which, and what can be wrong with that as a whole: circles, and too many nodes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """Branches of a parallel and cases of a value."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import combinations
 

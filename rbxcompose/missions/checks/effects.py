@@ -1,7 +1,5 @@
 """Steps, conditions, modifiers and numbers without effect."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """Interrupts, and what they restart."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from rbxcompose.base.findings import Finding, Related, Severity

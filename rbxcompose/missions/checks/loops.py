@@ -1,7 +1,5 @@
 """Loops: their lists, their items, and whether they take time."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 
 from rbxcompose.base.config import PLACE

@@ -1,7 +1,5 @@
 """States of machines, and the transitions between them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from rbxcompose.base.findings import DID_YOU_MEAN, Finding, Severity, replacement

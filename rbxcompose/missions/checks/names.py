@@ -1,7 +1,5 @@
 """Names that mean nothing, or two things, to this robot."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import replace

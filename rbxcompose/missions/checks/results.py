@@ -1,7 +1,5 @@
 """Saved results and outputs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from rbxcompose.base.expressions.types import UNKNOWN, accepts, map_of

@@ -1,7 +1,5 @@
 """Values of the wrong type: arguments, fields of messages, inputs, conditions."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 

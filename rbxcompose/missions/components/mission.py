@@ -5,29 +5,28 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping
 from functools import cached_property
-from typing import Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from pydantic import InstanceOf, WithJsonSchema
 
 from rbxcompose.base.expressions.types import Type
 from rbxcompose.missions.analysis.uses import Using
 from rbxcompose.missions.engine.events import MissionEnded, MissionEvent
-from rbxcompose.missions.engine.logbook import INPUTS, LogRecord
 from rbxcompose.missions.engine.world import POSE, World
-from rbxcompose.missions.execution import missions as broadcast
 from rbxcompose.missions.execution import requests
 from rbxcompose.missions.execution.errands import ENDS, PUBLISHES, VALUE, port_name
-from rbxcompose.missions.execution.mission_run import PATIENCE, MissionRun
-from rbxcompose.missions.execution.missions import RunningMissions
 from rbxcompose.missions.execution.ports import EVENTS, ports_for
-from rbxcompose.missions.execution.topic_skills import Desks
-from rbxcompose.missions.execution.world import Arrivals, RobotWorld
 from rbxcompose.missions.program.outcomes import IDLE, Result
 from rbxcompose.missions.program.program import Program, RobotNames
 from rbxcompose.missions.sources import SkillSource, TopicSource, ValueSource, events_of
 from rbxcompose.msgs.std_msgs import String
 from rbxcompose.sdk import Capability, Component, Config, Level, Place, Port, Refused, RunsMissions, answers, component
 from rbxcompose.sdk.robot_events import MissionOver, MissionWaits
+
+if TYPE_CHECKING:  # a check needs no engine: it is imported when the component is configured
+    from rbxcompose.missions.engine.logbook import LogRecord
+    from rbxcompose.missions.execution.mission_run import MissionRun
+    from rbxcompose.missions.execution.world import RobotWorld
 
 LOOK_AGAIN = 0.1  # [s] between two checks for a pose that has not arrived yet
 NO_INPUTS: Mapping[str, str] = {}
@@ -115,9 +114,13 @@ class Mission(Component[MissionConfig]):
 
     def configure(self) -> None:
         """Start with no values and no missions."""
+        from rbxcompose.missions.execution.missions import Broadcast, RunningMissions
+        from rbxcompose.missions.execution.topic_skills import Desks
+        from rbxcompose.missions.execution.world import Arrivals
+
         self.arrivals, self.desks = Arrivals(self.config.values), Desks(self)
         self.missions = RunningMissions(self.config, self.world, self.story, self.publish)
-        self.broadcast = broadcast.Broadcast(self.config.programs, self.context.window)
+        self.broadcast = Broadcast(self.config.programs, self.context.window)
         self.is_held = False  # stopped before the start; a release alone lets nothing begin
         self.kept: dict[str, requests.RunMission] = {}  # requests by people that began missions that still run
         self.shown = ""  # the last reported status
@@ -128,6 +131,8 @@ class Mission(Component[MissionConfig]):
         self, ended: Callable[[int, Result], None], say: Callable[[MissionEvent], None]
     ) -> tuple[World, RobotWorld]:
         """Return the world of a mission, and the robot in it; tests wrap the robot in another world."""
+        from rbxcompose.missions.execution.world import RobotWorld
+
         robot = RobotWorld(self, self.arrivals, self.desks, ended, say)
         return robot, robot
 
@@ -210,6 +215,8 @@ class Mission(Component[MissionConfig]):
         """Report what a mission waits for before it starts; return when to check again [s]."""
         self.show(Level.OK, f"waiting for {missing}")
         if run.loses_patience(self.now):
+            from rbxcompose.missions.execution.mission_run import PATIENCE
+
             text = f"waits for {missing}, which has not arrived for {PATIENCE:g} s"
             self.warn(f"mission {run.name} {text}")
             self.context.notify(MissionWaits(run.name, text))
@@ -345,6 +352,8 @@ class Mission(Component[MissionConfig]):
 
     def publish(self, record: LogRecord) -> None:
         """Publish a record of the log, unless it only records an input."""
+        from rbxcompose.missions.engine.logbook import INPUTS
+
         if record["event"] not in INPUTS:
             self.bound[port_name(PUBLISHES, EVENTS)](String(data=json.dumps(record)))
 

@@ -1,7 +1,5 @@
 """Builds the tasks of a program: one per node, with a task around it for each of its modifiers and observers."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from rbxcompose.missions.engine.engine_base import EngineBase

@@ -1,7 +1,5 @@
 """A course is one line of work with a clock of its own: the mission itself, or the reaction to an interrupt."""
 
-from __future__ import annotations
-
 from rbxcompose.base.expressions.evaluate import holds
 from rbxcompose.missions.engine.scopes import SinceScope
 from rbxcompose.missions.engine.task import Task

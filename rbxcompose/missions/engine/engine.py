@@ -1,7 +1,5 @@
 """The engine runs one mission: single-threaded, pure, with time as an argument, idle while there is nothing to do."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from rbxcompose.base.expressions.values import Value

@@ -1,7 +1,5 @@
 """The engine and its runs as tasks see them: time, statuses, data, what wakes them, who observes them."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from random import Random

@@ -1,7 +1,5 @@
 """Typed events that an engine reports while a mission runs; a shell writes the log from them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from rbxcompose.base.dataclass import dataclass

@@ -1,7 +1,5 @@
 """What a mission is started with: values for its inputs, and states that it begins in."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from types import MappingProxyType

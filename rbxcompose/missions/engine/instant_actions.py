@@ -1,7 +1,5 @@
 """Instant actions of a task: publish messages, set and edit data, log."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 
 from rbxcompose.base.expressions.evaluate import evaluate

@@ -1,7 +1,5 @@
 """Leaves that request something of the robot, a skill or a service call, and wait for the response."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """A mission run again from its log, which is not trusted: each record is checked once, when it is read."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple

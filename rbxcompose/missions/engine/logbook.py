@@ -5,8 +5,6 @@ Each record is a map for JSON with `time` [s] of robot time, `mission`, `run` (h
 all other records are events of the engine. `log_replay.py` gives the same inputs to the same engine again.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import fields

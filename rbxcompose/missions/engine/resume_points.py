@@ -1,7 +1,5 @@
 """Where nodes with a history were halted, so that they can resume there."""
 
-from __future__ import annotations
-
 from typing import Protocol
 
 NO_HISTORY, LAST, DEEP = "none", "last", "deep"

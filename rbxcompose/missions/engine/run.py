@@ -1,7 +1,5 @@
 """One run of one mission: its data, what runs and what is suspended, its interrupts."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 from rbxcompose.base.expressions.tree import new_names
@@ -127,7 +125,7 @@ class Run(RunBase):
         robot_values = {
             reference.name: world.value(reference.name)
             for reference in condition.names
-            if self._is_robots(reference.name)
+            if reference.name not in self.data and reference.name not in self.inputs
         }
         shown = {name: self.show(name, value) for name, value in robot_values.items()}
         self.engine.say(InterruptStarted(reaction.name, condition.text, shown))
@@ -139,9 +137,6 @@ class Run(RunBase):
         self.engine.restarting = ()
         self.stack.append(reaction)
         self.returns.append(tuple(self.engine.cut_short))
-
-    def _is_robots(self, name: str) -> bool:
-        return name not in self.data and name not in self.inputs
 
     def _go_on(self, reaction: Reaction, now: float) -> int:
         """Do what follows a reaction; suspended work continues after the interrupts are checked again."""

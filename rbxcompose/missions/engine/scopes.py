@@ -1,7 +1,5 @@
 """What the expressions of a running mission see: its data, its inputs, the robot's values, the items of loops."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Protocol
 

@@ -4,8 +4,6 @@ A snapshot is restored into an engine made from the same program, robot and sett
 skills) is up to its world.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import fields

@@ -1,7 +1,5 @@
 """The story of a mission: one line of text per event, and how often each skill ended with each result."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping
 from typing import assert_never

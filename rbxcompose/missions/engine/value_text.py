@@ -1,7 +1,5 @@
 """How values are written for people: with the unit of their type, places without underscores."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Mapping
 

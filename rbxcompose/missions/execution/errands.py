@@ -1,7 +1,5 @@
 """What a leaf of a mission waits for: a goal, a call, a skill in Python or on topics."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, Protocol
 

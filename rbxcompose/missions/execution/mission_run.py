@@ -1,7 +1,5 @@
 """One mission that runs: its engine with its world, its story, its log, and what viewers see."""
 
-from __future__ import annotations
-
 import json
 import zlib
 from collections import deque

@@ -1,7 +1,5 @@
 """All missions of a robot: which run, which may start beside them, and what viewers see."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The ports of the component that runs missions, for all that they request of the robot."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

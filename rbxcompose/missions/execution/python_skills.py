@@ -1,7 +1,5 @@
 """Skills in Python on a running robot: their steps, their results, and what they raise."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 

@@ -1,7 +1,5 @@
 """What people and viewers may ask of a robot's missions."""
 
-from __future__ import annotations
-
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import field

@@ -1,7 +1,5 @@
 """The world of one running mission: its values, skills, topics and services are those of the robot."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any

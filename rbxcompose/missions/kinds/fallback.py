@@ -1,7 +1,5 @@
 """`fallback`: one node after the other, until one succeeds."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from rbxcompose.missions import sdk

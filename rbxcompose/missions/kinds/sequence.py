@@ -1,7 +1,5 @@
 """`sequence`: one node after the other, until one fails."""
 
-from __future__ import annotations
-
 from rbxcompose.missions import sdk
 
 

@@ -1,7 +1,5 @@
 """What is written in a node: expressions with their places and types, arguments, poses in place of names."""
 
-from __future__ import annotations
-
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions.parser import parse
 from rbxcompose.base.expressions.tree import Expression, Flag, Number, Text, Word
@@ -33,7 +31,11 @@ def expression_of(scalar: ScalarNode) -> Expression:
     end = len(scalar.text)
     match scalar.filled:
         case None:
-            return _parsed(scalar)
+            # Quotes round a whole word are intended: people write 'hello' for a text, and YAML removes the quotes.
+            expression = parse(scalar.text)
+            if not scalar.plain and isinstance(expression.tree, Word):
+                return Expression(scalar.text, Text(0, len(scalar.text), expression.tree.name))
+            return expression
         case Quantity(value=value, dimension=dimension):
             return Expression(scalar.text, Number(0, end, value, dimension))
         case bool() as flag:
@@ -42,14 +44,6 @@ def expression_of(scalar: ScalarNode) -> Expression:
             return Expression(scalar.text, Number(0, end, float(number), NUMBER))
         case text:
             return Expression(scalar.text, Text(0, end, str(text)))
-
-
-def _parsed(scalar: ScalarNode) -> Expression:
-    # Quotes round a whole word are intended: people write 'hello' for a text, and YAML removes the quotes.
-    expression = parse(scalar.text)
-    if not scalar.plain and isinstance(expression.tree, Word):
-        return Expression(scalar.text, Text(0, len(scalar.text), expression.tree.name))
-    return expression
 
 
 @dataclass(frozen=True, slots=True)

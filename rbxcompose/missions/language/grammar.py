@@ -1,7 +1,5 @@
 """The places of a mission's grammar: what each takes, for the slips that are recognised there."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 from enum import StrEnum
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """The parts of a mission besides its nodes: its inputs, its data, its rate."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from rbxcompose.base.expressions.types import TYPES, UNKNOWN, Type, choice_of

@@ -1,7 +1,5 @@
 """The key that says what a step is: the word of a kind, the name of a skill, or what other languages call it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import cache
 

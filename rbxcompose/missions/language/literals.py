@@ -1,7 +1,5 @@
 """Literal values in a manifest, and whether the value of a typed argument or input can be of that type."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 
 from rbxcompose.base.expressions.text import TextSlot, parse_template, refuse_foreign

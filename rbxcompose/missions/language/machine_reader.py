@@ -1,7 +1,5 @@
 """Reads machines and states."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from rbxcompose.base.findings import Span

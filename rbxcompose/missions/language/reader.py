@@ -1,7 +1,5 @@
 """From the located tree of a mission file to its program; every error becomes a finding with its place."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Reads single values of a mission node: expressions, counts, flags, choices, texts, names."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from typing import Protocol

@@ -1,7 +1,5 @@
 """From an argument as written to the function that computes its value."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterator, Mapping
 
 from rbxcompose.base.expressions.evaluate import evaluate

@@ -1,7 +1,5 @@
 """How a modifier is declared, and the order in which modifiers surround a node."""
 
-from __future__ import annotations
-
 import importlib
 import inspect
 from collections.abc import Callable, Mapping

@@ -1,7 +1,5 @@
 """Types in which kinds of nodes and modifiers answer questions about themselves before a mission runs."""
 
-from __future__ import annotations
-
 from collections.abc import Hashable, Mapping
 from dataclasses import field
 from enum import Enum, StrEnum, auto

@@ -1,7 +1,5 @@
 """What the kinds of a family have in common, so that each answers only what is its own."""
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """Actions, services and topics as skills: arguments, the goal made from them, what a result means."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Collection, Mapping
 from types import MappingProxyType

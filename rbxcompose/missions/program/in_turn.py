@@ -1,7 +1,5 @@
 """What kinds share that run nodes one after the other and resume where they were halted."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 from rbxcompose.base.dataclass import dataclass

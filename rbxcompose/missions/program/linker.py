@@ -1,7 +1,5 @@
 """Links a mission and those that it uses into one program with a single row of nodes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 

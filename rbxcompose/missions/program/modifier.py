@@ -1,7 +1,5 @@
 """A setting that any node may have: how it is read, and what it changes."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from dataclasses import field
 from typing import ClassVar, Self

@@ -1,7 +1,5 @@
 """The registry of mission node kinds: each is one file in `missions/kinds`, registered by a decorator."""
 
-from __future__ import annotations
-
 import importlib
 import inspect
 import pkgutil

@@ -1,7 +1,5 @@
 """Speech without a loudspeaker: it takes as long as the words would."""
 
-from __future__ import annotations
-
 from rbxcompose.sdk import Activity, skill
 
 PER_WORD = 0.4  # [s] per word of unhurried speech

@@ -3,8 +3,6 @@
 Each is a function of a `GrammarPlace` and the node there, under `@slip(PLACES)`; it returns None if there is no slip.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from rbxcompose.base.slips import Repair, Slips

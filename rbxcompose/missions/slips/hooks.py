@@ -1,7 +1,5 @@
 """Hooks with steps, which can only act."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from rbxcompose.base.findings import Edit, Finding, Fix, nearest

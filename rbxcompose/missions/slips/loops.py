@@ -1,7 +1,5 @@
 """Loops and conditions in the words or the form of other languages."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 

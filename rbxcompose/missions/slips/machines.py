@@ -1,7 +1,5 @@
 """Machines: keys beside them, names of states, and transitions that ask."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Settings of steps: unknown ones, those of other languages, and those that stand at the wrong place."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The word of a step: misspelt, without a space behind its colon, without a dash, or beside another one."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 

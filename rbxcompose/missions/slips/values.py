@@ -1,7 +1,5 @@
 """Single values: numbers in words, flags, lists, names and assignments in one line."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import replace

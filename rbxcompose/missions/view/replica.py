@@ -1,7 +1,5 @@
 """What a viewer sees of a running mission: its full state, then what has changed since."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any

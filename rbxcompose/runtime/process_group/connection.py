@@ -561,7 +561,10 @@ class Lifeline:
         """Count a beat of the process; when due, evaluate the last probe and send the next one."""
         self._beats += 1
         if self._is_changing:
-            self._look_whether_to_try()
+            if self._retry:
+                self._retry -= 1
+                if not self._retry:
+                    Thread(target=self._open, name="renewal", daemon=True).start()
             return
         if self._roll is not None and (lost := self._roll.beat()):
             self._renew(f"does not reach {' and '.join(lost)} any more, as others do")
@@ -606,12 +609,6 @@ class Lifeline:
     def _put_off(self, words: str) -> None:
         self._log(f"no session on the bus can be opened ({words}); trying again in {self._pause * BEAT:g} s")
         self._retry, self._pause = self._pause, min(2 * self._pause, LONGEST_PAUSE)
-
-    def _look_whether_to_try(self) -> None:
-        if self._retry:
-            self._retry -= 1
-            if not self._retry:
-                Thread(target=self._open, name="renewal", daemon=True).start()
 
     def _attach(self, new: Transport) -> None:
         self._is_changing, self._pause = False, FIRST_PAUSE

@@ -1,7 +1,5 @@
 """Carries topics, services and actions between the buses of robots: what is shared, and nothing else."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

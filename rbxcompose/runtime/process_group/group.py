@@ -1,7 +1,5 @@
 """The main of a process group: its scheduler, clock, bus, host and driver, controlled by the supervisor."""
 
-from __future__ import annotations
-
 import faulthandler
 import gc
 import math
@@ -12,6 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import FrameType
+from typing import TYPE_CHECKING
 
 from rbxcompose.base.clock import DISPUTE, Clock, ExternalClock, MonotonicClock, SteppedClock, Turn
 from rbxcompose.base.config import Config
@@ -43,12 +42,14 @@ from rbxcompose.runtime.process_group.connection import (
 )
 from rbxcompose.runtime.process_group.host import Host, Notice
 from rbxcompose.runtime.process_group.parameters import Deciders
-from rbxcompose.runtime.recording.files import Recorder
 from rbxcompose.runtime.recording.tape import PLAN, Tape
 from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic
 from rbxcompose.sdk.parameters import RobotRules
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.sdk.robot_events import MissionOver, MissionWaits
+
+if TYPE_CHECKING:
+    from rbxcompose.runtime.recording.files import Recorder
 
 PATH = "stop"  # below the robot's own keys; a process adds its name
 
@@ -134,6 +135,8 @@ class Taping:
         self._recorder = None
 
     def _begin(self, plan: Plan) -> None:
+        from rbxcompose.runtime.recording.files import Recorder  # imports MCAP, which only a recorded run needs
+
         self._recorder = Recorder(self._path, self._real.now())
         self._recorder.attach(PLAN, dump(plan, keeps_order=True).encode())
 
@@ -312,8 +315,6 @@ class ProcessGroup:
             self._scheduler.advance(time)
         instances = self._plan.of_group(self._name)
         if self._options.record is not None:
-            pass
-
             self._taping = Taping(
                 self._options.record, self._plan, self._clock, lambda text: self._complain("robot", text)
             )

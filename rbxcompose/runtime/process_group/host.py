@@ -1,7 +1,5 @@
 """The host of a process: takes its components through their lifecycle and isolates their faults."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, TypeVar

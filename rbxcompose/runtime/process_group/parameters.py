@@ -1,7 +1,5 @@
 """Parameters on the bus, and changes of live settings in two phases."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
 from functools import partial
@@ -26,6 +24,17 @@ from rbxcompose.sdk.parameters import ChangeRefusal, Configs, RobotRules, Wanted
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.sdk.registry import component_type
 
+INTERFACES = (
+    rcl.ListParameters,
+    rcl.GetParameters,
+    rcl.GetParameterTypes,
+    rcl.DescribeParameters,
+    rcl.SetParameters,
+    rcl.SetParametersAtomically,
+    ChangeParameters,
+    rcl.ParameterEvent,
+)
+"""What each component serves and publishes."""
 OnChange = Callable[[Hosted, Config, ChangeCause], None]  # that a component had another configuration before
 
 

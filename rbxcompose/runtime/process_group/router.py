@@ -1,7 +1,5 @@
 """The router of a robot, and the line to the routers of its other hosts."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

@@ -1,7 +1,5 @@
 """Files of recordings: writing them in small chunks, locks, names, recovery."""
 
-from __future__ import annotations
-
 import contextlib
 import fcntl
 import os

@@ -1,7 +1,5 @@
 """Reading recordings, even damaged or untrusted ones: intact content, summary, schedule of a replay."""
 
-from __future__ import annotations
-
 import io
 import struct
 import zlib

@@ -4,8 +4,6 @@ Besides the topics of the robot, it holds the events of services, as ROS 2 recor
 the orders that the host received and the instants whose time [s] cannot be computed from nanoseconds.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import replace
@@ -14,15 +12,7 @@ from rbxcompose.base.clock import NANOSECONDS, Clock
 from rbxcompose.bus.local import WitnessedCall
 from rbxcompose.bus.names import ADMIN, decode_attachment
 from rbxcompose.bus.tokens import EndpointToken, gid, parse_token
-from rbxcompose.bus.transport import (
-    LONGEST_WAIT,
-    Arrival,
-    Closable,
-    Question,
-    RemotePublisher,
-    Transport,
-    TransportReply,
-)
+from rbxcompose.bus.transport import Arrival, Closable, OnReply, Question, RemotePublisher, Transport
 from rbxcompose.msgs.cdr import encode
 from rbxcompose.msgs.events import TOPIC, event_of
 from rbxcompose.msgs.service_msgs import ServiceEventInfo
@@ -118,14 +108,7 @@ class _Taped:
         return self._inner.serve(key, asked)
 
     def ask(
-        self,
-        key: str,
-        payload: bytes,
-        attachment: bytes,
-        answered: Callable[[TransportReply], None],
-        *,
-        of_all: bool = True,
-        within: float = LONGEST_WAIT,
+        self, key: str, payload: bytes, attachment: bytes, answered: OnReply, *, of_all: bool, within: float
     ) -> Closable:
         return self._inner.ask(key, payload, attachment, answered, of_all=of_all, within=within)
 

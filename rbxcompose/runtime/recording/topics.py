@@ -1,7 +1,5 @@
 """Topics in a recording: what it stores about them, their definitions, and their selection."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """What a new plan changes in a running robot, decided before anything is touched. Pure."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 from enum import StrEnum

@@ -4,8 +4,6 @@ The shell around it (`supervisor.py`) carries out the `ConductorEffects` and rep
 a scheduler.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from itertools import takewhile

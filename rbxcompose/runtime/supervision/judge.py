@@ -4,8 +4,6 @@ Rules may take long, and those of other packages may do anything, so they run ne
 component. The judge is forked from the supervisor, which has the rules in its memory, when it is needed first.
 """
 
-from __future__ import annotations
-
 import gc
 import os
 import select

@@ -1,7 +1,5 @@
 """Starting a supervisor as a process of its own, and receiving its reports on the start and the end."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import select
@@ -15,7 +13,6 @@ import setproctitle
 
 from rbxcompose.base.clock import MonotonicClock
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.garbage_collection import collect_as_usual
 from rbxcompose.base.levels import Level
 from rbxcompose.base.processes import end_with
 from rbxcompose.base.requests import Family
@@ -143,7 +140,6 @@ def _become_supervisor(
     plan: Plan, options: RunOptions, rules: FiledRules | None, clock: MonotonicClock, pipe: int, caller: int
 ) -> NoReturn:
     exit_code = ROBOT_FAILED
-    collect_as_usual()
     try:
         os.setsid()  # signals of the terminal reach the caller, who passes them on
         if not options.is_detached:

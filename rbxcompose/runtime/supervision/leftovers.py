@@ -1,7 +1,5 @@
 """Ending the processes that a dead or unresponsive supervisor has left behind; apart from what starts one."""
 
-from __future__ import annotations
-
 import os
 import signal
 from collections.abc import Sequence

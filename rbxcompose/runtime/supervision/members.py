@@ -1,7 +1,5 @@
 """What the conductor knows about a robot's processes: members, dependents, who waits for whom."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
 from enum import Enum, auto

@@ -4,8 +4,6 @@ A host judges the others by what their supervisors say through the routers, seve
 is the same as for processes of its own: components that are out of reach are lost, those that have failed block others.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 

@@ -4,8 +4,6 @@ Components that stop are retired in reverse start order; empty processes end; th
 are forked, new components configured and, as at the start of the robot, activated in start order.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from itertools import groupby

@@ -7,25 +7,30 @@ All processes of a robot share the memory that the supervisor has filled before 
 the supervisor imports what the groups need, though it uses none of it.
 """
 
-from __future__ import annotations
-
 import array
 import gc
 import os
 import selectors
 import signal
 import socket
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import setproctitle
 
 from rbxcompose.base.clock import MonotonicClock
 from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.garbage_collection import collect_as_usual
 from rbxcompose.base.processes import end_with
 from rbxcompose.base.requests import Family
 from rbxcompose.compiler.plan.model import Plan
+from rbxcompose.msgs import registry
+from rbxcompose.msgs.action_msgs import CancelGoal, GoalStatusArray
+from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray
+from rbxcompose.msgs.rcl_interfaces import Log
+from rbxcompose.msgs.types import Action
 from rbxcompose.runtime.channel import Channel
 from rbxcompose.runtime.folder import RobotFolder, RunOptions, title
 from rbxcompose.runtime.log import LogFile
@@ -99,6 +104,7 @@ class Parent:
         _import_what_is_common(launch.plan)
         gc.collect()
         gc.freeze()  # a collection writes to every object that it inspects, which would copy all pages
+        collect_as_usual()  # not before: it would begin with a collection of everything
         signal.pthread_sigmask(signal.SIG_BLOCK, _HELD_BACK)
         pid = os.fork()
         if pid == 0:
@@ -250,6 +256,20 @@ def _import_what_is_common(plan: Plan) -> None:
 
     for name in {instance.type for instance in plan.instances}:
         component_type(name)
+    _make_messages({wire.type for instance in plan.instances for wire in instance.wires})
+
+
+def _make_messages(names: Collection[str]) -> None:
+    """Make classes of messages and their hashes once, which most processes use, and which take long to make."""
+    from rbxcompose.runtime.process_group.parameters import INTERFACES
+
+    of_kind = {"msg": registry.message, "srv": registry.service, "action": registry.action}
+    used: list[Any] = [of_kind[name.split("/")[1]](name) for name in sorted(names)]
+    for interface in (*INTERFACES, Log, DiagnosticArray, CancelGoal, GoalStatusArray, *used):
+        if issubclass(interface, Action):
+            _ = interface.SendGoal.HASH, interface.GetResult.HASH, interface.FeedbackMessage.HASH
+        else:
+            _ = interface.HASH
 
 
 def _redirect_output(path: Path) -> None:

@@ -1,7 +1,5 @@
 """Carries out the requests from the control socket, or passes them on to the component that takes them."""
 
-from __future__ import annotations
-
 from typing import Any, Protocol
 
 from rbxcompose.base.levels import Level
@@ -177,7 +175,8 @@ class RequestHandler:
             self._settings.go_on()
             if not is_refused:
                 conductor.layers = layers
-            self._applied(number, text, is_refused=is_refused)
+            self._supervisor.log(Level.ERROR if is_refused else Level.OK, f"apply: {text}")
+            (self._supervisor.refuse if is_refused else self._supervisor.answer)(number, text)
 
         conductor.change(found, applied)
 
@@ -185,10 +184,6 @@ class RequestHandler:
         conductor = self._supervisor.conductor
         failed = [name for name, (state, _) in conductor.states.items() if state == "failed"]
         return changes(conductor.plan, after, failed)
-
-    def _applied(self, number: int, text: str, *, is_refused: bool) -> None:
-        self._supervisor.log(Level.ERROR if is_refused else Level.OK, f"apply: {text}")
-        (self._supervisor.refuse if is_refused else self._supervisor.answer)(number, text)
 
     def _log(self, text: str) -> None:
         if not self._is_stepped:

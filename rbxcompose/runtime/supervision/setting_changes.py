@@ -5,8 +5,6 @@ it, then the judge whether it keeps the rules about the whole robot, then it is 
 between, also the end of a process, the others go back.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import field

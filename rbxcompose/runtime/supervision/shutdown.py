@@ -1,7 +1,5 @@
 """Going down: brake, wait for rest, shut the processes down in reverse order. Pure: the conductor drives it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from rbxcompose.compiler.plan.model import Plan

@@ -1,7 +1,5 @@
 """Silent processes: first reported to the others, later ended. Pure: time comes from a scheduler."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 
 from rbxcompose.base.levels import Level

@@ -4,8 +4,6 @@ On several hosts, each stop belongs to the host on which it was ordered, and hol
 its host knows of: one that was ordered meanwhile on the other side of a cut link holds the robot when the link is back.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The supervisor of a robot: the shell that carries out what the conductor decides."""
 
-from __future__ import annotations
-
 import os
 import selectors
 import signal

@@ -4,8 +4,6 @@
 does not wait.
 """
 
-from __future__ import annotations
-
 import argparse
 
 from rbxcompose.commands.guest import Guest, add_server_verbs, visit, write_names

@@ -5,12 +5,10 @@ manifest with errors changes nothing. Changes that are unsafe while the robot mo
 the reason. Of a system, all hosts are asked first: if one refuses, none is changed.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 
-from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, refuse, write_report
+from rbxcompose.commands.console import emit, write_report
 from rbxcompose.commands.lookup import answer_of, find_robot, show_answer
 from rbxcompose.commands.options import add_system_options, is_system
 from rbxcompose.commands.targets import add_layer_options, add_path_argument, chosen_layers, compiled, robot_path
@@ -39,8 +37,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Compile the robot, show what would change in the running one, and apply the change."""
     path = robot_path(arguments.path)
-    if path is None:
-        return FINDINGS
     if is_system(path):
         from rbxcompose.tools.system_runs import apply_system  # only needed for systems
 
@@ -51,23 +47,17 @@ def run(arguments: argparse.Namespace) -> int:
     write_report(compilation.report, compilation.sources)
     if compilation.plan is None or compilation.robot is None:
         return 1
-    try:
-        proposal = Proposal.of(compilation.plan, compilation.robot, chosen_layers(arguments))
-        emit(json.dumps(proposal.data) if arguments.json else proposal.text())
-        return carry_out(proposal, arguments)
-    except NotDoneError as error:
-        return refuse(error.finding)
+    proposal = Proposal.of(compilation.plan, compilation.robot, chosen_layers(arguments))
+    emit(json.dumps(proposal.data) if arguments.json else proposal.text())
+    return carry_out(proposal, arguments)
 
 
 def _undo(path: str, arguments: argparse.Namespace) -> int:
     """Take back the last change of a running robot."""
-    try:
-        folder = find_robot(path)
-        if (problem := unsure(folder.path.name, arguments)) is not None:
-            return problem
-        generation = None if arguments.undo == _LAST else arguments.undo
-        answer = answer_of(folder, RevertPlan(generation), timeout=LONGEST_CHANGE)
-    except NotDoneError as error:
-        return refuse(error.finding)
+    folder = find_robot(path)
+    if (problem := unsure(folder.path.name, arguments)) is not None:
+        return problem
+    generation = None if arguments.undo == _LAST else arguments.undo
+    answer = answer_of(folder, RevertPlan(generation), timeout=LONGEST_CHANGE)
     show_answer(arguments, folder, f"{folder.path.name} is as before: {answer}")
     return 0

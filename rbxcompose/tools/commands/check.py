@@ -5,8 +5,6 @@ checks the robots of the project that use it. Check an overlay on a robot: check
 errors found (with --strict also warnings), 2 wrong usage.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import re

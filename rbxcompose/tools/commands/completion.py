@@ -4,8 +4,6 @@ For bash: `rbxcompose completion bash > ~/.local/share/bash-completion/completio
 `_rbxcompose` in a folder of `$fpath`. For fish: `~/.config/fish/completions/rbxcompose.fish`.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import re
@@ -108,18 +106,15 @@ class _Place:
             self.given[self.option.dest] = word
             self.option = self.option if self.option.nargs in _SEVERAL else None
         elif self.positionals:
-            self._positional(word)
-
-    def _positional(self, word: str) -> None:
-        first = self.positionals[0]
-        if isinstance(first, argparse._SubParsersAction):
-            if word in first.choices:
-                self.parser = first.choices[word]
-                self.__post_init__()
-        else:
-            self.given.setdefault(str(first.metavar), word)
-            if first.nargs not in _SEVERAL:
-                self.positionals.pop(0)
+            first = self.positionals[0]
+            if isinstance(first, argparse._SubParsersAction):
+                if word in first.choices:
+                    self.parser = first.choices[word]
+                    self.__post_init__()
+            else:
+                self.given.setdefault(str(first.metavar), word)
+                if first.nargs not in _SEVERAL:
+                    self.positionals.pop(0)
 
     def fitting(self, current: str, values: CandidateValues) -> Iterable[str]:
         """Yield the candidates for the current word."""

@@ -4,8 +4,6 @@ With a robot, by file or name, it examines only that robot, including its device
 error, 1 errors found, 2 wrong usage.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import platform
@@ -13,7 +11,7 @@ import sys
 import time
 
 from rbxcompose.base.findings import Finding, Report
-from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, has_colour, refuse, write_report
+from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, has_colour, write_report
 from rbxcompose.commands.formats.text import render_text
 from rbxcompose.commands.guest import Guest, ReceivedMessage
 from rbxcompose.commands.lookup import add_robot_option, find_robot, place_of, robots_up
@@ -42,10 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Collect the facts, examine them, and report the results."""
     watch = machine.ClockWatch()
-    try:
-        folders, path = _addressed(arguments.robot or arguments.path)
-    except NotDoneError as error:
-        return refuse(error.finding)
+    folders, path = _addressed(arguments.robot or arguments.path)
     file = None if path is None else _described(path)
     if path is not None and file is None:
         return FINDINGS

@@ -1,12 +1,10 @@
 """Stop a robot and end all of its processes, also those that a dead supervisor has left."""
 
-from __future__ import annotations
-
 import argparse
 import json
 
 from rbxcompose.base.requests import Refused
-from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, refuse
+from rbxcompose.commands.console import NotDoneError, emit
 from rbxcompose.commands.lookup import NO_ANSWER, NOT_UP, add_robot_option, find_robot, known_state
 from rbxcompose.commands.options import add_system_options, is_system
 from rbxcompose.runtime.control import NoAnswerError, ask, supervisor_of
@@ -35,15 +33,11 @@ def run(arguments: argparse.Namespace) -> int:
     if wanted is not None and is_system(wanted):
         from rbxcompose.commands.hosts import ask_all, every_share  # only needed for systems
 
-        if (shares := every_share(wanted, arguments)) is None:
-            return FINDINGS
+        shares = every_share(wanted, arguments)
         options = ["--json"] if arguments.json else []  # the end on one host may end it on the others before they do
         return ask_all(shares, lambda robot: ["down", robot, *options], in_json=arguments.json, tolerates=NOT_UP.code)
-    try:
-        folder = find_robot(wanted)
-        report = _end(folder)
-    except NotDoneError as error:
-        return refuse(error.finding)
+    folder = find_robot(wanted)
+    report = _end(folder)
     if arguments.json:
         emit(json.dumps({"robot": folder.path.name, "told": report}))
         return 0

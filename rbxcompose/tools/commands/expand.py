@@ -4,15 +4,12 @@ The output is a manifest itself, for the folder of the robot's file.
 Exit codes: 0 fine, 1 errors found, 2 wrong usage.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 
 from rbxcompose.base.printable import escaped
 from rbxcompose.commands.console import FINDINGS, emit, write_report
-from rbxcompose.commands.targets import add_layer_options, add_path_argument, layers_of, robot_path
-from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.commands.targets import add_layer_options, add_path_argument, compiled, robot_path
 from rbxcompose.tools.inspection.expand import expand, expand_data
 
 GROUP = "write"
@@ -28,10 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the robot to stdout and its findings to stderr; if it has mistakes, as far as it could be read."""
-    path = robot_path(arguments.path)
-    if path is None:
-        return FINDINGS
-    compilation = compile_robot(path, **layers_of(arguments))
+    compilation = compiled(robot_path(arguments.path), arguments)
     write_report(compilation.report, compilation.sources)
     if compilation.robot is not None:
         manifest = compilation.robot.manifest

@@ -3,8 +3,6 @@
 Exit codes: 0 fine, 2 there is no such code.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 

@@ -7,8 +7,6 @@ The files go to a new or empty folder; `srdf` writes a URDF and an SRDF.
 Exit codes: 0 fine, 1 errors found, 2 wrong usage.
 """
 
-from __future__ import annotations
-
 import argparse
 import getpass
 import os

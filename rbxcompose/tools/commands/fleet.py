@@ -16,7 +16,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import kind
 from rbxcompose.base.levels import LOG_LEVELS
 from rbxcompose.commands import hosts
-from rbxcompose.commands.console import FINDINGS, emit, refuse, table
+from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, refuse, table
 from rbxcompose.commands.lookup import NOT_UP
 from rbxcompose.commands.options import add_system_options
 from rbxcompose.missions.execution.requests import MISSION
@@ -61,8 +61,6 @@ def run(arguments: argparse.Namespace) -> int:
         message = f"no system is named, and this folder has {', '.join(paths) if paths else 'none'}"
         return refuse(UNNAMED.at(None, message, help="give the path of one"))
     fleet = Fleet.of(paths, arguments)
-    if isinstance(fleet, int):
-        return fleet
     match arguments.action:
         case "ls":
             return fleet.list_robots(in_json=arguments.json)
@@ -81,15 +79,17 @@ class Fleet:
     executives: hosts.Shares
 
     @classmethod
-    def of(cls, paths: Sequence[str], arguments: argparse.Namespace) -> Fleet | int:
-        """Return the robots of systems that have all labels of the command; the exit code after a finding."""
+    def of(cls, paths: Sequence[str], arguments: argparse.Namespace) -> Fleet:
+        """Return the robots of systems that have all labels of the command.
+
+        Raises:
+            NotDoneError: if there is none, or two have the same name.
+        """
         shares: hosts.Shares = {}
         executives: hosts.Shares = {}
         known: set[str] = set()
         for path in paths:
             system = hosts.compiled(path, arguments)
-            if system is None:
-                return FINDINGS
             every = hosts.shares_of(system, arguments.ssh_config)
             for robot in system.robots.values():
                 known |= {*robot.labels}
@@ -98,14 +98,14 @@ class Fleet:
                 own = {key: share for key, share in every.items() if key[1] == robot.name}
                 if own.keys() & shares.keys():
                     message = f"two of these systems have a robot '{robot.name}' on a host of the same name"
-                    return refuse(hosts.WHICH.at(None, message, help="name the systems in two commands"))
+                    raise NotDoneError(hosts.WHICH.at(None, message, help="name the systems in two commands"))
                 shares = {**shares, **own}
                 keys = ((host, robot.name) for host in hosts.answering(robot, MISSION))
                 executives = {**executives, **{key: every[key] for key in keys}}
         if not shares:
             wrong = next((label for label in arguments.labels if label not in known), "")
             message = f"no robot has the label{'s' * (len(arguments.labels) > 1)} {' and '.join(arguments.labels)}"
-            return refuse(NO_LABEL.misspelt(None, message, wrong, sorted(known), "labels"))
+            raise NotDoneError(NO_LABEL.misspelt(None, message, wrong, sorted(known), "labels"))
         return cls(shares, executives)
 
     def list_robots(self, *, in_json: bool) -> int:

@@ -3,51 +3,43 @@
 Exit codes: 0 fine, 1 errors found, 2 wrong usage.
 """
 
-from __future__ import annotations
-
 import argparse
-import sys
 from pathlib import Path
 
 from rbxcompose.base.files import replace_file
-from rbxcompose.commands.console import FINDINGS, emit, refuse, write_report
-from rbxcompose.commands.layout import NotDrawnError
+from rbxcompose.commands.console import FINDINGS, emit, misused, write_report
 from rbxcompose.commands.options import out_option
-from rbxcompose.commands.targets import add_layer_options, add_path_argument, layers_of, robot_path
-from rbxcompose.compiler.compile import compile_robot
-from rbxcompose.tools.inspection.diagram import diagram_of, dot, mermaid
+from rbxcompose.commands.targets import add_layer_options, add_path_argument, compiled, robot_path
+from rbxcompose.tools.inspection.diagram import MANY, diagram_of, dot, folded, mermaid
 from rbxcompose.tools.inspection.graph_html import html
 
 GROUP = "look"
-USAGE = 2
-FORMATS = {"mermaid": mermaid, "dot": dot, "html": html}
+TEXTS = {"mermaid": mermaid, "dot": dot}
+HTML = "html"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_path_argument(parser)
     add_layer_options(parser)
-    parser.add_argument("--format", choices=list(FORMATS), default="mermaid", help="output format")
+    words = f"draw every mission and every open wire, also if there are more than {MANY} that are alike"
+    parser.add_argument("--all", action="store_true", help=words)
+    parser.add_argument("--format", choices=[*TEXTS, HTML], default="mermaid", help="output format")
     out_option("write it to this file")(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the graph; draw a robot with mistakes as far as it could be read, and write its findings to stderr."""
-    path = robot_path(arguments.path)
-    if path is None:
-        return FINDINGS
-    compilation = compile_robot(path, **layers_of(arguments))
+    compilation = compiled(robot_path(arguments.path), arguments)
     write_report(compilation.report, compilation.sources)
     if compilation.robot is not None:
-        try:
-            text = FORMATS[arguments.format](diagram_of(compilation.robot))
-        except NotDrawnError as error:
-            return refuse(error.finding)
+        whole = diagram_of(compilation.robot)
+        drawn = whole if arguments.all else folded(whole)
+        text = html(drawn, whole) if arguments.format == HTML else TEXTS[arguments.format](drawn)
         if arguments.out is None:
             emit(text.rstrip("\n"))
         elif problem := _write(Path(arguments.out), text):
-            sys.stderr.write(f"rbxcompose graph: {problem}\n")
-            return USAGE
+            return misused("graph", problem)
     return FINDINGS if compilation.report.has_errors else 0
 
 

@@ -5,19 +5,17 @@ files make one robot. Without `--out`, the manifest goes to stdout and the findi
 Exit codes: 0 fine, 1 errors found (what was understood is written nevertheless), 2 wrong usage.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 from dataclasses import replace
 from pathlib import Path
 
 from rbxcompose.base.findings import Finding, Report, Sources
-from rbxcompose.commands.console import FINDINGS, emit, refuse, write_report
+from rbxcompose.commands.console import FINDINGS, emit, write_report
 from rbxcompose.commands.formats.json_ import as_data
 from rbxcompose.commands.importing.foreign_files import read_files
 from rbxcompose.commands.importing.importer import ImportedFiles, broken_importers, imported, importers
-from rbxcompose.commands.new_files import EXISTS, AnswerError, name_like, read_name, robot_file, write_new
+from rbxcompose.commands.new_files import EXISTS, name_like, read_name, robot_file, write_new
 from rbxcompose.commands.options import add_json_option, out_option
 from rbxcompose.manifest.files import shown_name
 
@@ -40,10 +38,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Read the files, write the manifest, and report the findings."""
     report, sources = Report(broken_importers()), dict[str, str]()
     out = robot_file(arguments.out) if arguments.out is not None else None
-    try:
-        name = _name(arguments)
-    except AnswerError as error:
-        return refuse(error.finding)
+    name = _name(arguments)
     files = read_files(map(Path, arguments.files), report, sources)
     made = imported(arguments.program, files, name, report)
     findings = Report(

@@ -3,8 +3,6 @@
 A large log file is renamed to `log.jsonl.1`, and so on; the log of the previous run is `log.1.jsonl`.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import time
@@ -12,7 +10,7 @@ from collections.abc import Iterable, Sequence
 
 from rbxcompose.base.findings import suggest
 from rbxcompose.base.levels import LOG_LEVELS
-from rbxcompose.commands.console import FINDINGS, NotDoneError, emit, has_colour, refuse
+from rbxcompose.commands.console import NotDoneError, emit, has_colour
 from rbxcompose.commands.lookup import NOT_UP, add_robot_option, find_robot, known_state
 from rbxcompose.commands.options import add_system_options, is_system
 from rbxcompose.commands.story import StoryWriter
@@ -44,14 +42,11 @@ def run(arguments: argparse.Namespace) -> int:
     """Print the existing records and, if requested, new ones as they come."""
     if arguments.names and is_system(arguments.names[0]):
         return _of_system(arguments)
-    try:
-        folder, names = _addressed(arguments.robot, arguments.names)
-        follower = Follower(folder.path / NAME)
-        records = follower.read()
-        sources = {record.source for record in records}
-        _know(names, folder, sources)
-    except NotDoneError as error:
-        return refuse(error.finding)
+    folder, names = _addressed(arguments.robot, arguments.names)
+    follower = Follower(folder.path / NAME)
+    records = follower.read()
+    sources = {record.source for record in records}
+    _know(names, folder, sources)
     story = StoryWriter(names or sources, colour=has_colour(sys.stdout))
 
     def wanted(records: Iterable[Record]) -> list[Record]:
@@ -78,8 +73,7 @@ def _of_system(arguments: argparse.Namespace) -> int:
     options += ["-n", str(arguments.lines)] if arguments.lines is not None else []
     options += ["--json"] if arguments.json else []
     system, *names = arguments.names
-    if (shares := every_share(system, arguments)) is None:
-        return FINDINGS
+    shares = every_share(system, arguments)
     return follow_all(shares, lambda robot: ["logs", robot, *names, *options])
 
 

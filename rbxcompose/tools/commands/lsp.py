@@ -3,8 +3,6 @@
 It reports errors as you type, completes, jumps to definitions and explains. An editor starts it.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 from importlib.util import find_spec

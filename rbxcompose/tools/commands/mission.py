@@ -3,8 +3,6 @@
 Exit codes: 0 fine, 1 refused or errors found, 2 wrong usage.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import time

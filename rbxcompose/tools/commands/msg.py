@@ -3,8 +3,6 @@
 ROS 2 knows all types of a robot except those of the package `rbxcompose_msgs`: `msg export ros2_ws/src` writes it.
 """
 
-from __future__ import annotations
-
 import argparse
 from dataclasses import replace
 from pathlib import Path

@@ -4,8 +4,6 @@ PATH is a robot, a system (all of its robots), a mission or a part (the robots t
 pip install "$(rbxcompose needs PATH --pip)" installs them. Exit codes: 0 fine, 1 errors found, 2 wrong usage.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

@@ -4,8 +4,6 @@ What it writes has no findings and runs in simulation. At a terminal it asks a f
 option. It never overwrites a file.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 from collections.abc import Callable, Mapping, Sequence
@@ -15,17 +13,8 @@ from pathlib import Path, PurePosixPath
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import read_regular, replace_file
 from rbxcompose.base.printable import plain
+from rbxcompose.commands import new_files
 from rbxcompose.commands.console import FINDINGS, emit, refuse, write_report
-from rbxcompose.commands.new_files import (
-    ANSWER,
-    AnswerError,
-    Asker,
-    CancelledError,
-    read_name,
-    read_text,
-    read_yes,
-    write_new,
-)
 from rbxcompose.compiler.compile import Compilation, compile_robot
 from rbxcompose.compiler.model.mission_facts import navigator_of, top_speed
 from rbxcompose.compiler.model.robot import Robot
@@ -82,20 +71,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Ask, write the files, and report them."""
-    asker = Asker(is_asking=not arguments.yes)
+    asker = new_files.Asker(is_asking=not arguments.yes)
     try:
         return _write(_MAKERS[arguments.what](arguments, asker))
-    except AnswerError as error:
-        return refuse(error.finding)
     except MistakenRobotError as error:
         write_report(error.compilation.report, error.compilation.sources)
         return FINDINGS
-    except CancelledError:
+    except new_files.CancelledError:
         return INTERRUPTED
 
 
 def _write(new: New) -> int:
-    finding = write_new(new.folder, new.files)
+    finding = new_files.write_new(new.folder, new.files)
     if finding is not None:
         return refuse(finding)
     lines = [f"wrote {shown_name(new.folder / file)}" for file in new.files]
@@ -105,9 +92,9 @@ def _write(new: New) -> int:
     return 0
 
 
-def _robot(arguments: argparse.Namespace, asker: Asker) -> New:
-    name = read_name(arguments.name, "the robot")
-    about = asker.ask(ABOUT, read_text, scaffold.ROBOT_ABOUT, given=arguments.about)
+def _robot(arguments: argparse.Namespace, asker: new_files.Asker) -> New:
+    name = new_files.read_name(arguments.name, "the robot")
+    about = asker.ask(ABOUT, new_files.read_text, scaffold.ROBOT_ABOUT, given=arguments.about)
     base = asker.ask("Which component drives it?", scaffold.read_base, scaffold.BASE, given=arguments.base)
     if arguments.place is None:
         question = "Where can it go? Write one place, such as 'table=2,0' in metres from the dock, or nothing to go on"
@@ -128,26 +115,26 @@ def _test(arguments: argparse.Namespace, name: str) -> str:
     return shown_name(arguments.into / f"tests/test_{name}.py")
 
 
-def _part(arguments: argparse.Namespace, asker: Asker) -> New:
-    name = read_name(arguments.name, "the part")
-    about = asker.ask(ABOUT, read_text, scaffold.PART_ABOUT, given=arguments.about)
+def _part(arguments: argparse.Namespace, asker: new_files.Asker) -> New:
+    name = new_files.read_name(arguments.name, "the part")
+    about = asker.ask(ABOUT, new_files.read_text, scaffold.PART_ABOUT, given=arguments.about)
     then = (f"include it in a robot, as parts/{name}.yaml shows", f"python -m pytest {_test(arguments, name)}")
     return New(arguments.into, scaffold.part_files(name, about), then)
 
 
-def _component(arguments: argparse.Namespace, asker: Asker) -> New:
+def _component(arguments: argparse.Namespace, asker: new_files.Asker) -> New:
     name = scaffold.read_component_name(arguments.name)
     folder = shown_name(arguments.into / name)
     then = (f"python -m pip install -e {folder}", f"python -m pytest {folder}", f"use it in a robot: type: {name}")
     return New(arguments.into, scaffold.component_files(name), then)
 
 
-def _mission(arguments: argparse.Namespace, asker: Asker) -> New:
+def _mission(arguments: argparse.Namespace, asker: new_files.Asker) -> New:
     home = find_home(arguments.robot)
-    usual = home.usual(read_name(arguments.name, "the mission", home.robot.manifest.missions))
-    answers = replace(usual, about=asker.ask(ABOUT, read_text, usual.about, given=arguments.about))
+    usual = home.usual(new_files.read_name(arguments.name, "the mission", home.robot.manifest.missions))
+    answers = replace(usual, about=asker.ask(ABOUT, new_files.read_text, usual.about, given=arguments.about))
     file = shown_name(home.file)
-    is_wanted = not arguments.no_add and asker.ask(f"Shall it be added to {file}?", read_yes, "yes")
+    is_wanted = not arguments.no_add and asker.ask(f"Shall it be added to {file}?", new_files.read_yes, "yes")
     then = (
         f"rbxcompose up --rate 10x {shown_name(home.file.parent)} --set start={answers.name}",
         f"python -m pytest {shown_name(home.project / 'tests')}/test_{answers.name}.py",
@@ -162,7 +149,7 @@ def _mission(arguments: argparse.Namespace, asker: Asker) -> New:
     return New(home.project, scaffold.mission_files(answers), then, entry)
 
 
-_MAKERS: dict[str, Callable[[argparse.Namespace, Asker], New]] = {
+_MAKERS: dict[str, Callable[[argparse.Namespace, new_files.Asker], New]] = {
     "robot": _robot,
     "mission": _mission,
     "part": _part,
@@ -231,13 +218,13 @@ def find_home(written: str) -> MissionHome:
 def _file(written: str) -> Path:
     if written.startswith(PREFIX):
         help_text = "create your own with 'rbxcompose new robot NAME'"
-        raise AnswerError(
-            ANSWER.at(None, f"'{written}' is a robot of the library, which stays as it is", help=help_text)
+        raise new_files.AnswerError(
+            new_files.ANSWER.at(None, f"'{written}' is a robot of the library, which stays as it is", help=help_text)
         )
     path = find(written or _only())
     if isinstance(path, Path):
         return path
-    raise AnswerError(path)
+    raise new_files.AnswerError(path)
 
 
 def _only() -> str:
@@ -246,5 +233,9 @@ def _only() -> str:
         return str(files[0])
     if files:
         names = ", ".join(shown_name(file.parent) for file in files)
-        raise AnswerError(ANSWER.at(None, "which robot is the mission for?", help=f"name it with '--robot': {names}"))
-    raise AnswerError(ANSWER.at(None, "there is no robot below 'robots/'", help="name one with '--robot PATH'"))
+        raise new_files.AnswerError(
+            new_files.ANSWER.at(None, "which robot is the mission for?", help=f"name it with '--robot': {names}")
+        )
+    raise new_files.AnswerError(
+        new_files.ANSWER.at(None, "there is no robot below 'robots/'", help="name one with '--robot PATH'")
+    )

@@ -6,8 +6,6 @@ several values or none. A change lasts until the process ends; `save` writes it 
 Exit codes: 0 done, 1 refused (`diff`: there is a difference), 2 wrong usage.
 """
 
-from __future__ import annotations
-
 import argparse
 from functools import partial
 from pathlib import Path

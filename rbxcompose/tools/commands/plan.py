@@ -3,8 +3,6 @@
 Exit codes: 0 fine, 1 errors found, 2 wrong usage.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os
@@ -41,8 +39,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Write the plan of a robot without errors, or its difference from another plan."""
     path = robot_path(arguments.path)
-    if path is None:
-        return FINDINGS
     if is_system(path):
         return _show_system(path, arguments)
     after = _compiled(path, arguments, is_layered=True)

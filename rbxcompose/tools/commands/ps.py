@@ -1,7 +1,5 @@
 """Show the components of running robots: state, process, restarts; and who has stopped the robot."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from collections.abc import Iterable, Iterator, Mapping
@@ -36,13 +34,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Show the supervisor's answer or, if it does not answer, the last state that it wrote."""
     wanted = arguments.robot or arguments.path
-    try:
-        several = robots_up() if wanted is None else []
-        if len(several) > 1:
-            return _tell_all(several, in_json=arguments.json)
-        shown = _shown(find_robot(wanted))
-    except NotDoneError as error:
-        return refuse(error.finding)
+    several = robots_up() if wanted is None else []
+    if len(several) > 1:
+        return _tell_all(several, in_json=arguments.json)
+    shown = _shown(find_robot(wanted))
     emit(json.dumps(shown) if arguments.json else _table(shown))
     return 0
 

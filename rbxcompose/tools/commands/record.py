@@ -22,7 +22,7 @@ from rbxcompose.base.printable import plain
 from rbxcompose.bus.names import data_key, decode_attachment
 from rbxcompose.bus.tokens import SPACE, EndpointToken, parse_token
 from rbxcompose.bus.transport import Arrival
-from rbxcompose.commands.console import NotDoneError, emit, refuse, table, write_report
+from rbxcompose.commands.console import emit, refuse, table, write_report
 from rbxcompose.commands.guest import Guest
 from rbxcompose.commands.lookup import BusPlace, add_bus_options, find_place, find_robot
 from rbxcompose.commands.options import add_json_option, out_option, seconds
@@ -53,14 +53,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Record, then report what was recorded."""
-    try:
-        place = find_place(arguments)
-        path = _path(arguments)
-        if path.parent.is_dir():
-            recover_in(path.parent)
-        return _record(arguments, place, path)
-    except NotDoneError as error:
-        return refuse(error.finding)
+    place = find_place(arguments)
+    path = _path(arguments)
+    if path.parent.is_dir():
+        recover_in(path.parent)
+    return _record(arguments, place, path)
 
 
 def _record(arguments: argparse.Namespace, place: BusPlace, path: Path) -> int:

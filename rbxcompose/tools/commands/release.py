@@ -3,8 +3,6 @@
 A mission continues after `mission resume`.
 """
 
-from __future__ import annotations
-
 import argparse
 
 from rbxcompose.commands.lookup import add_asking_options, pass_on

@@ -9,8 +9,6 @@ its recorded inputs, and compares its outputs with the recording. The settings a
 --robot PATH. Exit codes: 0 the same, 1 a difference or findings.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import math
@@ -126,17 +124,14 @@ def run(arguments: argparse.Namespace) -> int:
         recover_in(path.parent)
     if path.name.endswith(PART) and not path.exists():
         path = path.with_name(path.name.removesuffix(PART))
-    try:
-        if arguments.into is not None:
-            with _opened(path) as reader:
-                return run_again(arguments, path, reader)
-        summary = _look_through(path)
-        if arguments.info:
-            emit(json.dumps(_fields(summary)) if arguments.json else _text(path, summary))
-            return 0
-        return _replay(arguments, path, summary)
-    except NotDoneError as error:
-        return refuse(error.finding)
+    if arguments.into is not None:
+        with _opened(path) as reader:
+            return run_again(arguments, path, reader)
+    summary = _look_through(path)
+    if arguments.info:
+        emit(json.dumps(_fields(summary)) if arguments.json else _text(path, summary))
+        return 0
+    return _replay(arguments, path, summary)
 
 
 def _misused(arguments: argparse.Namespace) -> str:
@@ -192,19 +187,15 @@ def _replay(arguments: argparse.Namespace, path: Path, summary: RecordingSummary
                 if not topics:
                     return refuse(finding)
                 warn(replace(finding, severity=Severity.WARNING))
-        return _replay_on(place, topics, arguments, path)
-
-
-def _replay_on(place: BusPlace, topics: list[RecordedTopic], arguments: argparse.Namespace, path: Path) -> int:
-    with Guest(place, stays=True) as guest, guest.interruptible():
-        player = Player(guest, topics, arguments.namespace or "")
-        player.wait_for_subscribers()
-        emit(f"replaying {len(topics)} topics of {plain(str(path))}; Ctrl-C ends it")
-        count = _play(path, player, topics, arguments, guest)
-        while arguments.loop and _wait(guest.clock.now() + _PAUSE, guest):  # even if the recording has no duration
-            count += _play(path, player, topics, arguments, guest)
-    emit(f"replayed {count:,} messages")
-    return 0
+        with Guest(place, stays=True) as guest, guest.interruptible():
+            player = Player(guest, topics, arguments.namespace or "")
+            player.wait_for_subscribers()
+            emit(f"replaying {len(topics)} topics of {plain(str(path))}; Ctrl-C ends it")
+            count = _play(path, player, topics, arguments, guest)
+            while arguments.loop and _wait(guest.clock.now() + _PAUSE, guest):  # even if the recording has no duration
+                count += _play(path, player, topics, arguments, guest)
+        emit(f"replayed {count:,} messages")
+        return 0
 
 
 def _sent_already(guest: Guest, topics: list[RecordedTopic], namespace: str) -> list[str]:

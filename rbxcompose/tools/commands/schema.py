@@ -3,8 +3,6 @@
 It knows all installed component types, including those of other distributions.
 """
 
-from __future__ import annotations
-
 import argparse
 
 from rbxcompose.commands.console import emit

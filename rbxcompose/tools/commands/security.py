@@ -6,8 +6,6 @@ certificate that is on this machine.
 Exit codes: 0 fine, 1 errors found, 2 wrong usage.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

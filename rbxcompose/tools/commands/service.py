@@ -3,8 +3,6 @@
 The request is YAML with the fields of the service's type; missing fields are zero.
 """
 
-from __future__ import annotations
-
 import argparse
 
 from rbxcompose.commands.guest import Guest, add_server_verbs, visit, write_names

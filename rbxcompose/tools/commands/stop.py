@@ -4,12 +4,10 @@ The base brakes, actions that claim what moves are cancelled, and missions pause
 software, not an emergency stop.
 """
 
-from __future__ import annotations
-
 import argparse
 
 from rbxcompose.commands import lookup
-from rbxcompose.commands.console import NotDoneError, refuse
+from rbxcompose.commands.console import NotDoneError
 from rbxcompose.commands.options import EACH
 from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.runtime.requests import StopRobot
@@ -28,11 +26,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Stop the robot, over the bus if its supervisor does not answer."""
-    try:
-        folder = lookup.find_robot(arguments.robot)
-        answer = _stopped(folder)
-    except NotDoneError as error:
-        return refuse(error.finding)
+    folder = lookup.find_robot(arguments.robot)
+    answer = _stopped(folder)
     lookup.show_answer(arguments, folder, answer)
     return 0
 

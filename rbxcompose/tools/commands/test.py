@@ -4,8 +4,6 @@ PATH is a test or a folder with tests below it; without one it is `missions/`. E
 or has errors, 2 wrong usage.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

@@ -4,8 +4,6 @@ It looks once a second, until q or Ctrl-C. Without a terminal it looks once. The
 messages; the share of a process is that of one processor. Of a system, it shows all robots on all hosts in one picture.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import subprocess
@@ -17,7 +15,7 @@ from functools import partial
 from typing import Any
 
 from rbxcompose.base.printable import plain
-from rbxcompose.commands.console import NotDoneError, emit, has_colour, refuse
+from rbxcompose.commands.console import NotDoneError, emit, has_colour
 from rbxcompose.commands.guest import Guest
 from rbxcompose.commands.hosts import Remote, Shares, SystemCommand
 from rbxcompose.commands.lookup import NOT_UP, add_robot_option, find_robot, place_of
@@ -47,20 +45,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Show the robot, once or repeatedly."""
-    try:
-        folder = find_robot(arguments.robot or arguments.path)
-        with Guest(place_of(folder)) as guest:
-            sampler = Sampler(folder, guest)
-            try:
-                if arguments.json and arguments.follow:
-                    return _follow(guest, sampler)
-                if arguments.json or arguments.once or not is_terminal():
-                    return _once(guest, sampler, arguments.json)
-                return _live(guest, sampler)
-            finally:
-                sampler.close()
-    except NotDoneError as error:
-        return refuse(error.finding)
+    folder = find_robot(arguments.robot or arguments.path)
+    with Guest(place_of(folder)) as guest:
+        sampler = Sampler(folder, guest)
+        try:
+            if arguments.json and arguments.follow:
+                return _follow(guest, sampler)
+            if arguments.json or arguments.once or not is_terminal():
+                return _once(guest, sampler, arguments.json)
+            return _live(guest, sampler)
+        finally:
+            sampler.close()
 
 
 def run_on_system(command: SystemCommand) -> int | None:

@@ -3,8 +3,6 @@
 It sees ROS 2 nodes as well as components. It needs no robot on this machine: `--router` names another bus.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import math

@@ -4,18 +4,14 @@ In the foreground it goes down when the mission named by `start:` has ended, or 
 Exit codes: 0 fine, 1 findings, 2 wrong usage, 3 the mission failed, 4 the robot failed, 130 interrupted.
 """
 
-from __future__ import annotations
-
 import argparse
 import math
-import sys
 from pathlib import Path
 
 from rbxcompose.base.units import TIME, UnitError, to_si
 from rbxcompose.commands import targets
-from rbxcompose.commands.console import FINDINGS, refuse, write_report
+from rbxcompose.commands.console import FINDINGS, misused, refuse, write_report
 from rbxcompose.commands.options import add_system_options, is_system
-from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.runtime.folder import RunOptions
 from rbxcompose.runtime.recording.codes import UNWRITABLE
 from rbxcompose.tools.live_rules import LiveRules
@@ -24,7 +20,6 @@ from rbxcompose.tools.run_view import is_fit, run_plan
 
 GROUP = "run"
 IS_COMMON = True
-USAGE = 2
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -50,38 +45,28 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Compile the robot, start its supervisor, and report what happens."""
     if arguments.real and arguments.rate.is_stepped:
-        sys.stderr.write("rbxcompose up: --real keeps its own time, so --rate cannot be given with it\n")
-        return USAGE
+        return misused("up", "--real keeps its own time, so --rate cannot be given with it")
     if arguments.watch and (arguments.detach or arguments.rate.is_stepped):
         other = "-d" if arguments.detach else "--rate"
-        sys.stderr.write(f"rbxcompose up: --watch is for the foreground in real time, without {other}\n")
-        return USAGE
+        return misused("up", f"--watch is for the foreground in real time, without {other}")
     path = targets.robot_path(arguments.path, may_run=False)
-    if path is None:
-        return FINDINGS
     if is_system(path):
         return _run_share(path, arguments)
     if arguments.host or arguments.robot:
-        sys.stderr.write("rbxcompose up: --host and --robot are for systems\n")
-        return USAGE
-    compilation = compile_robot(path, **targets.layers_of(arguments))
+        return misused("up", "--host and --robot are for systems")
+    compilation = targets.compiled(path, arguments)
     write_report(compilation.report, compilation.sources)
     if compilation.plan is None or compilation.robot is None or compilation.report.has_errors:
         return 1
     if compilation.plan.follows_clock and arguments.rate.is_stepped:
-        sys.stderr.write("rbxcompose up: the robot follows /clock ('bus.clock'), so --rate cannot be given with it\n")
-        return USAGE
+        return misused("up", "the robot follows /clock ('bus.clock'), so --rate cannot be given with it")
     options = _options(arguments)
     if options.record is not None and not options.is_stepped:
-        sys.stderr.write(
-            "rbxcompose up: --record needs --rate; a run in real time is recorded by 'rbxcompose record'\n"
-        )
-        return USAGE
+        return misused("up", "--record needs --rate; a run in real time is recorded by 'rbxcompose record'")
     if options.record is not None and (problem := _write_problem(options.record)):
         return refuse(UNWRITABLE.at(None, problem))
     if options.is_stepped and options.rate is None and options.duration is None and compilation.plan.start is None:
-        sys.stderr.write("rbxcompose up: without 'start:' nothing ends a run at --rate max: give --for\n")
-        return USAGE
+        return misused("up", "without 'start:' nothing ends a run at --rate max: give --for")
     if not is_fit(compilation.robot, compilation.sources):
         return FINDINGS
     reload = None

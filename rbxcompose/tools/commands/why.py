@@ -5,8 +5,6 @@ stand before it.
 Exit codes: 0 fine, 1 the robot cannot be read or has no such path, 2 wrong usage.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 from dataclasses import replace
@@ -14,8 +12,7 @@ from dataclasses import replace
 from rbxcompose.base.findings import Finding
 from rbxcompose.base.printable import plain
 from rbxcompose.commands.console import FINDINGS, emit, misused, refuse, write_report
-from rbxcompose.commands.targets import add_layer_options, layers_of, put_robot_last, robot_path
-from rbxcompose.compiler.compile import compile_robot
+from rbxcompose.commands.targets import add_layer_options, compiled, put_robot_last, robot_path
 from rbxcompose.manifest.files import find
 from rbxcompose.tools.inspection.why import why
 
@@ -39,11 +36,9 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.robot is None and "/" in arguments.path:
         return misused("why", f"'{plain(arguments.path)}' is a robot, and no value of it is named; {_USAGE}")
     robot = robot_path(arguments.robot)
-    if robot is None:
-        return FINDINGS
     if isinstance(missing := find(robot), Finding):
         return refuse(replace(missing, help="; ".join(filter(None, (missing.help, _USAGE)))))
-    compilation = compile_robot(robot, **layers_of(arguments))
+    compilation = compiled(robot, arguments)
     if compilation.robot is None:
         write_report(compilation.report, compilation.sources)
         return FINDINGS

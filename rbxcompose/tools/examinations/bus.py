@@ -1,7 +1,5 @@
 """What is on the bus of each robot: clocks that disagree, clashing types, ports of routers, wires with one end."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from rbxcompose.base.findings import Finding, Severity, kind

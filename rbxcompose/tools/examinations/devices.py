@@ -1,7 +1,5 @@
 """The devices that components name, and the USB adapters that are plugged in."""
 
-from __future__ import annotations
-
 import grp
 import os
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """This machine: its limits, versions, private files, and what robots have left behind on it."""
 
-from __future__ import annotations
-
 import os
 import re
 import stat
@@ -12,7 +10,7 @@ from rbxcompose.base.findings import Finding, Severity, kind
 from rbxcompose.base.printable import plain
 from rbxcompose.manifest.files import project_of, shown_name
 from rbxcompose.manifest.secrets import FOLDER
-from rbxcompose.tools.doctor import HostFacts, RunningRobot, Version, examination
+from rbxcompose.tools.doctor import HostFacts, RunningRobot, examination
 
 LEFT = kind("RBX9409", Severity.WARNING)
 _TITLE = re.compile(r"rbxcompose (?P<robot>[^:]+): (?P<process>.+)")
@@ -117,7 +115,7 @@ def _open_to_others(paths: list[Path], mode: str) -> Iterator[Finding]:
 @examination
 def versions(facts: HostFacts) -> Iterator[str | Finding]:
     """Compare the installed versions with the locked ones, if there is a lock file."""
-    wrong = [one for one in facts.versions if _is_other_version(one)]
+    wrong = [one for one in facts.versions if one.installed is None or one.locked not in (None, one.installed)]
     for one in wrong:
         there = f"{one.name} {one.installed} is installed" if one.installed else f"{one.name} is not installed"
         locked = f", {one.locked} is locked" if one.locked else ""
@@ -125,7 +123,3 @@ def versions(facts: HostFacts) -> Iterator[str | Finding]:
         yield OTHER_VERSION.at(None, there + locked, help=todo)
     fine = ", ".join(f"{one.name} {one.installed}" for one in facts.versions if one not in wrong)
     yield f"Python {facts.python}, {fine}" if fine else f"Python {facts.python}"
-
-
-def _is_other_version(version: Version) -> bool:
-    return version.installed is None or version.locked not in (None, version.installed)

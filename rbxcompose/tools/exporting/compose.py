@@ -3,8 +3,6 @@
 Certificates and other secrets are in neither: they come from the host, as Compose's secrets and its environment.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from typing import Any
 

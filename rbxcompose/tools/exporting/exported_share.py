@@ -1,7 +1,5 @@
 """What every export needs to know of a share: where it runs, the command that runs it, and what it opens."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 
 from rbxcompose.base.config import Config, Secret

@@ -4,8 +4,6 @@ A Kustomize base, so that each robot of a fleet is an overlay with a name, an im
 and other secrets are objects of the kind Secret, which the manifests name and do not contain.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 

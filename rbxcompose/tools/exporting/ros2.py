@@ -4,8 +4,6 @@
 bridge. ROS 2 reaches the robot's router by `rmw_zenoh_cpp`; the launch file sets the environment for that.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from operator import itemgetter
 from typing import Any

@@ -1,7 +1,5 @@
 """What MoveIt reads of a robot: its URDF, and an SRDF with its arms and the pairs of links to ignore."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from rbxcompose.domains.arms.sections.arms import ArmOfRobot, arms

@@ -5,8 +5,6 @@ change, and kills it if its supervisor is silent. It sees no more of the machine
 systemd.exec(5), systemd.service(5), systemd.resource-control(5).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from rbxcompose.tools.exporting.exported_share import FILE, GRACE, MISSION_FAILED, REFUSED, ExportedShare

@@ -1,7 +1,5 @@
 """`params`: files of ROS 2 parameters, and dumps of `dynamic_reconfigure`."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from pydantic import ValidationError
@@ -11,24 +9,14 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Related, Report, Severity, Span, kind
 from rbxcompose.base.printable import plain
 from rbxcompose.base.units import UNITS, Dimension
+from rbxcompose.commands.importing import ros_parameters
 from rbxcompose.commands.importing.foreign_files import ForeignFile, FreeNames, Given
 from rbxcompose.commands.importing.importer import DISAGREES, NOT_CARRIED_OVER, OTHER_PROGRAM, importer
 from rbxcompose.commands.importing.manifest_text import Row, header, place, quantity, row, section
-from rbxcompose.commands.importing.ros_parameters import (
-    NodeParameters,
-    ParameterData,
-    argument_type,
-    parameters_of,
-    scalars_of,
-    shown_name,
-    value_of,
-    was_refused,
-    written,
-)
 from rbxcompose.compiler.composition.dump import exact
 from rbxcompose.manifest.scalars import plain_value
 from rbxcompose.manifest.shapes import alternatives, field_types
-from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode
+from rbxcompose.manifest.tree import MappingNode, ScalarNode
 from rbxcompose.sdk.registry import component_type, usable_names
 
 GUESSED_TYPE = kind("RBX2293", Severity.WARNING)
@@ -52,7 +40,9 @@ class KnownComponent:
 
 
 def known_component(
-    node: NodeParameters, parameters: Mapping[tuple[str, ...], Given[ParameterData]], report: Report
+    node: ros_parameters.NodeParameters,
+    parameters: Mapping[tuple[str, ...], Given[ros_parameters.ParameterData]],
+    report: Report,
 ) -> KnownComponent | None:
     """Return the component that a node is; None unless its parameters are those of just one type.
 
@@ -73,7 +63,7 @@ def known_component(
     return KnownComponent(own, node.node, node.span, fitting[0], settings)
 
 
-def _fits(type_: str, node: str, given: Mapping[str, Given[ParameterData]]) -> bool:
+def _fits(type_: str, node: str, given: Mapping[str, Given[ros_parameters.ParameterData]]) -> bool:
     cls = component_type(type_)
     config = cls.config_type()
     fields = config.model_fields
@@ -99,30 +89,30 @@ def _dimensions(config: type[Config]) -> dict[str, Dimension]:
     }
 
 
-def _data(value: ParameterData, dimension: Dimension | None) -> object:
+def _data(value: ros_parameters.ParameterData, dimension: Dimension | None) -> object:
     return value if dimension is None or isinstance(value, str) else _written(value, dimension)
 
 
-def _written(value: ParameterData, dimension: Dimension | None) -> str:
+def _written(value: ros_parameters.ParameterData, dimension: Dimension | None) -> str:
     """Return a value as a manifest has it; numbers of files are in SI."""
     if dimension is None or isinstance(value, bool | str | list):
-        return written(value)
+        return ros_parameters.written(value)
     units = (name for name, unit in UNITS.items() if unit.dimension == dimension and unit.to_si(1.0) == 1.0)
     unit = next(units, None)
     return exact(float(value), dimension) if unit is None else quantity(float(value), unit)
 
 
 ParameterPath = tuple[str, ...]
-GivenValues = dict[ParameterPath, Given[ParameterData]]
+GivenValues = dict[ParameterPath, Given[ros_parameters.ParameterData]]
 
 
 @importer("params", "files of ROS 2 parameters, and dumps of dynamic_reconfigure")
 def params(files: Sequence[ForeignFile], name: str, report: Report) -> str:
     """Return a robot with a component for each node that is one of ours, and an argument for each other parameter."""
     found = [file for file in files if _is_one(file, report)]
-    nodes: dict[str, tuple[NodeParameters, GivenValues]] = {}
+    nodes: dict[str, tuple[ros_parameters.NodeParameters, GivenValues]] = {}
     for file in found:
-        for node in parameters_of(file):
+        for node in ros_parameters.parameters_of(file):
             _, known = nodes.setdefault(node.node, (node, {}))
             _add(known, node, report)
     components = {
@@ -148,17 +138,17 @@ def _is_one(file: ForeignFile, report: Report) -> bool:
     return not words
 
 
-def _add(known: GivenValues, node: NodeParameters, report: Report) -> None:
+def _add(known: GivenValues, node: ros_parameters.NodeParameters, report: Report) -> None:
     """Add the parameters of a node; report those that cannot be carried over, and those that disagree."""
-    for path, entry in scalars_of(node.root):
-        shown = f"'{plain(shown_name(path), 60)}' of '{plain(node.node, 60)}'"
-        if path[0] in _OF_ROS and not _is_false(entry.value):
+    for path, entry in ros_parameters.scalars_of(node.root):
+        shown = f"'{plain(ros_parameters.shown_name(path), 60)}' of '{plain(node.node, 60)}'"
+        if path[0] in _OF_ROS and not (isinstance(entry.value, ScalarNode) and plain_value(entry.value) is False):
             words = f"{shown} is not carried over: {_OF_ROS[path[0]]}"
             report.add(NOT_CARRIED_OVER.at(entry.key.span, words))
         if path[0] in _OF_ROS:
             continue
-        value = value_of(entry.value)
-        if value is None and was_refused(entry.value):
+        value = ros_parameters.value_of(entry.value)
+        if value is None and ros_parameters.was_refused(entry.value):
             continue
         if value is None:
             words = f"{shown} is not carried over: it is neither a value nor a list of values"
@@ -168,11 +158,7 @@ def _add(known: GivenValues, node: NodeParameters, report: Report) -> None:
             report.add(DISAGREES.at(value.span, words, related=[Related(other.span, "the first one")]))
 
 
-def _is_false(node: TreeNode) -> bool:
-    return isinstance(node, ScalarNode) and plain_value(node) is False
-
-
-def _argument_rows(nodes: dict[str, tuple[NodeParameters, GivenValues]]) -> Iterator[Row]:
+def _argument_rows(nodes: dict[str, tuple[ros_parameters.NodeParameters, GivenValues]]) -> Iterator[Row]:
     """Yield an argument for each parameter, below the name of its node."""
     names = FreeNames()
     if nodes:
@@ -182,8 +168,10 @@ def _argument_rows(nodes: dict[str, tuple[NodeParameters, GivenValues]]) -> Iter
         for path, value in known.items():
             last = "_".join(path)
             wanted = last if len(nodes) == 1 else f"{name.rpartition('/')[2].replace('**', 'all')}_{last}"
-            text = f"{{type: {argument_type(value.value)}, default: {written(value.value)}}}"
-            origin = f"{place(value.span)}: {plain(shown_name(path), 60)}"
+            text = (
+                f"{{type: {ros_parameters.argument_type(value.value)}, default: {ros_parameters.written(value.value)}}}"
+            )
+            origin = f"{place(value.span)}: {plain(ros_parameters.shown_name(path), 60)}"
             yield row(1, f"{names.take(wanted, 'parameter')}: {text}", origin)
 
 

@@ -1,10 +1,8 @@
 """A robot as boxes and wires: the common basis of all graphs, as DOT and as Mermaid."""
 
-from __future__ import annotations
-
 import json
-from collections.abc import Iterator
-from dataclasses import field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import field, replace
 from enum import StrEnum
 from typing import Any
 
@@ -26,6 +24,9 @@ Keys = tuple[tuple[str, str], ...]  # its purpose, and the key
 MISSION = "mission"  # the component that runs missions
 TRANSFORMS = ("/tf", "/tf_static")  # what a look-up subscribes to
 STATUSES = "/diagnostics"  # where every component publishes without declaring it
+_FOLD = "missions"  # the key of the box of those
+MANY = 6  # missions, or open wires of the same box: more of them hide the rest, and are folded
+_FEW = 3  # types of folded wires that are named
 _MERMAID_STYLES = ("classDef wire fill:none,stroke-dasharray:2 2", "classDef mux stroke-width:2px")
 
 
@@ -159,6 +160,43 @@ class Diagram:
     def of_group(self, group: str) -> tuple[Box, ...]:
         """Return the boxes of a process."""
         return tuple(box for box in self.boxes if box.group == group)
+
+
+def folded(diagram: Diagram) -> Diagram:
+    """Return a diagram whose many missions are one box, all but the one that `up` starts, and many open wires one wire.
+
+    An open wire has nothing at its other end, such as the services of each joint that no mission uses.
+    """
+    programs = [box for box in diagram.boxes if box.shape is BoxShape.PROGRAM]
+    hidden = {box.key: _FOLD for box in programs if box.key != diagram.start} if len(programs) > MANY else {}
+    boxes = [box for box in diagram.boxes if box.key not in hidden]
+    if hidden:
+        names = ", ".join(box.name for box in programs if box.key in hidden)
+        boxes.append(Box(_FOLD, f"{len(hidden)} missions", "mission", programs[0].group, BoxShape.PROGRAM, names))
+    alike: dict[tuple[object, ...], list[DiagramWire]] = {}
+    for wire in diagram.wires:
+        sources, targets = (_folded(tips, hidden) for tips in (wire.sources, wire.targets))
+        ends = (tuple(tip.box for tip in sources), tuple(tip.box for tip in targets))
+        what: object = wire.name if all(ends) or wire.about else ends
+        alike.setdefault((wire.kind, what), []).append(replace(wire, sources=sources, targets=targets))
+    wires = [wire for many in alike.values() for wire in (many if len(many) <= MANY else [_open(many)])]
+    runs = dict.fromkeys((executive, hidden.get(program, program)) for executive, program in diagram.runs)
+    return replace(diagram, boxes=tuple(boxes), wires=tuple(wires), runs=tuple(runs))
+
+
+def _folded(tips: Sequence[Tip], hidden: Mapping[str, str]) -> tuple[Tip, ...]:
+    """Return the ends of a wire, those at hidden boxes as one; its note stays if all of them have it."""
+    notes: dict[str, list[str]] = {}
+    for tip in tips:
+        notes.setdefault(hidden.get(tip.box, tip.box), []).append(tip.note)
+    return tuple(Tip(box, note[0] if len(set(note)) == 1 else "") for box, note in notes.items())
+
+
+def _open(wires: Sequence[DiagramWire]) -> DiagramWire:
+    """Return open wires of the same box as one."""
+    types = dict.fromkeys(wire.short_type for wire in wires)
+    shown = ", ".join(types) if len(types) <= _FEW else f"{len(types)} types"
+    return replace(wires[0], name=f"{len(wires)} {wires[0].kind}s", type=shown, qos="", about="not used here")
 
 
 @dataclass(slots=True)

@@ -1,7 +1,5 @@
 """The composed robot as one manifest, with the origin of each value after it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A robot as one self-contained HTML page: a picture to hover over, and tables of its contents."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from html import escape
 
@@ -63,23 +61,23 @@ _WIDE, _SMALL = 7.6, 6.4  # width of a letter of names and of small text [px]
 _RUNS = "runs"
 
 
-def html(diagram: Diagram) -> str:
-    """Return the HTML of the page: light or dark, as the reader has set it."""
-    return "".join(f"{line}\n" for line in _page(diagram))
+def html(drawn: Diagram, whole: Diagram | None = None) -> str:
+    """Return the HTML of the page, light or dark, as the reader has set it; the tables have all of `whole`."""
+    return "".join(f"{line}\n" for line in _page(drawn, whole or drawn))
 
 
-def _page(diagram: Diagram) -> Iterator[str]:
+def _page(diagram: Diagram, whole: Diagram) -> Iterator[str]:
     title = escape(diagram.robot)
     yield "<!doctype html>"
     yield f'<html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
     yield '<meta name="viewport" content="width=device-width, initial-scale=1">'
     yield f"<style>{STYLE}</style></head><body>"
     yield f"<header><h1>{title}</h1><p>{escape(diagram.about)}</p>"
-    yield from _legend(diagram)
+    yield from _legend(whole)
     yield '</header><div class="picture">'
     yield from _picture(diagram)
     yield "</div>"
-    yield from _tables(diagram)
+    yield from _tables(whole)
     yield f"<script>{SCRIPT}</script></body></html>"
 
 

@@ -1,7 +1,5 @@
 """A mission as one self-contained HTML page: nested boxes, with machines as diagrams of their own."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from html import escape
 

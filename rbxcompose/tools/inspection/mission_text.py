@@ -1,7 +1,5 @@
 """A mission as lines of text, as a Mermaid flowchart, or in DOT."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Sequence
 

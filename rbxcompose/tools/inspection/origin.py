@@ -1,7 +1,5 @@
 """Where a value of the composed robot comes from: its place, the layer that wrote it, and how it was written."""
 
-from __future__ import annotations
-
 from rbxcompose.base.config import HIDDEN, Secret
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Span

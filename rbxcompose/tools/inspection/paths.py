@@ -1,7 +1,5 @@
 """Paths of a robot as people write them: `battery.runtime`, `missions.patrol.with.rounds`, `go_to.cmd_vel`."""
 
-from __future__ import annotations
-
 from rbxcompose.base.config import COMPONENT
 from rbxcompose.base.findings import Finding, kind
 from rbxcompose.base.printable import plain

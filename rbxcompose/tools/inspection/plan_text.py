@@ -1,7 +1,5 @@
 """Plans for people: of a robot, of the changes to a running one, of a system."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Why a value of the robot is as it is: where it is written, what it replaced, what it means."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """What can be written at a position: keys, words, names of other sections and files, units."""
 
-from __future__ import annotations
-
 import re
 import string
 from collections.abc import Iterator, Mapping

@@ -1,7 +1,5 @@
 """Conversion of the core's results to the types of the protocol."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The names that cross files: the kind of thing that the keys of a map name, and the known names of a kind."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 

@@ -1,13 +1,11 @@
 """Renaming a name of the project in every file that has it, and fixes as changes to texts."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.findings import Finding, Severity, Span
+from rbxcompose.base.findings import Finding, Severity
 from rbxcompose.base.fixes import apply
 from rbxcompose.compiler.compile import Compilation, compile_robot
 from rbxcompose.manifest.files import shown_name
@@ -44,7 +42,7 @@ def actions(project: Project, findings: Iterable[Finding], first: int, last: int
     """Yield the fixes of the findings on the lines `first` to `last` (from 0)."""
     for finding in findings:
         span, fix = finding.span, finding.fix
-        if span is None or fix is None or not _meets(span, first, last):
+        if span is None or fix is None or not (span.line - 1 <= last and span.end_line - 1 >= first):
             continue
         files = {edit.span.file: Path(edit.span.file).resolve() for edit in fix.edits}
         texts = {file: project.text(path) for file, path in files.items()}
@@ -52,10 +50,6 @@ def actions(project: Project, findings: Iterable[Finding], first: int, last: int
         changes = {files[file]: change_of(texts[file], after[file]) for file in files if texts[file] != after[file]}
         if changes:
             yield CodeAction(fix.title, finding, fix.is_safe, changes)
-
-
-def _meets(span: Span, first: int, last: int) -> bool:
-    return span.line - 1 <= last and span.end_line - 1 >= first
 
 
 def change_of(before: str, after: str) -> TextChange:

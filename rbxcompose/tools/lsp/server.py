@@ -1,7 +1,5 @@
 """The language server: passes requests of an editor to the core, over stdin and stdout."""
 
-from __future__ import annotations
-
 import logging
 import sys
 from collections.abc import Callable, Mapping

@@ -1,7 +1,5 @@
 """Possible errors in the file of a test."""
 
-from __future__ import annotations
-
 from rbxcompose.base.findings import Severity, kind
 
 UNKNOWN = kind("RBX4201", is_fixable=True)

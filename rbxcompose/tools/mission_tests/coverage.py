@@ -1,7 +1,5 @@
 """Which paths of a mission the tests took: results of skills, branches, alternatives, interrupts, transitions."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import field
 

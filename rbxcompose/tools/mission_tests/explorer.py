@@ -1,7 +1,5 @@
 """Explores what could happen to a mission: every result of its skills, values on either side of each number."""
 
-from __future__ import annotations
-
 import json
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
@@ -10,17 +8,7 @@ from itertools import pairwise
 from typing import Any
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.expressions.tree import (
-    Comparison,
-    Expression,
-    ExpressionNode,
-    Flag,
-    Minus,
-    Text,
-    Variable,
-    Word,
-    walk,
-)
+from rbxcompose.base.expressions import tree as syntax
 from rbxcompose.base.expressions.types import TypeKind
 from rbxcompose.base.expressions.values import NOT_ARRIVED, NotArrived, Value
 from rbxcompose.missions.analysis.facts import constants_of, number_in
@@ -80,23 +68,23 @@ def _around(limits: Sequence[float]) -> tuple[float, ...]:
     return tuple(sorted({limits[-1] + width, *between, limits[0] - width}, reverse=True))
 
 
-def _compared(expression: Expression, constants: Mapping[str, Value]) -> Iterator[tuple[str, Value]]:
+def _compared(expression: syntax.Expression, constants: Mapping[str, Value]) -> Iterator[tuple[str, Value]]:
     """Yield each name that is compared with a constant, and the constant."""
-    for part, _ in walk(expression.tree):
-        if isinstance(part, Comparison):
+    for part, _ in syntax.walk(expression.tree):
+        if isinstance(part, syntax.Comparison):
             for one, other in ((part.left, part.right), (part.right, part.left)):
                 value = _constant(other, constants)
-                if isinstance(one, Variable) and value is not None:
+                if isinstance(one, syntax.Variable) and value is not None:
                     yield one.name, value
 
 
-def _constant(tree: ExpressionNode, constants: Mapping[str, Value]) -> Value:
+def _constant(tree: syntax.ExpressionNode, constants: Mapping[str, Value]) -> Value:
     match tree:
-        case Flag(value=flag):
+        case syntax.Flag(value=flag):
             return flag
-        case Text(value=text) | Word(name=text):
+        case syntax.Text(value=text) | syntax.Word(name=text):
             return text
-        case Minus(operand=operand):
+        case syntax.Minus(operand=operand):
             number = number_in(operand, constants)
             return None if number is None else -number
     return number_in(tree, constants)

@@ -1,7 +1,5 @@
 """Which files are tests: those that are named, and all tests in folders."""
 
-from __future__ import annotations
-
 import os
 import stat
 from collections.abc import Iterable

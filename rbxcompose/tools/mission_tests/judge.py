@@ -1,7 +1,5 @@
 """Compares what happened with what was expected; pure."""
 
-from __future__ import annotations
-
 from bisect import bisect_left
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Reads the file of a test, with a finding for each error."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field, replace

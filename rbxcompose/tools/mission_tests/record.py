@@ -1,7 +1,5 @@
 """The record of a run: lines with their times, the steps that ran, messages, data, the end."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import field
 

@@ -1,7 +1,5 @@
 """The report of tests: a line each, a trace of each failure, a summary; JUnit XML."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import Any
 from xml.etree import ElementTree

@@ -1,7 +1,5 @@
 """Runs a test in the way that it needs, alone or on the whole robot, and judges the result."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
@@ -260,7 +258,8 @@ class TrialStage:
             if excess := self._excess():
                 self.record.trouble = f"did not end: {excess} within {self.now:.0f} s{self._unwaiting()}"
                 break
-            upcoming = self._next()
+            times = [self.mocked.next_due(), self.engine.next_wake(), self.events[0].at if self.events else None]
+            upcoming = min((time for time in times if time is not None), default=None)
             if upcoming is None or upcoming > (LONGEST_TEST if until is None else until) + ROUNDING:
                 self._leave(until, upcoming)
                 break
@@ -317,10 +316,6 @@ class TrialStage:
                 self.engine.resume(self.now)
             case _:
                 self.record.note("the test releases the stop")
-
-    def _next(self) -> float | None:
-        times = [self.mocked.next_due(), self.engine.next_wake(), self.events[0].at if self.events else None]
-        return min((time for time in times if time is not None), default=None)
 
 
 WhenEnded = Callable[[int, Result], None]

@@ -1,7 +1,5 @@
 """What the expressions of a test see, before and during its run; and how its values are written."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 
 from rbxcompose.base.config import Place

@@ -1,7 +1,5 @@
 """What changes parameters, all of them or none: `param set`, `load` and `undo`."""
 
-from __future__ import annotations
-
 import argparse
 import getpass
 import os

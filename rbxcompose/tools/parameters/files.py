@@ -1,7 +1,5 @@
 """Live values beside the files of the robot, and into them: `param diff`, `dump`, `save`, also of another host."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import subprocess
@@ -21,7 +19,7 @@ from rbxcompose.base.fixes import apply
 from rbxcompose.base.printable import plain
 from rbxcompose.base.units import Dimension
 from rbxcompose.bus.names import resolve
-from rbxcompose.commands.console import NotDoneError, emit, refuse
+from rbxcompose.commands.console import NotDoneError, emit
 from rbxcompose.commands.guest import NO_NAME
 from rbxcompose.commands.hosts import UNREACHED, Remote, on_all
 from rbxcompose.commands.lookup import NO_ANSWER, answer_of, find_robot, known_state
@@ -450,13 +448,10 @@ class RemoteParameters:
 
     def run(self, arguments: argparse.Namespace) -> int:
         """Carry the command out and return its exit code."""
-        try:
-            if arguments.action == "load":
-                return self._load(arguments.file)
-            running = self._ask("ps")
-            return replace(self, real=bool(running.get("real")))._compare(arguments)
-        except NotDoneError as error:
-            return refuse(error.finding)
+        if arguments.action == "load":
+            return self._load(arguments.file)
+        running = self._ask("ps")
+        return replace(self, real=bool(running.get("real")))._compare(arguments)
 
     def _compare(self, arguments: argparse.Namespace) -> int:
         """Compare the live values with the files, and carry out what follows."""

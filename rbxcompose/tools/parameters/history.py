@@ -1,7 +1,5 @@
 """Who changed which parameters: `param history` and `watch`."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Iterable, Sequence
 from datetime import datetime

@@ -1,7 +1,5 @@
 """The nodes on a bus that have parameters, and their values: `param ls`, `get` and `describe`."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, TypeVar

@@ -14,6 +14,7 @@ import json
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from time import perf_counter, process_time
@@ -26,18 +27,10 @@ from rbxcompose.base.config import Config, Length, Time
 from rbxcompose.base.findings import suggest
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.base.units import ANGLE, LENGTH
+from rbxcompose.commands import options
 from rbxcompose.commands.console import NotDoneError, emit, misused, table
 from rbxcompose.commands.guest import Guest, visit, wanted
 from rbxcompose.commands.lookup import add_bus_options
-from rbxcompose.commands.options import (
-    Subcommand,
-    add_actions,
-    add_json_option,
-    add_timeout_option,
-    argument,
-    out_option,
-    run_action,
-)
 from rbxcompose.commands.targets import add_layer_options, add_path_argument, put_robot_last
 from rbxcompose.domains.arms.arm_config import ArmWorks
 from rbxcompose.domains.arms.command_line import (
@@ -56,21 +49,9 @@ from rbxcompose.domains.arms.command_line import (
     write_picture,
 )
 from rbxcompose.domains.arms.goals import goal_of
-from rbxcompose.domains.arms.motion.figures import (
-    NO_TRIES,
-    MotionProblem,
-    ProblemError,
-    Tries,
-    call_time,
-    ended,
-    free_pairs,
-    inverse_tries,
-    motion_tries,
-    problem_files,
-    read_problem,
-)
-from rbxcompose.domains.arms.motion.groups import moved_links
-from rbxcompose.domains.arms.motion.inverse_kinematics import PoseSolutions, PoseTarget
+from rbxcompose.domains.arms.motion import figures as measures
+from rbxcompose.domains.arms.motion.groups import Array, moved_links
+from rbxcompose.domains.arms.motion.inverse_kinematics import PoseSearch, PoseSolutions, PoseTarget
 from rbxcompose.domains.arms.motion.path_constraints import KeptTip
 from rbxcompose.domains.arms.motion.planner import MotionPlan, MotionRequest, Planning
 from rbxcompose.domains.arms.motion.pose_search import Posture, searched
@@ -89,16 +70,18 @@ M = TypeVar("M", MoveArm.Goal, TraceArm.Goal)
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    goal = argument("goal", metavar="GOAL", help="a pose by name, or '{JOINT: POSITION, ...}'")
-    fk_picture = argument("--picture", metavar="FILE", help="draw it among the things of the scene as PNG")
+    goal = options.argument("goal", metavar="GOAL", help="a pose by name, or '{JOINT: POSITION, ...}'")
+    fk_picture = options.argument("--picture", metavar="FILE", help="draw it among the things of the scene as PNG")
     words = "draw start, goal (green) and the way of the tip as PNG"
-    picture = argument("--picture", metavar="FILE", help=words)
-    way = argument("way", metavar="WAY", help="as in a mission: '{points: [{x: 5 cm}], relative: true}'")
-    start = argument("--from", dest="start", metavar="GOAL", default="", help="where it begins (default: at rest)")
+    picture = options.argument("--picture", metavar="FILE", help=words)
+    way = options.argument("way", metavar="WAY", help="as in a mission: '{points: [{x: 5 cm}], relative: true}'")
+    start = options.argument(
+        "--from", dest="start", metavar="GOAL", default="", help="where it begins (default: at rest)"
+    )
     words = "on the way: '{roll: 10 deg, pitch: 10 deg}'"
-    keep = argument("--keep", metavar="KEEP", default="", help=words)
-    arm = argument("--arm", metavar="NAME", help="which one, if there are several")
-    json_ = argument("--json", action="store_true", help="answer in JSON")
+    keep = options.argument("--keep", metavar="KEEP", default="", help=words)
+    arm = options.argument("--arm", metavar="NAME", help="which one, if there are several")
+    json_ = options.argument("--json", action="store_true", help="answer in JSON")
     shared = (add_path_argument, add_layer_options, json_)
     of_arm = (add_path_argument, arm, add_layer_options, json_)
     ik = "print positions of joints that bring the tip to a pose (inverse kinematics)"
@@ -107,17 +90,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     bench = "measure kinematics, and motions, also those of published problems"
     plan = "plan a motion and print how long it takes, or why there is none"
     actions = (
-        Subcommand("ls", "list the arms of a robot with their joints and poses", _ls, shared),
-        Subcommand("fk", "print where the tip is (forward kinematics)", _fk, (goal, fk_picture, *of_arm)),
-        Subcommand("ik", ik, run_inverse, (add_inverse_options, start, *of_arm)),
-        Subcommand("plan", plan, _plan, (goal, picture, start, *of_arm, keep)),
-        Subcommand("trace", trace, _trace, (way, picture, start, *of_arm)),
-        Subcommand("picture", "draw where the tip gets, and how well, as PNG", _picture, (add_reach_options, *of_arm)),
-        Subcommand("bench", bench, _bench, (add_bench_options, *of_arm)),
-        Subcommand("setup", setup, run_setup, (add_options, *shared)),
-        Subcommand("go", "move an arm of a running robot, and print how that ends", run_go, (add_go_options, keep)),
+        options.Subcommand("ls", "list the arms of a robot with their joints and poses", _ls, shared),
+        options.Subcommand("fk", "print where the tip is (forward kinematics)", _fk, (goal, fk_picture, *of_arm)),
+        options.Subcommand("ik", ik, run_inverse, (add_inverse_options, start, *of_arm)),
+        options.Subcommand("plan", plan, _plan, (goal, picture, start, *of_arm, keep)),
+        options.Subcommand("trace", trace, _trace, (way, picture, start, *of_arm)),
+        options.Subcommand(
+            "picture", "draw where the tip gets, and how well, as PNG", _picture, (add_reach_options, *of_arm)
+        ),
+        options.Subcommand("bench", bench, _bench, (add_bench_options, *of_arm)),
+        options.Subcommand("setup", setup, run_setup, (add_options, *shared)),
+        options.Subcommand(
+            "go", "move an arm of a running robot, and print how that ends", run_go, (add_go_options, keep)
+        ),
     )
-    add_actions(parser, actions)
+    options.add_actions(parser, actions)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -125,7 +112,7 @@ def run(arguments: argparse.Namespace) -> int:
     for asked in ("goal", "target", "way"):
         if asked in arguments and "path" in arguments:
             put_robot_last(arguments, asked)
-    return run_action(arguments)
+    return options.run_action(arguments)
 
 
 def _ls(arguments: argparse.Namespace) -> int:
@@ -221,11 +208,7 @@ def _goal(message: type[M], data: Mapping[str, object]) -> M:
 
 
 def _show_plan(
-    works: ArmWorks,
-    planning: Planning,
-    arguments: argparse.Namespace,
-    start: NDArray[np.float64],
-    goal: NDArray[np.float64] | None = None,
+    works: ArmWorks, planning: Planning, arguments: argparse.Namespace, start: Array, goal: Array | None = None
 ) -> int:
     """Print a plan, and draw it if that is wanted; without a goal, it ends where the plan ends.
 
@@ -233,7 +216,7 @@ def _show_plan(
         NotDoneError: if there is none.
     """
     began = perf_counter()
-    found = ended(planning)
+    found = measures.ended(planning)
     took = perf_counter() - began
     if goal is None:
         goal = found.waypoints[-1] if isinstance(found, MotionPlan) else start
@@ -262,8 +245,7 @@ def _show_plan(
 
 def add_inverse_options(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of `arm ik`."""
-    words = "of the tip: '{x: 20 cm, y: -10 cm, z: 55 cm, yaw: 90 deg}'"
-    parser.add_argument("target", metavar="POSE", help=words)
+    parser.add_argument("target", metavar="POSE", help="of the tip: '{x: 20 cm, y: -10 cm, z: 55 cm, yaw: 90 deg}'")
     parser.add_argument("--frame", metavar="LINK", default="", help="the link in whose frame it is (default: the root)")
     counts = parser.add_mutually_exclusive_group()
     counts.add_argument("--any-orientation", action="store_true", help="only the position counts")
@@ -325,19 +307,10 @@ def _found(
 ) -> PoseSolutions:
     solver, began = works.solver, perf_counter()
     prefer = arguments.prefer or solver.prefer
-    return ended(
-        searched(
-            works.kinematics,
-            works.space,
-            target,
-            start,
-            works.planner.checker.is_free,
-            seed=works.planner.settings.seed,
-            posture=Posture.of(works.space.names, positions_in(works, robot, prefer)) if prefer else None,
-            restarts=solver.restarts,
-            is_late=lambda: perf_counter() - began >= solver.time,
-        )
-    )
+    posture = Posture.of(works.space.names, positions_in(works, robot, prefer)) if prefer else None
+    is_free, seed = works.planner.checker.is_free, works.planner.settings.seed
+    search = PoseSearch(works.kinematics, works.space, target, start, is_free, seed, solver.restarts)
+    return measures.ended(searched(replace(search, is_late=lambda: perf_counter() - began >= solver.time), posture))
 
 
 def _far(away: float, angle: float) -> str:
@@ -352,8 +325,8 @@ def add_go_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("arm", metavar="ARM", help="the arm")
     words = "a pose by name, '{JOINT: POSITION, ...}', or a way of the tip: '{points: [{x: 5 cm}]}'"
     parser.add_argument("goal", metavar="GOAL", help=words)
-    add_timeout_option(parser, "5s")
-    add_json_option(parser)
+    options.add_timeout_option(parser, "5s")
+    options.add_json_option(parser)
     add_bus_options(parser)
 
 
@@ -407,28 +380,28 @@ def add_bench_options(parser: argparse.ArgumentParser) -> None:
 
 def run_bench(arguments: argparse.Namespace, works: ArmWorks) -> int:
     """Measure, and print the figures; return 1 if a plan collides by the second examination."""
-    problems = list[MotionProblem]()
+    problems = list[measures.MotionProblem]()
     if arguments.problems is not None:
         try:
-            files = problem_files(arguments.problems, arguments.count)
-            problems = [read_problem(*file, works.kinematics.body.root) for file in files]
+            files = measures.problem_files(arguments.problems, arguments.count)
+            problems = [measures.read_problem(*file, works.kinematics.body.root) for file in files]
             for each in problems:
                 _prove_fit(works, each)
-        except ProblemError as error:
+        except measures.ProblemError as error:
             return misused("arm bench", str(error))
     kinematics, clock = works.kinematics, process_time
     samples = works.space.samples(arguments.count, SEED)
     rest = np.array([kinematics.body.joints[name].rest for name in works.space.names])
     calls = {
-        "forward kinematics": call_time(partial(kinematics.tip, with_jacobian=False), samples, clock),
-        "Jacobian": call_time(partial(kinematics.tip, with_jacobian=True), samples, clock),
+        "forward kinematics": measures.call_time(partial(kinematics.tip, with_jacobian=False), samples, clock),
+        "Jacobian": measures.call_time(partial(kinematics.tip, with_jacobian=True), samples, clock),
     }
     tries = {
-        "inverse kinematics": inverse_tries(kinematics, works.space, works.solver, rest, samples, clock),
+        "inverse kinematics": measures.inverse_tries(kinematics, works.space, works.solver, rest, samples, clock),
         "random motions": _motions(works, arguments.count),
     }
     for scenario, found in _solved(works, problems):
-        tries[scenario] = tries.get(scenario, NO_TRIES).with_(found)
+        tries[scenario] = tries.get(scenario, measures.NO_TRIES).with_(found)
     is_fast = kinematics.compiled is not None
     if arguments.json:
         data = {name: _data(entry) for name, entry in tries.items()}
@@ -440,18 +413,19 @@ def run_bench(arguments: argparse.Namespace, works: ArmWorks) -> int:
         emit(table([HEAD, *rows, *(_row(name, entry) for name, entry in tries.items())]))
         for name, one in tries.items():
             for reason, count in Counter(one.failures).most_common(SHOWN):
-                emit(
-                    f"not solved in {name}, {count} times: {reason}" if count > 1 else f"not solved in {name}: {reason}"
-                )
+                often = f", {count} times" if count > 1 else ""
+                emit(f"not solved in {name}{often}: {reason}")
     return 1 if any(entry.colliding for entry in tries.values()) else 0
 
 
-def _motions(works: ArmWorks, count: int) -> Tries:
+def _motions(works: ArmWorks, count: int) -> measures.Tries:
     second = works.second_checker(works.objects)
-    return motion_tries(works.planner, free_pairs(works.planner, count, SEED), second.is_free_along, process_time)
+    return measures.motion_tries(
+        works.planner, measures.free_pairs(works.planner, count, SEED), second.is_free_along, process_time
+    )
 
 
-def _solved(works: ArmWorks, problems: list[MotionProblem]) -> Iterator[tuple[str, Tries]]:
+def _solved(works: ArmWorks, problems: list[measures.MotionProblem]) -> Iterator[tuple[str, measures.Tries]]:
     """Yield what became of each problem, with its scenario."""
     names = works.space.names
     for problem in problems:
@@ -460,10 +434,13 @@ def _solved(works: ArmWorks, problems: list[MotionProblem]) -> Iterator[tuple[st
         works.place_objects(problem.objects)
         second = works.second_checker(problem.objects, others)
         start, goal = (np.array([at[name] for name in names]) for at in (problem.start, problem.goal))
-        yield problem.scenario, motion_tries(works.planner, [(start, goal)], second.is_free_along, process_time)
+        yield (
+            problem.scenario,
+            measures.motion_tries(works.planner, [(start, goal)], second.is_free_along, process_time),
+        )
 
 
-def _prove_fit(works: ArmWorks, problem: MotionProblem) -> None:
+def _prove_fit(works: ArmWorks, problem: measures.MotionProblem) -> None:
     """Raise if a problem is about another arm.
 
     Raises:
@@ -471,27 +448,25 @@ def _prove_fit(works: ArmWorks, problem: MotionProblem) -> None:
     """
     for at, word in ((problem.start, "start"), (problem.goal, "goal")):
         if lacking := [name for name in works.space.names if name not in at]:
-            raise ProblemError(f"{word} {problem.scenario}/{problem.name} does not say where '{lacking[0]}' is")
+            raise measures.ProblemError(
+                f"{word} {problem.scenario}/{problem.name} does not say where '{lacking[0]}' is"
+            )
 
 
-def _row(name: str, one: Tries) -> tuple[str, ...]:
+def _row(name: str, one: measures.Tries) -> tuple[str, ...]:
     times = [f"{1e3 * took:.3g} ms" if one.times else "" for took in (one.median, one.p95)]
     ways = (f"{one.length:.2f} rad", f"{one.colliding}") if one.lengths else ("", "")
     return (name, f"{one.solved} of {one.count}", *times, *ways)
 
 
-def _data(one: Tries) -> dict[str, object]:
+def _data(one: measures.Tries) -> dict[str, object]:
     figures = {"median": one.median, "p95": one.p95, "length": one.length}
     known = {name: value for name, value in figures.items() if math.isfinite(value)}
     return {"count": one.count, "solved": one.solved, **known, "colliding": one.colliding}
 
 
 def draw_motion(
-    arguments: argparse.Namespace,
-    works: ArmWorks,
-    start: NDArray[np.float64],
-    goal: NDArray[np.float64],
-    found: MotionPlan | MotionFailure | None,
+    arguments: argparse.Namespace, works: ArmWorks, start: Array, goal: Array, found: MotionPlan | MotionFailure | None
 ) -> int:
     """Draw a motion, or why there is none; return the exit code."""
     from rbxcompose.domains.arms.motion.picture import ArmPicture, draw_arm  # its libraries take long
@@ -539,7 +514,7 @@ class _ReachModel(Config):
 def add_reach_options(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `arm picture`."""
     parser.add_argument("what", choices=(REACH, EASE), help=f"{REACH}: of {DIRECTIONS} directions; {EASE}: Yoshikawa's")
-    out_option("the picture, a PNG", required=True)(parser)
+    options.out_option("the picture, a PNG", required=True)(parser)
     words = "the layer that is shown, such as 'y: -10 cm' of the root, or 'all' (default: through the arm's base)"
     parser.add_argument("--layer", metavar="AXIS: AT", default="", help=words)
     parser.add_argument("--cell", metavar="LENGTH", default="4 cm", help="side of a cell (default: 4 cm)")
@@ -555,7 +530,7 @@ def add_reach_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def run_reach(arguments: argparse.Namespace, works: ArmWorks, start: NDArray[np.float64]) -> int:
+def run_reach(arguments: argparse.Namespace, works: ArmWorks, start: Array) -> int:
     """Try positions, draw the picture, print what is in it; return the exit code."""
     layer = "" if arguments.layer in ("", "all") else f", {arguments.layer}"
     wish = read_written(_ReachModel, f"{{cell: {arguments.cell}, time: {arguments.time}{layer}}}")
@@ -582,7 +557,7 @@ def run_reach(arguments: argparse.Namespace, works: ArmWorks, start: NDArray[np.
     return 0
 
 
-def _cut(arguments: argparse.Namespace, works: ArmWorks, wish: _ReachModel, start: NDArray[np.float64]) -> Cut | None:
+def _cut(arguments: argparse.Namespace, works: ArmWorks, wish: _ReachModel, start: Array) -> Cut | None:
     """Return the layer to show; None for all cells."""
     given = [(axis, at) for axis, at in enumerate((wish.x, wish.y, wish.z)) if at is not None]
     if arguments.layer == "all":
@@ -626,9 +601,7 @@ def _summary(arguments: argparse.Namespace, found: ReachMap, cut: Cut | None, to
     return f"the tip gets to {len(counts):,} cells of {found.side * 100:g} cm{where}: {words} ({tried})"
 
 
-def _drawn(
-    what: str, works: ArmWorks, start: NDArray[np.float64], found: ReachMap, cut: Cut | None, text: str
-) -> bytes:
+def _drawn(what: str, works: ArmWorks, start: Array, found: ReachMap, cut: Cut | None, text: str) -> bytes:
     from rbxcompose.domains.arms.motion.picture import ArmPicture
     from rbxcompose.domains.arms.motion.reach import ReachPicture, draw_reach
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from rbxcompose.base.files import replace_file
 from rbxcompose.base.findings import Finding, Report, kind, suggest
 from rbxcompose.base.printable import plain
-from rbxcompose.base.requests import to_data
+from rbxcompose.base.requests import Command, to_data
 from rbxcompose.commands.console import NotDoneError, emit, misused, refuse, table, write_report
 from rbxcompose.commands.lookup import add_asking_options, answer_of, find_robot, pass_on
 from rbxcompose.commands.options import Declare, Subcommand, add_actions, argument, out_option, run_action
@@ -62,9 +62,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     table: tuple[tuple[str, str, Do, tuple[Declare, ...]], ...] = (
         ("ls", "list the objects", _ls, (ask,)),
         ("add", "put an object into the scene", _add, (name, written, ask)),
-        ("remove", "take an object out of the scene", _remove, (name, ask)),
+        ("remove", "take an object out of the scene", _passing(scene_view.RemoveFromScene), (name, ask)),
         ("attach", hold, _attach, (name, carrier, ask, touch)),
-        ("detach", "let an object stay where it is", _detach, (name, ask)),
+        ("detach", "let an object stay where it is", _passing(scene_view.DetachInScene), (name, ask)),
         ("load", "put the objects of a file into the scene", _load, (file, ask, link)),
         ("save", save, _save, (file, ask)),
         ("watch", watch, _watch, (ask,)),
@@ -77,9 +77,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Run the chosen subcommand."""
-    return run_action(arguments)
+run = run_action
 
 
 def _objects(arguments: argparse.Namespace) -> tuple[PlacedObject, ...]:
@@ -123,16 +121,12 @@ def _add(arguments: argparse.Namespace) -> int:
     return pass_on(arguments, scene_view.AddToScene(read.placed(arguments.name, "", file)))
 
 
-def _remove(arguments: argparse.Namespace) -> int:
-    return pass_on(arguments, scene_view.RemoveFromScene(arguments.name))
+def _passing(command: Callable[[str], Command]) -> Do:
+    return lambda arguments: pass_on(arguments, command(arguments.name))
 
 
 def _attach(arguments: argparse.Namespace) -> int:
     return pass_on(arguments, scene_view.AttachInScene(arguments.name, arguments.link, tuple(arguments.touch)))
-
-
-def _detach(arguments: argparse.Namespace) -> int:
-    return pass_on(arguments, scene_view.DetachInScene(arguments.name))
 
 
 def _load(arguments: argparse.Namespace) -> int:

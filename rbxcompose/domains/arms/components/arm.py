@@ -9,51 +9,54 @@ from typing import Any
 import numpy as np
 
 from rbxcompose import sdk
-from rbxcompose.base.geometry import Vector3
+from rbxcompose.base.geometry import Vector3, rpy_from_quaternion
+from rbxcompose.base.printable import plain
 from rbxcompose.domains.arms import goals as arm_goals
 from rbxcompose.domains.arms import scene_view
 from rbxcompose.domains.arms.arm_config import ArmConfig, ArmWorks, dimensions_of, mesh_bytes
 from rbxcompose.domains.arms.hand import PICK, PLACE, PicksAndPlaces, hand_ports, hand_task, result_of
-from rbxcompose.domains.arms.location import LocationService, location_ports
+from rbxcompose.domains.arms.motion import moveit
 from rbxcompose.domains.arms.motion.arm_task import ArmTask
 from rbxcompose.domains.arms.motion.collisions import pairs_shown, readers_of
 from rbxcompose.domains.arms.motion.hand_task import HandTask
-from rbxcompose.domains.arms.motion.moveit import MoveItTask
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory
-from rbxcompose.domains.arms.motion.scene import PlacedObject, mistake_in
+from rbxcompose.domains.arms.motion.scene import SCENE_LIMITS, PlacedObject, mistake_among
 from rbxcompose.domains.arms.motion.scene_messages import path_of, placed_object
-from rbxcompose.domains.arms.moveit_ports import (
-    GIVEN,
-    MOTION,
-    KinematicsServices,
-    around,
-    is_turned_away,
-    moveit_ports,
-    moveit_task,
-)
 from rbxcompose.domains.arms.planning_processes import compile_elsewhere, planning_processes
 from rbxcompose.domains.arms.reasons import REASONS
 from rbxcompose.domains.arms.section_models import FAST
 from rbxcompose.domains.arms.teleoperation import PERIOD, ArmServo, servo_ports
+from rbxcompose.msgs import moveit_msgs
 from rbxcompose.msgs.control_msgs import FollowJointTrajectory
 from rbxcompose.msgs.fields import ArrayEntries
 from rbxcompose.msgs.geometry_msgs import PoseStamped, TwistStamped
-from rbxcompose.msgs.moveit_msgs import DisplayTrajectory, ExecuteTrajectory, MoveGroup, RobotState, RobotTrajectory
 from rbxcompose.msgs.nav_msgs import Path
-from rbxcompose.msgs.rbxcompose_msgs import MoveArm, PickObject, PlaceObject, ReachPose, SceneObjects, TraceArm
+from rbxcompose.msgs.rbxcompose_msgs import (
+    LocateArm,
+    MoveArm,
+    PickObject,
+    PlaceObject,
+    ReachPose,
+    SceneObjects,
+    TraceArm,
+)
 from rbxcompose.msgs.sensor_msgs import JointState
+from rbxcompose.msgs.stamps import to_seconds
 from rbxcompose.sdk.key_feed import KeyFeed, whole
 
-MOVE, REACH, TRACE, FOLLOW = "move", "reach", "trace", "follow"  # its ports
+MOVE, REACH, TRACE, FOLLOW, LOCATE = "move", "reach", "trace", "follow", "locate"  # its ports
+FORWARD, INVERSE, MOTION, GIVEN = "forward", "inverse", "motion", "given"  # those of programs for MoveIt
 WAY, DISPLAY = "way", "display"
 LARGE = 4_000_000  # [bytes] of meshes, whose reading takes seconds
 MOST_PAIRS = 200  # in a view
+MOST_REMEMBERED, LONGEST_NAME = 100, 100
+IK_TIME = 1.0  # [s] that a search may take; what else it should do waits meanwhile
 AnyGoal = sdk.ServedGoal[Any, Any, Any]
-AnyTask = ArmTask | HandTask | MoveItTask
+AnyTask = ArmTask | HandTask | moveit.MoveItTask
 
 
 @sdk.component("arm")
-class Arm(PicksAndPlaces, LocationService, KinematicsServices, sdk.Component[ArmConfig]):
+class Arm(PicksAndPlaces, sdk.Component[ArmConfig]):
     """Moves an arm to poses by name, to positions of its joints, or its tip to a pose, on ways without collisions.
 
     The actions are `NAME/move`, `NAME/reach` and `NAME/trace`, with a gripper also `NAME/pick` and `NAME/place`; the
@@ -76,46 +79,42 @@ class Arm(PicksAndPlaces, LocationService, KinematicsServices, sdk.Component[Arm
     rate = 20.0
     steps_for_goals = True
     joint_states = sdk.In(JointState, "joint_states", is_open=True)
-    scene = sdk.In(SceneObjects, "scene", qos="latched")
+    scene = sdk.In(SceneObjects, "scene", qos="latched", limits=SCENE_LIMITS)
 
     @classmethod
     def ports(cls, config: ArmConfig) -> dict[str, sdk.Port[Any]]:
         """Return the ports: its goals, and those of its controller."""
-        outcomes = dict.fromkeys(REASONS, "failure")
+        shared: Any = {"claims": config.controller, "outcomes": dict.fromkeys(REASONS, "failure")}
+        traced = arm_goals.TRACE_MEASURES
         return super().ports(config) | {
             MOVE: sdk.ServesAction(
                 MoveArm,
                 f"{config.name}/move",
-                claims=config.controller,
                 skill=f"move_{config.name}",
-                outcomes=outcomes,
                 entries=ArrayEntries("joints", "positions", dimensions_of(config), instead="remembered"),
                 measures=arm_goals.MOVE_MEASURES,
                 choices={"pose": tuple(config.poses)} if config.poses else {},
+                **shared,
             ).named(MOVE),
             REACH: sdk.ServesAction(
                 ReachPose,
                 f"{config.name}/reach",
-                claims=config.controller,
                 skill=f"reach_{config.name}",
-                outcomes=outcomes,
                 measures=arm_goals.REACH_MEASURES,
                 choices={"prefer": tuple(config.poses)} if config.poses else {},
                 may_lack=True,
+                **shared,
             ).named(REACH),
             WAY: sdk.Out(Path, f"{config.name}/plan", qos="latched").named(WAY),
-            DISPLAY: sdk.Out(DisplayTrajectory, f"{config.name}/display_planned_path", qos="latched").named(DISPLAY),
+            DISPLAY: sdk.Out(moveit_msgs.DisplayTrajectory, f"{config.name}/display_planned_path", qos="latched").named(
+                DISPLAY
+            ),
             TRACE: sdk.ServesAction(
-                TraceArm,
-                f"{config.name}/trace",
-                claims=config.controller,
-                skill=f"trace_{config.name}",
-                outcomes=outcomes,
-                measures=arm_goals.TRACE_MEASURES,
+                TraceArm, f"{config.name}/trace", skill=f"trace_{config.name}", measures=traced, **shared
             ).named(TRACE),
             **servo_ports(config),
             **moveit_ports(config),
-            **location_ports(config),
+            LOCATE: sdk.Serves(LocateArm, f"{config.name}/locate", skill=f"locate_{config.name}").named(LOCATE),
             FOLLOW: sdk.CallsAction(FollowJointTrajectory, config.follow).named(FOLLOW),
             **hand_ports(config),
         }
@@ -141,7 +140,8 @@ class Arm(PicksAndPlaces, LocationService, KinematicsServices, sdk.Component[Arm
         self.problem = "no planning scene has been received"  # with the scene, or nothing
         self.way: tuple[Vector3, ...] = ()  # of the tip, as last planned [m]
         self.measured: dict[str, tuple[float, float]] = {}  # position and velocity of all joints of the body
-        self.uprights, self.remembered = {}, {}
+        self.uprights = {}
+        self.remembered: dict[str, dict[str, float]] = {}  # positions of joints [rad or m] by the names given to them
         self.task: AnyTask | None = None
         self.goal: AnyGoal | None = None  # that of the task
         self.servo = ArmServo(self.works, self.bound) if self.config.stream else None
@@ -184,12 +184,11 @@ class Arm(PicksAndPlaces, LocationService, KinematicsServices, sdk.Component[Arm
     def on_scene(self, message: SceneObjects) -> None:
         """Plan among other objects from now on; while one of them cannot be, nothing is planned."""
         found, body = tuple(map(placed_object, message.objects)), self.works.kinematics.body
-        wrong = ((item.name, mistake_in(item, body)) for item in found)
-        self.problem = message.problem or next((f"object '{name}': {words}" for name, words in wrong if words), "")
+        self.problem = message.problem or mistake_among(found, body)
         if not self.problem:
             paddings = dict(zip(message.padded_links, message.paddings.tolist(), strict=False))
             try:
-                self.works.place_objects(*around(self, self.task, found, paddings))
+                self.works.place_objects(*self.around(self.task, found, paddings))
             except ValueError as error:
                 self.problem = str(error)
         if self.problem:
@@ -208,17 +207,13 @@ class Arm(PicksAndPlaces, LocationService, KinematicsServices, sdk.Component[Arm
         """Return why nobody can lead the tip by hand now, nothing if one can."""
         if self.is_stopped or self.task is not None:
             return "the robot is stopped" if self.is_stopped else "a goal moves the arm"
-        unknown = [name for name in self.works.space.names if name not in self.measured]
-        if unknown:
-            return f"nothing has reported where '{unknown[0]}' is"
-        return "" if self.is_ready else "no planning scene has been received"
+        return self.unreported or ("" if self.is_ready else "no planning scene has been received")
 
     def wake(self) -> None:
         """Go on with what is commanded now."""
         if self.servo is None or not self.servo.is_wanted or self.task is not None:
             return
-        at = {name: position for name, (position, _) in self.measured.items()}
-        if self.servo.go_on(self.now, self.stamp, at) and self.due <= self.now:
+        if self.servo.go_on(self.now, self.stamp, self.positions) and self.due <= self.now:
             self.due = self.now + PERIOD
             self.context.wake_at(self.due)
 
@@ -271,8 +266,8 @@ class Arm(PicksAndPlaces, LocationService, KinematicsServices, sdk.Component[Arm
 
     def task_of(self, message: Any) -> AnyTask:
         """Return the task of a goal."""
-        if isinstance(message, MoveGroup.Goal | ExecuteTrajectory.Goal):
-            return moveit_task(self, message)
+        if isinstance(message, moveit_msgs.MoveGroup.Goal | moveit_msgs.ExecuteTrajectory.Goal):
+            return self.moveit_task(message)
         if self.config.hand is not None and isinstance(message, PickObject.Goal | PlaceObject.Goal):
             return hand_task(self, self.works, self.config.hand, message)
         solver = self.config.kinematics.settings
@@ -286,7 +281,7 @@ class Arm(PicksAndPlaces, LocationService, KinematicsServices, sdk.Component[Arm
         self.task = self.goal = None
         failure = task.failure
         result = self.pictured(self.config.name, self.config.hand, failure, self.result_of(task, goal.request))
-        if isinstance(task, MoveItTask):
+        if isinstance(task, moveit.MoveItTask):
             task.end()
             if task.difference is not None and self.scene.value is not None:
                 self.on_scene(self.scene.value)
@@ -297,31 +292,148 @@ class Arm(PicksAndPlaces, LocationService, KinematicsServices, sdk.Component[Arm
         elif goal.cancel_requested:
             goal.canceled(result)
         else:
-            words = failure.text if isinstance(task, MoveItTask) else result.message
+            words = failure.text if isinstance(task, moveit.MoveItTask) else result.message
             goal.aborted(f"{failure.reason}: {words}", result)
 
     def result_of(self, task: AnyTask, message: Any) -> Any:
         """Return how a goal has ended."""
-        if isinstance(task, MoveItTask):
+        if isinstance(task, moveit.MoveItTask):
             return task.result(arm_goals.action_of(message))
         return result_of(message, task) if isinstance(task, HandTask) else arm_goals.ended_as(message, task)
 
     @sdk.answers(scene_view.ViewOfArm)
     def view(self, request: scene_view.ViewOfArm) -> scene_view.ArmView:
         """Return what it knows now."""
-        names, measured = self.works.space.names, self.measured
-        if self.problem:
-            raise sdk.Refused(self.problem)
-        if unknown := [name for name in names if name not in measured]:
-            raise sdk.Refused(f"nothing has reported where '{unknown[0]}' is")
-        positions = {name: position for name, (position, _) in measured.items()}
+        if problem := self.problem or self.unreported:
+            raise sdk.Refused(problem)
+        positions = self.positions
         if self.task is None:  # it plans with the rest of the body where that was
-            self.works.kinematics.place({name: position for name, position in positions.items() if name not in names})
+            self.place_rest()
         pairs = self.works.pairs(positions, request.between)[:MOST_PAIRS]
         config, watched = self.config, tuple(sorted(self.works.watched))
         return scene_view.ArmView(
             config.name, config.urdf, config.meshes, positions, self.works.objects, pairs, watched, self.way
         )
+
+    # Where it is
+
+    @property
+    def positions(self) -> dict[str, float]:
+        """Return where joints are [rad or m]."""
+        return {name: position for name, (position, _) in self.measured.items()}
+
+    @property
+    def unreported(self) -> str:
+        """Return that a joint of the arm has not been reported yet, nothing if all have."""
+        unknown = [name for name in self.works.space.names if name not in self.measured]
+        return f"nothing has reported where '{unknown[0]}' is" if unknown else ""
+
+    def place_rest(self) -> None:
+        """Plan with the rest of the body where it is."""
+        names = self.works.space.names
+        self.works.kinematics.place({name: at for name, at in self.positions.items() if name not in names})
+
+    @property
+    def poses(self) -> Mapping[str, Mapping[str, float]]:
+        """Return the poses by name, those of the manifest and those that it remembers."""
+        return {**self.remembered, **self.config.poses}
+
+    def on_locate(self, request: LocateArm.Request) -> LocateArm.Response:
+        """Report where the tip and the joints are."""
+        if problem := self.unreported or self.unfit(request):
+            return LocateArm.Response(message=problem)
+        space, kinematics, at = self.works.space, self.works.kinematics, self.positions
+        links, frame = kinematics.body.poses(at), request.frame or kinematics.body.root
+        tip = links[frame].inverse().compose(links[kinematics.group.tip])
+        roll, pitch, yaw = rpy_from_quaternion(tip.rotation)
+        if request.remember:
+            self.remembered[request.remember] = {name: at[name] for name in space.names}
+        (x, y, z), angles = tip.translation, zip(("roll", "pitch", "yaw"), (roll, pitch, yaw), strict=True)
+        place = ", ".join(f"{axis} {shown(value * 100)} cm" for axis, value in zip("xyz", (x, y, z), strict=True))
+        turn = ", ".join(f"{axis} {shown(math.degrees(value))} deg" for axis, value in angles)
+        joints = ", ".join(joint.shown(at[joint.name]) for joint in space.joints)
+        words = f"'{kinematics.group.tip}' in '{frame}': {place}, {turn}; joints from the base: {joints}"
+        return LocateArm.Response(success=True, message=words, x=x, y=y, z=z, roll=roll, pitch=pitch, yaw=yaw)
+
+    def unfit(self, request: LocateArm.Request) -> str:
+        """Return why that cannot be reported or remembered, nothing if it can."""
+        name, frame = request.remember, request.frame
+        if frame and frame not in self.works.kinematics.body.links:
+            return f"there is no link '{plain(frame)}'"
+        if name in self.config.poses:
+            return f"'{name}' is a pose of this arm: remember where it is by another name"
+        if len(name) > LONGEST_NAME:
+            return f"the name to remember has more than {LONGEST_NAME} characters"
+        if name and name not in self.remembered and len(self.remembered) >= MOST_REMEMBERED:
+            return f"it remembers {MOST_REMEMBERED} names already: use one of them again"
+        return ""
+
+    # What programs for MoveIt ask for
+
+    @property
+    def query(self) -> moveit.KinematicsQuery:
+        """Return what answers questions about where the arm is or could be."""
+        works = self.works
+        self.place_rest()
+        return moveit.KinematicsQuery(
+            self.config.name, works.kinematics, works.space, works.planner.checker, self.positions
+        )
+
+    def on_forward(self, request: moveit_msgs.GetPositionFK.Request) -> moveit_msgs.GetPositionFK.Response:
+        """Return where links are."""
+        busy = self.task is not None
+        return moveit_msgs.GetPositionFK.Response(error_code=moveit.busy()) if busy else self.query.forward(request)
+
+    def on_inverse(self, request: moveit_msgs.GetPositionIK.Request) -> moveit_msgs.GetPositionIK.Response:
+        """Return positions of joints that bring the tip to a pose."""
+        if self.task is not None:
+            return moveit_msgs.GetPositionIK.Response(error_code=moveit.busy())
+        wanted, begin = request.ik_request, self.now
+        most = min(to_seconds(wanted.timeout) or IK_TIME, IK_TIME)
+        for answer in self.query.inverse(wanted, self.config.planner.seed):
+            if answer is not None:
+                return answer
+            if self.now - begin > most:
+                break
+        return moveit_msgs.GetPositionIK.Response(error_code=moveit.late(most))
+
+    def moveit_task(
+        self, message: moveit_msgs.MoveGroup.Goal | moveit_msgs.ExecuteTrajectory.Goal
+    ) -> moveit.MoveItTask:
+        """Return the task of a goal; one that is refused is over."""
+        works, config, task = self.works, self.config, moveit.MoveItTask(self, self.works.planner)
+        try:
+            led_by = message.controller_names if isinstance(message, moveit_msgs.ExecuteTrajectory.Goal) else ()
+            if other := [name for name in led_by if name != config.controller]:
+                words = f"'{config.controller}' leads this arm, not '{other[0]}'"
+                raise moveit.RequestError(moveit_msgs.MoveItErrorCodes.CONTROL_FAILED, words)
+            if self.unreported:
+                raise moveit.RequestError(moveit_msgs.MoveItErrorCodes.ROBOT_STATE_STALE, self.unreported)
+            at, names = self.positions, works.space.names
+            if isinstance(message, moveit_msgs.ExecuteTrajectory.Goal):
+                given = moveit.trajectory_of(message.trajectory, names, np.array([at[name] for name in names]))
+                task.follow_given(works.kinematics, given)
+            else:
+                self.place_rest()
+                options = message.planning_options
+                reader = moveit.RequestReader(config.name, works.kinematics, works.planner.settings, at)
+                wish = reader.wish(message.request, options)
+                if moveit.differs(options.planning_scene_diff):  # it plans in another scene until the task is over
+                    task.difference = options.planning_scene_diff
+                    works.place_objects(*self.around(task, works.objects, works.paddings))
+                task.plan(works.kinematics, wish, config.kinematics.settings, is_plan=options.plan_only)
+        except moveit.RequestError as error:
+            task.refuse(error)
+        return task
+
+    def around(
+        self, task: AnyTask | None, objects: tuple[PlacedObject, ...], paddings: Mapping[str, float]
+    ) -> moveit.SceneAround:
+        """Return what is around the robot while it carries out a task; raises `RequestError` if that cannot be."""
+        if not isinstance(task, moveit.MoveItTask) or task.difference is None:
+            return objects, paddings
+        body = self.works.kinematics.body
+        return moveit.with_difference(body, objects, paddings, task.difference, self.positions)
 
     # What a task needs
 
@@ -340,12 +452,12 @@ class Arm(PicksAndPlaces, LocationService, KinematicsServices, sdk.Component[Arm
         self.way, self.duration = self.works.way(trajectory.positions), trajectory.duration
         self.bound[WAY](path_of(self.way, self.works.kinematics.body.root))
         state = JointState(name=tuple(self.measured), position=np.array([at for at, _ in self.measured.values()]))
-        motion = RobotTrajectory(joint_trajectory=arm_goals.follow_goal(names, trajectory).trajectory)
+        motion = moveit_msgs.RobotTrajectory(joint_trajectory=arm_goals.follow_goal(names, trajectory).trajectory)
         self.bound[DISPLAY](
-            DisplayTrajectory(
+            moveit_msgs.DisplayTrajectory(
                 model_id=self.works.kinematics.body.name,
                 trajectory=(motion,),
-                trajectory_start=RobotState(joint_state=state),
+                trajectory_start=moveit_msgs.RobotState(joint_state=state),
             )
         )
 
@@ -360,6 +472,39 @@ class Arm(PicksAndPlaces, LocationService, KinematicsServices, sdk.Component[Arm
             self.stage = words = stage if stage == within else f"{within}: {stage}"
             self.feed.update(self.parts())
             self.goal.feedback(arm_goals.feedback_of(self.goal.request, words))
+
+
+def moveit_ports(config: ArmConfig) -> dict[str, sdk.Port[Any]]:
+    """Return the ports that `move_group` passes on to what comes under the names of ROS 2."""
+    claims = config.controller
+    found: dict[str, sdk.Port[Any]] = {
+        FORWARD: sdk.Serves(moveit_msgs.GetPositionFK, f"{config.name}/compute_fk", skill=None),
+        INVERSE: sdk.Serves(moveit_msgs.GetPositionIK, f"{config.name}/compute_ik", skill=None),
+        MOTION: sdk.ServesAction(
+            moveit_msgs.MoveGroup, f"{config.name}/move_action", claims=claims, skill=None, limits=SCENE_LIMITS
+        ),
+        GIVEN: sdk.ServesAction(
+            moveit_msgs.ExecuteTrajectory,
+            f"{config.name}/execute_trajectory",
+            claims=claims,
+            skill=None,
+            limits=SCENE_LIMITS,
+        ),
+    }
+    return {name: port.named(name) for name, port in found.items()}
+
+
+def is_turned_away(goal: AnyGoal) -> bool:
+    """Return whether a goal that comes while another one is carried out only wants a plan; then it has ended."""
+    if not isinstance(goal.request, moveit_msgs.MoveGroup.Goal) or not goal.request.planning_options.plan_only:
+        return False
+    goal.aborted("the arm moves", moveit_msgs.MoveGroup.Result(error_code=moveit.busy()))
+    return True
+
+
+def shown(value: float) -> str:
+    """Return a number for people, without a sign of 0."""
+    return f"{round(value, 1) + 0.0:.1f}"
 
 
 def problem_of(end: sdk.Ended[FollowJointTrajectory.Result]) -> str:

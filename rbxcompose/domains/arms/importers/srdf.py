@@ -179,9 +179,7 @@ class _Drafts:
             elif other not in seen:
                 found.update(self.joints_of(self.said.groups[other], seen | {group.name}))
         return [
-            body_joint.name
-            for body_joint in self.body.joints_downwards
-            if body_joint.name in found and body_joint.moves and body_joint.mimic is None
+            item.name for item in self.body.joints_downwards if item.name in found and item.moves and item.mimic is None
         ]
 
     def _report_unknown(self, group: SemanticGroup, what: str) -> None:

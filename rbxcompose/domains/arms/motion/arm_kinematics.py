@@ -10,12 +10,10 @@ from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3
-from rbxcompose.domains.arms.motion.groups import ArmGroup, leader_of
+from rbxcompose.domains.arms.motion.groups import ArmGroup, Array, leader_of
 from rbxcompose.domains.arms.motion.numba_cache import is_installed
 from rbxcompose.domains.body.description import Description
 from rbxcompose.domains.body.pinocchio_model import PinocchioModel
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,14 +9,13 @@ from functools import partial
 from typing import Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3
+from rbxcompose.domains.arms.motion import inverse_kinematics
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.collisions import pairs_shown
-from rbxcompose.domains.arms.motion.groups import JointSpace
-from rbxcompose.domains.arms.motion.inverse_kinematics import ENOUGH, SOLVER, PoseSolutions, PoseTarget, SolverSettings
+from rbxcompose.domains.arms.motion.groups import Array, JointSpace
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory, speeds_of
 from rbxcompose.domains.arms.motion.path_constraints import Keep, KeptTip
 from rbxcompose.domains.arms.motion.planner import (
@@ -39,7 +38,7 @@ class ArmGoal:
 
     pose: str = ""
     positions: Mapping[str, float] = field(default_factory=dict)
-    target: PoseTarget | None = None
+    target: inverse_kinematics.PoseTarget | None = None
     frame: str = ""
     """The link in whose frame the target is; without it, the root."""
     speed: float = 1.0
@@ -83,9 +82,8 @@ class ArmGoal:
         return "what 'keep' asks of the tip is not possible together with 'approximate'"
 
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
-Solving = Generator[None, None, PoseSolutions]
+Solving = Generator[None, None, inverse_kinematics.PoseSolutions]
 
 MOVED = 0.035  # [rad or m] by which a joint may be elsewhere when a motion begins than when it was planned
 AT_REST, CALM = 0.05, 0.2  # [rad/s or m/s], [s]; a joint that is faster is at rest if it gets nowhere for this long
@@ -142,7 +140,7 @@ class ArmTask:
         kinematics: ArmKinematics,
         planner: MotionPlanner,
         goal: ArmGoal,
-        solver: SolverSettings = SOLVER,
+        solver: inverse_kinematics.SolverSettings = inverse_kinematics.SOLVER,
     ) -> None:
         self.failure: MotionFailure | None = None
         self.is_over = self.is_canceled = False
@@ -151,7 +149,9 @@ class ArmTask:
         """How far the tip ends from its target [m, rad], if that cannot be taken and was approximate."""
         self._site, self._kinematics, self._planner, self._solver = site, kinematics, planner, solver
         self._goal = replace(goal, prefer=goal.prefer or solver.prefer)
-        self._nearest: PoseTarget | None = None  # the target in the root's frame, if its aims are approximate
+        self._nearest: inverse_kinematics.PoseTarget | None = (
+            None  # the target in the root's frame, if its aims are approximate
+        )
         self._trajectory: Trajectory | None = None
         self._obstacle = ""  # what the motion would hit, since the scene has changed
         self._aims: list[Array] = []  # positions that would do, the next one to try first
@@ -270,35 +270,26 @@ class ArmTask:
         shifts = np.random.default_rng(self._planner.settings.seed).uniform(-off, off, (NEARBY, len(aim)))
         near = space.clamped(np.concatenate(([aim], aim + shifts)))
         free = [item for item in near if np.max(np.abs(item - aim)) <= off and is_free(item)]
-        return sorted(free, key=lambda one: float(np.max(np.abs(one - aim))))[:ENOUGH] or [aim]
+        return sorted(free, key=lambda one: float(np.max(np.abs(one - aim))))[: inverse_kinematics.ENOUGH] or [aim]
 
     def _frame(self) -> Transform3:
         """Return the frame of the goal."""
         return self._kinematics.poses(self._start)[self._goal.frame] if self._goal.frame else Transform3()
 
-    def _solutions(self, target: PoseTarget) -> Solving:
+    def _solutions(self, target: inverse_kinematics.PoseTarget) -> Solving:
         """Return the search for positions that bring the tip to a target in the root's frame."""
         checker, seed, kept, prefer = self._planner.checker, self._planner.settings.seed, self._kept, self._goal.prefer
         posture = Posture.of(self.space.names, self._site.poses[prefer]) if prefer else None
-        if kept is not None and target.any_orientation:
-            keep, first = self._goal.keep, self._start if self._first is None else self._first
-            return kept_solutions(
-                self._kinematics, self._narrow, target, keep, self._start, first, checker, seed=seed, posture=posture
-            )
-        ends, restarts = self._site.now + self._solver.time, self._solver.restarts
-        return searched(
-            self._kinematics,
-            self._narrow,
-            target,
-            self._start,
-            checker.is_free,
-            seed=seed,
-            posture=posture,
-            restarts=restarts,
-            is_late=lambda: self._site.now >= ends,
+        ends, kinematics, space = self._site.now + self._solver.time, self._kinematics, self._narrow
+        search = inverse_kinematics.PoseSearch(
+            kinematics, space, target, self._start, checker.is_free, seed, self._solver.restarts
         )
+        if kept is not None and target.any_orientation:
+            first = self._start if self._first is None else self._first
+            return kept_solutions(search, self._goal.keep, first, checker, posture)
+        return searched(replace(search, is_late=lambda: self._site.now >= ends), posture)
 
-    def _solve(self, target: PoseTarget, solving: Solving) -> None:
+    def _solve(self, target: inverse_kinematics.PoseTarget, solving: Solving) -> None:
         found = self._worked(solving)
         if found is None:
             return

@@ -1,28 +1,26 @@
-"""Arrays that compiled functions borrow; importing it imports numba."""
+"""What numba makes of `borrowed`; importing it imports numba."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Protocol, TypeVar, cast
+from typing import Any
 
 from numba import types
-from numba.extending import intrinsic
+from numba.extending import lower_builtin, type_callable
 
-T = TypeVar("T")
+from rbxcompose.domains.arms.motion.numba_cache import borrowed
+
 Numba = Any  # its types and code
 
 
-class _Borrow(Protocol):
-    def __call__(self, one: T, /) -> T:
-        """Return an array, or a tuple of arrays and tuples, whose references are not counted: its owner outlives it."""
-        ...
+@type_callable(borrowed)
+def _typed(_: Numba) -> Callable[[Numba], Numba]:
+    return lambda value: value
 
 
-def _typed(_: Numba, one: Numba) -> tuple[Numba, Callable[..., Numba]]:
-    def code(context: Numba, builder: Numba, signature: Numba, given: Numba) -> Numba:
-        return _without_owner(context, builder, signature.args[0], given[0])
-
-    return one(one), code
+@lower_builtin(borrowed, types.Any)  # type: ignore[no-untyped-call, untyped-decorator]
+def _code(context: Numba, builder: Numba, signature: Numba, given: Numba) -> Numba:
+    return _without_owner(context, builder, signature.args[0], given[0])
 
 
 def _without_owner(context: Numba, builder: Numba, type_: Numba, value: Numba) -> Numba:
@@ -35,7 +33,3 @@ def _without_owner(context: Numba, builder: Numba, type_: Numba, value: Numba) -
     array.meminfo = array.meminfo.type(None)
     array.parent = array.parent.type(None)
     return array._getvalue()
-
-
-borrowed = cast(_Borrow, intrinsic(_typed))
-"""For compiled functions alone."""

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3, rotate
 from rbxcompose.domains.arms.motion.collisions import Shapes
+from rbxcompose.domains.arms.motion.groups import Array
 from rbxcompose.domains.arms.motion.scene import OCTREE, PLANE, PlacedObject
 from rbxcompose.domains.body.model import Body, Geometry
 from rbxcompose.msgs.sensor_msgs import PointCloud2, PointField
 
-Array = NDArray[np.float64]
 MOST_POINTS = 10_000_000
 _NUMBERS = {
     PointField.INT8: "i1",

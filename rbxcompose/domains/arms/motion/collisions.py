@@ -13,12 +13,12 @@ from types import MappingProxyType
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
-from rbxcompose.domains.arms.motion.groups import JointSpace, moved_links, solid_link
+from rbxcompose.domains.arms.motion.groups import Array, JointSpace, moved_links, solid_link
 from rbxcompose.domains.arms.motion.octree_files import read_cells
 from rbxcompose.domains.arms.motion.parametrisation import toppra
 from rbxcompose.domains.arms.motion.scene import PairDistance, PlacedObject
@@ -26,7 +26,6 @@ from rbxcompose.domains.body.link_pairs import LinkPair, pair_of
 from rbxcompose.domains.body.meshes import read_mesh
 from rbxcompose.domains.body.model import Body, Geometry
 
-Array = NDArray[np.float64]
 Coal = Any  # of an extra, without types
 STL = ".stl"
 """The ending of meshes that coal reads rightly; those of others may have pieces, whose corners it confuses."""
@@ -361,8 +360,7 @@ class MeshChecker:
         """Return the pairs of shapes that it examines, and how far they must be from each other [m]."""
         margins = (request.security_margin for request in self._data.collisionRequests)
         return [
-            (pair.first, pair.second, margin)
-            for pair, margin in zip(self._geometry.collisionPairs, margins, strict=True)
+            (pair.first, pair.second, item) for pair, item in zip(self._geometry.collisionPairs, margins, strict=True)
         ]
 
     def collides(self, values: Array, pairs: Iterable[int]) -> bool:
@@ -432,14 +430,17 @@ class MeshChecker:
         return margin if kind == self._kinds[second] and kind in (_GEOM, _BVH) else max(margin, 0.0)
 
 
-def load_libraries() -> None:
+def load_libraries(*, with_ompl: bool) -> None:
     """Import what planning needs, which takes seconds and should not delay the first goal.
+
+    Where a search of ours comes first, OMPL is for what that does not find in time, and can be imported then.
 
     Raises:
         ModuleNotFoundError: if the extra `arm` is not installed.
     """
     atexit.unregister(gc.freeze)  # without a last collection at the exit, OMPL prints all that it had
-    import_module("ompl.geometric")
+    if with_ompl:
+        import_module("ompl.geometric")
     toppra()
 
 

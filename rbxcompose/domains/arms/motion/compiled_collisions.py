@@ -10,12 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbxcompose.base.geometry import Transform3, Vector3, rotate
-from rbxcompose.domains.arms.motion.borrowed import borrowed
-from rbxcompose.domains.arms.motion.groups import ArmGroup, leader_of
-from rbxcompose.domains.arms.motion.numba_cache import compiled, inlined
+from rbxcompose.domains.arms.motion.groups import ArmGroup, Array, leader_of
+from rbxcompose.domains.arms.motion.numba_cache import borrowed, compiled, inlined
 from rbxcompose.domains.body.model import Body
-
-Array = NDArray[np.float64]
 
 
 @inlined
@@ -140,7 +137,7 @@ def link_frames(chain: Chain, q: Array) -> Array:
     return frames
 
 
-@compiled
+@inlined
 def place_links(chain: Chain, q: Array, frames: Array) -> None:
     """Write the frames of a chain in that of the root, at positions of shape (n,), into an array of shape (m, 3, 4)."""
     own = np.empty((3, 4))  # in the frame of the parent
@@ -162,7 +159,7 @@ def place_links(chain: Chain, q: Array, frames: Array) -> None:
             _compose(frames[parent], own, frames[index])
 
 
-@compiled
+@inlined
 def _turn(place: Array, x: float, y: float, z: float, angle: float, out: Array) -> None:
     """Write a frame that is turned about one of its axes: Rodrigues' formula."""
     cos, sin = math.cos(angle), math.sin(angle)
@@ -175,14 +172,14 @@ def _turn(place: Array, x: float, y: float, z: float, angle: float, out: Array) 
         out[row, 3] = place[row, 3]
 
 
-@compiled
+@inlined
 def _copy(frame: Array, out: Array) -> None:
     for row in range(3):
         for column in range(4):
             out[row, column] = frame[row, column]
 
 
-@compiled
+@inlined
 def _compose(first: Array, second: Array, out: Array) -> None:
     for row in range(3):
         a, b, c = first[row, 0], first[row, 1], first[row, 2]

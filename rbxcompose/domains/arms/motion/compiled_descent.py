@@ -7,16 +7,13 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.arms.motion.compiled_collisions import FIXED, TURNS, Chain, chain_of, matrix_of, place_links
 from rbxcompose.domains.arms.motion.damped_steps import DAMPING, LEAST_DAMPING, LONGEST, PATIENCE, PROGRESS
-from rbxcompose.domains.arms.motion.groups import ArmGroup
-from rbxcompose.domains.arms.motion.numba_cache import compiled
+from rbxcompose.domains.arms.motion.groups import ArmGroup, Array
+from rbxcompose.domains.arms.motion.numba_cache import compiled, inlined
 from rbxcompose.domains.body.model import Body
-
-Array = NDArray[np.float64]
 
 
 class Aim(NamedTuple):
@@ -92,7 +89,7 @@ def _descents(chain: Chain, aim: Aim, firsts: Array, values: Array, away: Array)
     return len(firsts)
 
 
-@compiled
+@inlined
 def _descent(
     chain: Chain, aim: Aim, values: Array, away: Array, work: tuple[Array, Array, Array, Array, Array, Array]
 ) -> None:
@@ -121,7 +118,7 @@ def _descent(
             values[joint] = min(max(moved, aim.lower[joint]), aim.upper[joint])
 
 
-@compiled
+@inlined
 def _step(jacobian: Array, square: Array, error: Array, solution: Array, aim: Aim, size: float, step: Array) -> None:
     """Write the damped step; `size` is the square of the error."""
     top, rows = aim.top, aim.end - aim.top
@@ -138,7 +135,7 @@ def _step(jacobian: Array, square: Array, error: Array, solution: Array, aim: Ai
             step[joint] += jacobian[top + row, joint] * solution[row]
 
 
-@compiled
+@inlined
 def _block(jacobian: Array, aim: Aim, values: Array, step: Array) -> bool:
     """Take joints that would go beyond the limit at which they are from the Jacobian; return whether there are any."""
     found = False
@@ -150,7 +147,7 @@ def _block(jacobian: Array, aim: Aim, values: Array, step: Array) -> bool:
     return found
 
 
-@compiled
+@inlined
 def _measure(tip: Array, wanted: Array, error: Array) -> None:
     """Write how far the tip is from where it is wanted [m, rad], along the axes of the root.
 
@@ -175,7 +172,7 @@ def _measure(tip: Array, wanted: Array, error: Array) -> None:
         _half_turn(turn, angle, error)
 
 
-@compiled
+@inlined
 def _half_turn(turn: Array, angle: float, error: Array) -> None:
     largest = 0
     for row in range(1, 3):
@@ -189,7 +186,7 @@ def _half_turn(turn: Array, angle: float, error: Array) -> None:
         error[3 + row] *= angle / math.sqrt(length)
 
 
-@compiled
+@inlined
 def _differentiate(chain: Chain, frames: Array, jacobian: Array) -> None:
     """Write the Jacobian of the last frame, along the axes of the root."""
     for row in range(6):
@@ -218,7 +215,7 @@ def _differentiate(chain: Chain, frames: Array, jacobian: Array) -> None:
             jacobian[2, joint] += z
 
 
-@compiled
+@inlined
 def _solve(square: Array, right: Array, size: int, solution: Array) -> None:
     """Solve equations by Cholesky's decomposition; of the square, the lower half counts, and is overwritten."""
     for row in range(size):

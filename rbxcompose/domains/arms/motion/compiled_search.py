@@ -13,11 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rbxcompose.domains.arms.motion.borrowed import borrowed
 from rbxcompose.domains.arms.motion.compiled_collisions import CompiledModel, Workspace, is_line_free
-from rbxcompose.domains.arms.motion.numba_cache import compiled, inlined
+from rbxcompose.domains.arms.motion.groups import Array
+from rbxcompose.domains.arms.motion.numba_cache import borrowed, compiled, inlined
 
-Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
 
 GAIN = 0.02  # of a piece of a path: a shortcut that saves less is not examined

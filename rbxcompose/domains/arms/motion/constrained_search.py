@@ -12,11 +12,9 @@ from __future__ import annotations
 from collections.abc import Callable, Generator
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rbxcompose.domains.arms.motion.groups import JointSpace, interpolated
+from rbxcompose.domains.arms.motion.groups import Array, JointSpace, interpolated
 
-Array = NDArray[np.float64]
 IsFree = Callable[[Array], bool]
 Projected = Callable[[Array], "Array | None"]
 

@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections.abc import Generator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbxcompose.domains.arms.motion import compiled_search
 from rbxcompose.domains.arms.motion.compiled_collisions import CompiledModel, Workspace, near_pairs
-from rbxcompose.domains.arms.motion.groups import JointSpace
+from rbxcompose.domains.arms.motion.groups import Array, JointSpace
 from rbxcompose.domains.arms.motion.search import MARGIN, sample_range
-
-Array = NDArray[np.float64]
 
 SLICE = 5_000  # examined positions, after which a search lets others run
 NODES, MOST_NODES = 1_024, 16_384  # of a tree at the beginning, and at most

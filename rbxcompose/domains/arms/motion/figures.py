@@ -11,20 +11,18 @@ from typing import Any, TypeVar
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import read_regular
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
-from rbxcompose.domains.arms.motion.groups import JointSpace
-from rbxcompose.domains.arms.motion.inverse_kinematics import PoseTarget, SolverSettings, solved
+from rbxcompose.domains.arms.motion.groups import Array, JointSpace
+from rbxcompose.domains.arms.motion.inverse_kinematics import PoseSearch, PoseTarget, SolverSettings, solved
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory
 from rbxcompose.domains.arms.motion.planner import MotionPlan, MotionPlanner, MotionRequest
 from rbxcompose.domains.arms.motion.scene import PlacedObject, ScenePiece
 from rbxcompose.domains.body.model import Geometry
 
-Array = NDArray[np.float64]
 Seconds = Callable[[], float]
 T = TypeVar("T")
 CALLS, TURNS = 100, 15  # of something that takes microseconds
@@ -95,14 +93,10 @@ def inverse_tries(
     """Solve for the poses of the tip at positions of shape (m, n), each from `start`; collisions are not looked at."""
     times, found = [], 0
     for seed, goal in enumerate(goals):
-        target = PoseTarget(
-            kinematics.tip_pose(goal), tolerance=settings.tolerance, angle_tolerance=settings.angle_tolerance
-        )
+        target = PoseTarget(kinematics.tip_pose(goal), False, settings.tolerance, settings.angle_tolerance)
         began = clock()
-        search = solved(
-            kinematics, space, target, start, lambda _: True, seed=seed, restarts=settings.restarts, enough=1
-        )
-        found += bool(ended(search).free)
+        search = PoseSearch(kinematics, space, target, start, lambda _: True, seed, settings.restarts, 1)
+        found += bool(ended(solved(search)).free)
         times.append(clock() - began)
     return Tries(len(goals), found, tuple(times))
 

@@ -12,14 +12,12 @@ from collections.abc import Mapping
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3, Vector3, composed
+from rbxcompose.domains.arms.motion.groups import Array
 from rbxcompose.domains.body.model import Body
 from rbxcompose.domains.servos.limits import MotionLimits
-
-Array = NDArray[np.float64]
 
 NEAREST = 0.01  # [m] from the camera to a point that it can look at
 STEPS, ENOUGH = 40, 1e-4  # of the search from one position; [rad] that is good enough
@@ -112,9 +110,7 @@ class Gaze:
 
     def _camera_at(self, positions: Mapping[str, float]) -> Transform3:
         body = self._body
-        return composed(
-            joint.at(body.position(joint, positions)) if joint.moves else joint.origin for joint in self._chain
-        )
+        return composed(item.at(body.position(item, positions)) if item.moves else item.origin for item in self._chain)
 
 
 def past(point: Vector3) -> float:

@@ -60,6 +60,15 @@ def grasps_of(shape: Geometry, pose: geometry.Transform3, bearing: float, widest
     return sorted(found, key=lambda grasp: -grasp.quality)
 
 
+def widths_of(shape: Geometry, pose: geometry.Transform3, bearing: float) -> list[float]:
+    """Return the widths of the grasps of a box, cylinder or sphere, however wide, see `grasps_of`."""
+    return [_width(shape, pose, turned) for turned, _, _ in _sides(shape, pose, bearing)]
+
+
+def _width(shape: Geometry, pose: geometry.Transform3, turned: geometry.Quaternion) -> float:
+    return 2 * extent(shape, pose.rotation, geometry.rotate(turned, (0.0, 1.0, 0.0)))
+
+
 def least_width(shape: Geometry) -> float:
     """Return the least distance between fingers on both sides of an object."""
     match shape.kind:
@@ -108,10 +117,6 @@ def _sides(
     above = geometry.quaternion_about((0.0, 1.0, 0.0), math.pi / 2)
     for yaw, back in product(_closing_from_above(shape, pose, bearing), SHALLOW):
         yield geometry.multiply(geometry.quaternion_from_rpy(0.0, 0.0, yaw), above), FROM_ABOVE * (1.0 - back), back
-
-
-def _width(shape: Geometry, pose: geometry.Transform3, turn: geometry.Quaternion) -> float:
-    return 2 * extent(shape, pose.rotation, geometry.rotate(turn, (0.0, 1.0, 0.0)))
 
 
 def _yaws(shape: Geometry, pose: geometry.Transform3, bearing: float) -> Iterable[tuple[float, float]]:

@@ -14,6 +14,8 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.domains.body.model import Body, BodyJoint
 from rbxcompose.domains.servos.limits import MotionLimits
 
+Array = NDArray[np.float64]
+
 
 @dataclass(frozen=True, slots=True)
 class ArmGroup:
@@ -92,8 +94,6 @@ def leader_of(joint: BodyJoint, joints: Mapping[str, BodyJoint]) -> tuple[str, f
         joint = joints[mimic.joint]
     return joint.name, multiplier, offset
 
-
-Array = NDArray[np.float64]
 
 UNLIMITED = math.pi
 """[rad], how far from 0 positions of joints without an end are sampled."""

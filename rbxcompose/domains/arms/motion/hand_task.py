@@ -10,7 +10,6 @@ from itertools import product
 from typing import ClassVar, Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import (
@@ -29,15 +28,13 @@ from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.arm_task import LONGEST_CALL, SETTLING, ArmGoal, ArmSite, ArmTask
 from rbxcompose.domains.arms.motion.collisions import Checker, pairs_shown
 from rbxcompose.domains.arms.motion.grasps import Grasp, grasps_of, least_width, reach_of, solid_of
-from rbxcompose.domains.arms.motion.groups import JointSpace, interpolated
-from rbxcompose.domains.arms.motion.inverse_kinematics import TOLERANCE, PoseTarget, descended, solved
+from rbxcompose.domains.arms.motion.groups import Array, JointSpace, interpolated
+from rbxcompose.domains.arms.motion.inverse_kinematics import TOLERANCE, PoseSearch, PoseTarget, descended, solved
 from rbxcompose.domains.arms.motion.planner import RESOLUTION, MotionPlan, MotionPlanner, MotionRequest, Planning
 from rbxcompose.domains.arms.motion.scene import PlacedObject
 from rbxcompose.domains.arms.reasons import GraspReason, MotionFailure, MotionReason, StageFailure
 from rbxcompose.domains.body.link_pairs import LinkPair
 from rbxcompose.domains.body.model import Geometry
-
-Array = NDArray[np.float64]
 
 STEP = 0.005  # [m] between poses of the tip
 TURN = 0.1  # [rad] between them
@@ -195,15 +192,9 @@ class ContactSearch:
     def _way(self, contact: Contact, checkers: ContactCheckers) -> Generator[None, None, ContactWay | _Failed]:
         coming, (to, back) = checkers.coming(contact), self.stages
         target = PoseTarget(contact.at)
+        start, is_free = self.start, coming.is_free
         solutions = yield from solved(
-            self.kinematics,
-            self.space,
-            target,
-            self.start,
-            coming.is_free,
-            seed=self.seed,
-            restarts=RESTARTS,
-            enough=ENOUGH,
+            PoseSearch(self.kinematics, self.space, target, start, is_free, self.seed, RESTARTS, ENOUGH)
         )
         if not solutions.free:
             if solutions.colliding:
@@ -380,9 +371,7 @@ class WaysAhead:
         self.close()
         self._scene, self._later, way = scene, [], self._now.way
         last = way.contact if isinstance(way, ContactWay) else None
-        self._looking = self._look(
-            next((after for after, contact in enumerate(self._contacts, 1) if contact is last), 0)
-        )
+        self._looking = self._look(next((item for item, contact in enumerate(self._contacts, 1) if contact is last), 0))
 
     def _is_from(self, request: MotionRequest) -> bool:
         """Return whether the motion was planned from where all joints are."""

@@ -12,15 +12,12 @@ from collections.abc import Callable, Generator, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.damped_steps import DAMPING, LEAST_DAMPING, LONGEST, PATIENCE, PROGRESS
-from rbxcompose.domains.arms.motion.groups import JointSpace
-
-Array = NDArray[np.float64]
+from rbxcompose.domains.arms.motion.groups import Array, JointSpace
 
 TOLERANCE, ANGLE_TOLERANCE = 1e-3, math.radians(0.5)  # [m], [rad]
 RESTARTS = 60
@@ -108,24 +105,29 @@ class PoseSolutions:
     """Whether the free ones are as near to the target as is possible, and not within its tolerances."""
 
 
-def solved(
-    kinematics: ArmKinematics,
-    space: JointSpace,
-    target: PoseTarget,
-    start: Array,
-    is_free: Callable[[Array], bool],
-    *,
-    seed: int,
-    restarts: int = RESTARTS,
-    enough: int = ENOUGH,
-    is_late: Callable[[], bool] = lambda: False,
-    guesses: Sequence[Array] = (),
-) -> Generator[None, None, PoseSolutions]:
-    """Return solutions within the limits of joints; it yields after some attempts. The same seed gives the same.
+@dataclass(frozen=True, slots=True)
+class PoseSearch:
+    """A search for positions of joints that bring the tip to a target; the same seed gives the same.
 
-    It begins from the start, then from `guesses`, then from random positions. It ends with what it has when it
-    `is_late`.
+    It begins from the start, then from `guesses`, then from `restarts` random positions. It ends with what it has when
+    there are `enough` that are free, or it `is_late`.
     """
+
+    kinematics: ArmKinematics
+    space: JointSpace
+    target: PoseTarget
+    start: Array
+    is_free: Callable[[Array], bool]
+    seed: int
+    restarts: int = RESTARTS
+    enough: int = ENOUGH
+    is_late: Callable[[], bool] = lambda: False
+    guesses: Sequence[Array] = ()
+
+
+def solved(search: PoseSearch) -> Generator[None, None, PoseSolutions]:
+    """Return solutions within the limits of joints; it yields after some attempts."""
+    kinematics, space, target, start = search.kinematics, search.space, search.target, search.start
     free: list[Array] = []
     colliding: list[Array] = []
     nearest, attempts, bounds = (math.inf, math.inf), 0, bounds_of(space)
@@ -139,10 +141,11 @@ def solved(
             and away[1] <= target.angle_tolerance
             and target.is_met(kinematics.tip_pose(values))
         ):
-            (free if is_free(values) else colliding).append(values)
+            (free if search.is_free(values) else colliding).append(values)
         if attempts == 1:
-            firsts = np.concatenate((*(space.clamped(guess)[None] for guess in guesses), space.samples(restarts, seed)))
-        if len(free) >= enough or is_late() or not len(firsts):
+            random = space.samples(search.restarts, search.seed)
+            firsts = np.concatenate((*(space.clamped(guess)[None] for guess in search.guesses), random))
+        if len(free) >= search.enough or search.is_late() or not len(firsts):
             break
         yield
     return PoseSolutions(_sorted(free, start), _sorted(colliding, start), nearest, attempts)

@@ -9,29 +9,21 @@ from itertools import zip_longest
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3, conjugate, multiply
+from rbxcompose.domains.arms.motion import scene as scenes
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.arm_task import ArmGoal, ArmSite, ArmTask, GivenTask
 from rbxcompose.domains.arms.motion.collisions import Checker, pairs_shown
-from rbxcompose.domains.arms.motion.groups import JointSpace
-from rbxcompose.domains.arms.motion.inverse_kinematics import PoseSolutions, PoseTarget, SolverSettings
+from rbxcompose.domains.arms.motion.groups import Array, JointSpace
+from rbxcompose.domains.arms.motion.inverse_kinematics import PoseSearch, PoseSolutions, PoseTarget, SolverSettings
 from rbxcompose.domains.arms.motion.octree_files import cells_of_octomap
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory
 from rbxcompose.domains.arms.motion.path_constraints import Keep, KeptRange
 from rbxcompose.domains.arms.motion.planner import MotionPlanner, PlannerSettings
 from rbxcompose.domains.arms.motion.pose_search import Posture, searched
-from rbxcompose.domains.arms.motion.scene import (
-    MOST_POINTS,
-    PlacedObject,
-    PlanningScene,
-    SceneError,
-    ScenePiece,
-    settled,
-)
-from rbxcompose.domains.arms.motion.scene_messages import pose_message, pose_of
+from rbxcompose.domains.arms.motion.scene_messages import joint_trajectory, pose_message, pose_of
 from rbxcompose.domains.arms.reasons import MotionFailure, MotionReason
 from rbxcompose.domains.arms.section_models import OMPL, PLANNERS
 from rbxcompose.domains.body.model import Body, Geometry
@@ -76,7 +68,7 @@ _LENGTH_FIRST = ("cylinder", "cone")  # MoveIt's sizes are height and radius, ou
 _NUMBERS = {kind: number for number, kind in KINDS.items()}
 
 
-def object_of(message: CollisionObject, root: str) -> PlacedObject:
+def object_of(message: CollisionObject, root: str) -> scenes.PlacedObject:
     """Return the object of a message; without a frame it stands in that of the root.
 
     Raises:
@@ -84,43 +76,45 @@ def object_of(message: CollisionObject, root: str) -> PlacedObject:
     """
     pieces = list(pieces_of(message))
     if not pieces:
-        raise SceneError(f"'{message.id}' has no shapes")
+        raise scenes.SceneError(f"'{message.id}' has no shapes")
     first, *rest = pieces
     link, pose = message.header.frame_id or root, pose_of(message.pose)
-    return PlacedObject(message.id, first.shape, link, pose, pieces=tuple(rest), shape_pose=first.pose)
+    return scenes.PlacedObject(message.id, first.shape, link, pose, pieces=tuple(rest), shape_pose=first.pose)
 
 
-def pieces_of(message: CollisionObject) -> Iterator[ScenePiece]:
+def pieces_of(message: CollisionObject) -> Iterator[scenes.ScenePiece]:
     """Yield the shapes of a message, in the frame of the object; raises as `object_of` does."""
     yield from _placed([_primitive(primitive) for primitive in message.primitives], message.primitive_poses)
     yield from _placed([_mesh(mesh) for mesh in message.meshes], message.mesh_poses)
     yield from _placed([Geometry("plane", tuple(plane.coef.tolist())) for plane in message.planes], message.plane_poses)
 
 
-def _placed(shapes: Sequence[Geometry], poses: Sequence[Pose]) -> Iterator[ScenePiece]:
+def _placed(shapes: Sequence[Geometry], poses: Sequence[Pose]) -> Iterator[scenes.ScenePiece]:
     """Yield shapes with their poses; without any poses, all are where the object is."""
     if poses and len(poses) != len(shapes):
-        raise SceneError(f"it has {len(shapes)} shapes of one kind and {len(poses)} poses of them")
+        raise scenes.SceneError(f"it has {len(shapes)} shapes of one kind and {len(poses)} poses of them")
     for shape, pose in zip_longest(shapes, poses):
-        yield ScenePiece(shape, Transform3() if pose is None else pose_of(pose))
+        yield scenes.ScenePiece(shape, Transform3() if pose is None else pose_of(pose))
 
 
 def _primitive(message: SolidPrimitive) -> Geometry:
     kind, size = KINDS.get(message.type, ""), message.dimensions.tolist()
     if not kind:
-        raise SceneError(f"there is no shape of the type {message.type}: {', '.join(KINDS.values())}")
+        raise scenes.SceneError(f"there is no shape of the type {message.type}: {', '.join(KINDS.values())}")
     return Geometry(kind, tuple(reversed(size)) if kind in _LENGTH_FIRST else tuple(size))
 
 
 def _mesh(message: Mesh) -> Geometry:
-    if max(len(message.vertices), len(message.triangles)) > 2 * MOST_POINTS:
-        raise SceneError(f"its mesh has {len(message.vertices):,} corners and {len(message.triangles):,} triangles")
+    if max(len(message.vertices), len(message.triangles)) > 2 * scenes.MOST_POINTS:
+        raise scenes.SceneError(
+            f"its mesh has {len(message.vertices):,} corners and {len(message.triangles):,} triangles"
+        )
     points = tuple(value for vertex in message.vertices for value in (vertex.x, vertex.y, vertex.z))
     triangles = tuple(value for triangle in message.triangles for value in triangle.vertex_indices.tolist())
     return Geometry("mesh", (1.0, 1.0, 1.0), points=points, triangles=triangles)
 
 
-def collision_object(thing: PlacedObject) -> CollisionObject:
+def collision_object(thing: scenes.PlacedObject) -> CollisionObject:
     """Return an object as a message; meshes in files and octrees, which it cannot hold, are left out."""
     pieces = thing.own_pieces
     simple = [each for each in pieces if each.shape.kind in _NUMBERS]
@@ -407,7 +401,6 @@ def _angle(rotation: Sequence[float]) -> float:
     return 2.0 * math.atan2(math.hypot(*axis), abs(w))
 
 
-Array = NDArray[np.float64]
 TRIES = 20  # random positions that the search begins with
 
 
@@ -451,9 +444,7 @@ class KinematicsQuery:
         pose = PoseTarget((links[frame] if frame else Transform3()).compose(pose.pose))
         is_free = self.checker.is_free if request.avoid_collisions else lambda values: True
         space, posture = self._constrained(request.constraints.joint_constraints)
-        search = searched(
-            self.kinematics, space, pose, start, is_free, seed=seed, posture=posture, restarts=TRIES, enough=1
-        )
+        search = searched(PoseSearch(self.kinematics, space, pose, start, is_free, seed, TRIES, 1), posture)
         while True:
             try:
                 next(search)
@@ -555,7 +546,7 @@ class MoveItScene:
     Each method raises `SceneError` for what cannot be; the scene may have changed in part then.
     """
 
-    def __init__(self, scene: PlanningScene, paddings: dict[str, float]) -> None:
+    def __init__(self, scene: scenes.PlanningScene, paddings: dict[str, float]) -> None:
         self.scene, self.paddings = scene, paddings
 
     def change(self, message: CollisionObject) -> None:
@@ -567,20 +558,18 @@ class MoveItScene:
             case CollisionObject.APPEND:
                 self.scene.put(self._extended(there, message) if there else self._placed(message))
             case CollisionObject.REMOVE if not message.id:
-                self.scene.objects = {
-                    name: object_ for name, object_ in self.scene.objects.items() if self._is_held(object_)
-                }
+                self.scene.objects = {name: item for name, item in self.scene.objects.items() if self._is_held(item)}
             case CollisionObject.REMOVE:
                 self.scene.remove(message.id)
             case CollisionObject.MOVE:
                 if there is None:
-                    raise SceneError(f"there is no object '{message.id}' to move")
+                    raise scenes.SceneError(f"there is no object '{message.id}' to move")
                 if any(pieces_of(message)):
-                    raise SceneError(f"'{message.id}' is moved, so the message has no shapes")
+                    raise scenes.SceneError(f"'{message.id}' is moved, so the message has no shapes")
                 link = message.header.frame_id or self.scene.body.root
-                self.scene.put(settled(replace(there, link=link, pose=pose_of(message.pose)), self.scene.body))
+                self.scene.put(scenes.settled(replace(there, link=link, pose=pose_of(message.pose)), self.scene.body))
             case unknown:
-                raise SceneError(f"there is no operation {unknown}")
+                raise scenes.SceneError(f"there is no operation {unknown}")
 
     def attach(self, message: AttachedCollisionObject, poses: Poses) -> None:
         """Attach an object of the scene, or a new one, to a link; or detach one, without a name all of the link."""
@@ -592,7 +581,7 @@ class MoveItScene:
                 if name in ("", object_.name):
                     self.scene.detach(object_.name, poses)
             if name and not any(one.name == name for one in held):
-                raise SceneError(f"no link holds '{name}'")
+                raise scenes.SceneError(f"no link holds '{name}'")
             return
         if any(pieces_of(message.object)):
             self.scene.put(object_of(message.object, message.link_name))
@@ -604,7 +593,7 @@ class MoveItScene:
             self.scene.objects = {}
             self.paddings.clear()
         if scaled := [one.link_name for one in message.link_scale if one.scale != 1.0]:
-            raise SceneError(f"the link '{scaled[0]}' cannot be scaled: it can be padded")
+            raise scenes.SceneError(f"the link '{scaled[0]}' cannot be scaled: it can be padded")
         for padding in message.link_padding:
             self._pad(padding)
         for object_ in message.world.collision_objects:
@@ -624,10 +613,8 @@ class MoveItScene:
         state = RobotState(
             joint_state=JointState(name=tuple(positions), position=np.array([*positions.values()])),
             attached_collision_objects=tuple(
-                AttachedCollisionObject(
-                    link_name=object_.link, object=collision_object(object_), touch_links=object_.touches
-                )
-                for object_ in held
+                AttachedCollisionObject(link_name=item.link, object=collision_object(item), touch_links=item.touches)
+                for item in held
             ),
         )
         return PlanningSceneMessage(
@@ -635,55 +622,55 @@ class MoveItScene:
             robot_model_name=self.scene.body.name,
             robot_state=state,
             link_padding=tuple(LinkPadding(link_name=link, padding=padding) for link, padding in self.paddings.items()),
-            object_colors=tuple(
-                ObjectColor(id=object_.name, color=_color(object_)) for object_ in objects if object_.colour
-            ),
+            object_colors=tuple(ObjectColor(id=item.name, color=_color(item)) for item in objects if item.colour),
             world=PlanningSceneWorld(
                 collision_objects=tuple(collision_object(object_) for object_ in objects if object_ not in held)
             ),
         )
 
-    def _is_held(self, thing: PlacedObject) -> bool:
+    def _is_held(self, thing: scenes.PlacedObject) -> bool:
         return thing.link in self.scene.body.links and thing.link != self.scene.body.root
 
-    def _placed(self, message: CollisionObject) -> PlacedObject:
+    def _placed(self, message: CollisionObject) -> scenes.PlacedObject:
         """Return the object of a message; a link that never moves does not hold it."""
-        return settled(object_of(message, self.scene.body.root), self.scene.body)
+        return scenes.settled(object_of(message, self.scene.body.root), self.scene.body)
 
-    def _extended(self, there: PlacedObject, message: CollisionObject) -> PlacedObject:
+    def _extended(self, there: scenes.PlacedObject, message: CollisionObject) -> scenes.PlacedObject:
         """Return an object with further shapes; those of the message may be in another frame or at another pose.
 
         The object stays where it is, and so do the shapes.
         """
         new = self._placed(message)
         if new.link != there.link:
-            raise SceneError(f"'{there.name}' is in the frame of '{there.link}', and so are its further shapes")
+            raise scenes.SceneError(f"'{there.name}' is in the frame of '{there.link}', and so are its further shapes")
         moved = there.pose.inverse().compose(new.pose)
-        added = (ScenePiece(piece.shape, moved.compose(piece.pose)) for piece in new.own_pieces)
+        added = (scenes.ScenePiece(piece.shape, moved.compose(piece.pose)) for piece in new.own_pieces)
         return replace(there, pieces=(*there.pieces, *added))
 
     def _pad(self, padding: LinkPadding) -> None:
         if padding.link_name not in self.scene.body.links:
-            raise SceneError(f"there is no link '{padding.link_name}'")
+            raise scenes.SceneError(f"there is no link '{padding.link_name}'")
         if not 0.0 <= padding.padding <= 1.0:
-            raise SceneError(f"the padding of '{padding.link_name}' is {padding.padding:g} m: from 0 to 1 m")
+            raise scenes.SceneError(f"the padding of '{padding.link_name}' is {padding.padding:g} m: from 0 to 1 m")
         self.paddings[padding.link_name] = padding.padding
 
     def _put_octomap(self, message: OctomapWithPose) -> None:
         tree = message.octomap
         if not tree.binary or tree.id != "OcTree":
-            raise SceneError("an octomap is taken as a binary OcTree alone")
+            raise scenes.SceneError("an octomap is taken as a binary OcTree alone")
         try:
             cells = cells_of_octomap(tree.data.tobytes(), tree.resolution)
         except ValueError as error:
-            raise SceneError(f"the octomap cannot be read: {error}") from error
+            raise scenes.SceneError(f"the octomap cannot be read: {error}") from error
         shape = Geometry("octree", (tree.resolution,), points=tuple(cells.flatten().tolist()))
         link = message.header.frame_id or self.scene.body.root
-        self.scene.put(settled(PlacedObject(OCTOMAP, shape, link, pose_of(message.origin)), self.scene.body))
+        self.scene.put(
+            scenes.settled(scenes.PlacedObject(OCTOMAP, shape, link, pose_of(message.origin)), self.scene.body)
+        )
 
     def _colour(self, message: ObjectColor) -> None:
         if (object_ := self.scene.objects.get(message.id)) is None:
-            raise SceneError(f"there is no object '{message.id}' to colour")
+            raise scenes.SceneError(f"there is no object '{message.id}' to colour")
         color = message.color
         self.scene.put(replace(object_, colour=(color.r, color.g, color.b, color.a)))
 
@@ -698,7 +685,7 @@ class MoveItScene:
                 self.scene.put(replace(object_, touches=links, touches_objects=others))
 
 
-def _color(thing: PlacedObject) -> ColorRGBA:
+def _color(thing: scenes.PlacedObject) -> ColorRGBA:
     red, green, blue, alpha = thing.colour or (0.0, 0.0, 0.0, 0.0)
     return ColorRGBA(r=red, g=green, b=blue, a=alpha)
 
@@ -741,12 +728,7 @@ def code_of(failure: MotionFailure | None, *, is_moving: bool) -> Codes:
 
 def motion_message(names: tuple[str, ...], trajectory: Trajectory) -> RobotTrajectory:
     """Return a motion with where it begins as its first point."""
-    rows = zip(trajectory.times.tolist(), trajectory.positions, trajectory.velocities, strict=True)
-    points = tuple(
-        JointTrajectoryPoint(positions=at, velocities=speed, time_from_start=to_duration(time))
-        for time, at, speed in rows
-    )
-    return RobotTrajectory(joint_trajectory=JointTrajectory(joint_names=names, points=points))
+    return RobotTrajectory(joint_trajectory=joint_trajectory(names, trajectory, begin=0))
 
 
 def trace_message(names: tuple[str, ...], times: list[float], rows: list[list[float]]) -> RobotTrajectory:
@@ -791,7 +773,7 @@ def trajectory_of(message: RobotTrajectory, names: tuple[str, ...], here: Array)
     return Trajectory(times, positions, velocities)
 
 
-SceneAround = tuple[tuple[PlacedObject, ...], Mapping[str, float]]
+SceneAround = tuple[tuple[scenes.PlacedObject, ...], Mapping[str, float]]
 """Objects, and paddings of links [m]."""
 
 
@@ -823,7 +805,7 @@ def differs(message: PlanningSceneMessage) -> bool:
 
 def with_difference(
     body: Body,
-    objects: Iterable[PlacedObject],
+    objects: Iterable[scenes.PlacedObject],
     paddings: Mapping[str, float],
     difference: PlanningSceneMessage,
     positions: Mapping[str, float],
@@ -833,10 +815,10 @@ def with_difference(
     Raises:
         RequestError: if it cannot be.
     """
-    scene = MoveItScene(PlanningScene(body, objects), dict(paddings))
+    scene = MoveItScene(scenes.PlanningScene(body, objects), dict(paddings))
     try:
         scene.apply(difference, body.poses(positions))
-    except SceneError as error:
+    except scenes.SceneError as error:
         raise RequestError(Codes.INVALID_OBJECT_NAME, f"'planning_scene_diff' cannot be: {error}") from error
     return tuple(scene.scene.objects.values()), scene.paddings
 

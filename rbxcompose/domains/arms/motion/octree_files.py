@@ -7,12 +7,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbxcompose.base.files import read_regular
+from rbxcompose.domains.arms.motion.groups import Array
 from rbxcompose.domains.arms.motion.scene import MOST_POINTS
 
-Array = NDArray[np.float64]
 LARGEST = 20_000_000  # [bytes]
 DEPTH = 16  # levels of OctoMap's trees
 BINARY = ".bt"

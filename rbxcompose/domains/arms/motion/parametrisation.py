@@ -12,12 +12,9 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.domains.arms.motion.groups import JointSpace
-
-Array = NDArray[np.float64]
+from rbxcompose.domains.arms.motion.groups import Array, JointSpace
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,9 +203,7 @@ class _Later(ModuleType):
 
 def speeds_of(space: JointSpace, speed: float, acceleration: float) -> tuple[Array, Array]:
     """Return the greatest speeds and accelerations of joints, scaled by two shares from 0 to 1, each of shape (n,)."""
-    fast = np.array(
-        [DEFAULT_SPEED if joint.limits.velocity is None else joint.limits.velocity for joint in space.joints]
-    )
+    fast = np.array([DEFAULT_SPEED if item.limits.velocity is None else item.limits.velocity for item in space.joints])
     hard = [
         most / SECONDS_TO_SPEED if joint.limits.acceleration is None else joint.limits.acceleration
         for joint, most in zip(space.joints, fast.tolist(), strict=True)

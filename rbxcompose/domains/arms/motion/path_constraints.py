@@ -8,15 +8,12 @@ from dataclasses import field, replace
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Quaternion, Transform3, Vector3, conjugate, multiply
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
-from rbxcompose.domains.arms.motion.groups import ArmJoint, JointSpace, solid_link
+from rbxcompose.domains.arms.motion.groups import ArmJoint, Array, JointSpace, solid_link
 from rbxcompose.domains.body.model import Body, Geometry
-
-Array = NDArray[np.float64]
 
 RADIUS, ANGLE = 0.01, math.radians(30)  # [m], [rad]; the usual ones
 LARGEST = 10.0  # [m], a radius

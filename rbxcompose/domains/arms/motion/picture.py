@@ -9,17 +9,16 @@ from pathlib import Path
 from textwrap import wrap
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3, Vector3
+from rbxcompose.domains.arms.motion.groups import Array
 from rbxcompose.domains.arms.motion.octree_files import read_cells
 from rbxcompose.domains.arms.motion.scene import PlacedObject
 from rbxcompose.domains.body import picture as body_picture
 from rbxcompose.domains.body.meshes import Solid, joined
 from rbxcompose.domains.body.model import Body, Geometry
 
-Array = NDArray[np.float64]
 RED, GREEN, BLUE, SAND = (0.85, 0.1, 0.1), (0.2, 0.7, 0.3), (0.1, 0.3, 0.85), (0.85, 0.7, 0.45)
 FLOOR = (0.88, 0.88, 0.9)
 _WAY = 0.006  # [m]: half the width of the line along the way of the tip

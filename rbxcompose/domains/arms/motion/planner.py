@@ -6,12 +6,11 @@ from collections.abc import Callable, Collection, Generator, Iterator
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.domains.arms.motion.collisions import Checker, SearchingChecker, pairs_shown
 from rbxcompose.domains.arms.motion.constrained_search import kept_path
-from rbxcompose.domains.arms.motion.groups import JointSpace, interpolated
+from rbxcompose.domains.arms.motion.groups import Array, JointSpace, interpolated
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory, curve, jerks_of, speeds_of, timed
 from rbxcompose.domains.arms.motion.path_constraints import KeptTip
 from rbxcompose.domains.arms.motion.search import MARGIN, searched
@@ -20,7 +19,6 @@ from rbxcompose.domains.arms.section_models import AUTOMATIC, FAST, ompl_planner
 from rbxcompose.domains.body.link_pairs import LinkPair
 from rbxcompose.domains.servos.trajectory import ROUNDING
 
-Array = NDArray[np.float64]
 SLICE = 1_000  # examined positions, after which an examination lets others run
 
 

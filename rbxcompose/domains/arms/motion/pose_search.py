@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from collections.abc import Generator, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.domains.arms.motion import damped_steps, inverse_kinematics
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.collisions import Checker
-from rbxcompose.domains.arms.motion.groups import JointSpace
+from rbxcompose.domains.arms.motion.groups import Array, JointSpace
 from rbxcompose.domains.arms.motion.path_constraints import Keep, KeptTip
-
-Array = NDArray[np.float64]
 
 STEPS = 40  # along the null space, at most
 LEAST = 1e-3  # [rad or m] that a step brings nearer; less is not worth it
@@ -48,15 +45,9 @@ class Posture:
         return float(np.linalg.norm(self.way(space, values)))
 
 
-def slid(
-    kinematics: ArmKinematics,
-    space: JointSpace,
-    target: inverse_kinematics.PoseTarget,
-    values: Array,
-    posture: Posture,
-    is_free: Callable[[Array], bool],
-) -> Array:
+def slid(search: inverse_kinematics.PoseSearch, values: Array, posture: Posture) -> Array:
     """Return solutions of a target nearer to a posture, from one of them: free, and verified as those of a search."""
+    kinematics, space, target = search.kinematics, search.space, search.target
     wanted, bounds, (top, end) = kinematics.placement(target.pose), inverse_kinematics.bounds_of(space), target.rows
     here, distance, share = values, posture.distance(space, values), 1.0
     for _ in range(STEPS):
@@ -67,7 +58,7 @@ def slid(
         first = np.clip(here + step * share * min(1.0, damped_steps.LONGEST / longest), *bounds)
         moved = space.nearest_turns(inverse_kinematics.descended(kinematics, space, target, first)[0], values)
         left = posture.distance(space, moved)
-        if left <= distance - LEAST and target.is_met(kinematics.tip_pose(moved)) and is_free(moved):
+        if left <= distance - LEAST and target.is_met(kinematics.tip_pose(moved)) and search.is_free(moved):
             here, distance, share = moved, left, min(1.0, 2.0 * share)
         else:
             share /= 2.0
@@ -99,30 +90,22 @@ WAYS, POINTS = 5, 40  # ways to positions that collide, and points on each, wher
 AS_NEAR = 1.0  # tolerances by which others may be farther away than the nearest one
 
 
-def nearest_poses(
-    kinematics: ArmKinematics,
-    space: JointSpace,
-    target: inverse_kinematics.PoseTarget,
-    start: Array,
-    is_free: Callable[[Array], bool],
-    *,
-    seed: int,
-    guesses: Sequence[Array] = (),
-    is_late: Callable[[], bool] = lambda: False,
-) -> Generator[None, None, tuple[Array, ...]]:
+def nearest_poses(search: inverse_kinematics.PoseSearch) -> Generator[None, None, tuple[Array, ...]]:
     """Return free positions of joints whose tip is as near to the target as was found, the nearest first.
 
     It is never farther away than at the start, if that is free and within the limits; without any that are free,
     nothing is returned. What is nearer counts in tolerances of the target. It yields while it works, and ends with what
     it has when it `is_late`.
     """
+    kinematics, space, target, is_free = search.kinematics, search.space, search.target, search.is_free
     free: list[Array] = []
     colliding: list[Array] = []
-    first = space.clamped(start)
-    for sample in (first, *map(space.clamped, guesses), *space.samples(FIRSTS, seed)):
-        end = space.nearest_turns(_approached(kinematics, target, sample, inverse_kinematics.bounds_of(space)), start)
+    first = space.clamped(search.start)
+    for sample in (first, *map(space.clamped, search.guesses), *space.samples(FIRSTS, search.seed)):
+        end = _approached(kinematics, target, sample, inverse_kinematics.bounds_of(space))
+        end = space.nearest_turns(end, search.start)
         (free if is_free(end) else colliding).append(end)
-        if is_late():
+        if search.is_late():
             break
         yield
 
@@ -198,17 +181,7 @@ APART = 0.05  # [rad or m] by which a joint of another solution is elsewhere
 
 
 def searched(
-    kinematics: ArmKinematics,
-    space: JointSpace,
-    target: inverse_kinematics.PoseTarget,
-    start: Array,
-    is_free: Callable[[Array], bool],
-    *,
-    seed: int,
-    posture: Posture | None = None,
-    restarts: int = inverse_kinematics.RESTARTS,
-    enough: int = inverse_kinematics.ENOUGH,
-    is_late: Callable[[], bool] = lambda: False,
+    search: inverse_kinematics.PoseSearch, posture: Posture | None = None
 ) -> Generator[None, None, inverse_kinematics.PoseSolutions]:
     """Return solutions as `solved` does, those nearest to a posture first if there is one.
 
@@ -216,32 +189,19 @@ def searched(
     posture than a search without it, since that one's attempts are among its own. If nothing free meets the target and
     that is approximate, the solutions are the nearest ones; the posture does not count then.
     """
-    guesses = () if posture is None else (posture.guess(start),)
-    found = yield from inverse_kinematics.solved(
-        kinematics,
-        space,
-        target,
-        start,
-        is_free,
-        seed=seed,
-        restarts=restarts,
-        enough=enough + len(guesses),
-        is_late=is_late,
-        guesses=guesses,
-    )
+    guesses, target = () if posture is None else (posture.guess(search.start),), search.target
+    found = yield from inverse_kinematics.solved(replace(search, enough=search.enough + len(guesses), guesses=guesses))
     if not found.free and target.is_approximate:
-        near = yield from nearest_poses(
-            kinematics, space, target, start, is_free, seed=seed, guesses=(*guesses, *found.colliding), is_late=is_late
-        )
-        exact = tuple(item for item in near if target.is_met(kinematics.tip_pose(item)))  # which restarts have missed
-        found = replace(found, free=_apart(exact or near)[:enough], is_approximate=bool(near) and not exact)
+        near = yield from nearest_poses(replace(search, guesses=(*guesses, *found.colliding)))
+        exact = tuple(item for item in near if target.is_met(search.kinematics.tip_pose(item)))  # missed by restarts
+        found = replace(found, free=_apart(exact or near)[: search.enough], is_approximate=bool(near) and not exact)
     if posture is None or found.is_approximate:
         return found
     free = []
     for array in found.free:
-        free.append(slid(kinematics, space, target, array, posture, is_free))
+        free.append(slid(search, array, posture))
         yield
-    return replace(found, free=_apart(nearest_first(space, posture, free)))
+    return replace(found, free=_apart(nearest_first(search.space, posture, free)))
 
 
 def nearest_first(space: JointSpace, posture: Posture, solutions: Iterable[Array]) -> tuple[Array, ...]:
@@ -259,22 +219,14 @@ def _apart(solutions: Iterable[Array]) -> tuple[Array, ...]:
 
 
 def kept_solutions(
-    kinematics: ArmKinematics,
-    space: JointSpace,
-    target: inverse_kinematics.PoseTarget,
-    keep: Keep,
-    start: Array,
-    first: Array,
-    checker: Checker,
-    *,
-    seed: int,
-    posture: Posture | None = None,
+    search: inverse_kinematics.PoseSearch, keep: Keep, first: Array, checker: Checker, posture: Posture | None = None
 ) -> Generator[None, None, inverse_kinematics.PoseSolutions]:
     """Return solutions as `solved` does, for a target of which only the position counts.
 
     With a posture, one of the attempts begins there, and the solutions nearest to it come first. What is kept is
     measured from positions `first`, where the whole motion began.
     """
+    kinematics, space, target, start = search.kinematics, search.space, search.target, search.start
     frame = kinematics.poses(first)[keep.frame].inverse() if keep.frame else None
     point = frame.apply(target.pose.translation) if frame is not None else target.pose.translation
     half = inverse_kinematics.CLOSER * target.tolerance / math.sqrt(3.0)
@@ -285,7 +237,7 @@ def kept_solutions(
     colliding: list[Array] = []
     nearest, attempts = (math.inf, math.inf), 0
     guesses = (start,) if posture is None else (start, posture.guess(start))
-    for guess in (*map(space.clamped, guesses), *space.samples(inverse_kinematics.RESTARTS, seed)):
+    for guess in (*map(space.clamped, guesses), *space.samples(inverse_kinematics.RESTARTS, search.seed)):
         attempts += 1
         values = there.projected(guess, space)
         if values is not None and kept.is_kept(values) and target.is_met(kinematics.tip_pose(values)):
@@ -295,8 +247,6 @@ def kept_solutions(
         if len(free) >= inverse_kinematics.ENOUGH + len(guesses) - 1:
             break
         yield
-    by_distance = [
-        sorted(arrays, key=lambda values: float(np.max(np.abs(values - start)))) for arrays in (free, colliding)
-    ]
+    by_distance = [sorted(item, key=lambda values: float(np.max(np.abs(values - start)))) for item in (free, colliding)]
     ordered = tuple(by_distance[0]) if posture is None else nearest_first(space, posture, by_distance[0])
     return inverse_kinematics.PoseSolutions(ordered, tuple(by_distance[1]), nearest, attempts)

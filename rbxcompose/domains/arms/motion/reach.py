@@ -9,19 +9,17 @@ from dataclasses import field
 from textwrap import wrap
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.collisions import Checker
-from rbxcompose.domains.arms.motion.groups import JointSpace
+from rbxcompose.domains.arms.motion.groups import Array, JointSpace
 from rbxcompose.domains.arms.motion.picture import ArmPicture, solids_in
 from rbxcompose.domains.body.meshes import Solid, joined
 from rbxcompose.domains.body.model import Geometry
 from rbxcompose.domains.body.picture import bounds_of, need_for_pictures, placed, png_of, rendered, solids_of
 
-Array = NDArray[np.float64]
 Cell = tuple[int, int, int]
 
 DIRECTIONS = 50

@@ -9,17 +9,20 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbxcompose.base.geometry import Transform3, Vector3, quaternion_about
+from rbxcompose.domains.arms.motion.groups import Array
 from rbxcompose.domains.arms.motion.octree_files import read_cells
+from rbxcompose.domains.arms.motion.parametrisation import Trajectory
 from rbxcompose.domains.arms.motion.scene import PlacedObject, ScenePiece
 from rbxcompose.domains.body.model import Geometry
 from rbxcompose.msgs.geometry_msgs import Point, Pose, PoseStamped, Quaternion
 from rbxcompose.msgs.geometry_msgs import Vector3 as Vector3Message
 from rbxcompose.msgs.nav_msgs import Path as PathMessage
 from rbxcompose.msgs.rbxcompose_msgs import SceneObject, SceneShape
+from rbxcompose.msgs.stamps import to_duration, to_time
 from rbxcompose.msgs.std_msgs import ColorRGBA, Header
+from rbxcompose.msgs.trajectory_msgs import JointTrajectory, JointTrajectoryPoint
 from rbxcompose.msgs.visualization_msgs import Marker, MarkerArray
 
 
@@ -27,6 +30,16 @@ def pose_message(pose: Transform3) -> Pose:
     """Return a pose as a message."""
     (x, y, z), (qx, qy, qz, qw) = pose.translation, pose.rotation
     return Pose(position=Point(x=x, y=y, z=z), orientation=Quaternion(x=qx, y=qy, z=qz, w=qw))
+
+
+def joint_trajectory(names: tuple[str, ...], motion: Trajectory, *, begin: int = 1, stamp: int = 0) -> JointTrajectory:
+    """Return a motion from its point `begin` on, usually without where the arm is now; `stamp` is its start [ns]."""
+    rows = zip(motion.times[begin:].tolist(), motion.positions[begin:], motion.velocities[begin:], strict=True)
+    points = tuple(
+        JointTrajectoryPoint(positions=at, velocities=speed, time_from_start=to_duration(time))
+        for time, at, speed in rows
+    )
+    return JointTrajectory(header=Header(stamp=to_time(stamp)), joint_names=names, points=points)
 
 
 def pose_of(message: Pose) -> Transform3:
@@ -89,7 +102,7 @@ def _piece(message: SceneShape) -> ScenePiece:
 SAND = (0.85, 0.7, 0.45, 1.0)
 _SHEET = (4.0, 4.0, 0.002)  # [m] of a plane that is shown
 _SIDES = 24  # of a cone
-Points = Sequence[Sequence[float]] | NDArray[np.float64]
+Points = Sequence[Sequence[float]] | Array
 
 
 def markers(objects: Sequence[PlacedObject]) -> MarkerArray:
@@ -175,5 +188,5 @@ def _vector(values: Sequence[float]) -> Vector3:
 
 
 @lru_cache(maxsize=8)
-def _read(file: str, side: float) -> tuple[NDArray[np.float64], float]:
+def _read(file: str, side: float) -> tuple[Array, float]:
     return read_cells(Path(file), side)

@@ -8,12 +8,10 @@ from contextlib import closing
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rbxcompose.domains.arms.motion.groups import JointSpace
+from rbxcompose.domains.arms.motion.groups import Array, JointSpace
 from rbxcompose.domains.arms.section_models import OMPL
 
-Array = NDArray[np.float64]
 IsFree = Callable[[Array], bool]
 Ompl = Any  # of an extra, without types
 

@@ -13,10 +13,9 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbxcompose.domains.arms.motion.collisions import STL, TOUCH, coal_shape
-from rbxcompose.domains.arms.motion.groups import leader_of
+from rbxcompose.domains.arms.motion.groups import Array, leader_of
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory
 from rbxcompose.domains.arms.motion.scene import PlacedObject
 from rbxcompose.domains.body.description import Description
@@ -24,7 +23,6 @@ from rbxcompose.domains.body.link_pairs import LinkPair, pair_of
 from rbxcompose.domains.body.model import Geometry
 from rbxcompose.domains.body.pinocchio_model import PinocchioModel
 
-Array = NDArray[np.float64]
 GRID = 20  # instants for each point of a trajectory, at which its greatest speed is looked for
 
 

@@ -13,18 +13,16 @@ from __future__ import annotations
 from collections.abc import Collection, Generator, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.arms.motion.collisions import MeshChecker
 from rbxcompose.domains.arms.motion.compiled_collisions import CompiledModel, near_pairs, workspace
 from rbxcompose.domains.arms.motion.fast_search import compile_search, fast_path
-from rbxcompose.domains.arms.motion.groups import JointSpace
+from rbxcompose.domains.arms.motion.groups import Array, JointSpace
 from rbxcompose.domains.arms.motion.sphere_model import Trees, compiled_model
 from rbxcompose.domains.body.link_pairs import LinkPair
 from rbxcompose.domains.body.model import Geometry
 
-Array = NDArray[np.float64]
 ROOM = 4_096  # near pairs of one call, at least
 SAMPLES, SEED = 64, 1
 """Positions at which it is seen how well spheres distinguish pairs."""
@@ -60,7 +58,7 @@ class SphereChecker:
     def first_bad(self, points: Array) -> int | None:
         """Return the first of some positions, of shape (m, n), where something collides; None if there is none."""
         self._refresh()
-        begin = 0
+        points, begin = np.ascontiguousarray(points), 0  # another layout would be compiled anew
         while begin < len(points):
             count = near_pairs(self._model, points[begin:], self._found, self._work)
             near = self._found[:count]

@@ -13,11 +13,10 @@ from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.arms.motion import compiled_collisions, sphere_trees
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.collisions import CheckedPart, MeshChecker
-from rbxcompose.domains.arms.motion.groups import leader_of
+from rbxcompose.domains.arms.motion.groups import Array, leader_of
 from rbxcompose.domains.arms.motion.octree_files import read_cells
 from rbxcompose.domains.body.model import Geometry
 
-Array = NDArray[np.float64]
 Coal = Any  # of an extra, without types
 NONE = sphere_trees.ball_tree(np.inf)  # of a half space, which no spheres cover
 

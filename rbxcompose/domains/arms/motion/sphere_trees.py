@@ -18,8 +18,8 @@ from xxhash import xxh3_128_hexdigest
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import open_regular, replace_file
+from rbxcompose.domains.arms.motion.groups import Array
 
-Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
 Ball = tuple[Array, float]
 
@@ -116,8 +116,7 @@ def cells_tree(points: Array, side: float) -> SphereTree:
 
 def _one(centre: Array, radius: float, corners: Array) -> SphereTree:
     """Return one sphere as a tree."""
-    span = np.array([[0, len(corners)]])
-    return SphereTree(centre[None], np.array([radius + SLACK]), np.array([-1]), span, corners)
+    return SphereTree(centre[None], np.array([radius + SLACK]), np.array([-1]), np.array([[0, len(corners)]]), corners)
 
 
 def _corners(triangles: Array) -> Array:

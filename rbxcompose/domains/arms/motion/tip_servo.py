@@ -13,17 +13,15 @@ import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.collisions import Checker, pairs_shown
-from rbxcompose.domains.arms.motion.groups import interpolated
+from rbxcompose.domains.arms.motion.groups import Array, interpolated
 from rbxcompose.domains.arms.motion.parametrisation import MARGIN, Trajectory, speeds_of
 from rbxcompose.domains.arms.motion.planner import MotionPlanner
 from rbxcompose.domains.arms.motion.trace_planner import TURN
 
-Array = NDArray[np.float64]
 Wish = Callable[[Array], Array]
 """From positions of joints to the wanted velocity of the tip [m/s, rad/s], of shape (6,), along the root's axes."""
 

@@ -9,19 +9,16 @@ from itertools import accumulate, pairwise
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Quaternion, Transform3, Vector3, conjugate, lerp, multiply, slerp
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
 from rbxcompose.domains.arms.motion.collisions import Checker, pairs_shown
-from rbxcompose.domains.arms.motion.groups import JointSpace
+from rbxcompose.domains.arms.motion.groups import Array, JointSpace
 from rbxcompose.domains.arms.motion.inverse_kinematics import ANGLE_TOLERANCE, TOLERANCE, PoseTarget, descended
 from rbxcompose.domains.arms.motion.parametrisation import MARGIN, Trajectory, jerks_of, speeds_of, timed
 from rbxcompose.domains.arms.motion.planner import FINE, MotionPlan, MotionPlanner, Planning, examined, mistake_in_start
 from rbxcompose.domains.arms.reasons import MotionFailure, MotionReason
-
-Array = NDArray[np.float64]
 
 TURN = 0.1  # [m/rad]
 SAME = 1e-6  # [m or rad] between poses that are the same
@@ -474,7 +471,7 @@ class _Trace:
             )
             found: Traced | None = None
             while found is None:
-                if self._is_late():
+                if self._planner.now() - self._began >= self._planner.settings.time or self._steps >= MOST_STEPS:
                     text = f"no way was found in {self._planner.settings.time:g} s, after {self._steps} steps"
                     return MotionFailure(MotionReason.NO_PATH_IN_TIME, text)
                 try:
@@ -492,9 +489,6 @@ class _Trace:
         if problem and (share < self._wish.least or not parts):
             return MotionFailure(MotionReason.PATH_INCOMPLETE, f"only {share:.1%} of the way: {problem}", share)
         return parts, share if problem else 1.0
-
-    def _is_late(self) -> bool:
-        return self._planner.now() - self._began >= self._planner.settings.time or self._steps >= MOST_STEPS
 
     def _verified(self, parts: list[Traced]) -> Generator[None, None, Trajectory | MotionFailure]:
         made = []

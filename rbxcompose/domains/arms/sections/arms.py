@@ -22,7 +22,7 @@ from rbxcompose.domains.servos.sections.controllers import controllers, follow_t
 from rbxcompose.domains.servos.sections.joints import JointPosition, limits_in
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading, WantedComponent, Wiring
-from rbxcompose.manifest.tree import at, key_span, value_span
+from rbxcompose.manifest.tree import at, value_span
 from rbxcompose.manifest.validate import not_a_choice
 from rbxcompose.msgs.control_msgs import FollowJointTrajectory, GripperCommand
 from rbxcompose.sdk.capabilities import BoundsGoals
@@ -221,9 +221,7 @@ def arms(reading: Reading[ArmModel]) -> dict[str, ArmOfRobot]:
         if entry.planner.type not in section_models.PLANNERS:
             path = ("arms", name, "planner", "type")
             node = at(reading.contents.root, path)
-            reading.report.add(
-                not_a_choice(value_span(reading.contents.root, path), "type", node, list(section_models.PLANNERS))
-            )
+            reading.report.add(not_a_choice(reading.value(*path), "type", node, list(section_models.PLANNERS)))
         if description is None:
             continue  # it is missing or has a mistake, which is reported
         group = _group_of(reading, name, entries, groups, description.body)
@@ -253,7 +251,7 @@ def _group_of(
     parts = []
     for index, each in enumerate(model.groups):
         if _leads_to(each, name, entries):
-            span = value_span(reading.contents.root, ("arms", name, "groups", index))
+            span = reading.value("arms", name, "groups", index)
             reading.report.add(NO_CHAIN.at(span, f"the arm '{name}' would be a part of itself"))
             return None
         parts.append(_group_of(reading, each, entries, groups, known))
@@ -276,16 +274,15 @@ def _leads_to(name: str, wanted: str, entries: Mapping[str, ArmModel]) -> bool:
 
 def _group(reading: Reading[ArmModel], name: str, model: ArmModel, known: Body) -> ArmGroup | None:
     """Return the joints of an arm; None after a finding."""
-    root = reading.contents.root
     if model.links:
         if (found := carrying(known, model.links)) is None:
             message = f"no joint of these links carries '{model.links[-1]}', which would be the tip of the arm '{name}'"
-            reading.report.add(NO_CHAIN.at(value_span(root, ("arms", name, "links", len(model.links) - 1)), message))
+            reading.report.add(NO_CHAIN.at(reading.value("arms", name, "links", len(model.links) - 1), message))
         return found
     if model.chain is None:
         for index, joint in enumerate(model.joints):
             if not known.joints[joint].moves or known.joints[joint].mimic is not None:
-                span = value_span(root, ("arms", name, "joints", index))
+                span = reading.value("arms", name, "joints", index)
                 words = "follows another joint" if known.joints[joint].mimic else f"is {known.joints[joint].kind}"
                 reading.report.add(NO_CHAIN.at(span, f"'{joint}' {words}, so the arm '{name}' cannot move it"))
                 return None
@@ -293,20 +290,19 @@ def _group(reading: Reading[ArmModel], name: str, model: ArmModel, known: Body) 
     found = chain(known, model.chain.from_, model.chain.to)
     for index, joint in enumerate(model.passive if found is not None else ()):
         if found is not None and joint not in found.joints:
-            span = value_span(root, ("arms", name, "passive", index))
+            span = reading.value("arms", name, "passive", index)
             reading.report.add(NO_CHAIN.at(span, f"'{joint}' is not on the chain of the arm '{name}'"))
             return None
     if found is not None and (left := [joint for joint in found.joints if joint not in model.passive]):
         return ArmGroup(tuple(left), found.base, found.tip)
-    span = value_span(root, ("arms", name, "chain", "to"))
+    span = reading.value("arms", name, "chain", "to")
     if found is not None:
-        message = f"nothing moves between '{model.chain.from_}' and '{model.chain.to}'"
-        reading.report.add(NO_CHAIN.at(span, message))
+        reading.report.add(NO_CHAIN.at(span, f"nothing moves between '{model.chain.from_}' and '{model.chain.to}'"))
         return None
     message = f"'{model.chain.to}' is not below '{model.chain.from_}', which carries the arm '{name}'"
     is_turned = chain(known, model.chain.to, model.chain.from_) is not None
     help_text = f"write 'chain: {{from: {model.chain.to}, to: {model.chain.from_}}}'" if is_turned else ""
-    related = [Related(value_span(root, ("arms", name, "chain", "from")), "its base")]
+    related = [Related(reading.value("arms", name, "chain", "from"), "its base")]
     reading.report.add(NO_CHAIN.at(span, message, help=help_text, related=related))
     return None
 
@@ -316,11 +312,11 @@ def _mistakes(
 ) -> Iterator[Finding]:
     yield from _unled(reading, name, model, group)
     if (prefer := model.kinematics.prefer) is not None and prefer not in model.poses:
-        span = value_span(reading.contents.root, ("arms", name, "kinematics", "prefer"))
+        span = reading.value("arms", name, "kinematics", "prefer")
         yield NO_POSE.misspelt(span, f"the arm '{name}' has no pose '{prefer}'", prefer, model.poses, "its poses")
     there = reading.contents.of(controllers).get(model.gripper or "")
     if model.gripper is not None and there is not None and not served_topic(model.gripper, there, GripperCommand):
-        span = value_span(reading.contents.root, ("arms", name, "gripper"))
+        span = reading.value("arms", name, "gripper")
         yield NO_GRIPPER.at(span, f"'{model.gripper}' does not open and close anything, and is no gripper")
     elif there is not None:
         yield from _gripper_elsewhere(reading, name, model.gripper or "", there, group, known)
@@ -340,22 +336,21 @@ def _gripper_elsewhere(
         if is_own or last not in moved[known.joints[joint].parent]:
             words = "is one of the arm's own" if is_own else f"is not carried by '{last}'"
             message = f"'{gripper}' moves '{joint}', which {words}"
-            related = [Related(key_span(reading.contents.root, ("controllers", gripper)), "the gripper")]
-            span = value_span(reading.contents.root, ("arms", name, "gripper"))
-            yield GRIPPER_ELSEWHERE.at(span, message, related=related)
+            related = [Related(reading.key("controllers", gripper), "the gripper")]
+            yield GRIPPER_ELSEWHERE.at(reading.value("arms", name, "gripper"), message, related=related)
             return
 
 
 def _unled(reading: Reading[ArmModel], name: str, model: ArmModel, group: ArmGroup) -> Iterator[Finding]:
     there = reading.contents.of(controllers).get(model.controller)
-    span = value_span(reading.contents.root, ("arms", name, "controller"))
+    span = reading.value("arms", name, "controller")
     if there is None:
         return  # it has a mistake, which is reported
     if not served_topic(model.controller, there, FollowJointTrajectory):
         yield NOT_LED.at(span, f"the controller '{model.controller}' follows no trajectories")
     elif left := [joint for joint in group.joints if joint not in there.claimed]:
         words = ", ".join(f"'{joint}'" for joint in left)
-        related = [Related(key_span(reading.contents.root, ("controllers", model.controller)), "the controller")]
+        related = [Related(reading.key("controllers", model.controller), "the controller")]
         yield NOT_LED.at(span, f"the controller '{model.controller}' does not lead {words}", related=related)
 
 
@@ -363,17 +358,16 @@ def _unfit(
     reading: Reading[ArmModel], where: tuple[str, str, str], position: Quantity, group: ArmGroup, known: Body
 ) -> Iterator[Finding]:
     """Yield what is wrong with the position of a joint in a pose."""
-    (name, pose, joint), root = where, reading.contents.root
+    name, pose, joint = where
     if joint not in group.joints:
         message = f"the pose '{pose}' names '{joint}', which is no joint of the arm '{name}'"
-        key = key_span(root, ("arms", name, "poses", pose, joint))
+        key = reading.key("arms", name, "poses", pose, joint)
         yield NOT_OF_ARM.misspelt(key, message, joint, group.joints, "its joints")
         return
-    span, slides = value_span(root, ("arms", name, "poses", pose, joint)), known.joints[joint].slides
+    span, slides = reading.value("arms", name, "poses", pose, joint), known.joints[joint].slides
     if position.dimension != (LENGTH if slides else ANGLE):
         words, wanted = ("slides", "a length") if slides else ("turns", "an angle")
-        message = f"'{joint}' {words}, and this is {position.dimension.phrase}"
-        yield BEYOND.at(span, message, help=f"write {wanted}")
+        yield BEYOND.at(span, f"'{joint}' {words}, and this is {position.dimension.phrase}", help=f"write {wanted}")
         return
     limits = limits_in(reading.contents, known.joints[joint])
     nearest = limits.clamped(position.value)

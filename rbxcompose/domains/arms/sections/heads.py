@@ -15,7 +15,6 @@ from rbxcompose.domains.body.sections.body import body
 from rbxcompose.domains.servos.sections.controllers import controllers, follow_topic, stream_topic
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading, WantedComponent, Wiring
-from rbxcompose.manifest.tree import value_span
 
 HEAD = "head"
 NOT_TURNED = kind("RBX2355")
@@ -99,5 +98,5 @@ def heads(reading: Reading[HeadModel]) -> dict[str, HeadOfRobot]:
             path = ("heads", name, "controller")
             words = f"moves no joint between '{description.body.root}' and '{entry.camera}'"
             message = f"'{entry.controller}' {words if not led else 'follows no trajectories'}"
-            reading.report.add(NOT_TURNED.at(value_span(reading.contents.root, path), message))
+            reading.report.add(NOT_TURNED.at(reading.value(*path), message))
     return found

@@ -26,7 +26,7 @@ from rbxcompose.manifest.fields import FileName, FramePose
 from rbxcompose.manifest.files import resolve, shown_name
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading, WantedComponent, Wiring
-from rbxcompose.manifest.tree import KeyPath, key_span, value_span
+from rbxcompose.manifest.tree import KeyPath
 
 SCENE = "scene"
 """The component that a robot with arms runs."""
@@ -280,14 +280,14 @@ def scene(reading: Reading[SceneModel]) -> SceneOfRobot:
         file = _file(reading, model, path)
         wrong = mistake_in(model.placed(name, known.root, file), known, frames)
         if wrong:
-            reading.report.add(NO_OBJECT.at(key_span(reading.contents.root, path), f"object '{name}': {wrong}"))
+            reading.report.add(NO_OBJECT.at(reading.key(*path), f"object '{name}': {wrong}"))
         elif not model.file or file is not None:
             found.append(model.placed(name, known.root, file))
     found += _of_file(reading, read, known, {item.name for item in found})
     for name in read.clouds:
         if name in known.links or any(item.name == name for item in found):
             what = "a link of the body" if name in known.links else "an object of this scene"
-            span = key_span(reading.contents.root, ("scene", "clouds", name))
+            span = reading.key("scene", "clouds", name)
             reading.report.add(NO_OBJECT.at(span, f"the cloud '{name}' would have the name of {what}"))
     paddings = {link: padding for link in known.links if (padding := read.paddings.get(link, read.padding))}
     return SceneOfRobot(tuple(found), frames, paddings, read.clouds)
@@ -297,7 +297,7 @@ def _file(reading: Reading[SceneModel], model: ObjectModel, path: KeyPath) -> Pa
     """Return the file of an object; None if it needs none, or after a finding."""
     if not model.file:
         return None
-    span = value_span(reading.contents.root, (*path, "mesh" if model.mesh else "octree", "file"))
+    span = reading.value(*path, "mesh" if model.mesh else "octree", "file")
     found = _resolved(reading, model.file, span)
     if found is None or model.mesh is None:
         return found
@@ -324,7 +324,7 @@ def _of_file(reading: Reading[SceneModel], read: SceneModel, known: Body, taken:
     """Return the objects of the `.scene` file."""
     if read.file is None:
         return []
-    span = value_span(reading.contents.root, ("scene", "file"))
+    span = reading.value("scene", "file")
     path = _resolved(reading, read.file, span)
     if path is None:
         return []

@@ -21,7 +21,6 @@ from rbxcompose.domains.servos.sections.controllers import stream_topic
 from rbxcompose.manifest.fields import TopicName
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading, WantedComponent, Wiring
-from rbxcompose.manifest.tree import value_span
 
 TRACKER = "tracker"
 NO_REST = kind("RBX2356")
@@ -116,13 +115,13 @@ def trackers(reading: Reading[TrackerModel]) -> dict[str, TrackerOfRobot]:
         arm = reading.contents.of(arms).get(entry.arm)
         if description is None or arm is None:
             continue  # it is missing or has a mistake, which is reported
-        root, poses = reading.contents.root, arm.model.poses
+        poses = arm.model.poses
         if entry.rest is not None and entry.rest not in poses:
             message = f"the arm '{entry.arm}' has no pose '{entry.rest}'"
-            span = value_span(root, ("trackers", name, "rest"))
+            span = reading.value("trackers", name, "rest")
             reading.report.add(NO_REST.misspelt(span, message, entry.rest, list(poses), "its poses"))
         elif not stream_topic(reading.contents, arm.model.controller):
-            span = value_span(root, ("trackers", name, "arm"))
+            span = reading.value("trackers", name, "arm")
             reading.report.add(NO_REST.at(span, f"'{arm.model.controller}' takes no stream of trajectories"))
         else:
             found[name] = TrackerOfRobot(entry, *_reach(description.body, arm.group))

@@ -6,43 +6,29 @@ from typing import Annotated
 
 from pydantic import Field
 
+from rbxcompose import sdk
 from rbxcompose.base.geometry import AT_REST, Velocity2
 from rbxcompose.domains.bases.twins import ChoreCore, ChoreSettings
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.msgs.nav2_msgs import Wait
 from rbxcompose.msgs.stamps import to_duration, to_seconds
-from rbxcompose.sdk import (
-    AngularSpeed,
-    Capability,
-    CommandsMotion,
-    Component,
-    Config,
-    Live,
-    Out,
-    ServedGoal,
-    ServesAction,
-    Setting,
-    Speed,
-    Time,
-    component,
-)
 
 LONGEST = 24 * 3600.0  # [s]
 
 
-class ChoreSimConfig(Config):
+class ChoreSimConfig(sdk.Config):
     """How the base moves while the chore is done."""
 
-    speed: Annotated[Speed, Live()] = Field(0.05, ge=0)
+    speed: Annotated[sdk.Speed, sdk.Live()] = Field(0.05, ge=0)
     """Speed of the strokes: forwards in one, backwards in the next."""
-    turn_rate: Annotated[AngularSpeed, Live()] = 0.0
+    turn_rate: Annotated[sdk.AngularSpeed, sdk.Live()] = 0.0
     """How fast it turns meanwhile, always in the same direction."""
-    stroke: Annotated[Time, Live()] = Field(1.0, gt=0)
+    stroke: Annotated[sdk.Time, sdk.Live()] = Field(1.0, gt=0)
     """Duration of a stroke."""
 
 
-@component("chore_sim")
-class ChoreSim(Component[ChoreSimConfig]):
+@sdk.component("chore_sim")
+class ChoreSim(sdk.Component[ChoreSimConfig]):
     """A chore such as vacuuming: it takes as long as its goal says and moves the base a little.
 
     Its skill is called `chore` unless `connect` names it. A second goal is refused while it is busy.
@@ -54,13 +40,17 @@ class ChoreSim(Component[ChoreSimConfig]):
     rate = 20.0
     steps_for_goals = True
     simulated = True
-    cmd_vel = Out(Twist, "cmd_vel", qos="command")
-    chore = ServesAction(Wait, "chore", claims="base", pausable=True)
+    cmd_vel = sdk.Out(Twist, "cmd_vel", qos="command")
+    chore = sdk.ServesAction(Wait, "chore", claims="base", pausable=True)
 
     @classmethod
-    def capabilities(cls, config: ChoreSimConfig) -> tuple[Capability, ...]:
+    def capabilities(cls, config: ChoreSimConfig) -> tuple[sdk.Capability, ...]:
         """Declare how fast it moves the base."""
-        return (CommandsMotion("cmd_vel", Setting(config.speed, "speed"), Setting(config.turn_rate, "turn_rate")),)
+        return (
+            sdk.CommandsMotion(
+                "cmd_vel", sdk.Setting(config.speed, "speed"), sdk.Setting(config.turn_rate, "turn_rate")
+            ),
+        )
 
     def configure(self) -> None:
         """Do nothing."""
@@ -92,7 +82,7 @@ class ChoreSim(Component[ChoreSimConfig]):
         else:
             self.work(goal, dt)
 
-    def work(self, goal: ServedGoal[Wait.Goal, Wait.Result, Wait.Feedback], dt: float) -> None:
+    def work(self, goal: sdk.ServedGoal[Wait.Goal, Wait.Result, Wait.Feedback], dt: float) -> None:
         """Work for one cycle and report how much is left."""
         if goal is not self.doing:
             self.doing = goal

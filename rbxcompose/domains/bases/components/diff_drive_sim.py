@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
+from rbxcompose import sdk
 from rbxcompose.base.geometry import Pose2, Transform3, Velocity2
 from rbxcompose.base.levels import Level
 from rbxcompose.domains.bases.twins import ABSURD, DiffDriveCore, DiffDriveSettings
@@ -15,49 +16,30 @@ from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.msgs.tf2_msgs import TFMessage
-from rbxcompose.sdk import (
-    Acceleration,
-    AngularAcceleration,
-    AngularSpeed,
-    Capability,
-    Component,
-    Config,
-    Drives,
-    Frequency,
-    In,
-    Live,
-    Out,
-    Port,
-    Setting,
-    Speed,
-    Time,
-    WritesFrame,
-    component,
-)
 
 ODOM = "odom"
 BASE = "base_footprint"
 
 
-class DiffDriveSimConfig(Config):
+class DiffDriveSimConfig(sdk.Config):
     """Limits of the base."""
 
-    max_speed: Annotated[Speed, Live()] = Field(0.5, gt=0)
+    max_speed: Annotated[sdk.Speed, sdk.Live()] = Field(0.5, gt=0)
     """Largest speed, forwards and backwards."""
-    max_turn_rate: Annotated[AngularSpeed, Live()] = Field(math.pi / 2, gt=0)
+    max_turn_rate: Annotated[sdk.AngularSpeed, sdk.Live()] = Field(math.pi / 2, gt=0)
     """Largest turn rate."""
-    acceleration: Annotated[Acceleration, Live()] = Field(1.0, gt=0)
+    acceleration: Annotated[sdk.Acceleration, sdk.Live()] = Field(1.0, gt=0)
     """Acceleration when speeding up and braking."""
-    turn_acceleration: Annotated[AngularAcceleration, Live()] = Field(3.0, gt=0)
+    turn_acceleration: Annotated[sdk.AngularAcceleration, sdk.Live()] = Field(3.0, gt=0)
     """Acceleration when starting and stopping to turn."""
-    command_timeout: Annotated[Time, Live()] = Field(0.5, gt=0)
+    command_timeout: Annotated[sdk.Time, sdk.Live()] = Field(0.5, gt=0)
     """The base brakes when no command arrives for this long."""
-    rate: Frequency = Field(50.0, ge=1, le=1000)
+    rate: sdk.Frequency = Field(50.0, ge=1, le=1000)
     """How often it moves and publishes; a low rate lets more robots run on a machine."""
 
 
-@component("diff_drive_sim")
-class DiffDriveSim(Component[DiffDriveSimConfig]):
+@sdk.component("diff_drive_sim")
+class DiffDriveSim(sdk.Component[DiffDriveSimConfig]):
     """A base with two driven wheels that follows `cmd_vel` within its limits and publishes its odometry.
 
     Example:
@@ -66,9 +48,9 @@ class DiffDriveSim(Component[DiffDriveSimConfig]):
 
     process = "world"
     simulated = True
-    cmd_vel = In(geometry.Twist, "cmd_vel", qos="command")
-    odom = Out(Odometry, "odom")
-    tf = Out(TFMessage, "/tf")
+    cmd_vel = sdk.In(geometry.Twist, "cmd_vel", qos="command")
+    odom = sdk.Out(Odometry, "odom")
+    tf = sdk.Out(TFMessage, "/tf")
 
     @classmethod
     def rate_of(cls, config: DiffDriveSimConfig) -> float:
@@ -76,24 +58,24 @@ class DiffDriveSim(Component[DiffDriveSimConfig]):
         return config.rate
 
     @classmethod
-    def ports(cls, config: DiffDriveSimConfig) -> dict[str, Port[Any]]:
+    def ports(cls, config: DiffDriveSimConfig) -> dict[str, sdk.Port[Any]]:
         """Return the ports, with the rate of the odometry."""
-        return super().ports(config) | {"odom": Out(Odometry, "odom", rate=config.rate).named("odom")}
+        return super().ports(config) | {"odom": sdk.Out(Odometry, "odom", rate=config.rate).named("odom")}
 
     @classmethod
-    def capabilities(cls, config: DiffDriveSimConfig) -> tuple[Capability, ...]:
+    def capabilities(cls, config: DiffDriveSimConfig) -> tuple[sdk.Capability, ...]:
         """Declare its limits and the frame that it moves."""
-        base = Drives(
+        base = sdk.Drives(
             "cmd_vel",
             "odom",
-            max_speed=Setting(config.max_speed, "max_speed"),
-            max_turn_rate=Setting(config.max_turn_rate, "max_turn_rate"),
-            drops_above=Setting(ABSURD),
-            stops_after=Setting(config.command_timeout, "command_timeout"),
-            acceleration=Setting(config.acceleration, "acceleration"),
-            turn_acceleration=Setting(config.turn_acceleration, "turn_acceleration"),
+            max_speed=sdk.Setting(config.max_speed, "max_speed"),
+            max_turn_rate=sdk.Setting(config.max_turn_rate, "max_turn_rate"),
+            drops_above=sdk.Setting(ABSURD),
+            stops_after=sdk.Setting(config.command_timeout, "command_timeout"),
+            acceleration=sdk.Setting(config.acceleration, "acceleration"),
+            turn_acceleration=sdk.Setting(config.turn_acceleration, "turn_acceleration"),
         )
-        return base, WritesFrame("tf", Setting(ODOM), Setting(BASE))
+        return base, sdk.WritesFrame("tf", sdk.Setting(ODOM), sdk.Setting(BASE))
 
     def configure(self) -> None:
         """Put the base at the origin of `odom`."""

@@ -9,49 +9,31 @@ from typing import Annotated
 
 from pydantic import Field
 
+from rbxcompose import sdk
 from rbxcompose.base.geometry import AT_REST, Pose2, Velocity2, yaw_of
 from rbxcompose.domains.bases.driving import GoToCore, GoToSettings, least_time
 from rbxcompose.msgs.geometry_msgs import PoseStamped, Twist, Vector3
 from rbxcompose.msgs.nav2_msgs import NavigateToPose
-from rbxcompose.sdk import (
-    Angle,
-    AngularSpeed,
-    Capability,
-    CommandsMotion,
-    Component,
-    Config,
-    Drives,
-    Length,
-    Live,
-    Looks,
-    Navigates,
-    Out,
-    ServedGoal,
-    ServesAction,
-    Setting,
-    Speed,
-    component,
-)
 
 MAP = "map"
 FARTHEST = 100_000.0  # [m] from the origin; no map is as large
 
 
-class GoToConfig(Config):
+class GoToConfig(sdk.Config):
     """How to drive."""
 
-    speed: Annotated[Speed, Live()] = Field(0.3, gt=0)
+    speed: Annotated[sdk.Speed, sdk.Live()] = Field(0.3, gt=0)
     """Largest speed forwards."""
-    turn_rate: Annotated[AngularSpeed, Live()] = Field(math.radians(60), gt=0)
+    turn_rate: Annotated[sdk.AngularSpeed, sdk.Live()] = Field(math.radians(60), gt=0)
     """Largest turn rate."""
-    tolerance: Annotated[Length, Live()] = Field(0.05, gt=0)
+    tolerance: Annotated[sdk.Length, sdk.Live()] = Field(0.05, gt=0)
     """How far from the goal the base may end."""
-    heading_tolerance: Annotated[Angle, Live()] = Field(math.radians(3), gt=0)
+    heading_tolerance: Annotated[sdk.Angle, sdk.Live()] = Field(math.radians(3), gt=0)
     """How far from the goal's heading it may end."""
 
 
-@component("go_to")
-class GoTo(Component[GoToConfig]):
+@sdk.component("go_to")
+class GoTo(sdk.Component[GoToConfig]):
     """Drives to a pose in `map`: turns to it, drives straight, turns to its heading.
 
     Example:
@@ -60,16 +42,16 @@ class GoTo(Component[GoToConfig]):
 
     rate = 20.0
     steps_for_goals = True
-    cmd_vel = Out(Twist, "cmd_vel", qos="command")
-    pose = Looks(source="base_footprint", target=MAP)
-    go_to = ServesAction(NavigateToPose, "go_to", claims="base")
+    cmd_vel = sdk.Out(Twist, "cmd_vel", qos="command")
+    pose = sdk.Looks(source="base_footprint", target=MAP)
+    go_to = sdk.ServesAction(NavigateToPose, "go_to", claims="base")
 
     @classmethod
-    def capabilities(cls, config: GoToConfig) -> tuple[Capability, ...]:
+    def capabilities(cls, config: GoToConfig) -> tuple[sdk.Capability, ...]:
         """Declare how fast it drives and how near it comes."""
-        speed, turn_rate = Setting(config.speed, "speed"), Setting(config.turn_rate, "turn_rate")
-        tolerance = Setting(config.tolerance, "tolerance")
-        return CommandsMotion("cmd_vel", speed, turn_rate), Navigates(
+        speed, turn_rate = sdk.Setting(config.speed, "speed"), sdk.Setting(config.turn_rate, "turn_rate")
+        tolerance = sdk.Setting(config.tolerance, "tolerance")
+        return sdk.CommandsMotion("cmd_vel", speed, turn_rate), sdk.Navigates(
             "go_to", tolerance, least_time=partial(fastest, settings_of(config))
         )
 
@@ -109,7 +91,7 @@ class GoTo(Component[GoToConfig]):
 
     def follow(
         self,
-        goal: ServedGoal[NavigateToPose.Goal, NavigateToPose.Result, NavigateToPose.Feedback],
+        goal: sdk.ServedGoal[NavigateToPose.Goal, NavigateToPose.Result, NavigateToPose.Feedback],
         pose: Pose2,
         dt: float,
     ) -> None:
@@ -137,7 +119,7 @@ class GoTo(Component[GoToConfig]):
         self.cmd_vel(Twist(linear=Vector3(x=velocity.linear), angular=Vector3(z=velocity.angular)))
 
 
-def fastest(settings: GoToSettings, start: Pose2, goal: Pose2, base: Drives | None) -> float:
+def fastest(settings: GoToSettings, start: Pose2, goal: Pose2, base: sdk.Drives | None) -> float:
     """Return the least time of a drive on a base [s]."""
     limits = (base.max_speed, base.max_turn_rate, base.acceleration, base.turn_acceleration) if base else (None,) * 4
     speed, turn_rate, acceleration, turn_acceleration = (limit.value if limit else math.inf for limit in limits)

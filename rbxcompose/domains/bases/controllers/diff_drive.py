@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from rbxcompose import sdk
 from rbxcompose.base.config import AngularJerk, Config, Jerk, JointName, LinkName
 from rbxcompose.base.geometry import Transform3, Velocity2
 from rbxcompose.domains.bases.wheels import ABSURD, BaseLimits, OdometryPolicy, WheelDrive, WheelGeometry, WheelOdometry
@@ -20,22 +21,6 @@ from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.msgs.tf2_msgs import TFMessage
-from rbxcompose.sdk import (
-    Acceleration,
-    AngularAcceleration,
-    AngularSpeed,
-    Capability,
-    Drives,
-    In,
-    Length,
-    Out,
-    Port,
-    RollsOn,
-    Setting,
-    Speed,
-    Time,
-    WritesFrame,
-)
 
 AVERAGED = 0.1  # [s], over which velocities are averaged
 JUMP = 2.0  # times the largest speed of a wheel: a servo that has started again counts from elsewhere
@@ -68,23 +53,23 @@ class DiffDriveConfig(ControllerConfig):
     """The joint of the left wheel; forwards is positive."""
     right: JointName
     """The joint of the right wheel; forwards is positive."""
-    wheel_radius: Length | None = Field(None, gt=0)
+    wheel_radius: sdk.Length | None = Field(None, gt=0)
     """Radius of the wheels."""
     ticks_per_metre: float | None = Field(None, gt=0)
     """Ticks of a wheel's servo for each metre of way, instead of a radius."""
-    wheel_distance: Length = Field(gt=0)
+    wheel_distance: sdk.Length = Field(gt=0)
     """Between the points where the wheels touch the ground."""
     commands: TopicName = "cmd_vel"
     """The topic of its commands."""
-    command_timeout: Time = Field(0.5, ge=0)
+    command_timeout: sdk.Time = Field(0.5, ge=0)
     """The base brakes when no command arrives for this long; 0 is never."""
-    max_speed: Speed = Field(0.5, gt=0)
+    max_speed: sdk.Speed = Field(0.5, gt=0)
     """Largest speed, forwards and backwards."""
-    max_turn_rate: AngularSpeed = Field(math.pi / 2, gt=0)
+    max_turn_rate: sdk.AngularSpeed = Field(math.pi / 2, gt=0)
     """Largest turn rate."""
-    acceleration: Acceleration = Field(1.0, gt=0)
+    acceleration: sdk.Acceleration = Field(1.0, gt=0)
     """Acceleration when speeding up and braking."""
-    turn_acceleration: AngularAcceleration = Field(3.0, gt=0)
+    turn_acceleration: sdk.AngularAcceleration = Field(3.0, gt=0)
     """Acceleration when starting and stopping to turn."""
     jerk: Jerk | None = Field(None, gt=0)
     """Largest change of the acceleration."""
@@ -115,38 +100,40 @@ class DiffDriveController(Controller[DiffDriveConfig]):
     topics = MappingProxyType({"commands": "commands", "odometry": "odometry.topic"})
 
     @classmethod
-    def ports(cls, name: str, config: DiffDriveConfig) -> dict[str, Port[Any]]:
+    def ports(cls, name: str, config: DiffDriveConfig) -> dict[str, sdk.Port[Any]]:
         """Return its commands, and what it publishes."""
         odometry = config.odometry
-        ports: dict[str, Port[Any]] = {
-            "commands": In(geometry.Twist, config.commands, qos="command"),
-            "odometry": Out(Odometry, odometry.topic),
+        ports: dict[str, sdk.Port[Any]] = {
+            "commands": sdk.In(geometry.Twist, config.commands, qos="command"),
+            "odometry": sdk.Out(Odometry, odometry.topic),
         }
-        return {**ports, "tf": Out(TFMessage, "/tf")} if odometry.tf else ports
+        return {**ports, "tf": sdk.Out(TFMessage, "/tf")} if odometry.tf else ports
 
     @classmethod
-    def capabilities(cls, name: str, config: DiffDriveConfig) -> tuple[Capability, ...]:
+    def capabilities(cls, name: str, config: DiffDriveConfig) -> tuple[sdk.Capability, ...]:
         """Declare its limits, its wheels and the frame that it moves."""
         odometry, timeout = config.odometry, config.command_timeout
-        base = Drives(
+        base = sdk.Drives(
             "commands",
             "odometry",
-            max_speed=Setting(config.max_speed, "max_speed"),
-            max_turn_rate=Setting(config.max_turn_rate, "max_turn_rate"),
-            drops_above=Setting(ABSURD),
-            stops_after=Setting(timeout or math.inf, "command_timeout"),
-            acceleration=Setting(config.acceleration, "acceleration"),
-            turn_acceleration=Setting(config.turn_acceleration, "turn_acceleration"),
+            max_speed=sdk.Setting(config.max_speed, "max_speed"),
+            max_turn_rate=sdk.Setting(config.max_turn_rate, "max_turn_rate"),
+            drops_above=sdk.Setting(ABSURD),
+            stops_after=sdk.Setting(timeout or math.inf, "command_timeout"),
+            acceleration=sdk.Setting(config.acceleration, "acceleration"),
+            turn_acceleration=sdk.Setting(config.turn_acceleration, "turn_acceleration"),
         )
         radius = config.wheel_radius
-        wheels = RollsOn(
-            Setting(config.left, "left"),
-            Setting(config.right, "right"),
-            Setting(config.wheel_distance, "wheel_distance"),
-            Setting(radius, "wheel_radius") if radius else None,
-            Setting(odometry.child, "odometry.child"),
+        wheels = sdk.RollsOn(
+            sdk.Setting(config.left, "left"),
+            sdk.Setting(config.right, "right"),
+            sdk.Setting(config.wheel_distance, "wheel_distance"),
+            sdk.Setting(radius, "wheel_radius") if radius else None,
+            sdk.Setting(odometry.child, "odometry.child"),
         )
-        frame = WritesFrame("tf", Setting(odometry.frame, "odometry.frame"), Setting(odometry.child, "odometry.child"))
+        frame = sdk.WritesFrame(
+            "tf", sdk.Setting(odometry.frame, "odometry.frame"), sdk.Setting(odometry.child, "odometry.child")
+        )
         if config.start == "inactive":
             return (wheels,)  # another one drives, which may have the same commands and frames
         return (base, wheels, frame) if odometry.tf else (base, wheels)
@@ -180,15 +167,9 @@ class DiffDriveController(Controller[DiffDriveConfig]):
             config.turn_jerk,
         )
         own = [wheel.rules.limits for wheel in self.wheels]
-        least = min(
-            (motion_limits.acceleration for motion_limits in own if motion_limits.acceleration is not None),
-            default=math.inf,
-        )
+        least = min((item.acceleration for item in own if item.acceleration is not None), default=math.inf)
         self.drive = WheelDrive(
-            rolling,
-            limits.of_wheels(rolling, least),
-            config.command_timeout,
-            min(motion_limits.speed for motion_limits in own),
+            rolling, limits.of_wheels(rolling, least), config.command_timeout, min(item.speed for item in own)
         )
         fastest = rolling.fastest(Velocity2(config.max_speed, config.max_turn_rate)) * radius
         policy = OdometryPolicy(config.odometry.variance_per_metre, JUMP * fastest, radius * tick, AVERAGED)

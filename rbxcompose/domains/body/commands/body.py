@@ -18,39 +18,15 @@ from rbxcompose.commands import options
 from rbxcompose.commands.console import FINDINGS, emit, has_colour, misused, refuse, table, write_report
 from rbxcompose.commands.formats.json_ import as_data
 from rbxcompose.commands.formats.text import render_text
-from rbxcompose.commands.layout import NotDrawnError
 from rbxcompose.commands.lookup import add_bus_options
+from rbxcompose.domains.body import source as bodies
+from rbxcompose.domains.body import text as texts
 from rbxcompose.domains.body.command_pose import sliders_of
 from rbxcompose.domains.body.description import Description
 from rbxcompose.domains.body.files import FORMATS as MESHES
 from rbxcompose.domains.body.meshes import LEAST_FACES, MissingLibraryError, Scale, SimplifiedMesh, simplify
 from rbxcompose.domains.body.model import Body
 from rbxcompose.domains.body.picture import draw
-from rbxcompose.domains.body.source import (
-    UNKNOWN,
-    DescribedBody,
-    Do,
-    add_source_options,
-    file_of,
-    given_options,
-    no_body,
-    read,
-    reading,
-    used,
-    using,
-    write,
-)
-from rbxcompose.domains.body.text import (
-    FORMATS,
-    JOINTS,
-    LINKS,
-    draw_graph,
-    extent_of,
-    joints_of,
-    links_of,
-    mass_of,
-    tree_of,
-)
 from rbxcompose.manifest.files import find, shown_name
 
 GROUP = "bodies and arms"
@@ -78,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     out = options.out_option("write it to this file")
     words = "lines, or a picture as a graph"
-    form = options.argument("--format", choices=(TEXT, *FORMATS), default=TEXT, help=words)
+    form = options.argument("--format", choices=(TEXT, *texts.FORMATS), default=TEXT, help=words)
     words = "write it to this file (default of a PDF: NAME.pdf)"
     out_or_pdf = options.out_option(words)
     picture = options.out_option("the picture (default: NAME.png)")
@@ -86,13 +62,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     joint = options.argument("--joint", action="append", default=[], metavar="NAME=POSITION", help=words)
     tree = "show which link hangs on which, by which joint"
     check = "report what is wrong with the body alone: findings RBX20.., or the errors that keep it from being read"
-    source = add_source_options
-    table: tuple[tuple[str, str, Do, tuple[options.Declare, ...]], ...] = (
-        ("show", "list links and joints with masses and limits", using(_show), (source,)),
-        ("tree", tree, using(_tree), (source, form, out_or_pdf)),
-        ("check", check, reading(_check), (source, options.add_json_option)),
-        ("expand", "print the URDF, with nothing of xacro left", using(_expand), (source, out)),
-        ("picture", "draw it as a PNG", using(_picture), (source, picture, joint)),
+    source = bodies.add_source_options
+    table: tuple[tuple[str, str, bodies.Do, tuple[options.Declare, ...]], ...] = (
+        ("show", "list links and joints with masses and limits", bodies.using(_show), (source,)),
+        ("tree", tree, bodies.using(_tree), (source, form, out_or_pdf)),
+        ("check", check, bodies.reading(_check), (source, options.add_json_option)),
+        ("expand", "print the URDF, with nothing of xacro left", bodies.using(_expand), (source, out)),
+        ("picture", "draw it as a PNG", bodies.using(_picture), (source, picture, joint)),
         ("simplify", _SIMPLIFY, _run, (_add_simplify_options,)),
         ("pose", _POSE, _pose, (_add_pose_options,)),
     )
@@ -108,40 +84,35 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Run the chosen action."""
-    return options.run_action(arguments)
+run = options.run_action
 
 
 def _show(arguments: argparse.Namespace, description: Description) -> int:
     body = description.body
-    emit(f"{extent_of(body)}\n")
-    emit(table([LINKS, *links_of(body)]))
+    emit(f"{texts.extent_of(body)}\n")
+    emit(table([texts.LINKS, *texts.links_of(body)]))
     emit("")
-    emit(table([JOINTS, *joints_of(body)]))
+    emit(table([texts.JOINTS, *texts.joints_of(body)]))
     return 0
 
 
 def _tree(arguments: argparse.Namespace, description: Description) -> int:
-    try:
-        content = _drawn(arguments.format, description)
-    except NotDrawnError as error:
-        return refuse(error.finding)
+    content = _drawn(arguments.format, description)
     if arguments.out is not None:
-        return write(Path(arguments.out), content)
+        return bodies.write(Path(arguments.out), content)
     if arguments.format == PDF:
-        return write(file_of(arguments, description, ".pdf"), content)
+        return bodies.write(bodies.file_of(arguments, description, ".pdf"), content)
     emit(content.decode().rstrip("\n"))
     return 0
 
 
 def _drawn(form: str, description: Description) -> bytes:
     if form == TEXT:
-        return "".join(f"{line}\n" for line in tree_of(description.body)).encode()
-    return draw_graph(description.body, form)
+        return "".join(f"{line}\n" for line in texts.tree_of(description.body)).encode()
+    return texts.draw_graph(description.body, form)
 
 
-def _check(arguments: argparse.Namespace, found: DescribedBody) -> int:
+def _check(arguments: argparse.Namespace, found: bodies.DescribedBody) -> int:
     report = about_body(found, arguments.path)
     if found.description is None:
         return _refused(report, found.sources, arguments.json)
@@ -153,13 +124,13 @@ def _check(arguments: argparse.Namespace, found: DescribedBody) -> int:
     return FINDINGS if report.has_errors else 0
 
 
-def about_body(found: DescribedBody, path: str) -> Report:
+def about_body(found: bodies.DescribedBody, path: str) -> Report:
     """Return the findings about the body; if it could not be read for another reason, all errors."""
     own = Report([finding for finding in found.report if finding.code.startswith(_FAMILY)])
     if found.description is None and not own.has_errors:
         own.extend(finding for finding in found.report if finding.severity is Severity.ERROR)
         if not own.has_errors:
-            own.add(no_body(path))
+            own.add(bodies.no_body(path))
     return own
 
 
@@ -167,7 +138,7 @@ def summary_of(body: Body, report: Report) -> str:
     """Return a line: how large the body is, and how many errors and warnings it has."""
     errors, warnings = _counts(report)
     counted = f"{errors} error{'' if errors == 1 else 's'}, {warnings} warning{'' if warnings == 1 else 's'}"
-    return f"{extent_of(body)}: {counted}"
+    return f"{texts.extent_of(body)}: {counted}"
 
 
 def _findings(report: Report, sources: Sources) -> str:
@@ -190,7 +161,7 @@ def _data(body: Body, report: Report, sources: Sources) -> dict[str, object]:
     return {
         "links": len(body.links),
         "joints": len(body.moving),
-        "mass": mass_of(body),
+        "mass": texts.mass_of(body),
         "errors": errors,
         "warnings": warnings,
         "findings": [as_data(finding, sources) for finding in report],
@@ -206,7 +177,7 @@ def _expand(arguments: argparse.Namespace, description: Description) -> int:
     if arguments.out is None:
         emit(description.published.rstrip("\n"))
         return 0
-    return write(Path(arguments.out), description.published.encode())
+    return bodies.write(Path(arguments.out), description.published.encode())
 
 
 def _picture(arguments: argparse.Namespace, description: Description) -> int:
@@ -218,7 +189,7 @@ def _picture(arguments: argparse.Namespace, description: Description) -> int:
         return misused("body", str(error))
     except MissingLibraryError as error:
         return refuse(error.finding)
-    return write(file_of(arguments, description, ".png"), picture)
+    return bodies.write(bodies.file_of(arguments, description, ".png"), picture)
 
 
 def _position(body: Body, written: str) -> tuple[str, float]:
@@ -230,7 +201,7 @@ def _position(body: Body, written: str) -> tuple[str, float]:
 
 
 def _add_simplify_options(parser: argparse.ArgumentParser) -> None:
-    add_source_options(parser, "; or a mesh: .stl, .obj or .dae")
+    bodies.add_source_options(parser, "; or a mesh: .stl, .obj or .dae")
     amount = parser.add_mutually_exclusive_group()
     words = f"how many of the triangles are left, at most 1 (default: {_RATIO}); each mesh keeps at least {LEAST_FACES}"
     amount.add_argument("--ratio", type=_ratio, default=_RATIO, metavar="R", help=words)
@@ -262,10 +233,10 @@ def _run(arguments: argparse.Namespace) -> int:
         path = find(arguments.path)
         if isinstance(path, Finding):
             return refuse(path)
-        if option := next(given_options(arguments), "--mesh" if arguments.mesh else ""):
+        if option := next(bodies.given_options(arguments), "--mesh" if arguments.mesh else ""):
             return misused("body", f"{option} is for bodies: PATH is a mesh itself")
         return _written(arguments, {shown_name(path): path}, {shown_name(path): {UNSCALED}})
-    return read(arguments, lambda same, found: used(same, found, _meshes_of))
+    return bodies.read(arguments, lambda same, found: bodies.used(same, found, _meshes_of))
 
 
 def _meshes_of(arguments: argparse.Namespace, description: Description) -> int:
@@ -274,7 +245,7 @@ def _meshes_of(arguments: argparse.Namespace, description: Description) -> int:
         found = {name: path for name, path in description.meshes.items() if wanted in (name, path.name)}
         if not found:
             message = f"the body has no mesh '{plain(wanted)}'"
-            return refuse(UNKNOWN.misspelt(None, message, wanted, [*description.meshes], "meshes"))
+            return refuse(bodies.UNKNOWN.misspelt(None, message, wanted, [*description.meshes], "meshes"))
         chosen |= found
     if not chosen:
         return misused("body", "the body has no meshes to simplify")

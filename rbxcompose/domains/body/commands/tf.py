@@ -18,7 +18,7 @@ from rbxcompose.base.printable import plain
 from rbxcompose.base.transforms import SPAN, TransformError, TransformTree, UnknownFrameError
 from rbxcompose.base.units import ANGLE, LENGTH, TIME
 from rbxcompose.commands import options
-from rbxcompose.commands.console import NotDoneError, emit, refuse
+from rbxcompose.commands.console import emit, refuse
 from rbxcompose.commands.guest import NAME, NO_NAME, NOBODY, Guest, visit
 from rbxcompose.commands.lookup import BusPlace, add_bus_options, find_place
 from rbxcompose.commands.messages import shown, to_json
@@ -193,16 +193,13 @@ def publish_static(arguments: argparse.Namespace) -> int:
     parent, child = arguments.parent, arguments.frame
     turned = quaternion_from_rpy(arguments.roll, arguments.pitch, arguments.yaw)
     pose = Transform3((arguments.x, arguments.y, arguments.z), turned)
-    try:
-        place = find_place(arguments)
-        with Guest(place) as looking:  # through the router, which knows everyone
-            frames = ReceivedFrames(looking)
-            looking.run(lambda: frames.is_whole, arguments.timeout)
-        if refusal := _refusal(frames, parent, child, pose):
-            return refuse(NO_PLACE.at(None, refusal))
-        return _hold(place, frames, parent, child, pose)
-    except NotDoneError as error:
-        return refuse(error.finding)
+    place = find_place(arguments)
+    with Guest(place) as looking:  # through the router, which knows everyone
+        frames = ReceivedFrames(looking)
+        looking.run(lambda: frames.is_whole, arguments.timeout)
+    if refusal := _refusal(frames, parent, child, pose):
+        return refuse(NO_PLACE.at(None, refusal))
+    return _hold(place, frames, parent, child, pose)
 
 
 def _refusal(frames: ReceivedFrames, parent: str, child: str, pose: Transform3) -> str:

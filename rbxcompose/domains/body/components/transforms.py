@@ -8,12 +8,10 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator
 
-from rbxcompose.base.findings import Finding, once
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.body.model import Body, BodyJoint
 from rbxcompose.domains.body.urdf import body_of as urdf_body
-from rbxcompose.domains.body.urdf import read_body
-from rbxcompose.domains.body.xml_reader import read_urdf
+from rbxcompose.domains.body.urdf import read_text
 from rbxcompose.msgs.builtin_interfaces import Time
 from rbxcompose.msgs.geometry_msgs import Quaternion, Transform, TransformStamped, Vector3
 from rbxcompose.msgs.sensor_msgs import JointState
@@ -32,12 +30,9 @@ MOVING: dict[str, Port[Any]] = {
 }
 
 
-@once
 def _checked(urdf: str) -> str:
     """Return a URDF; raise ValueError with the first mistake that keeps it from being one."""
-    root = read_urdf(urdf, "urdf") if urdf else None
-    mistakes = [root] if isinstance(root, Finding) else read_body(root)[1] if root is not None else []
-    if mistakes:
+    if urdf and (mistakes := read_text(urdf)[1]):
         raise ValueError(mistakes[0].message)
     return urdf
 
@@ -76,9 +71,7 @@ class Transforms(Component[TransformsConfig]):
     def capabilities(cls, config: TransformsConfig) -> tuple[Capability, ...]:
         """Declare the frames that it writes."""
         body = body_of(config.urdf)
-        joints = [
-            WritesFrame(_port(joint), Setting(joint.parent), Setting(joint.child)) for joint in body.joints.values()
-        ]
+        joints = [WritesFrame(_port(item), Setting(item.parent), Setting(item.child)) for item in body.joints.values()]
         return (WritesFrame("tf_static", Setting(config.map, "map"), Setting(config.odom, "odom")), *joints)
 
     def configure(self) -> None:
@@ -108,11 +101,7 @@ class Transforms(Component[TransformsConfig]):
                 moved[name] = float(position)
         if moved:
             self.positions |= moved
-            affected = [
-                body_joint
-                for body_joint in self.moving
-                if (body_joint.mimic.joint if body_joint.mimic else body_joint.name) in moved
-            ]
+            affected = [item for item in self.moving if (item.mimic.joint if item.mimic else item.name) in moved]
             names, measured = [body_joint.name for body_joint in affected], to_nanoseconds(message.header.stamp)
             lag = self.stamp - measured if measured and abs(self.stamp - measured) <= MOST_LAG else 0
             self.reported.update(names)

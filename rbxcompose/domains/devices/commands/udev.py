@@ -25,7 +25,7 @@ from rbxcompose.commands.formats.json_ import as_data
 from rbxcompose.commands.formats.text import render_text
 from rbxcompose.commands.importing.manifest_text import key
 from rbxcompose.commands.options import Declare, Subcommand, add_actions, add_json_option, argument, run_action
-from rbxcompose.commands.targets import add_layer_options, add_path_argument, compiled, only_path, robot_path
+from rbxcompose.commands.targets import add_layer_options, add_path_argument, compiled, robot_path
 from rbxcompose.domains.devices import udev
 from rbxcompose.domains.devices.openable import look_at
 from rbxcompose.domains.devices.sections.devices import devices
@@ -61,16 +61,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_actions(
         parser,
-        (
-            Subcommand(name, about, do, (*shared, *own), f"{about[0].upper()}{about[1:]}.")
-            for name, about, do, own in table
-        ),
+        (Subcommand(name, item, do, (*shared, *own), f"{item[0].upper()}{item[1:]}.") for name, item, do, own in table),
     )
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Run the chosen action."""
-    return run_action(arguments)
+run = run_action
 
 
 Do = Callable[[argparse.Namespace], int]
@@ -110,8 +105,7 @@ def _group(text: str) -> str:
 
 def devices_of(arguments: argparse.Namespace) -> RobotDevices | None:
     """Return the devices of the robot that is meant; None after telling why there are none."""
-    path = robot_path(arguments.path)
-    return None if path is None else read_devices(path, arguments)
+    return read_devices(robot_path(arguments.path), arguments)
 
 
 def read_devices(path: str, arguments: argparse.Namespace) -> RobotDevices | None:
@@ -149,7 +143,7 @@ def _scan(arguments: argparse.Namespace) -> int:
 def _own() -> str | None:
     """Return the only robot of this folder, if it has one: what is plugged in is worth knowing without any."""
     try:
-        return only_path(may_run=False)
+        return robot_path(None, may_run=False)
     except console.NotDoneError:
         return None
 

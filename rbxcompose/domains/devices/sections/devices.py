@@ -13,7 +13,6 @@ from rbxcompose.base.findings import Finding, Related, Severity, Span, kind
 from rbxcompose.domains.devices.usb import USB_PORT, UsbDevice
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading
-from rbxcompose.manifest.tree import key_span
 
 NOT_DESCRIBED = kind("RBX2260")
 SAME_DEVICE = kind("RBX2261")
@@ -99,7 +98,7 @@ def devices(reading: Reading[DeviceModel]) -> dict[str, DeviceModel]:
             port: dev:usb2dynamixel
     """
     found = reading.entries()
-    spans = {name: key_span(reading.contents.root, ("devices", name)) for name in found}
+    spans = {name: reading.key("devices", name) for name in found}
     reading.report.extend(_mistakes(found, spans))
     return found
 

@@ -50,9 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_actions(parser, described, metavar="ACTION")
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Run the chosen subcommand."""
-    return run_action(arguments)
+run = run_action
 
 
 def _tree(arguments: argparse.Namespace) -> int:
@@ -187,9 +185,7 @@ def _values(line: requests.TreeLine, colour: bool, width: int) -> Iterator[str]:
 
 def change_line(change: requests.LevelChange, colour: bool) -> str:
     """Return a change as a line: `   12.30  /power  OK -> WARN  battery: Medium battery`."""
-    old, new = (
-        f"{_COLOURS[level]}{level.name}{_RESET}" if colour else level.name for level in (change.old, change.new)
-    )
+    old, new = (f"{_COLOURS[item]}{item.name}{_RESET}" if colour else item.name for item in (change.old, change.new))
     cause = "" if change.cause == change.new.name else plain(change.cause, _LONGEST)
     return f"{change.time:8.2f}  {plain(change.path)}  {old} -> {new}  {cause}".rstrip()
 

@@ -72,9 +72,8 @@ class NetworkMonitor(HostMonitor[NetworkMonitorConfig]):
         text = f"{received:.2f} MiB/s in, {sent:.2f} MiB/s out"
         is_bad = faults > self.config.most_faults
         values = {"faults": now.faults, "link": f"{speed} Mbit/s" if speed else "unknown"}
-        self.status(
-            Level.WARN if is_bad else Level.OK, f"{faults:.0f} faulty packets a second" if is_bad else text, **values
-        )
+        text = f"{faults:.0f} faulty packets a second" if is_bad else text
+        self.status(Level.WARN if is_bad else Level.OK, text, **values)
 
 
 def _pairs(now: Traffic, before: Traffic) -> tuple[tuple[int, int], tuple[int, int]]:

@@ -86,8 +86,7 @@ def read_aggregators(file: ForeignFile, report: Report) -> list[ForeignAggregato
         report.add(OTHER_PROGRAM.at(file.root.span, words))
         return []
     for node in others:
-        words = f"'{plain(node.node, 60)}' is not carried over: it has no analyzers"
-        report.add(NOT_CARRIED_OVER.at(node.span, words))
+        report.add(NOT_CARRIED_OVER.at(node.span, f"'{plain(node.node, 60)}' is not carried over: it has no analyzers"))
     return [_aggregator(node, report) for node in found]
 
 
@@ -221,11 +220,7 @@ def diagnostics(files: Sequence[ForeignFile], name: str, report: Report) -> str:
 def _settings(aggregators: Sequence[ForeignAggregator], report: Report) -> Iterator[Row]:
     rate = _agreed([aggregator.rate for aggregator in aggregators if aggregator.rate], "pub_rate", report)
     base = _agreed([aggregator.base for aggregator in aggregators if aggregator.base], "base path", report)
-    other = _agreed(
-        [aggregator.other_is_error for aggregator in aggregators if aggregator.other_is_error],
-        "other_as_errors",
-        report,
-    )
+    other = _agreed([item.other_is_error for item in aggregators if item.other_is_error], "other_as_errors", report)
     if rate:
         yield row(1, f"rate: {quantity(rate.value, 'Hz')}", f"{place(rate.span)}: pub_rate")
     if base and _path(base.value):

@@ -49,9 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_actions(parser, actions, add_asking_options, metavar="ls|why|select|lock|...")
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Run the chosen subcommand."""
-    return run_action(arguments)
+run = run_action
 
 
 def _names(folder: RobotFolder) -> list[str]:
@@ -76,8 +74,7 @@ def _chosen(arguments: argparse.Namespace, folder: RobotFolder) -> tuple[str, li
 def _only_mux(arguments: argparse.Namespace, folder: RobotFolder) -> str:
     mux, others = _chosen(arguments, folder)
     if others:
-        message = f"there is no mux '{others[0]}'; {suggest(others[0], [mux], 'muxes')}"
-        raise NotDoneError(REFUSED.at(None, message))
+        raise NotDoneError(REFUSED.at(None, f"there is no mux '{others[0]}'; {suggest(others[0], [mux], 'muxes')}"))
     return mux
 
 
@@ -128,11 +125,8 @@ def _watch(arguments: argparse.Namespace) -> int:
     while True:
         changes = answer_of(folder, requests.ReadMuxChanges(mux, after))
         for change in changes if after else changes[-1:]:
-            emit(
-                json.dumps({"mux": mux, **to_data(change)})
-                if arguments.json
-                else f"{change.time:9.2f} s  {change.text}"
-            )
+            line = f"{change.time:9.2f} s  {change.text}"
+            emit(json.dumps({"mux": mux, **to_data(change)}) if arguments.json else line)
             shown += 1
             if arguments.count is not None and shown >= arguments.count:
                 return 0

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Iterable, Mapping
 from typing import Any
 
 from rbxcompose.base.findings import suggest
-from rbxcompose.base.requests import Refused, answers
+from rbxcompose.base.requests import Command, Refused, answers
 from rbxcompose.domains.muxes import requests
 from rbxcompose.domains.muxes.account import lock_states, states_of, why
 from rbxcompose.domains.muxes.config import NOBODY, MuxConfig, MuxInputConfig, core_of, handover_limits, source_of
 from rbxcompose.domains.muxes.core import NEVER
-from rbxcompose.domains.muxes.orders import MuxOrders, input_at, noted
+from rbxcompose.domains.muxes.requests import AddMuxInput, DeleteMuxInput, LockMuxInputs, SelectMuxInput
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.fields import is_finite
 from rbxcompose.msgs.std_msgs import Bool, Empty, String
@@ -21,6 +21,67 @@ from rbxcompose.msgs.topic_tools_interfaces import MuxAdd, MuxDelete, MuxList, M
 from rbxcompose.msgs.types import Message
 from rbxcompose.sdk import Capability, Component, ComponentNoted, Forwards, In, Level, Out, Port, Serves, component
 from rbxcompose.sdk.capabilities import LocksInSilence, Setting
+
+
+class MuxOrders:
+    """The orders that still hold, in an order in which they can be repeated."""
+
+    def __init__(self) -> None:
+        self.added: dict[str, AddMuxInput] = {}
+        self._deleted: dict[str, DeleteMuxInput] = {}
+        self._locked: dict[str, LockMuxInputs] = {}
+        self._selected: SelectMuxInput | None = None
+
+    def take_over(self, old: MuxOrders, inputs: Collection[str]) -> None:
+        """Continue with those of another plan that still have a meaning; what it deleted is up to the new plan."""
+        self._locked = {name: mux_inputs for name, mux_inputs in old._locked.items() if name in inputs}
+        if old._selected is not None and old._selected.input in inputs:
+            self._selected = old._selected
+
+    def keep(self, order: Command) -> None:
+        """Keep an order, instead of earlier ones about the same."""
+        match order:
+            case AddMuxInput():
+                self.added[order.input] = order
+                self._deleted.pop(order.input, None)
+            case DeleteMuxInput():
+                if self.added.pop(order.input, None) is None:
+                    self._deleted[order.input] = order
+                self._locked.pop(order.input, None)
+            case LockMuxInputs():
+                self._locked |= {name: LockMuxInputs(order.component, (name,), order.seconds) for name in order.inputs}
+            case SelectMuxInput():
+                self._selected = order
+
+    def forget_locks(self, locked: Collection[str]) -> bool:
+        """Forget the locks that have ended, of all but these inputs; return whether there were any."""
+        ended = self._locked.keys() - locked
+        for name in ended:
+            del self._locked[name]
+        return bool(ended)
+
+    @property
+    def all(self) -> tuple[Command, ...]:
+        """Return all that hold."""
+        selected = (self._selected,) if self._selected else ()
+        return (*self.added.values(), *selected, *self._deleted.values(), *self._locked.values())
+
+
+def input_at(text: str, topics: Mapping[str, str]) -> str | None:
+    """Return the input that has this name or topic; a full topic may begin with the namespace of the robot."""
+    bare = text.strip("/")
+    for name, topic in topics.items():
+        own = topic.strip("/")
+        if text == name or bare == own or (text.startswith("/") and bare.endswith(f"/{own}")):
+            return name
+    return None
+
+
+def noted(locked: Iterable[tuple[str, float]]) -> str:
+    """Return what is locked by hand, and until which robot time [s]; empty if nothing is."""
+    locks = [name if until == float("inf") else f"{name} until {until:.1f} s" for name, until in locked]
+    return f"locked by hand: {', '.join(locks)}" if locks else ""
+
 
 LOCK = "lock_"  # prefix of the ports of locks
 ANNOUNCED = "announced"  # the port at which it publishes who holds the output
@@ -261,16 +322,13 @@ class Mux(Component[MuxConfig]):
 
     def on_add(self, request: MuxAdd.Request) -> MuxAdd.Response:
         """Add a topic as an input."""
-        topic = request.topic
-        return MuxAdd.Response(
-            success=self.does(lambda: self.add(requests.AddMuxInput(self.name, topic.strip("/"), topic)))
-        )
+        order = requests.AddMuxInput(self.name, request.topic.strip("/"), request.topic)
+        return MuxAdd.Response(success=self.does(lambda: self.add(order)))
 
     def on_delete(self, request: MuxDelete.Request) -> MuxDelete.Response:
         """Delete an input by its name or topic."""
-        return MuxDelete.Response(
-            success=self.does(lambda: self.delete(requests.DeleteMuxInput(self.name, request.topic)))
-        )
+        order = requests.DeleteMuxInput(self.name, request.topic)
+        return MuxDelete.Response(success=self.does(lambda: self.delete(order)))
 
     def on_list(self, request: MuxList.Request) -> MuxList.Response:
         """Return the topics of all inputs."""
@@ -371,8 +429,7 @@ class Mux(Component[MuxConfig]):
 
 
 def _input(name: str, topic: str, config: MuxConfig, max_rate: float | None) -> In[Any]:
-    message = registry.message(config.message)
-    return In(message, topic, qos="command", is_open=True, max_rate=max_rate).named(name)
+    return In(registry.message(config.message), topic, qos="command", is_open=True, max_rate=max_rate).named(name)
 
 
 def _services(output: str) -> dict[str, Port[Any]]:

@@ -7,14 +7,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field, replace
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.findings import Finding, Related, Report, Severity, Span, kind
+from rbxcompose.base.findings import Related, Report, Severity, Span, kind
 from rbxcompose.base.printable import plain
 from rbxcompose.commands.importing.foreign_files import ForeignFile, ForeignMap, FreeNames, Given
 from rbxcompose.commands.importing.importer import DISAGREES, NOT_CARRIED_OVER, OTHER_PROGRAM, importer
 from rbxcompose.commands.importing.manifest_text import Row, flow, header, place, quantity, row, section
 from rbxcompose.commands.importing.ros_parameters import NodeParameters, parameters_with
 from rbxcompose.domains.muxes.words import OWN_NAMES
-from rbxcompose.manifest.tree import MappingNode, SequenceNode, TreeNode
+from rbxcompose.manifest.tree import MappingNode, SequenceNode
 from rbxcompose.manifest.validate import OUT_OF_RANGE, WRONG_TYPE, label_of
 
 TWIST_MUX, YOCS = "twist_mux", "yocs"
@@ -113,17 +113,13 @@ def _entries(given: ForeignMap, key: str, what: str) -> Iterator[tuple[str, Fore
     given.places(key)  # it is known
     for item in node.items:
         if not isinstance(item, MappingNode):
-            given.add(_no_map(item, what))
+            given.add(WRONG_TYPE.at(item.span, f"each {what} must be a map of keys and values", label=label_of(item)))
             continue
         foreign_map = ForeignMap(item, f"this {what}", item.span, given.report)
         name = foreign_map.needs("name", foreign_map.text("name"))
         if name is not None:
             foreign_map.what = f"{what} '{plain(name.value, 60)}'"
             yield name.value, foreign_map
-
-
-def _no_map(item: TreeNode, what: str) -> Finding:
-    return WRONG_TYPE.at(item.span, f"each {what} must be a map of keys and values", label=label_of(item))
 
 
 def _source(name: str, foreign_map: ForeignMap, program: str) -> ForeignSource | None:

@@ -6,44 +6,31 @@ from typing import Annotated
 
 from pydantic import Field
 
+from rbxcompose import sdk
 from rbxcompose.base.levels import Level
 from rbxcompose.domains.power.battery_twin import BatteryCore, BatterySettings
 from rbxcompose.msgs.rbxcompose_msgs import SetBatteryLevel
 from rbxcompose.msgs.std_msgs import Float32
-from rbxcompose.sdk import (
-    Capability,
-    Component,
-    Config,
-    Drains,
-    Live,
-    Out,
-    Ratio,
-    Refused,
-    Serves,
-    Setting,
-    Time,
-    component,
-)
 
 PERCENT = 100.0  # a `battery_level` message counts from 0 to 100
 DIGITS = 6  # of a percentage; further ones are rounding errors, which would put 80 % below 80 %
 
 
-class BatterySimConfig(Config):
+class BatterySimConfig(sdk.Config):
     """How fast the battery drains, and when it warns."""
 
-    runtime: Annotated[Time, Live()] = Field(gt=0)
+    runtime: Annotated[sdk.Time, sdk.Live()] = Field(gt=0)
     """Time from full to empty."""
-    initial: Ratio = Field(1.0, ge=0, le=1)
+    initial: sdk.Ratio = Field(1.0, ge=0, le=1)
     """Charge at the start."""
-    warn: Annotated[Ratio, Live()] = Field(0.5, ge=0, le=1)
+    warn: Annotated[sdk.Ratio, sdk.Live()] = Field(0.5, ge=0, le=1)
     """Below this charge its status is WARN."""
-    error: Annotated[Ratio, Live()] = Field(0.2, ge=0, le=1)
+    error: Annotated[sdk.Ratio, sdk.Live()] = Field(0.2, ge=0, le=1)
     """Below this charge its status is ERROR."""
 
 
-@component("battery_sim")
-class BatterySim(Component[BatterySimConfig]):
+@sdk.component("battery_sim")
+class BatterySim(sdk.Component[BatterySimConfig]):
     """A battery that drains evenly from full to empty over `runtime`; a charger can set its level.
 
     Example:
@@ -53,15 +40,15 @@ class BatterySim(Component[BatterySimConfig]):
     rate = 1.0
     process = "world"
     simulated = True
-    battery_level = Out(Float32, "battery_level", unit="%", rate=rate)
-    set_battery_level = Serves(SetBatteryLevel, "set_battery_level", unit="%")
+    battery_level = sdk.Out(Float32, "battery_level", unit="%", rate=rate)
+    set_battery_level = sdk.Serves(SetBatteryLevel, "set_battery_level", unit="%")
 
     @classmethod
-    def capabilities(cls, config: BatterySimConfig) -> tuple[Capability, ...]:
+    def capabilities(cls, config: BatterySimConfig) -> tuple[sdk.Capability, ...]:
         """Declare that it is a battery."""
-        runtime = Setting(config.runtime, "runtime")
-        warn, error = Setting(config.warn, "warn"), Setting(config.error, "error")
-        return (Drains("battery_level", runtime, warn, error),)
+        runtime = sdk.Setting(config.runtime, "runtime")
+        warn, error = sdk.Setting(config.warn, "warn"), sdk.Setting(config.error, "error")
+        return (sdk.Drains("battery_level", runtime, warn, error),)
 
     def configure(self) -> None:
         """Fill the battery."""
@@ -85,7 +72,7 @@ class BatterySim(Component[BatterySimConfig]):
     def on_set_battery_level(self, request: SetBatteryLevel.Request) -> SetBatteryLevel.Response:
         """Set the charge, given from 0 to 100; refuse one out of range."""
         if refusal := self.core.set(request.value / PERCENT):
-            raise Refused(refusal)
+            raise sdk.Refused(refusal)
         self.info(f"set to {request.value:.0f} %")
         self.publish()
         return SetBatteryLevel.Response()

@@ -6,41 +6,26 @@ from functools import partial
 
 from pydantic import Field
 
+from rbxcompose import sdk
 from rbxcompose.msgs.rbxcompose_msgs import Recharge, SetBatteryLevel
 from rbxcompose.msgs.std_msgs import Float32
-from rbxcompose.sdk import (
-    Calls,
-    Capability,
-    Charges,
-    Component,
-    Config,
-    In,
-    Length,
-    Looks,
-    PlaceName,
-    Pose2,
-    Reply,
-    ServesAction,
-    Setting,
-    component,
-)
 
 FULL = 100.0  # [%]
 NEARLY_FULL = 99.0  # [%] a level from here on counts as full: the battery drains even while it reports
 PATIENCE = 10.0  # [s] for the battery to report its level
 
 
-class ChargerConfig(Config):
+class ChargerConfig(sdk.Config):
     """Where the dock is."""
 
-    dock: PlaceName
+    dock: sdk.PlaceName
     """The place where the robot can be charged."""
-    reach: Length = Field(0.2, gt=0)
+    reach: sdk.Length = Field(0.2, gt=0)
     """How near to the dock the robot must be."""
 
 
-@component("charger")
-class Charger(Component[ChargerConfig]):
+@sdk.component("charger")
+class Charger(sdk.Component[ChargerConfig]):
     """Charges the battery of a robot at the dock; away from the dock, the goal is refused.
 
     Example:
@@ -49,16 +34,16 @@ class Charger(Component[ChargerConfig]):
 
     rate = 10.0
     steps_for_goals = True
-    pose = Looks(source="base_footprint", target="map")
-    battery_level = In(Float32, "battery_level", unit="%")
-    set_battery_level = Calls(SetBatteryLevel, "set_battery_level")
-    recharge = ServesAction(Recharge, "recharge", claims="base")
+    pose = sdk.Looks(source="base_footprint", target="map")
+    battery_level = sdk.In(Float32, "battery_level", unit="%")
+    set_battery_level = sdk.Calls(SetBatteryLevel, "set_battery_level")
+    recharge = sdk.ServesAction(Recharge, "recharge", claims="base")
 
     @classmethod
-    def capabilities(cls, config: ChargerConfig) -> tuple[Capability, ...]:
+    def capabilities(cls, config: ChargerConfig) -> tuple[sdk.Capability, ...]:
         """Declare that it charges at the dock until the battery is nearly full."""
-        dock, reach = Setting(config.dock, "dock"), Setting(config.reach, "reach")
-        return (Charges("recharge", dock, reach, until=Setting(NEARLY_FULL / FULL)),)
+        dock, reach = sdk.Setting(config.dock, "dock"), sdk.Setting(config.reach, "reach")
+        return (sdk.Charges("recharge", dock, reach, until=sdk.Setting(NEARLY_FULL / FULL)),)
 
     def configure(self) -> None:
         """Start without a goal."""
@@ -73,7 +58,7 @@ class Charger(Component[ChargerConfig]):
         dock, pose = self.config.dock, self.pose.now()
         if pose is None:
             return "the robot's position is unknown"
-        away = pose.distance(Pose2(dock.x, dock.y))
+        away = pose.distance(sdk.Pose2(dock.x, dock.y))
         if away > self.config.reach:
             return f"the robot is {away:.2f} m away from '{dock.name}'"
         return ""
@@ -100,7 +85,7 @@ class Charger(Component[ChargerConfig]):
         elif self.now >= self.deadline:
             goal.aborted(f"the battery reported no level for {PATIENCE:.0f} s")
 
-    def answered(self, goal: object, reply: Reply[SetBatteryLevel.Response]) -> None:
+    def answered(self, goal: object, reply: sdk.Reply[SetBatteryLevel.Response]) -> None:
         """Handle the battery's answer, unless it concerns a goal that has ended."""
         if goal is self.charging:
             self.error, self.is_set = reply.error, not reply.error

@@ -12,17 +12,11 @@ from rbxcompose.base.units import RATIO, UnitError, to_si
 from rbxcompose.commands.console import NotDoneError, emit, table
 from rbxcompose.commands.lookup import REFUSED, add_asking_options, answer_of, find_robot, known_state, show_answer
 from rbxcompose.commands.options import Subcommand, add_actions, argument, run_action
-from rbxcompose.domains.servos.controller_manager import (
-    BUS,
-    ControllerState,
-    ListControllers,
-    ScaleMotion,
-    SwitchControllers,
-)
+from rbxcompose.domains.servos import controller_manager
 from rbxcompose.runtime.folder import RobotFolder
 
 GROUP = "drive"
-ON_SYSTEM = BUS
+ON_SYSTEM = controller_manager.BUS
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -46,17 +40,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_actions(parser, actions, add_asking_options)
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Run the chosen subcommand."""
-    return run_action(arguments)
+run = run_action
 
 
-def _listed(folder: RobotFolder) -> Iterator[tuple[str, ControllerState]]:
+def _listed(folder: RobotFolder) -> Iterator[tuple[str, controller_manager.ControllerState]]:
     """Yield the controllers of a robot, each with its bus."""
     state = known_state(folder)
     for component in state.components if state else ():
-        if component.type == BUS:
-            for one in answer_of(folder, ListControllers(component.name)):
+        if component.type == controller_manager.BUS:
+            for one in answer_of(folder, controller_manager.ListControllers(component.name)):
                 yield component.name, one
 
 
@@ -67,14 +59,12 @@ def _ls(arguments: argparse.Namespace) -> int:
     elif not found:
         emit("this robot has no controllers")
     else:
-        rows = [
-            (state.name, state.type, _state(state), bus, ", ".join(state.joints), state.note) for bus, state in found
-        ]
+        rows = [(item.name, item.type, _state(item), bus, ", ".join(item.joints), item.note) for bus, item in found]
         emit(table([("name", "type", "state", "bus", "joints", ""), *rows]))
     return 0
 
 
-def _state(state: ControllerState) -> str:
+def _state(state: controller_manager.ControllerState) -> str:
     return "active" if state.is_active else "inactive"
 
 
@@ -90,7 +80,7 @@ def _switch(arguments: argparse.Namespace) -> int:
             raise NotDoneError(REFUSED.at(None, message))
     if len({buses[name] for name in names}) > 1:
         raise NotDoneError(REFUSED.at(None, "these controllers are on different buses: switch those of one at a time"))
-    request = SwitchControllers(buses[names[0]], tuple(arguments.on), tuple(arguments.off))
+    request = controller_manager.SwitchControllers(buses[names[0]], tuple(arguments.on), tuple(arguments.off))
     show_answer(arguments, folder, answer_of(folder, request))
     return 0
 
@@ -105,5 +95,9 @@ def _speed(arguments: argparse.Namespace) -> int:
         share = to_si(arguments.share, RATIO)
     except UnitError as error:
         raise NotDoneError(REFUSED.at(None, f"'{arguments.share}' {error}", help="write '30 %'")) from error
-    show_answer(arguments, folder, answer_of(folder, ScaleMotion(buses[arguments.name], arguments.name, share)))
+    show_answer(
+        arguments,
+        folder,
+        answer_of(folder, controller_manager.ScaleMotion(buses[arguments.name], arguments.name, share)),
+    )
     return 0

@@ -3,31 +3,75 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
 from typing import Any, Literal
 
 from rbxcompose.base.clock import MonotonicClock
+from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.requests import Refused, answers
 from rbxcompose.domains.devices.serial_ports import PortError
 from rbxcompose.domains.servos import controller_manager
-from rbxcompose.domains.servos.bus import bus_type
+from rbxcompose.domains.servos.bus import ServoBus, bus_type
 from rbxcompose.domains.servos.bus_config import ServoBusConfig, drives_of, item_of, joint_ports, mimics_of
-from rbxcompose.domains.servos.bus_line import open_bus
-from rbxcompose.domains.servos.controller import controller_type
-from rbxcompose.domains.servos.joint_drive import JointDrive, PositionDrive
+from rbxcompose.domains.servos.controller import ControllerSite, controller_type
+from rbxcompose.domains.servos.joint_drive import JointDrive, PositionDrive, ServoJoint
 from rbxcompose.domains.servos.joint_states import Enable, Hold, JointMode, MoveTo
 from rbxcompose.domains.servos.servo_cycle import ServoCycle, ServoItem, prepare, set_up, with_torque
 from rbxcompose.domains.servos.supervision import Periods, Reboots, be_prompt, joint_report, joint_state
-from rbxcompose.domains.servos.twins.fault_script import InjectFault
+from rbxcompose.domains.servos.twins.fault_script import FaultScript, InjectFault
+from rbxcompose.domains.servos.twins.servo_fake import FakeServo
+from rbxcompose.domains.servos.twins.servo_twin import TwinBus, twin_of, twin_servos
 from rbxcompose.msgs.rbxcompose_msgs import SetSpeed
 from rbxcompose.msgs.sensor_msgs import JointState
 from rbxcompose.msgs.std_srvs import SetBool, Trigger
 from rbxcompose.sdk import Component, Later, Out, Port, Serves, ServesAction, component
 from rbxcompose.sdk.capabilities import Capability, ConnectedBy, NeedsExtra, OpensPort, Setting, within
 from rbxcompose.sdk.component import Context
+
+
+@dataclass(frozen=True, slots=True)
+class OpenedBus:
+    """A bus, and what goes wrong with its servos, if they are simulated."""
+
+    bus: ServoBus
+    faults: FaultScript | None = None
+    note: str = ""
+    """What people should know of it; empty if nothing."""
+
+
+def open_bus(
+    config: ServoBusConfig,
+    joints: Sequence[ServoJoint],
+    now: Callable[[], float],
+    at_end: ExitStack,
+    *,
+    is_real_time: bool,
+) -> OpenedBus:
+    """Open the bus of these joints, until `at_end` is closed. Simulated servos have bytes in real time only.
+
+    Raises:
+        PortError: if the port cannot be opened.
+    """
+    path, faults = config.port, None
+    if config.twin:
+        has_bytes = is_real_time and config.twin == "pty"
+        servos = twin_servos(joints, is_ideal=config.twin == "ideal", noise=config.noise, seed=config.seed)
+        servos |= {f"servo {id_}": [FakeServo(model, id_)] for id_, model in config.lone.items()}
+        twin = at_end.enter_context(twin_of(servos, now, has_bytes=has_bytes))
+        faults = FaultScript(config.faults.values(), servos, twin)
+        if isinstance(twin, TwinBus):
+            is_other = config.twin == "pty"
+            note = "bytes need real time, so servos are simulated without them" if is_other else ""
+            return OpenedBus(twin, faults, note)
+        path = str(twin.path)
+    known = {servo.id: servo.model for joint in joints for servo in joint.servos}
+    bus = bus_type(config.kind).open(path, known | config.lone, baud=config.baud, clock=now, is_fast=config.fast)
+    at_end.callback(bus.close)
+    return OpenedBus(bus, faults)
+
 
 GONE = "the bus of servos has gone"
 REOPEN = 0.5  # [s] between attempts to find a port that has gone
@@ -113,10 +157,8 @@ class ServoBusDriver(Component[ServoBusConfig]):
         self.cycle = ServoCycle(opened.bus, drives, mimics, config.watchdog, config.thermal.scope == "bus")
         self.reboots = Reboots(opened.bus, self.prepare)
         seats = {
-            name: controller_manager.ControllerSeat(
-                self, name, {joint: drives[joint] for joint in controller.config.claimed}
-            )
-            for name, controller in config.controllers.items()
+            name: ControllerSite(self, name, {joint: drives[joint] for joint in item.config.claimed})
+            for name, item in config.controllers.items()
         }
         self.controllers = controller_manager.ControllerManager(
             {

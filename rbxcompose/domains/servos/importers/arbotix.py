@@ -654,9 +654,7 @@ class ArbotixManifest:
             yield out.row(3, f"- {name}")
 
     def _base_rows(self) -> Iterator[out.Row]:
-        bases = [
-            controller for controller in self._robot.controllers.values() if isinstance(controller, DiffController)
-        ]
+        bases = [item for item in self._robot.controllers.values() if isinstance(item, DiffController)]
         if bases:
             yield out.row(0, "components:")
         for base in bases:

@@ -13,7 +13,7 @@ from rbxcompose.domains.servos.bus import DYNAMIXEL, BusType, bus_type, bus_type
 from rbxcompose.domains.servos.models import ServoModel
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading
-from rbxcompose.manifest.tree import ScalarNode, at, key_span, value_span
+from rbxcompose.manifest.tree import ScalarNode, at
 
 NO_MODEL = kind("RBX2213", is_fixable=True)
 ONE_ID = kind("RBX2214")
@@ -78,7 +78,7 @@ def _models(reading: Reading[ActuatorModel], found: Mapping[str, ActuatorModel])
     for name, actuator in found.items():
         if model_of(reading.contents, actuator) is None:
             known = type_of(reading.contents, actuator.bus).models()
-            span = value_span(reading.contents.root, ("actuators", name, "model"))
+            span = reading.value("actuators", name, "model")
             yield NO_MODEL.misspelt(span, f"no servo is called '{actuator.model}'", actuator.model, known, "models")
 
 
@@ -86,10 +86,9 @@ def _ids(reading: Reading[ActuatorModel], found: Mapping[str, ActuatorModel]) ->
     first: dict[tuple[str, int], str] = {}
     for name, model in found.items():
         if (before := first.setdefault((model.bus, model.id), name)) != name:
-            root = reading.contents.root
-            span, other = (value_span(root, ("actuators", each, "id")) for each in (name, before))
+            span, other = (reading.value("actuators", each, "id") for each in (name, before))
             if span == other:  # by '<<', one has the keys of the other
-                span = key_span(root, ("actuators", name))
+                span = reading.key("actuators", name)
             message = f"two servos of the bus '{model.bus}' have the id {model.id}"
             taken = {each.id for each in found.values() if each.bus == model.bus}
             free = next((number for number in range(1, 253) if number not in taken), None)

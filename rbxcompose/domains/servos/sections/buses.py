@@ -22,7 +22,7 @@ from rbxcompose.domains.servos.sections.joints import JointModel, effort_of, hel
 from rbxcompose.domains.servos.sections.safety import safety
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading, SetScope, WantedComponent, Wiring
-from rbxcompose.manifest.tree import KeyPath, at, key_span, value_span
+from rbxcompose.manifest.tree import KeyPath, at
 from rbxcompose.manifest.validate import MISSING_KEY, not_a_choice
 from rbxcompose.manifest.written import as_written
 
@@ -75,7 +75,7 @@ def _is_known(reading: Reading[BusOfServosModel], name: str, model: BusOfServosM
     if model.type in bus_type_names():
         return True
     path = ("buses", name, "type")
-    span, node = value_span(reading.contents.root, path), at(reading.contents.root, path)
+    span, node = reading.value(*path), at(reading.contents.root, path)
     reading.report.add(not_a_choice(span, "type", node, bus_type_names()))
     return False
 
@@ -87,11 +87,7 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
     places = buses_of_joints(contents)
     for name, bus in contents.of(buses).items():
         own = {joint: entry for joint, entry in driven.items() if places.get(joint) == name}
-        led = {
-            key: controller
-            for key, controller in contents.of(controllers).items()
-            if _is_led(controller, own, servos, name)
-        }
+        led = {key: item for key, item in contents.of(controllers).items() if _is_led(item, own, servos, name)}
         used = {item.actuator: _servo(servos[item.actuator]) for entry in led.values() for item in entry.used}
         if not own and not used:
             continue
@@ -115,9 +111,7 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
                 key: {
                     "type": entry.type,
                     "settings": as_written(entry),
-                    "sliding": [
-                        joint for joint in entry.claimed if joint in known.joints and known.joints[joint].slides
-                    ],
+                    "sliding": [item for item in entry.claimed if item in known.joints and known.joints[item].slides],
                 }
                 for key, entry in led.items()
             },
@@ -132,11 +126,8 @@ def _places(led: Mapping[str, ControllerConfig]) -> dict[str, KeyPath]:
     for name, config in led.items():
         cls = controller_type(config.type)
         for port in cls.ports(name, config):
-            found[f"{name}_{port}"] = (
-                "controllers",
-                name,
-                *(cls.topics[port].split(".") if port in cls.topics else ()),
-            )
+            where = cls.topics[port].split(".") if port in cls.topics else ()
+            found[f"{name}_{port}"] = ("controllers", name, *where)
     return found
 
 
@@ -203,6 +194,6 @@ def buses(reading: Reading[BusOfServosModel]) -> dict[str, BusOfServosModel]:
     found = {name: entry for name, entry in read.items() if _is_known(reading, name, entry)}
     for name, one in found.items():
         if not one.port and not reading.contents.is_simulated:
-            span = key_span(reading.contents.root, ("buses", name))
+            span = reading.key("buses", name)
             reading.report.add(MISSING_KEY.at(span, f"the bus '{name}' of real servos needs the key 'port'"))
     return found

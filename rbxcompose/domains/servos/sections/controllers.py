@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from rbxcompose.base.config import CONTROLLER, Config
-from rbxcompose.base.findings import Finding, Related, Span, kind
+from rbxcompose.base.findings import DID_YOU_MEAN, Finding, Related, Span, kind
 from rbxcompose.base.plugins import BROKEN, BrokenPluginError
 from rbxcompose.domains.body.model import BodyJoint
 from rbxcompose.domains.body.sections.body import body
@@ -17,9 +17,10 @@ from rbxcompose.domains.servos.models import OUTPUTS
 from rbxcompose.domains.servos.sections.actuators import actuators, model_of
 from rbxcompose.domains.servos.sections.joints import held_limits, joints, may_be_driven
 from rbxcompose.manifest.arguments import decided_at
+from rbxcompose.manifest.foreign_words import CONTROLLERS
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading
-from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode, at, key_span, value_span
+from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode, at, key_span
 from rbxcompose.manifest.validate import MISSING_KEY, not_a_choice
 from rbxcompose.msgs.control_msgs import FollowJointTrajectory
 from rbxcompose.msgs.trajectory_msgs import JointTrajectory
@@ -105,7 +106,7 @@ def _read(reading: Reading[ControllerConfig], name: str, entry: Entry) -> Contro
             reading.valid(ControllerConfig, name, entry.value)
         return None
     if written.text not in names:
-        reading.report.add(not_a_choice(written.span, "type", written, names))
+        reading.report.add(_unknown_type(written, names))
         return None
     try:
         return reading.valid(controller_type(written.text).config_type(), name, entry.value)
@@ -114,11 +115,21 @@ def _read(reading: Reading[ControllerConfig], name: str, entry: Entry) -> Contro
         return None
 
 
+def _unknown_type(written: ScalarNode, names: Sequence[str]) -> Finding:
+    """Return the finding for a type of controller that does not exist; `package/Class` is that of ros2_control."""
+    finding = not_a_choice(written.span, "type", written, [*names])
+    package, _, cls = written.text.partition("/")
+    if cls.endswith("Broadcaster"):
+        return replace(finding, help="the states of joints are published without a controller: remove it", fix=None)
+    ours = CONTROLLERS.get(cls) or CONTROLLERS.get(package)
+    return replace(finding, help=f"{DID_YOU_MEAN} '{ours}'?") if ours in names else finding
+
+
 def _mistakes(
     reading: Reading[ControllerConfig], name: str, config: ControllerConfig, owners: dict[str, tuple[str, Span]]
 ) -> Iterator[Finding]:
     root = reading.contents.root
-    here, cls = key_span(root, ("controllers", name)), controller_type(config.type)
+    here, cls = reading.key("controllers", name), controller_type(config.type)
     yield from _undriven(reading, name, config)
     yield from _following(reading, name, config)
     yield from _unfit(reading, name, config)
@@ -164,7 +175,7 @@ def _undriven(reading: Reading[ControllerConfig], name: str, config: ControllerC
             if servo.mode != wanted:
                 given, taken = _PLURAL[wanted], _PLURAL[servo.mode]
                 message = f"the controller '{name}' gives {given}, and the servos of '{joint}' take {taken}"
-                there = key_span(reading.contents.root, ("actuators", each))
+                there = reading.key("actuators", each)
                 first, other = (there, span) if there.file == span.file else (span, there)
                 related = [Related(other, "the controller" if first is there else "the actuator")]
                 yield NOT_DRIVEN.at(first, message, help=f"give '{each}' 'mode: {wanted}'", related=related)
@@ -211,9 +222,9 @@ def _blind(reading: Reading[ControllerConfig], name: str, config: ControllerConf
             message = (
                 f"'{name}' needs to know how far '{servo}' turns, and an {model.name} measures {degrees} of 360 deg"
             )
-            span = value_span(reading.contents.root, ("actuators", servo, "model"))
+            span = reading.value("actuators", servo, "model")
             help_text = "take a model that sees the whole turn, such as XL430-W250 or MX-28"
-            here = Related(key_span(reading.contents.root, ("controllers", name)), "the controller")
+            here = Related(reading.key("controllers", name), "the controller")
             yield NO_WHOLE_TURN.at(span, message, help=help_text, related=[here])
 
 
@@ -241,7 +252,7 @@ def _unknown_items(reading: Reading[ControllerConfig], name: str, config: Contro
         model = model_of(reading.contents, servos[used.actuator]) if used.actuator in servos else None
         valid = [item for item in model.items if item in OUTPUTS or not used.is_written] if model else []
         if model is not None and used.item not in valid:
-            span = value_span(reading.contents.root, ("controllers", name, used.field))
+            span = reading.value("controllers", name, used.field)
             is_there = used.item in model.items
             message = f"'{used.item}' cannot be switched" if is_there else f"{model.name} has no item '{used.item}'"
             what = "items that can be switched" if used.is_written else "its items"
@@ -267,7 +278,7 @@ def _place(reading: Reading[ControllerConfig], name: str, joint: str) -> Span:
         for item in items:
             if isinstance(item, ScalarNode) and item.text == joint and key != "type":
                 return item.span
-    return value_span(reading.contents.root, ("controllers", name))
+    return reading.value("controllers", name)
 
 
 def served_topic(name: str, config: ControllerConfig, action: type[Any]) -> str:

@@ -14,7 +14,6 @@ from rbxcompose.domains.servos.sections.joints import joints, may_be_driven, unr
 from rbxcompose.domains.servos.twins.servo_faults import UNPLUG, FaultName
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading
-from rbxcompose.manifest.tree import key_span, value_span
 
 NO_SERVO = kind("RBX2270")
 OF_WHAT = kind("RBX2271")
@@ -78,8 +77,7 @@ def faults(reading: Reading[FaultModel]) -> dict[str, FaultModel]:
     wrong = {name: finding for name, entry in found.items() if (finding := _mistake(reading, name, entry))}
     reading.report.extend(wrong.values())
     if found and not reading.contents.is_simulated:
-        span = key_span(reading.contents.root, ("faults",))
-        reading.report.add(REAL.at(span, "the servos are real, so nothing of this happens"))
+        reading.report.add(REAL.at(reading.key("faults"), "the servos are real, so nothing of this happens"))
     return {name: entry for name, entry in found.items() if name not in wrong}
 
 
@@ -87,17 +85,17 @@ def _mistake(reading: Reading[FaultModel], name: str, model: FaultModel) -> Find
     root, driven = reading.contents.root, buses_of_joints(reading.contents)
     if (model.joint is None) == (model.bus is None):
         words = "neither a joint nor a bus" if model.joint is None else "a joint and a bus"
-        return OF_WHAT.at(key_span(root, ("faults", name)), f"the fault '{name}' is of {words}")
+        return OF_WHAT.at(reading.key("faults", name), f"the fault '{name}' is of {words}")
     if model.joint is not None and model.fault == UNPLUG:
-        span = value_span(root, ("faults", name, "joint"))
+        span = reading.value("faults", name, "joint")
         return OF_WHAT.at(span, f"'{model.joint}' cannot be unplugged", help="give 'bus' instead of 'joint'")
     in_doubt = may_be_driven(reading.contents, model.joint) if model.joint else bool(unread_joints(reading.contents))
     if in_doubt or (not driven and "joints" in root):
         return None  # they have mistakes, which are reported
     if model.joint is not None and model.joint not in driven:
-        message, span = f"no servo drives '{model.joint}'", value_span(root, ("faults", name, "joint"))
+        message, span = f"no servo drives '{model.joint}'", reading.value("faults", name, "joint")
         return NO_SERVO.misspelt(span, message, model.joint, driven, "joints with a servo")
     if model.bus is not None and model.bus not in driven.values():
-        span = value_span(root, ("faults", name, "bus"))
+        span = reading.value("faults", name, "bus")
         return NO_SERVO.at(span, f"no joint is driven by the bus '{model.bus}'", about=[model.bus])
     return None

@@ -33,14 +33,8 @@ def _either(turning: units.Dimension, sliding: units.Dimension) -> PlainValidato
     """Return what reads a quantity of a joint that turns or slides."""
 
     def read(value: object) -> units.Quantity:
-        read = (
-            value
-            if isinstance(value, units.Quantity)
-            else units.parse_quantity(value)
-            if isinstance(value, str)
-            else None
-        )
-        if read is None or read.dimension not in (turning, sliding):
+        read = units.parse_quantity(value) if isinstance(value, str) else value
+        if not isinstance(read, units.Quantity) or read.dimension not in (turning, sliding):
             raise units.UnitError(f"must be {turning.phrase} or {sliding.phrase}, such as '{units.example(turning)}'")
         return read
 
@@ -173,22 +167,19 @@ def _mistakes(
     users: dict[str, str],
 ) -> Iterator[Finding]:
     root = reading.contents.root
-    at = key_span(root, ("joints", name))
+    at = reading.key("joints", name)
     if not model.servos:
         yield MISSING_KEY.at(at, f"joint '{name}' needs the key 'actuator'")
     yield from _servos(reading, name, model, users)
     for key, value in (("ratio", model.ratio), ("travel", model.travel)):
         if value == 0.0:
-            yield NOT_TOGETHER.at(
-                value_span(root, ("joints", name, key)), f"with a {key} of 0, joint '{name}' never moves"
-            )
+            yield NOT_TOGETHER.at(reading.value("joints", name, key), f"with a {key} of 0, joint '{name}' never moves")
     if joint is not None:
         yield from _of_body(root, name, model, joint)
     if model.calibration and (reason := _no_table(model)):
-        yield NOT_TOGETHER.at(key_span(root, ("joints", name, "calibration")), reason)
+        yield NOT_TOGETHER.at(reading.key("joints", name, "calibration"), reason)
     for key, reason, help_text in _no_motion(model, joint):
-        span = value_span(root, ("joints", name, "limits", key))
-        yield NOWHERE_TO_GO.at(span, f"joint '{name}' {reason}", help=help_text)
+        yield NOWHERE_TO_GO.at(reading.value("joints", name, "limits", key), f"joint '{name}' {reason}", help=help_text)
 
 
 def _of_body(root: MappingNode, name: str, model: JointModel, joint: BodyJoint) -> Iterator[Finding]:
@@ -218,7 +209,7 @@ def _follows(
     if joint is None or joint.mimic is None:
         return
     leader, known = joint.mimic.joint, reading.contents.of(actuators)
-    at = key_span(reading.contents.root, ("joints", name))
+    at = reading.key("joints", name)
     if leader not in found:
         if _is_written(reading, leader):
             return  # it has a mistake, which is reported
@@ -295,7 +286,7 @@ def _servos(
     reading: Reading[dict[str, JointModel]], name: str, model: JointModel, users: dict[str, str]
 ) -> Iterator[Finding]:
     known = reading.contents.of(actuators)
-    at = key_span(reading.contents.root, ("joints", name))
+    at = reading.key("joints", name)
     there: Mapping[str, ActuatorModel] = {servo: known[servo] for servo in model.servos if servo in known}
     for servo in model.servos:
         if (other := users.setdefault(servo, name)) != name:

@@ -13,7 +13,6 @@ from rbxcompose.domains.servos.sections.faults import buses_of_joints
 from rbxcompose.domains.servos.sections.joints import JointPosition
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading, WantedComponent, Wiring
-from rbxcompose.manifest.tree import key_span
 
 THERMAL_ORDER = kind("RBX2218")
 NOTHING_TO_PARK = kind("RBX2219")
@@ -82,14 +81,14 @@ def safety(reading: Reading[SafetyModel]) -> SafetyModel:
           thermal: {limit: 65 degC, resume: 50 degC}
     """
     read = reading.whole() or SafetyModel()
-    root, heat = reading.contents.root, read.thermal
+    heat = read.thermal
     if not (heat.resume < heat.limit and heat.warn <= heat.limit):
         message = f"resume {heat.resume:g} degC, warn {heat.warn:g} degC, limit {heat.limit:g} degC"
         key, order = ("warn", "not above") if heat.resume < heat.limit else ("resume", "below")
         help_text = f"'{key}' must be {order} 'limit', {heat.limit:g} degC: write it, or raise 'limit'"
-        reading.report.add(THERMAL_ORDER.at(key_span(root, ("safety", "thermal")), message, help=help_text))
+        reading.report.add(THERMAL_ORDER.at(reading.key("safety", "thermal"), message, help=help_text))
     if read.on_shutdown == "park" and not read.park:
-        span = key_span(root, ("safety", "on_shutdown"))
+        span = reading.key("safety", "on_shutdown")
         message = "joints are to be parked, but 'park' names none"
         help_text = "add 'park: {JOINT: 0 deg}' beside it, with the position of each joint"
         reading.report.add(NOTHING_TO_PARK.at(span, message, help=help_text))

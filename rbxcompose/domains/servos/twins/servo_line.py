@@ -64,9 +64,7 @@ class FakeLine:
 
     def _listening(self, protocol: int, baud: int | None) -> list[FakeServo]:
         powered = (fake_servo for fake_servo in self.servos if not fake_servo.faults.is_off)
-        found = [
-            fake_servo for fake_servo in powered if baud is None or abs(fake_servo.baud - baud) <= _TOLERANCE * baud
-        ]
+        found = [item for item in powered if baud is None or abs(item.baud - baud) <= _TOLERANCE * baud]
         for servo in found:
             servo.heard = self._now
         return [fake_servo for fake_servo in found if fake_servo.model.protocol == protocol]

@@ -60,7 +60,7 @@ def packet_one(id: int, code: int, parameters: bytes = b"") -> bytes:
 
 def packet_two(id: int, instruction: int, parameters: bytes = b"") -> bytes:
     """Return a packet of protocol 2.0, stuffed; a status begins its parameters with the error byte."""
-    body = _stuffed(bytes([instruction]) + parameters)
+    body = (bytes([instruction]) + parameters).replace(b"\xff\xff\xfd", b"\xff\xff\xfd\xfd")
     packet = _TWO + bytes([id]) + (len(body) + 2).to_bytes(2, "little") + body
     return packet + crc_of(packet).to_bytes(2, "little")
 
@@ -70,10 +70,6 @@ def status(protocol: int, id: int, error: int, parameters: bytes = b"") -> bytes
     if protocol == 1:
         return packet_one(id, error, parameters)
     return packet_two(id, STATUS, bytes([error]) + parameters)
-
-
-def _stuffed(body: bytes) -> bytes:
-    return body.replace(b"\xff\xff\xfd", b"\xff\xff\xfd\xfd")
 
 
 def _plain(body: bytes) -> bytes:
