@@ -221,6 +221,14 @@ class NeedsExtra(Capability):
 
 
 @dataclass(frozen=True, slots=True)
+class ServesPage(Capability):
+    """It serves a page for browsers of this machine; `up` shows the link."""
+
+    port: Setting[int]
+    """TCP port."""
+
+
+@dataclass(frozen=True, slots=True)
 class RunsMissions(Capability):
     """It runs the robot's missions: its skills are those of the robot, and values may come from outside."""
 
