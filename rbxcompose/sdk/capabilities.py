@@ -226,6 +226,8 @@ class ServesPage(Capability):
 
     port: Setting[int]
     """TCP port."""
+    commands: Setting[str] = Setting("")
+    """The topic on which people drive by it, by its full name; empty if they cannot."""
 
 
 @dataclass(frozen=True, slots=True)

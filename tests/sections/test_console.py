@@ -71,4 +71,4 @@ def test_a_robot_that_does_not_drive_has_a_console_too(tmp_path: Path) -> None:
 def test_nobody_beyond_this_machine_is_served_yet(tmp_path: Path) -> None:
     project = Project(tmp_path)
     project.check(f"{BASE}console:\n  listen: lan\n")
-    assert [(finding.code, finding.span and finding.span.line) for finding in project.findings] == [("RBX9601", 8)]
+    assert [(finding.code, finding.span and finding.span.line) for finding in project.findings] == [("RBX9601", 9)]

@@ -117,7 +117,7 @@ class Gateway(Component[GatewayConfig]):
     def capabilities(cls, config: GatewayConfig) -> tuple[Capability, ...]:
         """Declare the page, and what it needs."""
         needed = (NeedsExtra(Setting(package), Setting("console")) for package in PACKAGES)
-        return (ServesPage(Setting(config.port, "port")), *needed)
+        return (ServesPage(Setting(config.port, "port"), Setting(config.drive_topic, "drive_topic")), *needed)
 
     def configure(self) -> None:
         """Serve nothing yet: the robot must be known from outside first."""
