@@ -336,6 +336,7 @@ class GatewaySession:
             lifespan="off",
             ws="websockets-sansio",
             ws_max_size=2 * LARGEST,  # beyond that, the connection is closed
+            ws_per_message_deflate=False,  # within a machine it costs more than it saves
             ws_ping_interval=_PING,
             ws_ping_timeout=_PING,
             timeout_graceful_shutdown=_FAREWELL,
