@@ -6,7 +6,7 @@ from dataclasses import replace
 from rbxcompose.base.expressions.check import check
 from rbxcompose.base.expressions.tree import Number, walk
 from rbxcompose.base.expressions.types import COUNT, PLACE, TEXT, UNKNOWN, Type, TypeKind, choice_of, quantity_of
-from rbxcompose.base.findings import Finding, Related, Span, nearest, suggest
+from rbxcompose.base.findings import Finding, Related, Span, clauses, nearest, suggest
 from rbxcompose.base.printable import plain
 from rbxcompose.base.units import NUMBER, QUOTIENT, Dimension, example
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, TreeNode
@@ -103,7 +103,7 @@ def _argument(view: View, skill: Skill, argument: WrittenArgument) -> Iterator[F
         finding = wrong_argument.misspelt(argument.span, message, name, arguments, "its arguments", taken=taken)
         if skill.main and skill.main not in taken and "" not in taken and not nearest(name, arguments):
             value = plain(argument.value.text, 60) if isinstance(argument.value, ScalarNode) else "..."
-            finding = replace(finding, help=f"{finding.help}; write '{skill.name}: {value}'".removeprefix("; "))
+            finding = replace(finding, help=clauses(finding.help, f"write '{skill.name}: {value}'"))
         yield finding
     elif isinstance(argument.value, ScalarNode):
         if argument.value.plain and not argument.value.text:
