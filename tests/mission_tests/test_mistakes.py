@@ -183,3 +183,34 @@ def test_a_slip_of_the_hand_can_be_fixed(trying: Trying) -> None:
     path = trying.folder / "tried.test.yaml"
     fixes = [finding.fix for finding in trying.reading.read(path)[1] if finding.fix]
     assert [fix.title for fix in fixes] == ["'rechrge' -> 'recharge'"]
+
+
+@pytest.mark.parametrize(
+    ("text", "message", "cure"),
+    [
+        (FINE + "for: 3 min\n", "unknown key 'for' in this file", "it belongs below 'expect', beside 'outcome'"),
+        (
+            FINE + "  profile: home\n",
+            "unknown key 'profile' in 'expect'",
+            "it belongs at the left margin, beside 'robot'",
+        ),
+        (FINE + "  takes: 3 s\n", "unknown key 'takes' in 'expect'", "it belongs to an entry of 'mocks'"),
+        (
+            FINE.replace("  go_to:\n", "  go_to: {at: 3 s}\n"),
+            "unknown key 'at' in 'mocks.go_to'",
+            "it belongs to an entry of 'events'",
+        ),
+        (
+            "events: [{at: 3 s, never: [go_to], resume: true}]\n" + FINE,
+            "unknown key 'never' in 'events.0'",
+            "it belongs below 'expect', beside 'outcome'",
+        ),
+    ],
+)
+def test_a_key_of_another_place_in_the_file_says_where_it_belongs(
+    text: str, message: str, cure: str, trying: Trying
+) -> None:
+    _, found = trying.read(text)
+    assert message in found
+    assert f"= help: {cure}\n" in found
+    assert found.count("error[RBX1001]") == 1

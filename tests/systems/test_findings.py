@@ -60,6 +60,7 @@ WRONG = {
     "RBX6146": {"{address: 10.42.0.1}": "{address: 10.42.0.2}"},
     "RBX1302": {"profile: linked": "profile: garden"},
     "RBX1001": {"hosts:": "hots:"},
+    "RBX1001b": {"kind: System": "kind: System\nstop_within: 1 s", "on: desk": "on: desk\n    address: 10.42.0.3"},
     "RBX1002": {"robots:": "other:"},
     "RBX1003b": {"  robot: {address": "  - {name: robot, address", "  desk: {address": "  - {name: desk, address"},
     "RBX1003": {"address: 10.42.0.2": "address: [1, 2]"},

@@ -539,7 +539,9 @@ class TrialReader:
         root, report = written.root, written.report
         if root is None:
             return None
-        Documents(report, self.sources).check(TrialFile, _without_values(root))
+        documents = Documents(report, self.sources)
+        root = documents.placed(TrialFile, root, SECTIONS)
+        documents.check(TrialFile, _without_values(root))
         found = self._robot(root, written.path, report)
         if found is None:
             return None
