@@ -21,7 +21,7 @@ from rbxcompose.msgs.stamps import to_nanoseconds, to_time
 from rbxcompose.msgs.types import Action, Message
 from rbxcompose.msgs.unique_identifier_msgs import UUID
 from rbxcompose.sdk.bound import Ended, Outcome, Reply
-from rbxcompose.sdk.ports import ORDINARY, Limits, Qos
+from rbxcompose.sdk.ports import ORDINARY, MessageLimits, Qos
 
 STATUS_PERIOD = 0.1  # [s] between two publications of the goals' states during a flood of goals
 LOG_PERIOD = 1.0  # [s] between two log lines during a flood of goals
@@ -79,7 +79,7 @@ class ActionServer(Generic[G, R, F]):
         accept: Callable[[G], str],
         *,
         waits: bool = False,
-        limits: Limits = ORDINARY,
+        limits: MessageLimits = ORDINARY,
     ) -> None:
         """With `waits`, hold goals back until the node is open. Goals beyond the `limits` are refused."""
         names = ActionNames.of(name)

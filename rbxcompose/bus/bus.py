@@ -15,7 +15,7 @@ from rbxcompose.bus.transport import Closable, NoTransport, Transport
 from rbxcompose.bus.window import Window
 from rbxcompose.bus.wire import WIRE_PROFILES
 from rbxcompose.msgs.types import Action, Message, Service
-from rbxcompose.sdk.ports import ORDINARY, Limits, Qos
+from rbxcompose.sdk.ports import ORDINARY, MessageLimits, Qos
 
 M = TypeVar("M", bound=Message)
 Q = TypeVar("Q", bound=Message)
@@ -75,7 +75,7 @@ class Bus:
         handler: Callable[[M], None],
         *,
         max_rate: float | None = None,
-        limits: Limits | None = None,
+        limits: MessageLimits | None = None,
         waits: bool = False,
         is_patient: bool = False,
         is_light: bool = True,
@@ -111,7 +111,7 @@ class Bus:
         client_left: Callable[[bytes], None] | None = None,
         waits: bool = False,
         rate: float = REQUESTS,
-        limits: Limits = ORDINARY,
+        limits: MessageLimits = ORDINARY,
     ) -> Server[Q, R]:
         """Call `handle` with each request, to be answered now or later; with `waits`, none before `open`.
 
@@ -136,7 +136,7 @@ class Bus:
         accept: Callable[[G], str],
         *,
         waits: bool = False,
-        limits: Limits = ORDINARY,
+        limits: MessageLimits = ORDINARY,
     ) -> ActionServer[G, R, F]:
         """Carry out goals; with `waits`, none before `open`. `accept` returns why it refuses a goal, or nothing."""
         node = self._node(owner)

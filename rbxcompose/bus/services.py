@@ -20,7 +20,7 @@ from rbxcompose.bus.wire import SERVICE_QOS
 from rbxcompose.msgs.cdr import CdrLimitError, decode, encode
 from rbxcompose.msgs.types import Message, Service
 from rbxcompose.sdk.bound import Reply
-from rbxcompose.sdk.ports import ORDINARY, Limits
+from rbxcompose.sdk.ports import ORDINARY, MessageLimits
 
 Q = TypeVar("Q", bound=Message)
 R = TypeVar("R", bound=Message)
@@ -86,7 +86,7 @@ class Server(Generic[Q, R]):
         *,
         waits: bool = False,
         rate: float = REQUESTS,
-        limits: Limits = ORDINARY,
+        limits: MessageLimits = ORDINARY,
     ) -> None:
         """With `waits`, hold requests until the node is open; take at most `rate` [Hz] from each client elsewhere.
 

@@ -19,7 +19,7 @@ from rbxcompose.bus.wire import expects_speech, most_per_second, queue_depth, ro
 from rbxcompose.msgs.cdr import CdrError, CdrLengthError, CdrLimitError, decode, encode
 from rbxcompose.msgs.fields import NotFiniteError, require_finite
 from rbxcompose.msgs.types import Message
-from rbxcompose.sdk.ports import Limits, Qos, limits_of
+from rbxcompose.sdk.ports import MessageLimits, Qos, limits_of
 
 M = TypeVar("M", bound=Message)
 
@@ -113,7 +113,7 @@ class Subscription(Generic[M]):
         handler: Callable[[M], None],
         max_rate: float | None = None,
         *,
-        limits: Limits | None = None,
+        limits: MessageLimits | None = None,
         waits: bool = False,
         listens: bool = True,
         is_patient: bool = False,

@@ -28,7 +28,7 @@ class Qos(StrEnum):
 _DEPTH = {Qos.COMMAND: 1, Qos.STATE: 10, Qos.LATCHED: 1, Qos.EVENT: 10_000, Qos.BULK: 2}
 
 
-class Limits(NamedTuple):
+class MessageLimits(NamedTuple):
     """What a port takes of another process at most; a message beyond that is refused before it is decoded."""
 
     size: float = 256 * 1024
@@ -37,12 +37,12 @@ class Limits(NamedTuple):
     """Entries of all its lists of texts and messages; each takes some 10 µs to decode."""
 
 
-ORDINARY = Limits()
-BULK = Limits(64 * 1024 * 1024, 10_000)
+ORDINARY = MessageLimits()
+BULK = MessageLimits(64 * 1024 * 1024, 10_000)
 """For topics of QoS class `bulk`, such as images and clouds, and for who only looks at any topic."""
 
 
-def limits_of(qos: Qos) -> Limits:
+def limits_of(qos: Qos) -> MessageLimits:
     """Return the limits that messages of a QoS class have if none are declared."""
     return BULK if qos is Qos.BULK else ORDINARY
 
@@ -122,7 +122,7 @@ class In(Port[Latest[M]]):
         unit: str = "",
         is_open: bool = False,
         max_rate: float | None = None,
-        limits: Limits | None = None,
+        limits: MessageLimits | None = None,
         may_be_silent: bool = False,
     ) -> None:
         """Take `is_open` for an input that may also be fed from outside the robot.
@@ -172,7 +172,7 @@ class ServesTopic(In[M]):
         entries: ArrayEntries | None = None,
         qos: Qos | str = Qos.EVENT,
         max_rate: float | None = None,
-        limits: Limits | None = None,
+        limits: MessageLimits | None = None,
     ) -> None:
         """Declare the port.
 
@@ -221,7 +221,7 @@ class Serves(Port[None]):
         *,
         skill: str | None = "",
         unit: str = "",
-        limits: Limits = ORDINARY,
+        limits: MessageLimits = ORDINARY,
     ) -> None:
         super().__init__(topic)
         self.interface, self.skill, self.unit = service, skill, unit
@@ -269,7 +269,7 @@ class ServesAction(Port[ActionServer[G, R, F]]):
         measures: Measures = MappingProxyType({}),
         choices: Mapping[str, Collection[str]] = MappingProxyType({}),
         may_lack: bool = False,
-        limits: Limits = ORDINARY,
+        limits: MessageLimits = ORDINARY,
     ) -> None:
         """Declare the port.
 

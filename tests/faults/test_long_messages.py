@@ -82,6 +82,7 @@ def test_no_process_is_held_up_by_a_message(robot: str, tmp_path: Path) -> None:
     try:
         state = folder.read_state()
         assert state is not None, said
+        assert state.router is not None
         before = dict(state.processes)
         transport = ZenohTransport(open_peer(state.router), lambda owner, callback: None)
         heard: list[float] = []

@@ -9,7 +9,7 @@ from dataclasses import replace
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.body.model import Body, Geometry
-from rbxcompose.sdk.ports import Limits
+from rbxcompose.sdk.ports import MessageLimits
 
 SIZES: Mapping[str, tuple[str, ...]] = {
     "box": ("x", "y", "z"),
@@ -71,7 +71,7 @@ def _mistake_in_points(shape: Geometry) -> str:
 
 MOST_SHAPES = 1_000
 """More would make each change of the scene take seconds: many small things are one octree."""
-SCENE_LIMITS = Limits(size=16 * 1024 * 1024, entries=10_000)
+SCENE_LIMITS = MessageLimits(size=16 * 1024 * 1024, entries=10_000)
 """Of messages with objects: enough for so many shapes, or for an octree of some centimetres in a hall."""
 MOST_PADDING = 1.0  # [m]
 LONGEST_NAME = 200

@@ -14,10 +14,13 @@ from rbxcompose.domains.diagnostics.settings import DiagnosticsModel
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray, DiagnosticStatus, KeyValue
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header
-from rbxcompose.sdk import Component, In, Limits, Out, Refused, answers, component
+from rbxcompose.sdk import Component, In, MessageLimits, Out, Refused, answers, component
 
 PAUSE = 0.05  # [s] between two reports at least, so that flapping levels cost little
-MOST_ARRAYS, ARRAY = 30.0, Limits(size=200_000)  # [Hz] and limits of one publisher: more takes too much of a core
+MOST_ARRAYS, ARRAY = (
+    30.0,
+    MessageLimits(size=200_000),
+)  # [Hz] and limits of one publisher: more takes too much of a core
 MOST_LOGGED = 100_000  # characters of an answer to people
 ROUNDING = 1e-9  # [s]
 PAUSE_PER_ROW = 0.0001  # [s]; a row is about 20 us of work, so reports never take more than a fifth of a core

@@ -16,12 +16,12 @@ from rbxcompose.msgs.fields import ArrayEntries
 from rbxcompose.msgs.rbxcompose_msgs import MoveJoints
 from rbxcompose.msgs.stamps import to_nanoseconds
 from rbxcompose.msgs.trajectory_msgs import JointTrajectory
-from rbxcompose.sdk import BoundsGoals, Capability, In, Limits, Port, ServesAction, Setting
+from rbxcompose.sdk import BoundsGoals, Capability, In, MessageLimits, Port, ServesAction, Setting
 
 Follow = FollowJointTrajectory
 FOLLOW, MOVE, STREAM = "follow_joint_trajectory", "move", "joint_trajectory"  # its ports
 NANOSECONDS = 1_000_000_000
-TRAJECTORY = Limits(size=2 * 1024 * 1024, entries=5_000)  # points
+TRAJECTORY = MessageLimits(size=2 * 1024 * 1024, entries=5_000)  # points
 
 
 class TrajectoryToleranceConfig(Config):
