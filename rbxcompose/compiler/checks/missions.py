@@ -86,15 +86,16 @@ def _expressions(program: Program) -> Iterator[tuple[ScalarNode, syntax.Expressi
 
 @check("RBX4131", closed=("places",))
 def place_in_data(robot: Robot) -> Iterator[Finding]:
-    """The data of a mission name a place that the robot does not know."""
+    """The data or inputs of a mission name a place that the robot does not know."""
     places = robot.manifest.places
     for mission in robot.missions.values():
         program, known = mission.program, {**shortened(mission.program), **constants(mission)}
-        wrong = {name: _without(value, places) for name, value in known.items() if name in program.data}
+        names = program.data.keys() | mission.given.keys()
+        wrong = {name: _without(value, places) for name, value in known.items() if name in names}
         for node, name in _goals(robot, program):
             for text, datum in _texts(program, node, name, wrong):
                 yield place_in_data.at(
-                    _place_of(program, datum, text),
+                    _place_of(program, datum, text) if datum in program.data else mission.given[datum],
                     f"there is no place '{text}', which '{node.skill}' gets from '${name}'",
                     help=suggest(text, places, "places of this robot"),
                     related=[Related(node.span, "used here")],
