@@ -297,6 +297,11 @@ def suggest(name: str, valid: Iterable[str], what: str = VALID) -> str:
     return f"{what}: {', '.join(_by_likeness(name, names)[:MOST_NAMES])}{rest}"
 
 
+def clauses(*parts: str) -> str:
+    """Return the parts of a sentence that are not empty, joined by semicolons."""
+    return "; ".join(filter(None, parts))
+
+
 def _is_chance(name: str, near: str) -> bool:
     """Return whether two names are only somewhat alike, in no word: `wheel_separation` and `acceleration`."""
     words, others = _words(name), _words(near)
