@@ -281,7 +281,7 @@ def test_a_bare_word_is_a_choice_where_one_is_expected_also_if_a_place_has_that_
     paint = Skill("paint", {"where": choice_of("dock", "wall")}, "where")
     robot = replace(ROBOT, skills={**SKILLS, "paint": paint})
     simulated = Simulated(program_of("do: [{paint: dock}, {paint: wall}]", robot), robot=robot)
-    simulated.story = MissionStory("test", robot.skills)
+    simulated.story = MissionStory("test")
     assert simulated.advance(5) == "success"
     given = [event.arguments["where"] for _, event in simulated.events if isinstance(event, SkillStarted)]
     assert given == ["dock", "wall"]
