@@ -26,11 +26,10 @@ class SkillTask(sdk.Leaf):
         super().__init__(site)
         self.skill = site.engine.robot.skills[step.skill]
         self.claims, self.is_restartable = self.skill.claims, self.skill.restartable
-        names = [(argument.name or self.skill.main, argument.value) for argument in step.arguments]
+        self.written = {argument.name or self.skill.main: argument for argument in step.arguments}
         self.getters: Mapping[str, sdk.Getter] = {
-            name: sdk.getter(value, self.skill.arguments[name]) for name, value in names
+            name: sdk.getter(argument.value, self.skill.arguments[name]) for name, argument in self.written.items()
         }
-        self.written = {name: _written(value) for name, value in names if not _is_computed(value)}
         self.arguments: dict[str, sdk.Value] = {}
         self.started = 0.0  # [s] of robot time
 
@@ -55,9 +54,12 @@ class SkillTask(sdk.Leaf):
     def _shown(self) -> Iterator[str]:
         """Yield the arguments as they were written, where that is no expression, and else their values."""
         for name, value in self.arguments.items():
-            computed = value.name if is_named_pose(value) else show(self.skill.arguments[name], value)
-            text = self.written.get(name, computed)
-            yield text if name == self.skill.main else f"{name} {text}"
+            argument = self.written[name]
+            if isinstance(argument.value, sdk.ScalarNode) and written_unit(argument.value.text) is None:
+                text = value.name if is_named_pose(value) else show(self.skill.arguments[name], value)
+            else:
+                text = _written(argument.value)
+            yield f"{argument.name} {text}".lstrip()
 
     def ended(self, result: sdk.Result) -> None:
         """Take the result from the world."""
@@ -140,10 +142,6 @@ class SkillStep(sdk.LeafStep):
     def text(self, node: sdk.MissionNode) -> str:
         """Return its arguments."""
         return ", ".join(f"{argument.name} {_written(argument.value)}".strip() for argument in self.arguments)
-
-
-def _is_computed(value: TreeNode) -> bool:
-    return isinstance(value, sdk.ScalarNode) and written_unit(value.text) is None
 
 
 def _written(value: TreeNode) -> str:
