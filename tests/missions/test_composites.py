@@ -224,7 +224,7 @@ def test_text_arguments_are_templates_and_take_their_scalar_as_written() -> None
 def test_arguments_of_numbers_are_expressions() -> None:
     simulated = simulate("do:\n  go_to:\n    pose: dock\n    tolerance: 2 * 5 cm")
     simulated.advance(10)
-    assert skills(simulated) == ["0 go_to dock, tolerance 0.1 m"]
+    assert skills(simulated) == ["0 go_to pose dock, tolerance 0.1 m"]
 
 
 @pytest.mark.parametrize(
