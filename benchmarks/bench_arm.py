@@ -1,4 +1,4 @@
-"""Arms: kinematics of arms that many know, where their descriptions are installed, and planned motions."""
+"""Arms: kinematics of well-known arms, where their descriptions are installed, and planned motions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How late a fast topic is beside components that compute for long: in another process, in its own, in a thread."""
+"""A fast topic beside long computations: how late it is if they run in another process, in its own, in a thread."""
 
 from __future__ import annotations
 

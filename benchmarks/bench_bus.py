@@ -1,4 +1,4 @@
-"""The bus between two processes, beside what Zenoh alone and ROS 1 take for the same, measured in turns."""
+"""The bus: between two processes, beside what Zenoh alone and ROS 1 take for the same, measured in turns."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The command's own start."""
+"""The start of a command."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The compiler on robots of many lines and of many components."""
+"""The compiler: robots of many lines and of many components."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ def rows() -> list[Row]:
         Row(
             "the same, every level changes each time",
             "% of a core",
-            "all changes are remembered, published and told to the log",
+            "all changes are remembered, published and logged",
             100 * changes.median,
             100 * changes.p99,
         ),

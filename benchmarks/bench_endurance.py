@@ -1,4 +1,4 @@
-"""The patrol robot that goes on: what it takes of a processor, and whether its memory grows."""
+"""Endurance: what the patrol robot takes of a processor, and whether its memory grows."""
 
 from __future__ import annotations
 

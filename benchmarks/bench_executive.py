@@ -1,4 +1,4 @@
-"""Missions on a robot that runs: from a skill's result to the next goal, and what a mission that waits takes."""
+"""Missions: from a skill's result to the next goal on a running robot, and what a mission that waits takes."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def rows() -> list[Row]:
         Row(
             name="load of the patrol mission while it waits for its skills",
             unit="% of a core",
-            how=f"processor time of its process over {WATCHED:.0f} s of a patrol, signs of life and probes included",
+            how=f"processor time of its process over {WATCHED:.0f} s of a patrol, heartbeats included",
             ours=100 * load,
             most=0.5,
         ),

@@ -1,4 +1,4 @@
-"""Picking an object: how long it is planned by one process and by two, on tables that are easy and hard."""
+"""Picking an object: planned by one process and by two, on tables that are easy and hard."""
 
 from __future__ import annotations
 

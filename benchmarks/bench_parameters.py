@@ -1,4 +1,4 @@
-"""A parameter of a robot that runs, set by a client that stays connected, in turns with dynamic_reconfigure's.
+"""Parameters: one of a running robot, set by a client that stays connected, in turns with dynamic_reconfigure's.
 
 The robot has been brought up as a user does it, so its supervisor and the judge of its rules are in the way.
 """

@@ -1,4 +1,4 @@
-"""Ten relays in a row, each in a process of its own: until a message has passed all, and after one was killed."""
+"""Ten relays: in a row, each in a process of its own: until a message has passed all, and after one was killed."""
 
 from __future__ import annotations
 

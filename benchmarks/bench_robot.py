@@ -1,4 +1,4 @@
-"""The patrol robot and one with an arm in real processes, and as fast as the clock can be stepped."""
+"""Whole robots: the patrol robot and one with an arm in real processes, and as fast as the clock can be stepped."""
 
 from __future__ import annotations
 

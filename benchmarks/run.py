@@ -5,6 +5,7 @@ A subject is a file of this folder with a function `rows()`. Each runs in a proc
 
 from __future__ import annotations
 
+import ast
 import importlib
 import json
 import os
@@ -12,6 +13,7 @@ import platform
 import subprocess
 import sys
 from dataclasses import asdict
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -23,11 +25,14 @@ PAGE = ROOT / "docs" / "benchmarks.md"
 ONE = "--one"
 ABOUT = """# Benchmarks
 
-`make bench` writes this page. Times are medians, with the 99th percentile where there are many samples: wall time for
-whole commands, processor time within a process. A peer and ours are measured in turns, in the same run. So ratios hold
-where times do not: times differ between machines by a factor of two or three.
+`make bench` measures all of this and writes the page. In each table, *ours* is rbxcompose, *peer* the program in
+brackets, *ratio* ours divided by theirs, and *bar* what we want to reach. Times are medians, *p99* is the 99th
+percentile: wall time for whole commands, processor time within a process. Ours and a peer are measured in turns, in the
+same run, so that ratios hold where times do not: these differ between machines by a factor of two or three.
 
-{table}
+{missed}
+
+{tables}
 
 Measured on {machine}; load of other work at the start: {load:.1f}. The rows of ROS 1 and dora appear only where these
 are installed, and the figures of RoboPlan where `RBXCOMPOSE_ROBOPLAN` names a Python that has it.
@@ -58,19 +63,32 @@ def as_data(row: Row, subject: str) -> dict[str, Any]:
 
 
 def page(results: dict[str, Any]) -> str:
-    """Return the page of the docs."""
+    """Return the page of the docs: the bars that are missed, then a table for each subject."""
+    rows: list[dict[str, Any]] = results["rows"]
+    missed = dict.fromkeys(row["name"] for row in rows if row["met"] is False)
+    words = f"Bars that are missed: {'; '.join(missed)}." if missed else "All bars are met."
+    tables = "\n\n".join(_section(subject, list(found)) for subject, found in groupby(rows, lambda row: row["subject"]))
+    return ABOUT.format(missed=words, tables=tables, machine=results["machine"], load=results["load"])
+
+
+def _section(subject: str, rows: list[dict[str, Any]]) -> str:
+    """Return the table of a subject below the first line of its file."""
+    about = ast.get_docstring(ast.parse((FOLDER / f"{subject}.py").read_text(encoding="utf-8"))) or subject
+    title, _, rest = about.partition("\n")[0].rstrip(".").partition(": ")
     lines = [
+        f"## {title}",
+        *([f"{rest[:1].upper()}{rest[1:]}.", ""] if rest else []),
         "| what | ours | p99 | peer | ratio | bar | | how |",
         "| --- | ---: | ---: | ---: | ---: | --- | --- | --- |",
     ]
-    for row in results["rows"]:
+    for row in rows:
         met = {True: "met", False: "**missed**", None: ""}[row["met"]]
         peer = f"{_figure(row['peer'])} ({row['against']})" if row["peer"] else ""
         ratio = f"{_figure(row['ratio'])}x" if row["ratio"] else ""
         ours = f"{_figure(row['ours'])} {row['unit']}".strip()
         cells = [row["name"], ours, _figure(row["p99"]), peer, ratio, row["bar"], met, row["how"]]
         lines.append(f"| {' | '.join(cells)} |")
-    return ABOUT.format(table="\n".join(lines), machine=results["machine"], load=results["load"])
+    return "\n".join(lines)
 
 
 def _figure(value: float | None) -> str:

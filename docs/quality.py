@@ -8,12 +8,14 @@ from pathlib import Path
 DOCS = Path(__file__).parent
 ABOUT = """# Quality
 
-What random and hostile input has found, by the suites below. `make test` runs a part of each (some hundreds of
-examples), `make soak` the numbers in the table. A failure becomes a file that every later run tries again.
+Random and hostile input, and faults of processes, hosts, links and disks, look for mistakes that nobody thought of.
+`make test` runs some hundreds of examples of each suite, `make soak` as many as the table says. An input that fails
+becomes a file that every later run tries again. [What the suites do](#what-the-suites-do) stands below the table.
 
 {table}
 
-- **Mutants of manifests** (`tests/mutate`): changes one file of the shipped robots, missions and parts up to three
+## What the suites do
+- **Mutants of manifests** (`tests/mutate`): change one file of the shipped robots, missions and parts up to three
   times: bytes, lines, keys, values, branches of the tree. Each mutant must either be refused, in every format and with
   places that lie in its texts, or be a robot. Its plan, written and read again, must then be the same plan.
 - **Random expressions** (`tests/properties`): none may raise an undeclared exception, reach into an object or the
@@ -22,17 +24,17 @@ examples), `make soak` the numbers in the table. A failure becomes a file that e
   terminal. Each must be refused with a place, within 2 s (times 3 for slow machines) and 200 MB.
 - **Poses of links** (`tests/body`): where every link of a body is at random positions of its joints, by our model, by
   Pinocchio and by yourdfpy. No entry of a matrix may differ by more than 1e-9.
-- **Published robots** (`tests/body`): reads, checks, places and draws the [robots of a public
+- **Published robots** (`tests/body`): read, check, place and draw the [robots of a public
   package](robots_tried.md), each in a process of its own. Each must be read as Pinocchio reads it and be drawn, or be
   refused with a finding.
-- **Storms over simulated robots** (`tests/simulated_faults`): runs the patrol robot with its real conductor and
+- **Storms over simulated robots** (`tests/simulated_faults`): run the patrol robot with its real supervisor and
   processes, in virtual time, over a network that delays, loses, duplicates and reorders. Processes are killed and
   hang, links break, components raise, commands make no sense, people stop, release and set parameters, all from one
   seed. `rbxcompose/testing/safety.py` defines what is safe and judges the record of the run.
 - **Disks that fail** (`tests/io`): each system call of a writer fails once, in each way that a disk can
   fail. Existing data is never torn or lost, the failure is reported, and the next try works.
 - **Links that fail** (`tests/net`): a proxy before the router delays, slows down, cuts and freezes the links.
-- **Faults of processes** (`tests/faults`): kills and stops each process of a patrolling robot (`SIGKILL`, `SIGSTOP`) in
+- **Faults of processes** (`tests/faults`): kill and stop each process of a patrolling robot (`SIGKILL`, `SIGSTOP`) in
   turn, in a random order. What can come back does, and the mission succeeds; otherwise everything ends in order. A
   process outside the robot listens: the base moves by live commands alone, and rests in time after the last one.
   `tests/faults/test_table.py` has a table of faults with the test of each.
@@ -40,11 +42,10 @@ examples), `make soak` the numbers in the table. A failure becomes a file that e
   driven from another host.
 - **Floods** (`tests/faults`): one process sends the base as many messages as it can, none of them a command; others
   send goals, requests and queries. The patrol continues with the same processes. Liveliness tokens are
-  the limit: a Zenoh session (1.4 to 1.10) keeps the key of every token that has ever crossed one of its links, 9 kB
-  each, and looks through all of them for the next. Between two bare sessions with 50 tokens at a time, 1,700 a second
-  fall to 150 after 20,000. A client that makes 140 tokens a second holds up the robot's messages for over 2 s after a
-  minute: then `world` hangs, and the robot brakes and goes down. The soak floods for 30 s.
-- **Attacks on listeners** (`tests/exposure`): finds in the kernel's tables what a running robot listens on, and sends
+  a known limit: a Zenoh session (1.4 to 1.10) keeps the key of every token that has ever crossed one of its links, 9 kB
+  each, and searches all of them for the next one. A client that declares 140 tokens a second holds up the robot's
+  messages for over 2 s after a minute: the robot then brakes and goes down. The soak floods for 30 s.
+- **Attacks on listeners** (`tests/exposure`): find in the kernel's tables what a running robot listens on, and send
   nonsense, floods and crowds there.
 - **Fuzzing** (`tests/fuzz`, extra `fuzz`): coverage-guided inputs.
 """

@@ -305,6 +305,8 @@ def suggest(name: str, valid: Iterable[str], what: str = VALID) -> str:
 def _is_chance(name: str, near: str) -> bool:
     """Return whether two names are only somewhat alike, in no word: `wheel_separation` and `acceleration`."""
     words, others = _words(name), _words(near)
+    if not _shared(words, others) and _edits(name, near) > max(1, len(name) // 3):
+        return True
     if min(len(name), len(near)) >= _LONG and _similarity(name, near) < _ALIKE and not _shared(words, others):
         return not any(_is_slip(word, other) for word in words for other in others)
     if _is_slip(name, near) or _shared(words, others) or _similarity(name, near) >= _CHANCE:
@@ -440,6 +442,21 @@ def surely_meant(name: str, valid: Iterable[str]) -> str | None:
 
 def _similarity(text: str, other: str) -> float:
     return difflib.SequenceMatcher(None, text, other).ratio()
+
+
+def _edits(text: str, other: str) -> int:
+    """Return how many characters were changed, added, removed or swapped with their neighbour, at the least."""
+    before: list[int] = []
+    row = list(range(len(other) + 1))
+    for at, character in enumerate(text, 1):
+        above, row, older = row, [at], before
+        for to, wanted in enumerate(other, 1):
+            cost = min(above[to] + 1, row[-1] + 1, above[to - 1] + (character != wanted))
+            if at > 1 and to > 1 and character == other[to - 2] and wanted == text[at - 2]:
+                cost = min(cost, older[to - 2] + 1)
+            row.append(cost)
+        before = above
+    return row[-1]
 
 
 def _is_swap(name: str, meant: str) -> bool:

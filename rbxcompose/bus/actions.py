@@ -21,7 +21,7 @@ from rbxcompose.msgs.stamps import to_nanoseconds, to_time
 from rbxcompose.msgs.types import Action, Message
 from rbxcompose.msgs.unique_identifier_msgs import UUID
 from rbxcompose.sdk.bound import Ended, Outcome, Reply
-from rbxcompose.sdk.ports import Qos
+from rbxcompose.sdk.ports import ORDINARY, MessageLimits, Qos
 
 STATUS_PERIOD = 0.1  # [s] between two publications of the goals' states during a flood of goals
 LOG_PERIOD = 1.0  # [s] between two log lines during a flood of goals
@@ -79,8 +79,9 @@ class ActionServer(Generic[G, R, F]):
         accept: Callable[[G], str],
         *,
         waits: bool = False,
+        limits: MessageLimits = ORDINARY,
     ) -> None:
-        """With `waits`, hold goals back until the node is open."""
+        """With `waits`, hold goals back until the node is open. Goals beyond the `limits` are refused."""
         names = ActionNames.of(name)
         self.current: ServedGoal[G, R, F] | None = None  # the goal to carry out; a newer one replaces it
         self.began: Callable[[], None] = lambda: None  # called when there is a goal to carry out
@@ -106,6 +107,7 @@ class ActionServer(Generic[G, R, F]):
                 self._on_client_left,
                 waits=waits,
                 rate=GOALS,
+                limits=limits,
             ),
         ]
 

@@ -1,6 +1,5 @@
 """The bus of one process: everything that its components declare, by component."""
 
-import math
 from collections.abc import Callable, Collection, Sequence
 from typing import Any, TypeVar
 
@@ -16,7 +15,7 @@ from rbxcompose.bus.transport import Closable, NoTransport, Transport
 from rbxcompose.bus.window import Window
 from rbxcompose.bus.wire import WIRE_PROFILES
 from rbxcompose.msgs.types import Action, Message, Service
-from rbxcompose.sdk.ports import Qos
+from rbxcompose.sdk.ports import ORDINARY, MessageLimits, Qos
 
 M = TypeVar("M", bound=Message)
 Q = TypeVar("Q", bound=Message)
@@ -76,7 +75,7 @@ class Bus:
         handler: Callable[[M], None],
         *,
         max_rate: float | None = None,
-        max_size: float = math.inf,
+        limits: MessageLimits | None = None,
         waits: bool = False,
         is_patient: bool = False,
         is_light: bool = True,
@@ -85,13 +84,13 @@ class Bus:
         """Call `handler` with each message of a topic; with `waits`, not before `open`.
 
         Takes at most `max_rate` [Hz] from each publisher of another process (all messages if infinite); None means the
-        limit of the QoS class. Refuses their messages of more than `max_size` [B]. A patient subscription is for topics
+        limit of the QoS class. Refuses their messages beyond the `limits`. A patient subscription is for topics
         that are published often and read rarely. A light handler may run in the thread that brings a message. Whoever
         `may_be_silent` is not missed.
         """
         node = self._node(owner)
         kinds = {"waits": waits, "is_patient": is_patient, "is_light": is_light, "may_be_silent": may_be_silent}
-        made = Subscription(self._topics, node, topic, message, qos, handler, max_rate, max_size=max_size, **kinds)
+        made = Subscription(self._topics, node, topic, message, qos, handler, max_rate, limits=limits, **kinds)
         return _kept(node, made)
 
     def serve(self, owner: str, name: str, service: type[Service[Q, R]], handler: Callable[[Q], R]) -> None:
@@ -112,13 +111,17 @@ class Bus:
         client_left: Callable[[bytes], None] | None = None,
         waits: bool = False,
         rate: float = REQUESTS,
+        limits: MessageLimits = ORDINARY,
     ) -> Server[Q, R]:
         """Call `handle` with each request, to be answered now or later; with `waits`, none before `open`.
 
         Takes at most `rate` [Hz] from each client elsewhere. `client_left` gets the GID of each client that is gone.
         """
         node = self._node(owner)
-        return _kept(node, Server(self._services, node, name, service, handle, client_left, waits=waits, rate=rate))
+        return _kept(
+            node,
+            Server(self._services, node, name, service, handle, client_left, waits=waits, rate=rate, limits=limits),
+        )
 
     def client(self, owner: str, name: str, service: type[Service[Q, R]]) -> Client[Q, R]:
         """Declare a client of a service; call it with a request."""
@@ -126,11 +129,20 @@ class Bus:
         return _kept(node, Client(self._services, node, name, service))
 
     def serve_action(
-        self, owner: str, name: str, action: type[Action[G, R, F]], accept: Callable[[G], str], *, waits: bool = False
+        self,
+        owner: str,
+        name: str,
+        action: type[Action[G, R, F]],
+        accept: Callable[[G], str],
+        *,
+        waits: bool = False,
+        limits: MessageLimits = ORDINARY,
     ) -> ActionServer[G, R, F]:
         """Carry out goals; with `waits`, none before `open`. `accept` returns why it refuses a goal, or nothing."""
         node = self._node(owner)
-        return _kept(node, ActionServer(self._topics, self._services, node, name, action, accept, waits=waits))
+        return _kept(
+            node, ActionServer(self._topics, self._services, node, name, action, accept, waits=waits, limits=limits)
+        )
 
     def action_client(self, owner: str, name: str, action: type[Action[G, R, F]]) -> ActionClient[G, R, F]:
         """Declare a client of an action; call it with a goal."""

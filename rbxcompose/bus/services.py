@@ -17,9 +17,10 @@ from rbxcompose.bus.names import Attachment, decode_attachment
 from rbxcompose.bus.tokens import EntityKind, gid, session_of
 from rbxcompose.bus.transport import LONGEST_WAIT, Closable, Question, TransportReply
 from rbxcompose.bus.wire import SERVICE_QOS
-from rbxcompose.msgs.cdr import decode, encode
+from rbxcompose.msgs.cdr import CdrLimitError, decode, encode
 from rbxcompose.msgs.types import Message, Service
 from rbxcompose.sdk.bound import Reply
+from rbxcompose.sdk.ports import ORDINARY, MessageLimits
 
 Q = TypeVar("Q", bound=Message)
 R = TypeVar("R", bound=Message)
@@ -85,8 +86,13 @@ class Server(Generic[Q, R]):
         *,
         waits: bool = False,
         rate: float = REQUESTS,
+        limits: MessageLimits = ORDINARY,
     ) -> None:
-        """With `waits`, hold requests until the node is open; take at most `rate` [Hz] from each client elsewhere."""
+        """With `waits`, hold requests until the node is open; take at most `rate` [Hz] from each client elsewhere.
+
+        Requests from there beyond the `limits` are refused.
+        """
+        self._limits = limits
         endpoint = node.endpoint(EntityKind.SERVER, name, service, SERVICE_QOS)
         self.route = endpoint.route
         self.malformed = 0  # requests that could not be read
@@ -157,8 +163,10 @@ class Server(Generic[Q, R]):
     def _read(self, question: Question) -> ServedRequest[Q, R] | None:
         try:
             asker = decode_attachment(question.attachment)
-            message, answer = decode(self._service.Request, question.payload), partial(self._answer, question, asker)
-            return ServedRequest(message, asker.gid, asker.sequence, answer)
+            if len(question.payload) > self._limits.size:
+                raise CdrLimitError(f"{len(question.payload)} bytes, at most {self._limits.size} are taken")
+            message = decode(self._service.Request, question.payload, self._limits.entries)
+            return ServedRequest(message, asker.gid, asker.sequence, partial(self._answer, question, asker))
         except ValueError as error:
             question.fail(f"malformed request: {error}")
             self.malformed += 1

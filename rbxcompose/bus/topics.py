@@ -16,10 +16,10 @@ from rbxcompose.bus.names import Attachment, AttachmentError, decode_attachment
 from rbxcompose.bus.tokens import EndpointToken, EntityKind, gid, parse_token, session_of
 from rbxcompose.bus.transport import Arrival, Closable
 from rbxcompose.bus.wire import expects_speech, most_per_second, queue_depth, ros_qos
-from rbxcompose.msgs.cdr import CdrError, CdrLengthError, decode, encode
+from rbxcompose.msgs.cdr import CdrError, CdrLengthError, CdrLimitError, decode, encode
 from rbxcompose.msgs.fields import NotFiniteError, require_finite
 from rbxcompose.msgs.types import Message
-from rbxcompose.sdk.ports import Qos
+from rbxcompose.sdk.ports import MessageLimits, Qos, limits_of
 
 M = TypeVar("M", bound=Message)
 
@@ -100,7 +100,7 @@ class Subscription(Generic[M]):
     """Passes the messages of a topic to `handler` and remembers the newest.
 
     It takes at most `max_rate` [Hz] from each publisher in another process; None means the limit of the QoS class.
-    Messages of more than `max_size` [B] from there are refused before they cost anything.
+    Messages from there beyond the `limits`, or those of the QoS class, are refused before they cost anything.
     """
 
     def __init__(
@@ -113,7 +113,7 @@ class Subscription(Generic[M]):
         handler: Callable[[M], None],
         max_rate: float | None = None,
         *,
-        max_size: float = math.inf,
+        limits: MessageLimits | None = None,
         waits: bool = False,
         listens: bool = True,
         is_patient: bool = False,
@@ -132,7 +132,7 @@ class Subscription(Generic[M]):
         self.refusals = Refusals()
         self.is_wanted: Callable[[], bool] = lambda: True  # if false, arrivals from other processes are ignored
         self._topics, self._process, self._qos = topics, node.process, qos
-        self._message, self._handler, self._max_size = message, handler, max_size
+        self._message, self._handler, self._limits = message, handler, limits or limits_of(qos)
         self._may_be_silent = may_be_silent
         rate = max_rate or most_per_second(qos)
         self._allowances = None if rate is None or math.isinf(rate) else Allowances(rate)
@@ -214,7 +214,7 @@ class Subscription(Generic[M]):
         # In a thread of the transport: age is measured from here, however busy the scheduler is.
         if not self.is_wanted():
             return
-        if len(arrival.payload) > self._max_size:
+        if len(arrival.payload) > self._limits.size:
             self.refusals.add(RefusalReason.TOO_LARGE)
             return
         now, source = self._process.clock.now(), None
@@ -245,7 +245,7 @@ class Subscription(Generic[M]):
             source = source or decode_attachment(arrival.attachment)
             if self._qos is Qos.LATCHED and self._topics.published_here(self, source):
                 return None  # the history of a latched topic brings our own messages back
-            message = decode(self._message, arrival.payload)
+            message = decode(self._message, arrival.payload, self._limits.entries)
             if self._qos is Qos.COMMAND:
                 require_finite(message)
         except (AttachmentError, CdrError, NotFiniteError) as error:
@@ -263,6 +263,7 @@ class Subscription(Generic[M]):
 _REASONS: dict[type[ValueError], RefusalReason] = {
     AttachmentError: RefusalReason.ATTACHMENT,
     CdrLengthError: RefusalReason.LENGTH,
+    CdrLimitError: RefusalReason.TOO_LARGE,
     CdrError: RefusalReason.CONTENT,
     NotFiniteError: RefusalReason.NOT_FINITE,
 }

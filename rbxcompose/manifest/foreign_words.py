@@ -22,6 +22,7 @@ _OURS = {
     "match": "contains startswith",
     "with": "params parameters arguments vars",
     "from": "source src",
+    "baud": "baudrate baud_rate bitrate",
     "wheel_distance": "wheel_separation wheel_track track_width wheelbase",
 }
 FOREIGN: Mapping[str, str] = {name: ours for ours, names in _OURS.items() for name in names.split()}
@@ -58,6 +59,17 @@ _COMPONENTS = {
 }
 COMPONENTS: Mapping[str, str] = {name: ours for ours, names in _COMPONENTS.items() for name in names.split()}
 """Our type of a component for each node of ROS, or for what people call it."""
+
+_CONTROLLERS = {
+    "joint_trajectory": "joint_trajectory_controller JointTrajectoryController",
+    "joint_command": "forward_command_controller ForwardCommandController position_controllers "
+    "JointGroupPositionController JointPositionController position_controller",
+    "gripper": "gripper_action_controller GripperActionController GripperController parallel_gripper_action_controller",
+    "diff_drive": "diff_drive_controller DiffDriveController",
+    "gpio": "gpio_controllers GpioCommandController GPIOController",
+}
+CONTROLLERS: Mapping[str, str] = {name: ours for ours, names in _CONTROLLERS.items() for name in names.split()}
+"""Our type of a controller for each package and class of ros2_control and ros_control."""
 CHOICES: Mapping[str, str] = {
     "unless-stopped": "always",
     "on-failure": "on_failure",

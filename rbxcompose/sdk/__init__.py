@@ -44,7 +44,19 @@ from rbxcompose.sdk.capabilities import (
 )
 from rbxcompose.sdk.component import Component
 from rbxcompose.sdk.messages import MessageName
-from rbxcompose.sdk.ports import Calls, CallsAction, In, Looks, Out, Port, Qos, Serves, ServesAction, ServesTopic
+from rbxcompose.sdk.ports import (
+    Calls,
+    CallsAction,
+    In,
+    Looks,
+    MessageLimits,
+    Out,
+    Port,
+    Qos,
+    Serves,
+    ServesAction,
+    ServesTopic,
+)
 from rbxcompose.sdk.registry import component
 from rbxcompose.sdk.robot_events import ComponentNoted, MissionOver, MissionWaits, RobotHeld
 from rbxcompose.sdk.skills import Activity, skill
@@ -82,6 +94,7 @@ __all__ = [
     "LinkName",
     "Live",
     "Looks",
+    "MessageLimits",
     "MessageName",
     "MissionOver",
     "MissionWaits",

@@ -3,7 +3,7 @@
 from collections.abc import Collection, Mapping
 from enum import StrEnum
 from types import MappingProxyType
-from typing import Any, ClassVar, Generic, Protocol, Self, TypeVar, overload
+from typing import Any, ClassVar, Generic, NamedTuple, Protocol, Self, TypeVar, overload
 
 from rbxcompose.msgs.fields import ArrayEntries, Measures
 from rbxcompose.msgs.types import Action, Message, Service
@@ -26,6 +26,25 @@ class Qos(StrEnum):
 
 
 _DEPTH = {Qos.COMMAND: 1, Qos.STATE: 10, Qos.LATCHED: 1, Qos.EVENT: 10_000, Qos.BULK: 2}
+
+
+class MessageLimits(NamedTuple):
+    """What a port takes of another process at most; a message beyond that is refused before it is decoded."""
+
+    size: float = 256 * 1024
+    """Bytes."""
+    entries: float = 2_000
+    """Entries of all its lists of texts and messages; each takes some 10 µs to decode."""
+
+
+ORDINARY = MessageLimits()
+BULK = MessageLimits(64 * 1024 * 1024, 10_000)
+"""For topics of QoS class `bulk`, such as images and clouds, and for who only looks at any topic."""
+
+
+def limits_of(qos: Qos) -> MessageLimits:
+    """Return the limits that messages of a QoS class have if none are declared."""
+    return BULK if qos is Qos.BULK else ORDINARY
 
 
 M = TypeVar("M", bound=Message)
@@ -103,7 +122,7 @@ class In(Port[Latest[M]]):
         unit: str = "",
         is_open: bool = False,
         max_rate: float | None = None,
-        max_size: int | None = None,
+        limits: MessageLimits | None = None,
         may_be_silent: bool = False,
     ) -> None:
         """Take `is_open` for an input that may also be fed from outside the robot.
@@ -111,11 +130,13 @@ class In(Port[Latest[M]]):
         `may_be_silent` is for one whose publishers speak only now and then: nobody misses them.
 
         At most `max_rate` messages per second are taken from each publisher of another process [Hz]; commands are
-        always limited. Messages of other processes with more than `max_size` [B] are refused unread.
+        always limited. Their messages beyond the `limits` are refused before they are decoded; by default, these are
+        those of the QoS class. A handler must be done with the longest message in much less than 0.5 s.
         """
         super().__init__(topic)
         self.interface, self.qos, self.unit, self.is_open, self.max_rate = message, Qos(qos), unit, is_open, max_rate
-        self.max_size, self.may_be_silent = max_size, may_be_silent
+        self.limits = limits or limits_of(self.qos)
+        self.may_be_silent = may_be_silent
 
 
 class ServesTopic(In[M]):
@@ -151,6 +172,7 @@ class ServesTopic(In[M]):
         entries: ArrayEntries | None = None,
         qos: Qos | str = Qos.EVENT,
         max_rate: float | None = None,
+        limits: MessageLimits | None = None,
     ) -> None:
         """Declare the port.
 
@@ -158,7 +180,7 @@ class ServesTopic(In[M]):
             ValueError: if `ends` cannot report an end, if `halts` or `outcomes` could never be used, or if the message
                 does not have the `entries`.
         """
-        super().__init__(message, topic, qos=qos, is_open=True, max_rate=max_rate)
+        super().__init__(message, topic, qos=qos, is_open=True, max_rate=max_rate, limits=limits)
         end: type[Message] | None = ends.interface if ends is not None else None
         if end is not None and end.FIELDS.get("success") != "bool":
             raise ValueError(f"{end.TYPE} has no flag 'success' to report the end of an order")
@@ -187,14 +209,23 @@ class Serves(Port[None]):
     """Serves requests: the method `on_<port>` takes a request and returns the response, or a `Later` that brings it.
 
     It is a skill of missions if the response has a flag `success`; `skill` is as in `ServesAction`. `unit` says what a
-    bare number in the request means (`%`).
+    bare number in the request means (`%`). `limits` are as in `In`.
     """
 
     kind = "serves"
 
-    def __init__(self, service: type[Service[Q, R]], topic: str, *, skill: str | None = "", unit: str = "") -> None:
+    def __init__(
+        self,
+        service: type[Service[Q, R]],
+        topic: str,
+        *,
+        skill: str | None = "",
+        unit: str = "",
+        limits: MessageLimits = ORDINARY,
+    ) -> None:
         super().__init__(topic)
         self.interface, self.skill, self.unit = service, skill, unit
+        self.limits = limits
 
 
 class Calls(Port[Caller[Q, R]]):
@@ -238,6 +269,7 @@ class ServesAction(Port[ActionServer[G, R, F]]):
         measures: Measures = MappingProxyType({}),
         choices: Mapping[str, Collection[str]] = MappingProxyType({}),
         may_lack: bool = False,
+        limits: MessageLimits = ORDINARY,
     ) -> None:
         """Declare the port.
 
@@ -259,7 +291,7 @@ class ServesAction(Port[ActionServer[G, R, F]]):
             raise ValueError(f"{action.Goal.TYPE} has no text '{wrong[0]}'")
         self.measures, self.choices, self.may_lack = measures, choices, may_lack
         self.interface, self.claims, self.restartable = action, claims, restartable
-        self.pausable, self.outcomes = pausable, outcomes
+        self.pausable, self.outcomes, self.limits = pausable, outcomes, limits
 
 
 class CallsAction(Port[ActionCaller[G, R, F]]):

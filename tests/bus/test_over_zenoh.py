@@ -25,7 +25,7 @@ from rbxcompose.msgs.nav2_msgs import NavigateToPose
 from rbxcompose.msgs.std_msgs import Float32, String
 from rbxcompose.msgs.unique_identifier_msgs import UUID
 from rbxcompose.sdk.bound import Ended, Outcome, Reply
-from rbxcompose.sdk.ports import Qos
+from rbxcompose.sdk.ports import MessageLimits, Qos
 from tests.bus.conftest import Connected, Network
 
 Goal, Result, Feedback = NavigateToPose.Goal, NavigateToPose.Result, NavigateToPose.Feedback
@@ -117,7 +117,7 @@ def test_bad_input_is_refused_counted_by_reason_and_logged_once(
     source, good = Attachment(1, 0, bytes(16)).encode(), encode(Twist())
     bad = [
         (good[:-1], source),
-        (good + bytes(8), source),
+        (good + bytes(17), source),
         (good, b""),
         (good, source + b"x"),
         (b"\x07" + good, source),
@@ -163,7 +163,8 @@ def test_a_flood_of_commands_is_capped_before_anything_is_decoded_and_other_topi
 
 def test_a_message_that_is_too_large_is_refused_unread(network: Network, one: Connected, other: Connected) -> None:
     got = list[Twist]()
-    heard = other.bus.subscribe("base", "moved", Twist, Qos.STATE, got.append, max_size=52)  # that of a Twist
+    size_of_a_twist = MessageLimits(size=52)
+    heard = other.bus.subscribe("base", "moved", Twist, Qos.STATE, got.append, limits=size_of_a_twist)
     moved = one.bus.publisher("base", "moved", Twist, Qos.STATE)
     network.until(lambda: moved._remote.has_match)
     moved._remote.put(bytes(53), Attachment(1, 0, bytes(16)).encode())

@@ -64,15 +64,7 @@ def test_fences_keep_their_file_and_their_mistake() -> None:
 def test_it_builds_without_a_warning(tmp_path: Path) -> None:
     pytest.importorskip("zensical")
     site.write(tmp_path / "site")
-    words = [
-        sys.executable,
-        "-m",
-        "zensical",
-        "build",
-        "--strict",
-        "--config-file",
-        str(tmp_path / "site/zensical.toml"),
-    ]
-    built = subprocess.run(words, capture_output=True, text=True, check=False)
+    words = [sys.executable, "-m", "zensical", "build", "--strict", "--config-file"]
+    built = subprocess.run([*words, str(tmp_path / "site/zensical.toml")], capture_output=True, text=True, check=False)
     assert built.returncode == 0, built.stdout + built.stderr
     assert (tmp_path / "site/html/findings/RBX1001.html").exists()

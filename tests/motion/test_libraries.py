@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rbxcompose.domains.arms.motion import numba_cache
 from rbxcompose.domains.arms.motion.compiled_collisions import near_pairs, workspace
 from rbxcompose.domains.arms.motion.library import Library, flat
-from rbxcompose.domains.arms.motion.numba_cache import Compiled, borrowed, can_link, compiled, inlined, is_empty
+from rbxcompose.domains.arms.motion.numba_cache import CompiledFunction, borrowed, can_link, compiled, inlined, is_empty
 from tests.motion.toy_arm import fast_planner
 
 Array = NDArray[np.float64]
@@ -50,29 +50,29 @@ def asked(function: Any, table: Array, weight: float = 0.1) -> tuple[int, list[f
 
 
 @pytest.fixture
-def kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Compiled:
+def kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> CompiledFunction:
     """Return the function above, in a library."""
     monkeypatch.setattr(numba_cache, "cache_folder", lambda: str(tmp_path))
     monkeypatch.setattr(numba_cache, "_made", [])
-    maker = Compiled(cast(Compiled, weighted)._function, is_kept=True)
+    maker = CompiledFunction(cast(CompiledFunction, weighted).function, is_kept=True)
     assert is_empty()
     asked(maker, np.ones((3, 2)))
     numba_cache.keep_libraries()
     assert not is_empty()
-    return Compiled(cast(Compiled, weighted)._function, is_kept=True)
+    return CompiledFunction(cast(CompiledFunction, weighted).function, is_kept=True)
 
 
 TABLE = np.array([[1.0, 2.0], [3.0, 5.0], [7.0, 11.0]])
 
 
-def test_a_library_answers_as_numba(kept: Compiled) -> None:
+def test_a_library_answers_as_numba(kept: CompiledFunction) -> None:
     found = asked(kept, TABLE)
     assert "dispatcher" not in vars(kept)
     assert found == asked(kept.dispatcher, TABLE)
 
 
 @pytest.mark.parametrize("table", [np.asfortranarray(TABLE), TABLE.astype(np.float32), np.repeat(TABLE, 2, 0)[::2]])
-def test_other_arrays_are_left_to_numba(kept: Compiled, table: Array) -> None:
+def test_other_arrays_are_left_to_numba(kept: CompiledFunction, table: Array) -> None:
     assert asked(kept, table) == asked(kept.dispatcher, TABLE.astype(table.dtype))
     assert "dispatcher" in vars(kept)
 
@@ -91,12 +91,12 @@ def test_a_block_has_the_address_of_an_array() -> None:
 def test_the_search_is_the_same_to_the_last_bit() -> None:
     checker: Any = fast_planner().checker
     numba_cache.keep_libraries()
-    function, points = cast(Compiled, near_pairs), fast_planner().space.samples(200, 1)
+    function, points = cast(CompiledFunction, near_pairs), fast_planner().space.samples(200, 1)
     path = function.library_path
     assert path is not None
     assert path.is_file()
     answers = []
-    for called in (Compiled(function._function, is_kept=True), function.dispatcher):
+    for called in (CompiledFunction(function.function, is_kept=True), function.dispatcher):
         found = np.zeros((4096, 2), dtype=np.int64)
         answers.append((called(checker._model, points, found, workspace(checker._model)), found.tolist()))
     assert answers[0] == answers[1]

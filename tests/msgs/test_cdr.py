@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from rbxcompose.msgs.action_msgs import CancelGoal, GoalInfo
 from rbxcompose.msgs.builtin_interfaces import Time
-from rbxcompose.msgs.cdr import HEADER, CdrError, decode, encode
-from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray, DiagnosticStatus
+from rbxcompose.msgs.cdr import HEADER, CdrError, CdrLimitError, decode, encode
+from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray, DiagnosticStatus, KeyValue
 from rbxcompose.msgs.geometry_msgs import PoseWithCovariance, Twist, Vector3
 from rbxcompose.msgs.nav_msgs import Odometry
 from rbxcompose.msgs.std_msgs import Bool, Empty, Float32, Int32, String
@@ -105,14 +105,23 @@ def test_a_sequence_of_messages_holds_at_most_a_million() -> None:
         decode(EVERYTHING, payload[:-4] + struct.pack("<I", 1_000_001) + bytes(1_000_001))
 
 
-def test_up_to_three_bytes_of_filling_are_accepted_and_no_more() -> None:
+def test_padding_of_other_writers_is_accepted_and_no_more() -> None:
     payload = encode(String(data="hi"))
-    assert decode(String, payload + bytes(3)) == String(data="hi")
-    with pytest.raises(CdrError, match="no std_msgs/msg/String: 4 bytes too many"):
-        decode(String, payload + bytes(4))
+    assert decode(String, payload + bytes(16)) == String(data="hi")
+    with pytest.raises(CdrError, match="no std_msgs/msg/String: 17 bytes too many"):
+        decode(String, payload + bytes(17))
 
 
-@given(any_message(), st.integers(0, 3))
+@pytest.mark.parametrize("count", [1, 3])
+def test_entries_of_nested_lists_are_counted_together_before_they_are_read(count: int) -> None:
+    statuses = tuple(DiagnosticStatus(values=(KeyValue(),) * count) for _ in range(5))
+    payload, entries = encode(DiagnosticArray(status=statuses)), 5 + 5 * count
+    assert decode(DiagnosticArray, payload, entries) == DiagnosticArray(status=statuses)
+    with pytest.raises(CdrLimitError, match=f"DiagnosticArray with more than {entries - 1} entries"):
+        decode(DiagnosticArray, payload, entries - 1)
+
+
+@given(any_message(), st.integers(0, 16))
 def test_a_message_is_the_same_with_and_without_filling(message: Message, filling: int) -> None:
     assert encode(decode(type(message), encode(message) + bytes(filling))) == encode(message)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import threading
 from collections.abc import Callable
 from functools import partial
@@ -209,7 +208,7 @@ def subscribe(
         port.qos,
         handler,
         max_rate=port.max_rate,
-        max_size=math.inf if port.max_size is None else port.max_size,
+        limits=port.limits,
         waits=waits,
         is_light=is_light,
         may_be_silent=port.may_be_silent,
@@ -238,14 +237,14 @@ def _end(
             return subscribe(component, owner, instance.topic(name), port, bus, handling)
         case ports.Serves():
             serve = _on_request(component, name, port, handling)
-            bus.serve_later(owner, instance.topic(name), interface, serve, waits=True)
+            bus.serve_later(owner, instance.topic(name), interface, serve, waits=True, limits=port.limits)
             return None
         case ports.Calls():
             return bus.client(owner, instance.topic(name), interface)
         case ports.ServesAction():
             topic = instance.topic(name)
             accept = _on_goal(component, name, port, handling)
-            server = bus.serve_action(owner, topic, interface, accept, waits=True)
+            server = bus.serve_action(owner, topic, interface, accept, waits=True, limits=port.limits)
             if port.pausable:
                 bus.serve(owner, f"{topic}/{PAUSE}", SetBool, partial(_pause, server, port, handling))
             return server

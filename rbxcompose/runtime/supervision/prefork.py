@@ -13,7 +13,7 @@ import os
 import selectors
 import signal
 import socket
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -256,24 +256,20 @@ def _import_what_is_common(plan: Plan) -> None:
 
     for name in {instance.type for instance in plan.instances}:
         component_type(name)
-    _make_messages({wire.type for instance in plan.instances for wire in instance.wires})
+    _make_messages({wire.type for instance in plan.instances for wire in instance.wires if wire.type})
 
 
 def _make_messages(names: Collection[str]) -> None:
     """Make classes of messages and their hashes once, which most processes use, and which take long to make."""
     from rbxcompose.runtime.process_group.parameters import INTERFACES
 
-    of_kind: dict[str, Callable[[str], Any]] = {
-        "msg": registry.message,
-        "srv": registry.service,
-        "action": registry.action,
-    }
-    used = [of_kind[name.split("/")[1]](name) for name in sorted(names)]
+    of_kind = {"msg": registry.message, "srv": registry.service, "action": registry.action}
+    used: list[Any] = [of_kind[name.split("/")[1]](name) for name in sorted(names)]
     for interface in (*INTERFACES, Log, DiagnosticArray, CancelGoal, GoalStatusArray, *used):
-        is_action = issubclass(interface, Action)
-        parts = (interface.SendGoal, interface.GetResult, interface.FeedbackMessage) if is_action else (interface,)
-        for part in parts:
-            _ = part.HASH
+        if issubclass(interface, Action):
+            _ = interface.SendGoal.HASH, interface.GetResult.HASH, interface.FeedbackMessage.HASH
+        else:
+            _ = interface.HASH
 
 
 def _redirect_output(path: Path) -> None:

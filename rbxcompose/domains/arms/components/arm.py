@@ -20,7 +20,7 @@ from rbxcompose.domains.arms.motion.arm_task import ArmTask
 from rbxcompose.domains.arms.motion.collisions import pairs_shown, readers_of
 from rbxcompose.domains.arms.motion.hand_task import HandTask
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory
-from rbxcompose.domains.arms.motion.scene import PlacedObject, mistake_in
+from rbxcompose.domains.arms.motion.scene import SCENE_LIMITS, PlacedObject, mistake_among
 from rbxcompose.domains.arms.motion.scene_messages import path_of, placed_object
 from rbxcompose.domains.arms.planning_processes import compile_elsewhere, planning_processes
 from rbxcompose.domains.arms.reasons import REASONS
@@ -79,7 +79,7 @@ class Arm(PicksAndPlaces, sdk.Component[ArmConfig]):
     rate = 20.0
     steps_for_goals = True
     joint_states = sdk.In(JointState, "joint_states", is_open=True)
-    scene = sdk.In(SceneObjects, "scene", qos="latched")
+    scene = sdk.In(SceneObjects, "scene", qos="latched", limits=SCENE_LIMITS)
 
     @classmethod
     def ports(cls, config: ArmConfig) -> dict[str, sdk.Port[Any]]:
@@ -184,8 +184,7 @@ class Arm(PicksAndPlaces, sdk.Component[ArmConfig]):
     def on_scene(self, message: SceneObjects) -> None:
         """Plan among other objects from now on; while one of them cannot be, nothing is planned."""
         found, body = tuple(map(placed_object, message.objects)), self.works.kinematics.body
-        wrong = ((item.name, mistake_in(item, body)) for item in found)
-        self.problem = message.problem or next((f"object '{name}': {words}" for name, words in wrong if words), "")
+        self.problem = message.problem or mistake_among(found, body)
         if not self.problem:
             paddings = dict(zip(message.padded_links, message.paddings.tolist(), strict=False))
             try:
@@ -481,9 +480,15 @@ def moveit_ports(config: ArmConfig) -> dict[str, sdk.Port[Any]]:
     found: dict[str, sdk.Port[Any]] = {
         FORWARD: sdk.Serves(moveit_msgs.GetPositionFK, f"{config.name}/compute_fk", skill=None),
         INVERSE: sdk.Serves(moveit_msgs.GetPositionIK, f"{config.name}/compute_ik", skill=None),
-        MOTION: sdk.ServesAction(moveit_msgs.MoveGroup, f"{config.name}/move_action", claims=claims, skill=None),
+        MOTION: sdk.ServesAction(
+            moveit_msgs.MoveGroup, f"{config.name}/move_action", claims=claims, skill=None, limits=SCENE_LIMITS
+        ),
         GIVEN: sdk.ServesAction(
-            moveit_msgs.ExecuteTrajectory, f"{config.name}/execute_trajectory", claims=claims, skill=None
+            moveit_msgs.ExecuteTrajectory,
+            f"{config.name}/execute_trajectory",
+            claims=claims,
+            skill=None,
+            limits=SCENE_LIMITS,
         ),
     }
     return {name: port.named(name) for name, port in found.items()}

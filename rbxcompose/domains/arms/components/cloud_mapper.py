@@ -15,7 +15,7 @@ from rbxcompose.base.geometry import Transform3, rotate
 from rbxcompose.domains.arms.motion.clouds import CloudError, SeenCells, SpaceFilter, points_of
 from rbxcompose.domains.arms.motion.collisions import readers_of
 from rbxcompose.domains.arms.motion.groups import Array
-from rbxcompose.domains.arms.motion.scene import PlacedObject
+from rbxcompose.domains.arms.motion.scene import SCENE_LIMITS, PlacedObject, mistake_among
 from rbxcompose.domains.arms.motion.scene_messages import object_message, placed_object
 from rbxcompose.domains.body.model import Geometry
 from rbxcompose.domains.body.urdf import body_of
@@ -25,7 +25,6 @@ from rbxcompose.msgs.stamps import NANOSECONDS, to_nanoseconds
 from rbxcompose.sdk.updater import TaskStatus
 
 CLOUD = "cloud"  # the port
-LARGEST = 64_000_000  # [bytes] of a cloud
 OLDEST, EARLIEST = 1.0, 0.2  # [s] by which the stamp of a cloud may be behind and ahead of now
 MOST_CELLS = 50_000  # of an octree; more would make each examination of a motion slow
 KNOWN = 200  # messages about joints that are remembered
@@ -76,15 +75,13 @@ class CloudMapper(sdk.Component[CloudMapperConfig]):
     process = "clouds"
     blocking = True
     joint_states = sdk.In(JointState, "joint_states", is_open=True)
-    scene = sdk.In(SceneObjects, "scene", qos="latched")
+    scene = sdk.In(SceneObjects, "scene", qos="latched", limits=SCENE_LIMITS)
 
     @classmethod
     def ports(cls, config: CloudMapperConfig) -> dict[str, sdk.Port[Any]]:
         """Return the ports: clouds, the octree, and a look at each frame outside of the body."""
         root = body_of(config.urdf).root
-        clouds = sdk.In(
-            PointCloud2, config.topic, qos="bulk", is_open=True, max_rate=max(1.0, 2 * config.rate), max_size=LARGEST
-        )
+        clouds = sdk.In(PointCloud2, config.topic, qos="bulk", is_open=True, max_rate=max(1.0, 2 * config.rate))
         looks = {_look(frame): sdk.Looks(source=frame, target=root).named(_look(frame)) for frame in _outside(config)}
         cells: sdk.Out[SceneObjects] = sdk.Out(SceneObjects, f"scene/{config.name}", qos="latched")
         return super().ports(config) | {CLOUD: clouds.named(CLOUD), "cells": cells.named("cells"), **looks}
@@ -117,6 +114,8 @@ class CloudMapper(sdk.Component[CloudMapperConfig]):
         found = map(placed_object, message.objects)
         there = [object_ for object_ in found if object_.name != self.config.name and object_.link in self.body.links]
         try:
+            if mistake := mistake_among(there, self.body):
+                raise ValueError(mistake)
             self.filter.place(there)
         except ValueError as error:
             self.warn(f"points of things that are known are not left out: {error}")

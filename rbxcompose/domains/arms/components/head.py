@@ -17,6 +17,7 @@ from rbxcompose.base.printable import plain
 from rbxcompose.base.units import ANGLE, LENGTH, TIME
 from rbxcompose.domains.arms.arm_config import ArmJointConfig
 from rbxcompose.domains.arms.motion.gaze import NEAREST, Aiming, Gaze
+from rbxcompose.domains.arms.motion.scene import SCENE_LIMITS
 from rbxcompose.domains.arms.motion.scene_messages import placed_object
 from rbxcompose.domains.arms.reasons import REASONS, GraspReason, MotionReason
 from rbxcompose.domains.body.urdf import body_of
@@ -106,7 +107,7 @@ class Head(sdk.Component[HeadConfig]):
             FOLLOW: sdk.CallsAction(FollowJointTrajectory, config.follow).named(FOLLOW),
         }
         if config.sees_scene:
-            found[SCENE] = sdk.In(SceneObjects, "scene", qos="latched").named(SCENE)
+            found[SCENE] = sdk.In(SceneObjects, "scene", qos="latched", limits=SCENE_LIMITS).named(SCENE)
         if config.stream:
             topic = f"{config.name}/target"
             found[TARGET] = sdk.In(PointStamped, topic, qos="command", is_open=True, may_be_silent=True).named(TARGET)

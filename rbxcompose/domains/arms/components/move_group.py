@@ -11,6 +11,7 @@ from pydantic import Field
 from rbxcompose import sdk
 from rbxcompose.base.config import Config as Model
 from rbxcompose.domains.arms.motion.moveit import not_done
+from rbxcompose.domains.arms.motion.scene import SCENE_LIMITS
 from rbxcompose.msgs.moveit_msgs import (
     ExecuteTrajectory,
     GetMotionPlan,
@@ -53,9 +54,9 @@ class MoveGroupServer(sdk.Component[MoveGroupConfig]):
     process = "scene"
     rate = 20.0
     steps_for_goals = True
-    move_action = sdk.ServesAction(MoveGroup, "move_action", skill=None)
-    execute_trajectory = sdk.ServesAction(ExecuteTrajectory, "execute_trajectory", skill=None)
-    plan_kinematic_path = sdk.Serves(GetMotionPlan, "plan_kinematic_path", skill=None)
+    move_action = sdk.ServesAction(MoveGroup, "move_action", skill=None, limits=SCENE_LIMITS)
+    execute_trajectory = sdk.ServesAction(ExecuteTrajectory, "execute_trajectory", skill=None, limits=SCENE_LIMITS)
+    plan_kinematic_path = sdk.Serves(GetMotionPlan, "plan_kinematic_path", skill=None, limits=SCENE_LIMITS)
 
     @classmethod
     def ports(cls, config: MoveGroupConfig) -> dict[str, sdk.Port[Any]]:

@@ -16,7 +16,14 @@ from rbxcompose.base.geometry import Quaternion, Transform3, Vector3
 from rbxcompose.base.printable import plain
 from rbxcompose.domains.arms import scene_view
 from rbxcompose.domains.arms.motion.moveit import MoveItScene
-from rbxcompose.domains.arms.motion.scene import Colour, PlacedObject, PlanningScene, SceneError, ScenePiece
+from rbxcompose.domains.arms.motion.scene import (
+    SCENE_LIMITS,
+    Colour,
+    PlacedObject,
+    PlanningScene,
+    SceneError,
+    ScenePiece,
+)
 from rbxcompose.domains.arms.motion.scene_messages import markers, object_message, placed_object
 from rbxcompose.domains.arms.motion.scene_text import read_scene
 from rbxcompose.domains.body.model import Geometry
@@ -105,10 +112,12 @@ class Scene(Component[SceneConfig]):
     made_by = "A robot with arms runs one."
     process = "scene"
     joint_states = In(JointState, "joint_states", is_open=True)
-    collision_object = In(CollisionObject, "collision_object", qos="event", is_open=True)
-    attached_collision_object = In(AttachedCollisionObject, "attached_collision_object", qos="event", is_open=True)
-    planning_scene = In(PlanningSceneMessage, "planning_scene", qos="event", is_open=True)
-    apply_planning_scene = Serves(ApplyPlanningScene, "apply_planning_scene", skill=None)
+    collision_object = In(CollisionObject, "collision_object", qos="event", is_open=True, limits=SCENE_LIMITS)
+    attached_collision_object = In(
+        AttachedCollisionObject, "attached_collision_object", qos="event", is_open=True, limits=SCENE_LIMITS
+    )
+    planning_scene = In(PlanningSceneMessage, "planning_scene", qos="event", is_open=True, limits=SCENE_LIMITS)
+    apply_planning_scene = Serves(ApplyPlanningScene, "apply_planning_scene", skill=None, limits=SCENE_LIMITS)
     get_planning_scene = Serves(GetPlanningScene, "get_planning_scene", skill=None)
     scene = Out(SceneObjects, "scene", qos="latched")
     markers = Out(MarkerArray, "scene_markers", qos="latched")
@@ -117,7 +126,10 @@ class Scene(Component[SceneConfig]):
     def ports(cls, config: SceneConfig) -> dict[str, Port[Any]]:
         """Return the ports: its own, what sensors see, and a look at each frame outside of the body."""
         root = body_of(config.urdf).root
-        seen = {item: In(SceneObjects, f"scene/{item}", qos="latched").named(f"cloud_{item}") for item in config.clouds}
+        seen = {
+            item: In(SceneObjects, f"scene/{item}", qos="latched", limits=SCENE_LIMITS).named(f"cloud_{item}")
+            for item in config.clouds
+        }
         clouds = {port.name: port for port in seen.values()}
         looks = {_look(frame): Looks(source=frame, target=root).named(_look(frame)) for frame in config.frames}
         seen = {name: port.named(name) for name, port in clouds.items()}

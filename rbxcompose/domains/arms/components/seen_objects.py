@@ -11,6 +11,7 @@ from rbxcompose import sdk
 from rbxcompose.base.geometry import Transform3, Vector3
 from rbxcompose.base.levels import Level
 from rbxcompose.base.printable import plain
+from rbxcompose.domains.arms.motion.scene import SCENE_LIMITS
 from rbxcompose.domains.arms.motion.scene_messages import pose_message, pose_of
 from rbxcompose.domains.arms.motion.sightings import SeenObject, Sighting, Sightings
 from rbxcompose.msgs.moveit_msgs import CollisionObject
@@ -57,7 +58,7 @@ class SeenObjects(sdk.Component[SeenObjectsConfig]):
     """
 
     rate = 5.0
-    scene = sdk.In(SceneObjects, "scene", qos="latched", is_open=True)
+    scene = sdk.In(SceneObjects, "scene", qos="latched", is_open=True, limits=SCENE_LIMITS)
     objects = sdk.Out(CollisionObject, "collision_object", qos="event")
     nearest = sdk.Out(String, "nearest_object")
     newest = sdk.Out(String, "newest_object")

@@ -45,7 +45,7 @@ def compiled(function: F) -> F:
     Raises:
         ModuleNotFoundError: without numba, when it is called.
     """
-    return cast(F, Compiled(function, is_kept=True))
+    return cast(F, CompiledFunction(function, is_kept=True))
 
 
 def inlined(function: F) -> F:
@@ -53,7 +53,7 @@ def inlined(function: F) -> F:
 
     Nothing is made that Python could call, which halves the compiling.
     """
-    return cast(F, Compiled(function, no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=True))
+    return cast(F, CompiledFunction(function, no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=True))
 
 
 def borrowed(value: T) -> T:
@@ -64,11 +64,11 @@ def borrowed(value: T) -> T:
     return value
 
 
-class Compiled:
+class CompiledFunction:
     """A function for numba, or one of a library that it has made before."""
 
     def __init__(self, function: Callable[..., object], *, is_kept: bool = False, **options: bool) -> None:
-        self._function, self._is_kept, self._options = function, is_kept, options
+        self.function, self._is_kept, self._options = function, is_kept, options
         update_wrapper(self, function)
 
     def __call__(self, *arguments: Any) -> Any:
@@ -88,7 +88,7 @@ class Compiled:
         config.CACHE_DIR = folder  # which numba reads now, and only here: functions of others keep their own place
         cached = self._is_kept and bool(folder)
         try:
-            made = numba.njit(self._function, cache=cached, nogil=True, error_model="numpy", **self._options)
+            made = numba.njit(self.function, cache=cached, nogil=True, error_model="numpy", **self._options)
         finally:
             config.CACHE_DIR = before
         if self._is_kept:
@@ -100,7 +100,7 @@ class Compiled:
         """Return the file of its library, whether it is there or not; None if it is not kept."""
         if not (folder := cache_folder()) or not self._is_kept:
             return None
-        function = self._function
+        function = self.function
         return Path(folder, f"{function.__module__}.{function.__qualname__}-{_machine()}{LIBRARY}")
 
     @cached_property
@@ -111,7 +111,7 @@ class Compiled:
         return None
 
 
-_made: list[Compiled] = []
+_made: list[CompiledFunction] = []
 
 
 def keep_libraries() -> None:
@@ -123,7 +123,7 @@ def keep_libraries() -> None:
         for function in _made:
             path = function.library_path
             if path is not None and not path.exists():
-                from rbxcompose.domains.arms.motion.linking import write_library  # imports LLVM
+                from rbxcompose.domains.arms.motion.linker import write_library  # imports LLVM
 
                 write_library(function.dispatcher, path)
 
@@ -146,7 +146,7 @@ def _numba() -> Any:
         if sys.modules[_BLAS] is None:
             del sys.modules[_BLAS]
     import_module("rbxcompose.domains.arms.motion.borrowed")
-    typeof_impl.register(Compiled)(lambda function, context: typeof_impl(function.dispatcher, context))
+    typeof_impl.register(CompiledFunction)(lambda function, context: typeof_impl(function.dispatcher, context))
     return numba
 
 

@@ -9,6 +9,7 @@ from dataclasses import replace
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.body.model import Body, Geometry
+from rbxcompose.sdk.ports import MessageLimits
 
 SIZES: Mapping[str, tuple[str, ...]] = {
     "box": ("x", "y", "z"),
@@ -70,6 +71,8 @@ def _mistake_in_points(shape: Geometry) -> str:
 
 MOST_SHAPES = 1_000
 """More would make each change of the scene take seconds: many small things are one octree."""
+SCENE_LIMITS = MessageLimits(size=16 * 1024 * 1024, entries=10_000)
+"""Of messages with objects: enough for so many shapes, or for an octree of some centimetres in a hall."""
 MOST_PADDING = 1.0  # [m]
 LONGEST_NAME = 200
 FARTHEST = 10_000.0  # [m] from its frame
@@ -153,6 +156,19 @@ def mistake_in(thing: PlacedObject, body: Body, frames: Collection[str] = ()) ->
     return _mistake_in_carrying(thing, thing.link, body) if thing.link in body.links else ""
 
 
+def mistake_among(things: Collection[PlacedObject], body: Body) -> str:
+    """Return why objects cannot be in the scene together, nothing if they can."""
+    if too_many := _too_many(things):
+        return too_many
+    wrong = ((thing.name, mistake_in(thing, body)) for thing in things)
+    return next((f"object '{name}': {words}" for name, words in wrong if words), "")
+
+
+def _too_many(things: Iterable[PlacedObject]) -> str:
+    shapes = sum(len(thing.own_pieces) for thing in things)
+    return f"there would be {shapes:,} shapes, and may be {MOST_SHAPES:,}" if shapes > MOST_SHAPES else ""
+
+
 def _mistake_in_carrying(thing: PlacedObject, link: str, body: Body) -> str:
     fixed = [piece.shape.kind for piece in thing.all_pieces if piece.shape.kind in FIXED]
     return f"no link that moves can carry its {fixed[0]}" if fixed and link not in body.still else ""
@@ -201,9 +217,9 @@ class PlanningScene:
         """
         if mistake := mistake_in(thing, self.body, self.frames):
             raise SceneError(mistake)
-        others = (len(each.own_pieces) for each in self.objects.values() if each.name != thing.name)
-        if len(thing.own_pieces) + sum(others) > MOST_SHAPES:
-            raise SceneError(f"there would be more than {MOST_SHAPES:,} shapes")
+        objects = self.objects | {thing.name: thing}
+        if too_many := _too_many(objects.values()):
+            raise SceneError(too_many)
         self.objects[thing.name] = thing
 
     def remove(self, name: str) -> None:

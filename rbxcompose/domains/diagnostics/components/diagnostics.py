@@ -14,10 +14,13 @@ from rbxcompose.domains.diagnostics.settings import DiagnosticsModel
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray, DiagnosticStatus, KeyValue
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.std_msgs import Header
-from rbxcompose.sdk import Component, In, Out, Refused, answers, component
+from rbxcompose.sdk import Component, In, MessageLimits, Out, Refused, answers, component
 
 PAUSE = 0.05  # [s] between two reports at least, so that flapping levels cost little
-MOST_ARRAYS, LARGEST_ARRAY = 30.0, 200_000  # [Hz], [B] of one publisher: to read more takes too much of a core
+MOST_ARRAYS, ARRAY = (
+    30.0,
+    MessageLimits(size=200_000),
+)  # [Hz] and limits of one publisher: more takes too much of a core
 MOST_LOGGED = 100_000  # characters of an answer to people
 ROUNDING = 1e-9  # [s]
 PAUSE_PER_ROW = 0.0001  # [s]; a row is about 20 us of work, so reports never take more than a fifth of a core
@@ -40,7 +43,7 @@ class Diagnostics(Component[DiagnosticsConfig]):
 
     made_by = "Every robot runs one; its groups are those of the section `diagnostics`."
     rate = 5.0
-    diagnostics = In(DiagnosticArray, "/diagnostics", is_open=True, max_rate=MOST_ARRAYS, max_size=LARGEST_ARRAY)
+    diagnostics = In(DiagnosticArray, "/diagnostics", is_open=True, max_rate=MOST_ARRAYS, limits=ARRAY)
     diagnostics_agg = Out(DiagnosticArray, "/diagnostics_agg")
     diagnostics_toplevel_state = Out(DiagnosticStatus, "/diagnostics_toplevel_state")
     diagnostics_changes = Out(DiagnosticArray, "/diagnostics_changes", qos="event")

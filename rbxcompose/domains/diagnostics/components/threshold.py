@@ -13,6 +13,7 @@ from rbxcompose.domains.diagnostics.limits import LimitCore, Limits
 from rbxcompose.msgs import registry
 from rbxcompose.sdk import Capability, Component, Config, In, Live, MessageName, Port, Setting, Time, Warns, component
 from rbxcompose.sdk.messages import number_field
+from rbxcompose.sdk.ports import BULK
 
 
 class ThresholdConfig(Config):
@@ -70,7 +71,8 @@ class Threshold(Component[ThresholdConfig]):
     @classmethod
     def ports(cls, config: ThresholdConfig) -> dict[str, Port[Any]]:
         """Return the topic that it listens to."""
-        return {"number": In(registry.message(config.message), config.topic, is_open=True).named("number")}
+        kind = registry.message(config.message)
+        return {"number": In(kind, config.topic, is_open=True, limits=BULK).named("number")}
 
     @classmethod
     def capabilities(cls, config: ThresholdConfig) -> tuple[Capability, ...]:

@@ -11,6 +11,7 @@ from rbxcompose.msgs import registry
 from rbxcompose.msgs.stamps import NANOSECONDS, to_nanoseconds
 from rbxcompose.sdk import Component, Config, Frequency, In, MessageName, Port, Time, component
 from rbxcompose.sdk.capabilities import Capability, ExpectsRate, Setting
+from rbxcompose.sdk.ports import BULK
 from rbxcompose.sdk.updater import OLDEST, TOLERANCE, CompositeTask, FrequencyTask, StampTask
 
 
@@ -51,7 +52,8 @@ class TopicMonitor(Component[TopicMonitorConfig]):
     @classmethod
     def ports(cls, config: TopicMonitorConfig) -> dict[str, Port[Any]]:
         """Return the topic that it listens to."""
-        return {"messages": In(registry.message(config.message), config.topic, is_open=True).named("messages")}
+        kind = registry.message(config.message)
+        return {"messages": In(kind, config.topic, is_open=True, limits=BULK).named("messages")}
 
     @classmethod
     def capabilities(cls, config: TopicMonitorConfig) -> tuple[Capability, ...]:

@@ -16,11 +16,12 @@ from rbxcompose.msgs.fields import ArrayEntries
 from rbxcompose.msgs.rbxcompose_msgs import MoveJoints
 from rbxcompose.msgs.stamps import to_nanoseconds
 from rbxcompose.msgs.trajectory_msgs import JointTrajectory
-from rbxcompose.sdk import BoundsGoals, Capability, In, Port, ServesAction, Setting
+from rbxcompose.sdk import BoundsGoals, Capability, In, MessageLimits, Port, ServesAction, Setting
 
 Follow = FollowJointTrajectory
 FOLLOW, MOVE, STREAM = "follow_joint_trajectory", "move", "joint_trajectory"  # its ports
 NANOSECONDS = 1_000_000_000
+TRAJECTORY = MessageLimits(size=2 * 1024 * 1024, entries=5_000)  # points
 
 
 class TrajectoryToleranceConfig(Config):
@@ -75,9 +76,9 @@ class JointTrajectoryController(Controller[JointTrajectoryConfig]):
         """Return both actions; `move` is a skill."""
         entries = ArrayEntries("joints", "positions", config.dimensions)
         return {
-            FOLLOW: ServesAction(Follow, f"{name}/{FOLLOW}", claims=name, skill=None),
+            FOLLOW: ServesAction(Follow, f"{name}/{FOLLOW}", claims=name, skill=None, limits=TRAJECTORY),
             MOVE: ServesAction(MoveJoints, f"{name}/{MOVE}", claims=name, skill=name, entries=entries),
-            STREAM: In(JointTrajectory, f"{name}/{STREAM}", is_open=True, may_be_silent=True),
+            STREAM: In(JointTrajectory, f"{name}/{STREAM}", is_open=True, may_be_silent=True, limits=TRAJECTORY),
         }
 
     @classmethod

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from rbxcompose.base.config import CONTROLLER, Config
-from rbxcompose.base.findings import Finding, Related, Span, kind
+from rbxcompose.base.findings import DID_YOU_MEAN, Finding, Related, Span, kind
 from rbxcompose.base.plugins import BROKEN, BrokenPluginError
 from rbxcompose.domains.body.model import BodyJoint
 from rbxcompose.domains.body.sections.body import body
@@ -17,6 +17,7 @@ from rbxcompose.domains.servos.models import OUTPUTS
 from rbxcompose.domains.servos.sections.actuators import actuators, model_of
 from rbxcompose.domains.servos.sections.joints import held_limits, joints, may_be_driven
 from rbxcompose.manifest.arguments import decided_at
+from rbxcompose.manifest.foreign_words import CONTROLLERS
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading
 from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode, at, key_span
@@ -105,13 +106,23 @@ def _read(reading: Reading[ControllerConfig], name: str, entry: Entry) -> Contro
             reading.valid(ControllerConfig, name, entry.value)
         return None
     if written.text not in names:
-        reading.report.add(not_a_choice(written.span, "type", written, names))
+        reading.report.add(_unknown_type(written, names))
         return None
     try:
         return reading.valid(controller_type(written.text).config_type(), name, entry.value)
     except BrokenPluginError as error:
         reading.report.add(BROKEN.at(written.span, str(error)))
         return None
+
+
+def _unknown_type(written: ScalarNode, names: Sequence[str]) -> Finding:
+    """Return the finding for a type of controller that does not exist; `package/Class` is that of ros2_control."""
+    finding = not_a_choice(written.span, "type", written, [*names])
+    package, _, cls = written.text.partition("/")
+    if cls.endswith("Broadcaster"):
+        return replace(finding, help="the states of joints are published without a controller: remove it", fix=None)
+    ours = CONTROLLERS.get(cls) or CONTROLLERS.get(package)
+    return replace(finding, help=f"{DID_YOU_MEAN} '{ours}'?") if ours in names else finding
 
 
 def _mistakes(
