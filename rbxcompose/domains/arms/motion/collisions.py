@@ -358,10 +358,7 @@ class MeshChecker:
     @property
     def watched_parts(self) -> list[tuple[int, int, float]]:
         """Return the pairs of shapes that it examines, and how far they must be from each other [m]."""
-        margins = (request.security_margin for request in self._data.collisionRequests)
-        return [
-            (pair.first, pair.second, item) for pair, item in zip(self._geometry.collisionPairs, margins, strict=True)
-        ]
+        return self._watched_parts
 
     def collides(self, values: Array, pairs: Iterable[int]) -> bool:
         """Return whether one of some pairs collides, by their places in `watched_parts`."""
@@ -376,12 +373,14 @@ class MeshChecker:
         # Pairs with a plane, of which the tree overlooks some that are inclined or keep a distance; and
         # with a flat mesh, since it takes boxes without a thickness for empty.
         self._apart: list[int] = []
+        self._watched_parts: list[tuple[int, int, float]] = []
         # Asking coal for each pair takes long.
         overlooked = [self._is_overlooked(one) for one in range(len(self._owners))]
         requests = zip(self._data.collisionRequests, self._geometry.collisionPairs, strict=True)
         for index, (request, pair) in enumerate(requests):
             first, second = pair.first, pair.second
-            request.security_margin = self._margin(first, second)
+            request.security_margin = margin = self._margin(first, second)
+            self._watched_parts.append((first, second, margin))
             if overlooked[first] or overlooked[second]:
                 self._apart.append(index)
         self._manager = self._pinocchio.BroadPhaseManager_DynamicAABBTreeCollisionManager(

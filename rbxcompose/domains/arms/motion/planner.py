@@ -303,8 +303,9 @@ class _Run:
         limits = speeds_of(planner.space, request.speed, request.acceleration)
         last = Rejected(True, "", 0.0)
         for _ in range(ROUNDS):
-            # A look at the curve costs a tenth of its timing, which follows where nothing is seen.
-            rejected = yield from examined(curve(path, COARSE), self._space, planner.checker)
+            # A look at a curve costs a tenth of its timing, which follows where nothing is seen; lines take no time.
+            look = curve(path, COARSE) if len(path) > 2 else path[:0]
+            rejected = yield from examined(look, self._space, planner.checker)
             if rejected is None:
                 made = timed(path, *limits, jerks_of(planner.space))
                 if isinstance(made, str):
