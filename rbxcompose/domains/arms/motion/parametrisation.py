@@ -34,18 +34,19 @@ class PathTiming:
 
     def at(self, when: Array) -> tuple[Array, Array]:
         """Return the places and the speeds at some times [s]."""
-        return self._at(when)[0], np.interp(when, self.times, self.speeds)
+        return self._at(when)[:2]
 
     def mean(self, window: float, count: int) -> tuple[Array, Array, Array]:
         """Return times [s], and the mean place and speed over the last `window` seconds, each of shape (count,)."""
         end = float(self.times[-1])
         times = np.linspace(0.0, end + window, count)
-        (place, sum_), (place_before, sum_before) = self._at(times), self._at(times - window)
+        (place, _, sum_), (place_before, _, sum_before) = self._at(times), self._at(times - window)
         return times, np.clip((sum_ - sum_before) / window, 0.0, self.way[-1]), (place - place_before) / window
 
-    def _at(self, when: Array) -> tuple[Array, Array]:
-        """Return places at some times, before, while or after it moves, and the integral of the place until then."""
-        times, steps = self.times, np.diff(self.times)
+    def _at(self, when: Array) -> tuple[Array, Array, Array]:
+        """Return places and speeds at some times, before, while or after it moves, and the integrals of the place."""
+        times = self.times
+        steps = np.diff(times)
         slopes = np.diff(self.speeds) / steps
         parts = steps * (self.way[:-1] + steps * (self.speeds[:-1] / 2 + steps * slopes / 6))
         sums = np.concatenate([[0.0], np.cumsum(parts)])
@@ -54,7 +55,7 @@ class PathTiming:
         t, speed, slope = inside - times[index], self.speeds[index], slopes[index]
         place = self.way[index] + t * (speed + t * slope / 2)
         sum_ = sums[index] + t * (self.way[index] + t * (speed / 2 + t * slope / 6))
-        return place, sum_ + np.maximum(0.0, when - times[-1]) * self.way[-1]
+        return place, speed + t * slope, sum_ + np.maximum(0.0, when - times[-1]) * self.way[-1]
 
 
 def jerks_of(space: JointSpace) -> Array | None:
