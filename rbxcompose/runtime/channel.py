@@ -65,9 +65,13 @@ class PrepareChange:
 
 @dataclass(frozen=True, slots=True)
 class CommitChange:
-    """Apply the settings that were prepared, then send `ChangeFollowed`."""
+    """Apply the settings that were prepared, then send `ChangeFollowed`.
+
+    With the number of an `AskForChange`, nothing else is to be applied elsewhere: once applied, it is decided and over.
+    """
 
     number: int
+    decides: int | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -83,8 +83,12 @@ def change_settings(host: Host, order: messages.SettingOrder, channel: messages.
     match order:
         case messages.PrepareChange():
             channel.send(_prepared(host, order))
-        case messages.CommitChange(number):
-            channel.send(messages.ChangeFollowed(number, changes.commit(number)))
+        case messages.CommitChange(number, decides):
+            reason = changes.commit(number)
+            channel.send(messages.ChangeFollowed(number, reason))
+            if decides is not None and not reason:
+                changes.end(number)
+                host.parameters.decided(decides, None)
         case messages.UndoChange(number):
             channel.send(messages.ChangeFollowed(number, changes.undo(number)))
         case messages.EndChange(number):
