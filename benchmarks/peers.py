@@ -82,7 +82,7 @@ class Ros:
     @staticmethod
     @cache
     def is_here() -> bool:
-        """Tell whether it is installed, with the packages that our nodes import: without one, they would never come up."""
+        """Tell whether it is installed, with what our nodes import: without that, they would never come up."""
         if not all(map(shutil.which, (ROS_PYTHON, "roslaunch", "rosmaster", "rostopic"))):
             return False
         imports = f"import {', '.join(ROS_PACKAGES)}"
