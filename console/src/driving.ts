@@ -46,8 +46,6 @@ export type DriveEvent =
   | { is: "interrupted" }
   | { is: "connected" }
   | { is: "disconnected" }
-  /** A person asks for the lease without driving yet. */
-  | { is: "take" }
   | { is: "granted" }
   /** The lease was refused, or somebody else has it now. */
   | { is: "refused" }
@@ -58,9 +56,9 @@ export type DriveEvent =
 
 export type Action = { do: "publish"; motion: Motion } | { do: "take" } | { do: "give" };
 
-export const PERIOD = 100; // [ms] of publishing; the gateway stops the base 500 ms after the last command
+export const PERIOD = 100; // [ms] of publishing; 500 ms after the last command, the gateway stops the base and ends the lease
 const SLACK = 15; // [ms] by which a timer may be early
-const IDLE = 5_000; // [ms] without input after which the lease is given back
+const IDLE = 2_000; // [ms] without input, while zero is published, after which the lease is given back
 const DEAD_ZONE = 0.06; // of the pad, around its middle
 
 export const STILL: Motion = { forward: 0, turn: 0 };
@@ -84,7 +82,7 @@ export function parked(speeds: Motion): Driving {
 /** Returns the motion that the inputs ask for, or null while no dead-man switch is held. */
 export function wanted(state: Driving): Motion | null {
   if (state.pad) {
-    return { forward: state.speeds.forward * reach(state.pad.y), turn: -state.speeds.turn * reach(state.pad.x) };
+    return { forward: state.speeds.forward * reach(state.pad.y), turn: state.speeds.turn * reach(-state.pad.x) };
   }
   if (!state.shift || state.keys.size === 0) return null;
   const held = (direction: Direction) => Number(state.keys.has(direction));
@@ -101,11 +99,7 @@ export function moves(motion: Motion): boolean {
 export function drive(before: Driving, event: DriveEvent, now: number): { state: Driving; actions: Action[] } {
   const actions: Action[] = [];
   let state = after(before, event);
-  if (event.is === "take" || event.is === "granted") state = { ...state, used: now };
-  if (event.is === "take" && state.connected) {
-    actions.push({ do: "take" });
-    state = { ...state, lease: "asked" };
-  }
+  if (event.is === "granted") state = { ...state, used: now };
   const inUse = state.pad !== null || state.keys.size > 0;
   if (!inUse && state.latched) state = { ...state, latched: false };
   const motion = state.connected && !state.stopped && !state.latched ? wanted(state) : null;
@@ -118,12 +112,14 @@ export function drive(before: Driving, event: DriveEvent, now: number): { state:
       actions.push({ do: "publish", motion });
       state = { ...state, commanded: motion, published: now };
     }
-  } else if (moves(state.commanded)) {
-    if (state.connected && state.lease === "held") actions.push({ do: "publish", motion: STILL });
+  } else if (state.lease === "held" && (moves(state.commanded) || now - state.published >= PERIOD - SLACK)) {
+    actions.push({ do: "publish", motion: STILL });
     state = { ...state, commanded: STILL, published: now };
+  } else if (state.lease !== "held") {
+    state = { ...state, commanded: STILL };
   }
-  const idle = state.lease === "held" && !motion && now - state.used >= IDLE;
-  if (idle || (state.lease !== "none" && event.is === "interrupted")) {
+  const ends = event.is === "interrupted" || event.is === "stopped";
+  if ((ends && state.lease !== "none") || (state.lease === "held" && !motion && now - state.used >= IDLE)) {
     actions.push({ do: "give" });
     state = { ...state, lease: "none" };
   }
@@ -162,7 +158,6 @@ function after(state: Driving, event: DriveEvent): Driving {
       return { ...state, stopped: true, latched: true };
     case "released":
       return { ...state, stopped: false, latched: true };
-    case "take":
     case "tick":
       return state;
   }

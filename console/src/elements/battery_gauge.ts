@@ -4,7 +4,10 @@ import { chargeOf, formatAge, formatName, formatValue } from "../format";
 import type { Value } from "../config";
 
 const STALE = 15_000; // [ms] after which a value says how old it is
-const WORDS = { good: "Good", fair: "Fair", low: "Low: recharge" };
+const SHELL =
+  "M3.500 7h15a1.500 1.500 0 0 1 1.500 1.500v7a1.500 1.500 0 0 1-1.500 1.500h-15A1.500 1.500 0 0 1 2 15.500v-7A1.500 1.500 0 0 1 3.500 7M22.500 10.500v3";
+const BOLT = "M13 3 6 13.500h5L10 21l7-10.500h-5z";
+const WORDS = { good: "Good", fair: "Fair", low: "Low" };
 
 export class BatteryGauge extends HTMLElement {
   #unit = "";
@@ -16,12 +19,11 @@ export class BatteryGauge extends HTMLElement {
 
   describe(value: Value): this {
     this.#unit = value.unit;
-    const shell = svg("path", { d: "M3.500 7h15a1.500 1.500 0 0 1 1.500 1.500v7a1.500 1.500 0 0 1-1.500 1.500h-15A1.500 1.500 0 0 1 2 15.500v-7A1.500 1.500 0 0 1 3.500 7M22.500 10.500v3" });
-    if (this.#unit === "%") {
-      this.append(svg("svg", { viewBox: "0 0 24 24", class: "icon battery", "aria-hidden": "true" }, shell, this.#level));
-    }
+    const shell = svg("path", { d: SHELL });
+    const parts = this.#unit === "%" ? [shell, this.#level] : [svg("path", { d: BOLT })];
+    this.append(svg("svg", { viewBox: "0 0 24 24", class: "icon battery", "aria-hidden": "true" }, ...parts));
     const name = h("span", { class: "label" }, formatName(value.name));
-    this.append(h("div", { class: "battery-text" }, name, h("div", { class: "battery-row" }, this.#number, this.#word)));
+    this.append(h("div", { class: "battery-text" }, name, this.#number, this.#word));
     this.show(null, 0);
     return this;
   }

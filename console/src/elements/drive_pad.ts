@@ -2,14 +2,16 @@
 import { h, svg } from "../dom";
 import type { Point } from "../driving";
 
+const REACH = 0.76; // of the pad, from its middle
+
 export class DrivePad extends HTMLElement {
   #pointer: number | null = null;
   readonly #knob = h("div", { class: "pad-knob" });
 
   connectedCallback(): void {
     if (this.childElementCount > 0) return;
-    const lines = svg("path", { d: "M50 4v92M4 50h92M27 50a23 23 0 1 0 46 0 23 23 0 1 0-46 0M5 50a45 45 0 1 0 90 0 45 45 0 1 0-90 0" });
-    const arrows = svg("path", { class: "pad-arrows", d: "m46.500 9 3.500-4 3.500 4zm0 82 3.500 4 3.500-4zM9 46.500 5 50l4 3.500zm82 0 4 3.500-4 3.500z" });
+    const lines = svg("path", { d: "M50 12v76M12 50h76M31 31h38v38H31zM12 12h76v76H12z" });
+    const arrows = svg("path", { class: "pad-arrows", d: "m47 8 3-3.500 3 3.500zm0 84 3 3.500 3-3.500zM8 47l-3.500 3 3.500 3zm84 0 3.500 3-3.500 3z" });
     this.append(svg("svg", { viewBox: "0 0 100 100", "aria-hidden": "true" }, lines, arrows), this.#knob);
     this.addEventListener("pointerdown", (event) => this.#press(event));
     this.addEventListener("pointermove", (event) => {
@@ -47,10 +49,10 @@ export class DrivePad extends HTMLElement {
     this.dispatchEvent(new CustomEvent("pad", { detail: at }));
   }
 
-  /** The whole speed is reached at the outer circle. */
+  /** The whole speed is reached at the outer line. */
   #pointOf(event: PointerEvent): Point {
     const box = this.getBoundingClientRect();
-    const clip = (place: number) => Math.max(-1, Math.min(1, place / 0.9));
+    const clip = (place: number) => Math.max(-1, Math.min(1, place / REACH));
     return {
       x: clip((2 * (event.clientX - box.left)) / box.width - 1),
       y: clip(1 - (2 * (event.clientY - box.top)) / box.height),

@@ -71,7 +71,7 @@ function openDrive(host: HTMLElement, robot: Robot, config: DriveConfig): () => 
     state = next.state;
     for (const action of next.actions) {
       if (action.do === "publish") publish(action.motion);
-      else if (action.do === "take") void take(event.is === "take");
+      else if (action.do === "take") void take();
       else link.call("/console/drive", { take: false, name }).then(showHolder, () => undefined);
     }
     paint();
@@ -88,15 +88,13 @@ function openDrive(host: HTMLElement, robot: Robot, config: DriveConfig): () => 
     dispatch({ is: "refused" });
   };
 
-  /** Asks for the lease; from somebody else only when a person said so. */
-  const take = async (over: boolean) => {
+  const take = async () => {
     if (!name) return refuse("Enter your name first.");
-    if (holder && holder !== name && !over) return refuse(`${holder} is driving. Take over first.`);
     try {
       const values = await link.call("/console/drive", { take: true, name });
       showHolder(values);
       if (isMessage(values) && values.success === false) {
-        return refuse(typeof values.message === "string" && values.message ? values.message : "The robot refused.");
+        return refuse(sentence(values.message));
       }
       blocked = "";
       dispatch({ is: "granted" });
@@ -119,7 +117,7 @@ function openDrive(host: HTMLElement, robot: Robot, config: DriveConfig): () => 
 
   const paint = () => {
     const motion = wanted(state) ?? { forward: 0, turn: 0 };
-    const live = state.lease === "held" && state.published > 0 && wanted(state) !== null && !state.latched;
+    const live = state.lease === "held" && wanted(state) !== null && !state.latched;
     pad.show({ x: -motion.turn / (state.speeds.turn || 1), y: motion.forward / (state.speeds.forward || 1) }, live);
     pad.setAttribute("aria-disabled", String(!state.connected || state.stopped));
     velocity.commanded(state.commanded);
@@ -147,11 +145,11 @@ function openDrive(host: HTMLElement, robot: Robot, config: DriveConfig): () => 
     if (kind === "name") {
       lease.replaceChildren(nameForm());
     } else if (kind === "other") {
-      lease.replaceChildren(icon("warning"), words(`${holder} is driving`, `You are ${name}`), button("Take over", () => dispatch({ is: "take" })));
+      lease.replaceChildren(icon("warning"), words(`${holder} is driving`, `${name}, you can take over when ${holder} lets go`));
     } else if (kind === "mine") {
       lease.replaceChildren(icon("wheel"), words("You are driving", `as ${name}`), button("Hand back", () => dispatch({ is: "interrupted" })));
     } else {
-      const rename = button("Change name", () => {
+      const rename = button("Rename", () => {
         name = "";
         storeName("");
         paint();
@@ -231,7 +229,7 @@ function openDrive(host: HTMLElement, robot: Robot, config: DriveConfig): () => 
   }
   link.advertise(config.topic, config.type);
   link.onStatus = ({ id, level, msg }) => {
-    if (id.startsWith("drive:") && level === "error" && state.lease !== "none") refuse(msg);
+    if (id.startsWith("drive:") && level === "error") refuse(sentence(msg));
     else if (level === "error") robot.notify(msg);
   };
   const timer = setInterval(() => {
@@ -255,7 +253,13 @@ const coarse = matchMedia("(pointer: coarse)");
 function instructions(): string {
   return coarse.matches
     ? "Touch the pad and drag. Lift your finger to stop."
-    : "Hold the pad and drag, or hold Shift with the arrow keys or W A S D. Let go to stop.";
+    : "Hold the pad and drag, or hold Shift with the arrow keys or WASD. Let go to stop.";
+}
+
+/** Returns a message of the robot as a sentence. */
+function sentence(message: Json | undefined): string {
+  const text = typeof message === "string" ? message.trim() : "";
+  return text ? text.charAt(0).toUpperCase() + text.slice(1) + (/[.!?]$/.test(text) ? "" : ".") : "The robot refused.";
 }
 
 function words(first: string, second: string): HTMLElement {
