@@ -11,14 +11,17 @@ const NOTICE = 6_000; // [ms] for which a notice is shown
 
 /** Shows a screen without a robot: loading, or an error with a button to try again. */
 export function showState(kind: "loading" | "error", text: string, retry?: () => void): void {
-  const children: Node[] = [icon(kind === "loading" ? "wait" : "warning"), h("p", {}, text)];
+  const children: Node[] = [
+    icon(kind === "loading" ? "wait" : "warning"),
+    h("p", { role: kind === "error" ? "alert" : "status" }, text),
+  ];
   if (retry) {
     const button = h("button", { type: "button" }, "Try again");
     button.onclick = retry;
     children.push(button);
   }
   document.body.replaceChildren(
-    h("main", { class: `state ${kind}`, role: kind === "error" ? "alert" : "status" }, h("h1", {}, "Robot console"), ...children),
+    h("main", { class: `state ${kind}` }, h("h1", {}, "Robot console"), ...children),
   );
 }
 

@@ -47,5 +47,5 @@ export function stopButtons(link: Rosbridge, stopped: Signal<boolean>, notify: (
     event.preventDefault();
     void sendStop();
   });
-  return h("div", { class: "stops", role: "group", "aria-label": "Emergency" }, release, stop);
+  return h("section", { class: "stops", "aria-label": "Emergency" }, release, stop);
 }
