@@ -300,7 +300,7 @@ def suggest(name: str, valid: Iterable[str], what: str = VALID) -> str:
 def _is_chance(name: str, near: str) -> bool:
     """Return whether two names are only somewhat alike, in no word: `wheel_separation` and `acceleration`."""
     words, others = _words(name), _words(near)
-    if not _shared(words, others) and _edits(name, near) > max(1, len(name) // 4):
+    if not _shared(words, others) and _edits(name, near) > max(1, len(name) // 3):
         return True
     if min(len(name), len(near)) >= _LONG and _similarity(name, near) < _ALIKE and not _shared(words, others):
         return not any(_is_slip(word, other) for word in words for other in others)

@@ -19,6 +19,7 @@ from rbxcompose.commands.options import Subcommand, add_actions, argument, count
 from rbxcompose.domains.muxes import requests
 from rbxcompose.runtime.folder import RobotFolder
 
+GROUP = "drive"
 ON_SYSTEM = requests.MUX
 _LOOK = 0.2  # [s] between two looks of `watch`; no change is missed between them
 

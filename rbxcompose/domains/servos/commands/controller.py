@@ -15,6 +15,7 @@ from rbxcompose.commands.options import Subcommand, add_actions, argument, run_a
 from rbxcompose.domains.servos import controller_manager
 from rbxcompose.runtime.folder import RobotFolder
 
+GROUP = "drive"
 ON_SYSTEM = controller_manager.BUS
 
 
