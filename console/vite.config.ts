@@ -10,5 +10,5 @@ export default defineConfig({
     modulePreload: { polyfill: false },
     target: "es2022",
   },
-  server: { proxy: { "/console": "http://127.0.0.1:9090", "/rosbridge": { target: "ws://127.0.0.1:9090", ws: true } } },
+  server: { proxy: { "/console": "http://127.0.0.1:8080", "/rosbridge": { target: "ws://127.0.0.1:8080", ws: true } } },
 });

@@ -17,7 +17,7 @@ export interface DriveConfig {
   maxSpeed: number;
   /** [rad/s] */
   maxTurnRate: number;
-  /** Topic (std_msgs/String) of the name of who holds the drive lease, empty while nobody does. */
+  /** Name of who holds the drive lease, empty while nobody does. */
   holder: string;
 }
 

@@ -1,6 +1,6 @@
 /** STOP and RELEASE: the two buttons that stand on every page and need no lease. */
 import { h, icon } from "./dom";
-import type { Rosbridge } from "./rosbridge";
+import { CallError, isMessage, type Rosbridge } from "./rosbridge";
 import type { Signal } from "./signal";
 
 /** Returns the buttons. A STOP without a connection is sent as soon as there is one again. */
@@ -17,7 +17,7 @@ export function stopButtons(link: Rosbridge, stopped: Signal<boolean>, notify: (
       return;
     }
     try {
-      await link.call("/console/stop");
+      await ask(link, "/console/stop");
     } catch (error) {
       owed = link.state.value.is !== "open";
       notify(`STOP failed: ${(error as Error).message}. Use the switch on the robot.`);
@@ -27,7 +27,7 @@ export function stopButtons(link: Rosbridge, stopped: Signal<boolean>, notify: (
   release.onclick = async () => {
     release.disabled = true;
     try {
-      await link.call("/console/release");
+      await ask(link, "/console/release");
       owed = false;
       stopped.set(false);
       stop.focus();
@@ -48,4 +48,10 @@ export function stopButtons(link: Rosbridge, stopped: Signal<boolean>, notify: (
     void sendStop();
   });
   return h("section", { class: "stops", "aria-label": "Emergency" }, release, stop);
+}
+
+/** Calls a service that may answer that it did not succeed. */
+async function ask(link: Rosbridge, service: string): Promise<void> {
+  const values = await link.call(service);
+  if (isMessage(values) && values.success === false) throw new CallError(String(values.message || "the robot refused"));
 }

@@ -24,7 +24,7 @@ CONFIG: dict[str, Any] = {
         "type": "geometry_msgs/Twist",
         "max_speed": 0.5,
         "max_turn_rate": 1.5,
-        "holder": "/console/holder",
+        "holder": "",
     },
     "values": {
         "base_battery": {"topic": "/battery_level", "type": "std_msgs/Float32", "field": "data", "unit": "%"},
@@ -87,11 +87,16 @@ class FakeGateway:
         if path == "/rosbridge":
             return None
         if path == "/console/config":
-            return self._response(HTTPStatus.OK, "application/json", json.dumps(self.config).encode())
+            return self._response(HTTPStatus.OK, "application/json", json.dumps(self._shown_config()).encode())
         file = (self.static / (path.lstrip("/") or "index.html")).resolve()
         if not file.is_file() or not file.is_relative_to(self.static):
             return self._response(HTTPStatus.NOT_FOUND, "text/plain", b"not found")
         return self._response(HTTPStatus.OK, mimetypes.guess_type(file)[0] or "text/plain", file.read_bytes())
+
+    def _shown_config(self) -> dict[str, Any]:
+        if not (drive := self.config and self.config["drive"]):
+            return self.config
+        return self.config | {"drive": drive | {"holder": self.others or self.holder}}
 
     def _response(self, status: HTTPStatus, kind: str, body: bytes) -> Response:
         headers = {"Content-Type": kind, "Content-Length": str(len(body)), "Content-Security-Policy": POLICY}
@@ -108,14 +113,18 @@ class FakeGateway:
             pass
         finally:
             del self.subscribed[connection]
-            self.velocity = (0.0, 0.0)
+            self.velocity, self.holder = (0.0, 0.0), ""
 
     def _handle(self, connection: ServerConnection, frame: dict[str, Any]) -> None:
         match frame["op"]:
             case "subscribe":
                 self.subscribed[connection].add(frame["topic"])
             case "publish":
-                self.velocity = (frame["msg"]["linear"]["x"], frame["msg"]["angular"]["z"])
+                if self.others:
+                    error = {"op": "status", "level": "error", "id": frame["id"], "msg": "not yours"}
+                    connection.send(json.dumps(error))
+                else:
+                    self.velocity = (frame["msg"]["linear"]["x"], frame["msg"]["angular"]["z"])
             case "call_service":
                 values = self._call(frame["service"], frame["args"])
                 answer = {"op": "service_response", "id": frame["id"], "service": frame["service"]}
@@ -133,7 +142,6 @@ class FakeGateway:
         while not self._ended.wait(0.1):
             forward, turn = self.velocity
             data: dict[str, dict[str, Any]] = {topic: {"data": value} for topic, value in DATA.items()}
-            data["/console/holder"] = {"data": self.others or self.holder}
             data["odom"] = {"twist": {"twist": {"linear": {"x": 0.96 * forward}, "angular": {"z": 0.97 * turn}}}}
             for connection, topics in list(self.subscribed.items()):
                 for topic in topics & data.keys():

@@ -239,7 +239,8 @@ def test_somebody_else_who_drives_is_named(open_page: Callable[..., Page], gatew
     page.keyboard.down("ArrowUp")
     wait_for(lambda: len(gateway.commands()) > 2, page)
     gateway.others = "Ben"
-    expect(page.locator(".hint").first).to_have_text("Ben took over.")
+    expect(page.locator(".hint").first).to_have_text("You no longer drive. Let go, then press again.")
+    expect(page.locator(".lease")).to_contain_text("Ben is driving")
     count = len(gateway.commands())
     page.wait_for_timeout(300)
     assert len(gateway.commands()) - count < 2

@@ -1,5 +1,5 @@
 /** Drive: the pad, keys with a dead-man switch, speeds, batteries, and who drives. */
-import { pluck, type DriveConfig } from "../config";
+import { fetchConfig, pluck, type DriveConfig } from "../config";
 import { h, icon, setText } from "../dom";
 import { drive, parked, PERIOD, wanted, type Direction, type DriveEvent, type Motion } from "../driving";
 import { BatteryGauge } from "../elements/battery_gauge";
@@ -21,6 +21,7 @@ const KEYS: Record<string, Direction> = {
 const NAME = "rbxcompose.name";
 const NAME_LENGTH = 40;
 const STALE = 1_000; // [ms] after which a measured speed is unknown
+const LOOK = 2_000; // [ms] between two looks for who drives
 const AXES = [
   { key: "forward", label: "Forward", unit: "m/s", place: "twist.twist.linear.x" },
   { key: "turn", label: "Turn", unit: "rad/s", place: "twist.twist.angular.z" },
@@ -47,7 +48,7 @@ function openDrive(host: HTMLElement, robot: Robot, config: DriveConfig): () => 
   const limits: Motion = { forward: config.maxSpeed, turn: config.maxTurnRate };
   let state = parked({ forward: limits.forward / 2, turn: limits.turn / 2 });
   let name = storedName();
-  let holder = "";
+  let holder = config.holder;
   let lastPublish = 0;
   let blocked = ""; // why the last attempt to drive came to nothing
 
@@ -79,8 +80,8 @@ function openDrive(host: HTMLElement, robot: Robot, config: DriveConfig): () => 
 
   const publish = (motion: Motion) => {
     lastPublish += 1;
-    const message = { linear: { x: motion.forward, y: 0, z: 0 }, angular: { x: 0, y: 0, z: motion.turn } };
-    link.publish(config.topic, message, { id: `drive:${lastPublish}`, sent: performance.now() });
+    const twist = { linear: { x: motion.forward, y: 0, z: 0 }, angular: { x: 0, y: 0, z: motion.turn } };
+    link.publish(config.topic, config.type.endsWith("Stamped") ? { twist } : twist, { id: `drive:${lastPublish}`, sent: performance.now() });
   };
 
   const refuse = (why: string) => {
@@ -108,11 +109,13 @@ function openDrive(host: HTMLElement, robot: Robot, config: DriveConfig): () => 
     paint();
   };
 
-  const holderChanged = (next: string) => {
-    holder = next;
-    if (state.lease !== "held" || next === name) paint();
-    else if (next) refuse(`${next} took over.`);
-    else dispatch({ is: "lapsed" });
+  /** Asks who drives, while that is not this page and somebody looks. */
+  const lookForHolder = async () => {
+    if (state.lease !== "none" || !state.connected || document.hidden) return;
+    const fresh = await fetchConfig().catch(() => null);
+    if (!fresh || state.lease !== "none") return;
+    holder = fresh.drive?.holder ?? "";
+    paint();
   };
 
   const paint = () => {
@@ -220,23 +223,21 @@ function openDrive(host: HTMLElement, robot: Robot, config: DriveConfig): () => 
     link.subscribe("odom", velocity.measured, { type: "nav_msgs/Odometry", throttle: PERIOD }),
     batteries.close,
   );
-  if (config.holder) {
-    cleanups.push(
-      link.subscribe(config.holder, ({ data }) => holderChanged(typeof data === "string" ? data : ""), {
-        type: "std_msgs/String",
-      }),
-    );
-  }
   link.advertise(config.topic, config.type);
   link.onStatus = ({ id, level, msg }) => {
-    if (id.startsWith("drive:") && level === "error") refuse(sentence(msg));
-    else if (level === "error") robot.notify(msg);
+    if (level !== "error") return;
+    if (!id.startsWith("drive:")) robot.notify(sentence(msg));
+    else if (state.lease === "held") refuse("You no longer drive. Let go, then press again.");
   };
   const timer = setInterval(() => {
     dispatch({ is: "tick" });
     velocity.refresh(performance.now());
   }, PERIOD);
-  cleanups.push(() => clearInterval(timer));
+  const looking = setInterval(() => void lookForHolder(), LOOK);
+  cleanups.push(
+    () => clearInterval(timer),
+    () => clearInterval(looking),
+  );
 
   const stick = h("section", { class: "card stick", "aria-label": "Pad" }, pad, hint);
   host.append(h("div", { class: "drive" }, lease, stick, velocity.element, speeds, batteries.element));
