@@ -46,6 +46,7 @@ bench: $(VENV)/.test  ## Measure, beside peers where they are installed, and wri
 docs: $(VENV)/.test  ## Write the generated pages, tables and schemas, and the pictures of docs/
 	$(BIN)/python -m docs.generate
 	$(BIN)/python -m benchmarks.misconfig --write
+	$(BIN)/python -m benchmarks.run --marks
 	$(BIN)/python docs/draw_patrol.py
 	$(BIN)/python docs/draw_screens.py
 	$(BIN)/python docs/draw_robots.py
