@@ -97,7 +97,7 @@ function lostBanner(link: Rosbridge): HTMLElement {
     if (state.is === "lost") lost = true;
     banner.hidden = !lost;
     setText(message, lost ? "Connection lost. The robot stops by itself. " : "");
-    setText(text, state.is === "lost" ? `Next attempt in ${formatAge(state.retry - Date.now())}.` : "Connecting\u2026");
+    setText(text, state.is === "lost" ? `Next attempt in ${formatAge(Math.max(1_000, state.retry - Date.now()))}.` : "Connecting\u2026");
     button.disabled = state.is !== "lost";
   };
   link.state.watch(show);

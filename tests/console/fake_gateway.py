@@ -44,6 +44,7 @@ class FakeGateway:
         self.frames: list[tuple[float, dict[str, Any]]] = []
         self.holder = ""
         self.others: str | None = None  # who drives from elsewhere
+        self.is_away = False  # takes no connections
         self.subscribed: dict[ServerConnection, set[str]] = {}
         self.velocity = (0.0, 0.0)
         self._server = serve(self._serve, "127.0.0.1", 0, process_request=self._respond)
@@ -85,7 +86,7 @@ class FakeGateway:
     def _respond(self, connection: ServerConnection, request: Request) -> Response | None:
         path = request.path.partition("?")[0]
         if path == "/rosbridge":
-            return None
+            return self._response(HTTPStatus.SERVICE_UNAVAILABLE, "text/plain", b"away") if self.is_away else None
         if path == "/console/config":
             return self._response(HTTPStatus.OK, "application/json", json.dumps(self._shown_config()).encode())
         file = (self.static / (path.lstrip("/") or "index.html")).resolve()

@@ -324,7 +324,12 @@ def test_everyone_can_read_and_reach_it(open_page: Callable[..., Page], gateway:
     def stop() -> None:
         page.get_by_role("button", name="STOP").click()
 
-    for prepare in (None, name, stop, gateway.drop):
+    def lose() -> None:
+        gateway.is_away = True
+        gateway.drop()
+        expect(page.get_by_role("alert").filter(has_text="Connection lost")).to_be_visible()
+
+    for prepare in (None, name, stop, lose):
         if prepare:
             prepare()
         page.wait_for_timeout(100)

@@ -148,7 +148,7 @@ function openDrive(host: HTMLElement, robot: Robot, config: DriveConfig): () => 
     if (kind === "name") {
       lease.replaceChildren(nameForm());
     } else if (kind === "other") {
-      lease.replaceChildren(icon("warning"), words(`${holder} is driving`, `${name}, you can take over when ${holder} lets go`));
+      lease.replaceChildren(icon("warning"), words(`${holder} is driving`, `You can drive when ${holder} lets go`));
     } else if (kind === "mine") {
       lease.replaceChildren(icon("wheel"), words("You are driving", `as ${name}`), button("Hand back", () => dispatch({ is: "interrupted" })));
     } else {
