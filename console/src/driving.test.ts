@@ -24,7 +24,7 @@ class Run {
 
   /** Lets time pass with the ticks that the page has. */
   pass(time: number): this {
-    for (const end = this.now + time; this.now < end; ) {
+    for (const end = this.now + time; this.now < end;) {
       this.now += PERIOD;
       this.send({ is: "tick" });
     }
@@ -37,8 +37,18 @@ class Run {
   }
 }
 
-const press = (direction: "forward" | "back" | "left" | "right", shift = true): DriveEvent => ({ is: "key", direction, down: true, shift });
-const release = (direction: "forward" | "left", shift = true): DriveEvent => ({ is: "key", direction, down: false, shift });
+const press = (direction: "forward" | "back" | "left" | "right", shift = true): DriveEvent => ({
+  is: "key",
+  direction,
+  down: true,
+  shift,
+});
+const release = (direction: "forward" | "left", shift = true): DriveEvent => ({
+  is: "key",
+  direction,
+  down: false,
+  shift,
+});
 const publish = (forward: number, turn: number): Action => ({ do: "publish", motion: { forward, turn } });
 const ZERO: Action = { do: "publish", motion: STILL };
 
@@ -99,7 +109,12 @@ describe("the pad", () => {
   it("stands still around its middle and holds the lease", () => {
     const run = held().send({ is: "pad", at: { x: 0.05, y: -0.05 } });
     run.take();
-    expect(run.pass(5 * PERIOD).take().map((action) => action.do)).toEqual(Array(5).fill("publish"));
+    expect(
+      run
+        .pass(5 * PERIOD)
+        .take()
+        .map((action) => action.do),
+    ).toEqual(Array(5).fill("publish"));
     expect(run.state.commanded).toEqual(STILL);
   });
 
@@ -149,10 +164,6 @@ describe("the lease", () => {
     expect(run.pass(1000).take()).toEqual([]);
     expect(run.send(release("forward"), press("forward")).take()).toEqual([{ do: "take" }]);
   });
-
-  it("that ran out is asked for again while driving", () => {
-    expect(driving().send({ is: "lapsed" }).take()).toEqual([{ do: "take" }]);
-  });
 });
 
 describe("what ends driving", () => {
@@ -174,7 +185,9 @@ describe("what ends driving", () => {
 
   it("whatever happens in whatever order: nothing but zero without dead-man, lease and connection", () => {
     const events: DriveEvent[] = [
-      ...(["interrupted", "connected", "disconnected", "granted", "refused", "lapsed", "stopped", "released", "tick"] as const).map((is) => ({ is })),
+      ...(
+        ["interrupted", "connected", "disconnected", "granted", "refused", "stopped", "released", "tick"] as const
+      ).map((is) => ({ is })),
       press("forward"),
       press("left", false),
       release("forward"),

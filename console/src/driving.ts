@@ -47,10 +47,8 @@ export type DriveEvent =
   | { is: "connected" }
   | { is: "disconnected" }
   | { is: "granted" }
-  /** The lease was refused, or somebody else has it now. */
+  /** The lease was refused, or it is lost. */
   | { is: "refused" }
-  /** The lease ran out and nobody has it. */
-  | { is: "lapsed" }
   | { is: "stopped" }
   | { is: "released" };
 
@@ -152,8 +150,6 @@ function after(state: Driving, event: DriveEvent): Driving {
       return state.lease === "asked" ? { ...state, lease: "held" } : state;
     case "refused":
       return { ...state, lease: "none", latched: true };
-    case "lapsed":
-      return { ...state, lease: "none" };
     case "stopped":
       return { ...state, stopped: true, latched: true };
     case "released":

@@ -22,11 +22,17 @@ it("a unit stands beside its number, if there is one", () => {
 });
 
 it("names are words", () => {
-  expect([formatName("base_battery"), formatName("/arm/load"), formatName("")]).toEqual(["Base battery", "Arm load", ""]);
+  expect([formatName("base_battery"), formatName("/arm/load"), formatName("")]).toEqual([
+    "Base battery",
+    "Arm load",
+    "",
+  ]);
 });
 
 it("ages have one unit", () => {
-  expect([formatAge(-5), formatAge(1499), formatAge(61_000), formatAge(7_300_000)].map((age) => age.replace("\u202f", " "))).toEqual(["0 s", "1 s", "1 min", "2 h"]);
+  expect(
+    [formatAge(-5), formatAge(1499), formatAge(61_000), formatAge(7_300_000)].map((age) => age.replace("\u202f", " ")),
+  ).toEqual(["0 s", "1 s", "1 min", "2 h"]);
 });
 
 it("batteries are low up to 30 % and fair up to 50 %", () => {
@@ -45,7 +51,10 @@ it.each<[string, number | null]>([
 
 it("a configuration has defaults, and a robot without a base has no drive", () => {
   expect(parseConfig({})).toEqual({ robot: "robot", about: "", firstPage: "", drive: null, values: [] });
-  const { drive, values } = parseConfig({ drive: { topic: "/cmd", max_speed: null }, values: { a: { topic: "/a" }, b: 3 } });
+  const { drive, values } = parseConfig({
+    drive: { topic: "/cmd", max_speed: null },
+    values: { a: { topic: "/a" }, b: 3 },
+  });
   expect(drive).toEqual({ topic: "/cmd", type: "geometry_msgs/Twist", maxSpeed: 0.5, maxTurnRate: 1, holder: "" });
   expect(values).toEqual([{ name: "a", topic: "/a", type: "", field: "data", unit: "" }]);
 });

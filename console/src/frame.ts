@@ -20,9 +20,7 @@ export function showState(kind: "loading" | "error", text: string, retry?: () =>
     button.onclick = retry;
     children.push(button);
   }
-  document.body.replaceChildren(
-    h("main", { class: `state ${kind}` }, h("h1", {}, "Robot console"), ...children),
-  );
+  document.body.replaceChildren(h("main", { class: `state ${kind}` }, h("h1", {}, "Robot console"), ...children));
 }
 
 /** Shows the frame with the page that the address names, else the first one of the robot. */
@@ -55,12 +53,17 @@ function route(host: HTMLElement, tabs: HTMLElement, robot: Robot): void {
   let close = () => undefined as void;
   const open = () => {
     const wanted = [location.hash.slice(1), robot.config.firstPage];
-    const turn = Math.max(0, wanted.map((name) => pages.findIndex((page) => page.name === name)).find((at) => at >= 0) ?? 0);
+    const turn = Math.max(
+      0,
+      wanted.map((name) => pages.findIndex((page) => page.name === name)).find((at) => at >= 0) ?? 0,
+    );
     const page = pages[turn];
     close();
     host.replaceChildren();
     if (!page) return;
-    links.forEach((link, at) => (at === turn ? link.setAttribute("aria-current", "page") : link.removeAttribute("aria-current")));
+    links.forEach((link, at) =>
+      at === turn ? link.setAttribute("aria-current", "page") : link.removeAttribute("aria-current"),
+    );
     document.title = `${page.title} \u00b7 ${robot.config.robot}`;
     close = page.open(host, robot);
   };
@@ -97,7 +100,12 @@ function lostBanner(link: Rosbridge): HTMLElement {
     if (state.is === "lost") lost = true;
     banner.hidden = !lost;
     setText(message, lost ? "Connection lost. The robot stops by itself. " : "");
-    setText(text, state.is === "lost" ? `Next attempt in ${formatAge(Math.max(1_000, state.retry - Date.now()))}.` : "Connecting\u2026");
+    setText(
+      text,
+      state.is === "lost"
+        ? `Next attempt in ${formatAge(Math.max(1_000, state.retry - Date.now()))}.`
+        : "Connecting\u2026",
+    );
     button.disabled = state.is !== "lost";
   };
   link.state.watch(show);

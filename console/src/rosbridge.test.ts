@@ -40,13 +40,23 @@ beforeEach(() => {
 afterEach(() => vi.useRealTimers());
 
 describe("frames", () => {
-  it.each<unknown>(["", "nonsense", "1", "null", "[]", "{}", '{"op":"publish","topic":"/a","msg":3}', '{"op":7}', new ArrayBuffer(1)])(
-    "that mean nothing are ignored: %s",
-    (text) => expect(parseFrame(text)).toBeUndefined(),
-  );
+  it.each<unknown>([
+    "",
+    "nonsense",
+    "1",
+    "null",
+    "[]",
+    "{}",
+    '{"op":"publish","topic":"/a","msg":3}',
+    '{"op":7}',
+    new ArrayBuffer(1),
+  ])("that mean nothing are ignored: %s", (text) => expect(parseFrame(text)).toBeUndefined());
 
   it("of services may have no values", () => {
-    expect(parseFrame('{"op":"service_response","id":"a","result":true}')).toMatchObject({ values: null, result: true });
+    expect(parseFrame('{"op":"service_response","id":"a","result":true}')).toMatchObject({
+      values: null,
+      result: true,
+    });
   });
 });
 
@@ -139,7 +149,8 @@ describe("topics", () => {
 });
 
 describe("services", () => {
-  const answer = (frame: Message) => last().receive({ op: "service_response", service: "/s", id: last().sent.at(-1)?.id, ...frame });
+  const answer = (frame: Message) =>
+    last().receive({ op: "service_response", service: "/s", id: last().sent.at(-1)?.id, ...frame });
 
   it("answer the call that has their id", async () => {
     const link = make();

@@ -10,17 +10,15 @@ export function stopButtons(link: Rosbridge, stopped: Signal<boolean>, notify: (
   const release = h("button", { type: "button", class: "release" }, icon("play"), "Release");
 
   const sendStop = async () => {
+    const answer = ask(link, "/console/stop"); // before all that follows from it
     stopped.set(true);
     owed = link.state.value.is !== "open";
-    if (owed) {
-      notify("Not connected: the robot stops by itself. STOP is sent when the connection is back.");
-      return;
-    }
     try {
-      await ask(link, "/console/stop");
+      await answer;
     } catch (error) {
-      owed = link.state.value.is !== "open";
-      notify(`STOP failed: ${(error as Error).message}. Use the switch on the robot.`);
+      owed ||= link.state.value.is !== "open";
+      if (owed) notify("Not connected: the robot stops by itself. STOP is sent when the connection is back.");
+      else notify(`STOP failed: ${(error as Error).message}. Use the switch on the robot.`);
     }
   };
   stop.onclick = () => void sendStop();

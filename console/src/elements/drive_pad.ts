@@ -11,7 +11,10 @@ export class DrivePad extends HTMLElement {
   connectedCallback(): void {
     if (this.childElementCount > 0) return;
     const lines = svg("path", { d: "M50 12v76M12 50h76M31 31h38v38H31zM12 12h76v76H12z" });
-    const arrows = svg("path", { class: "pad-arrows", d: "m47 8 3-3.500 3 3.500zm0 84 3 3.500 3-3.500zM8 47l-3.500 3 3.500 3zm84 0 3.500 3-3.500 3z" });
+    const arrows = svg("path", {
+      class: "pad-arrows",
+      d: "m47 8 3-3.500 3 3.500zm0 84 3 3.500 3-3.500zM8 47l-3.500 3 3.500 3zm84 0 3.500 3-3.500 3z",
+    });
     this.append(svg("svg", { viewBox: "0 0 100 100", "aria-hidden": "true" }, lines, arrows), this.#knob);
     this.addEventListener("pointerdown", (event) => this.#press(event));
     this.addEventListener("pointermove", (event) => {

@@ -1,7 +1,7 @@
 /** Drive: the pad, keys with a dead-man switch, speeds, batteries, and who drives. */
 import { fetchConfig, pluck, type DriveConfig } from "../config";
 import { h, icon, setText } from "../dom";
-import { drive, parked, PERIOD, wanted, type Direction, type DriveEvent, type Motion } from "../driving";
+import { drive, parked, PERIOD, STILL, wanted, type Direction, type DriveEvent, type Motion } from "../driving";
 import { BatteryGauge } from "../elements/battery_gauge";
 import { DrivePad } from "../elements/drive_pad";
 import { formatNumber, formatValue } from "../format";
@@ -35,7 +35,14 @@ export const page: Page = {
     const { drive: config } = robot.config;
     if (!config) {
       const batteries = batteryCard(robot);
-      host.append(h("div", { class: "drive empty" }, h("section", { class: "card" }, icon("wheel"), h("p", {}, "This robot has no base to drive.")), batteries.element));
+      host.append(
+        h(
+          "div",
+          { class: "drive empty" },
+          h("section", { class: "card" }, icon("wheel"), h("p", {}, "This robot has no base to drive.")),
+          batteries.element,
+        ),
+      );
       return batteries.close;
     }
     return openDrive(host, robot, config);
@@ -81,7 +88,10 @@ function openDrive(host: HTMLElement, robot: Robot, config: DriveConfig): () => 
   const publish = (motion: Motion) => {
     lastPublish += 1;
     const twist = { linear: { x: motion.forward, y: 0, z: 0 }, angular: { x: 0, y: 0, z: motion.turn } };
-    link.publish(config.topic, config.type.endsWith("Stamped") ? { twist } : twist, { id: `drive:${lastPublish}`, sent: performance.now() });
+    link.publish(config.topic, config.type.endsWith("Stamped") ? { twist } : twist, {
+      id: `drive:${lastPublish}`,
+      sent: performance.now(),
+    });
   };
 
   const refuse = (why: string) => {
@@ -119,8 +129,8 @@ function openDrive(host: HTMLElement, robot: Robot, config: DriveConfig): () => 
   };
 
   const paint = () => {
-    const motion = wanted(state) ?? { forward: 0, turn: 0 };
-    const live = state.lease === "held" && wanted(state) !== null && !state.latched;
+    const motion = (state.connected && !state.stopped && !state.latched && wanted(state)) || STILL;
+    const live = state.lease === "held" && motion !== STILL;
     pad.show({ x: -motion.turn / (state.speeds.turn || 1), y: motion.forward / (state.speeds.forward || 1) }, live);
     pad.setAttribute("aria-disabled", String(!state.connected || state.stopped));
     velocity.commanded(state.commanded);
@@ -150,7 +160,11 @@ function openDrive(host: HTMLElement, robot: Robot, config: DriveConfig): () => 
     } else if (kind === "other") {
       lease.replaceChildren(icon("warning"), words(`${holder} is driving`, `You can drive when ${holder} lets go`));
     } else if (kind === "mine") {
-      lease.replaceChildren(icon("wheel"), words("You are driving", `as ${name}`), button("Hand back", () => dispatch({ is: "interrupted" })));
+      lease.replaceChildren(
+        icon("wheel"),
+        words("You are driving", `as ${name}`),
+        button("Hand back", () => dispatch({ is: "interrupted" })),
+      );
     } else {
       const rename = button("Rename", () => {
         name = "";
@@ -172,7 +186,12 @@ function openDrive(host: HTMLElement, robot: Robot, config: DriveConfig): () => 
 
   const nameForm = () => {
     const input = h("input", { id: "name", maxlength: String(NAME_LENGTH), autocomplete: "nickname", required: "" });
-    const form = h("form", {}, h("label", { for: "name" }, "Your name, shown to others while you drive"), h("div", { class: "row" }, input, h("button", {}, "OK")));
+    const form = h(
+      "form",
+      {},
+      h("label", { for: "name" }, "Your name, shown to others while you drive"),
+      h("div", { class: "row" }, input, h("button", {}, "OK")),
+    );
     form.onsubmit = (event) => {
       event.preventDefault();
       name = input.value.trim().slice(0, NAME_LENGTH);
@@ -272,7 +291,14 @@ function speedCard(limits: Motion, start: Motion, changed: (speeds: Motion) => v
   const rows = AXES.map(({ key, unit }) => {
     const label = key === "forward" ? "Top speed" : "Top turn rate";
     const step = limits[key] / 50;
-    const input = h("input", { id: `top-${key}`, type: "range", min: String(step), max: String(limits[key]), step: String(step), value: String(start[key]) });
+    const input = h("input", {
+      id: `top-${key}`,
+      type: "range",
+      min: String(step),
+      max: String(limits[key]),
+      step: String(step),
+      value: String(start[key]),
+    });
     const output = h("output", { for: input.id });
     const show = () => {
       speeds = { ...speeds, [key]: Math.min(limits[key], Number(input.value)) };
@@ -304,7 +330,14 @@ function velocityCard(limits: Motion) {
     "section",
     { class: "card velocity", "aria-label": "Velocity" },
     ...rows.map(({ label, unit, measured, commanded, bar }) =>
-      h("div", { class: "axis" }, h("span", { class: "label" }, label), h("p", {}, measured, h("span", { class: "unit" }, unit)), bar, commanded),
+      h(
+        "div",
+        { class: "axis" },
+        h("span", { class: "label" }, label),
+        h("p", {}, measured, h("span", { class: "unit" }, unit)),
+        bar,
+        commanded,
+      ),
     ),
   );
   const share = (value: number, limit: number) => String(Math.max(-1, Math.min(1, value / limit)));
