@@ -134,7 +134,7 @@ class Documents:
                     return changed(node, items=tuple(inner))
                 case MappingNode(entries=entries):
                     values = {
-                        name: self._placed(one.value, (*path, name), places, root) for name, one in entries.items()
+                        name: self._placed(entry.value, (*path, name), places, root) for name, entry in entries.items()
                     }
                     return changed(node, entries={name: changed(entries[name], value=values[name]) for name in entries})
         own = places.get(place)

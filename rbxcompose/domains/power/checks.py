@@ -193,13 +193,13 @@ def given_up_before(robot: Robot) -> Iterator[Finding]:
     for mission in robot.missions.values():
         for call in calls(robot, mission):
             for node in mission.program.below(mission.program.main):
-                watched = [one for one in node.asked[node.own :] if one.is_watched]  # those of 'as_long_as'
-                for one in watched if _counts_failures(mission.program, node) else ():
-                    least = _least_level(one, call, constants(mission))
+                watched = [asked for asked in node.asked[node.own :] if asked.is_watched]  # those of 'as_long_as'
+                for asked in watched if _counts_failures(mission.program, node) else ():
+                    least = _least_level(asked, call, constants(mission))
                     if least is not None and call.level < least <= 1.0:
                         level, limit = format_quantity(call.level, RATIO), format_quantity(least, RATIO)
                         yield given_up_before.at(
-                            one.scalar.span,
+                            asked.scalar.span,
                             f"this fails at {limit}, before '{call.interrupt.name}' charges the battery below {level}",
                             help=f"charge it at {limit} or above, or let this go on until below {level}",
                             related=[Related(call.interrupt.when.scalar.span, "it charges at this")],
