@@ -15,7 +15,7 @@ up: $(VENV)/.up
 	@extras=$$($(BIN)/rbxcompose needs $(ROBOT) --missing --pip 2>/dev/null || true); [ -z "$$extras" ] || { \
 		sed -n 's/^\([a-zA-Z0-9._-]*==[^ ;\\]*\).*/\1/p' requirements-test.lock > $(VENV)/versions.txt && \
 		$(BIN)/python -m pip install -q --disable-pip-version-check -c $(VENV)/versions.txt "$$extras"; }
-	@! command -v npm > /dev/null || $(BIN)/python console/build.py || true
+	@! grep -qs '^console:' $(ROBOT) || $(MAKE) -s console || true  # the robot runs without its page
 	@trap : INT; $(BIN)/rbxcompose up $(ROBOT) || test $$? -eq 130  # Ctrl-C is how a run ends
 
 console: | $(VENV)/bin/python  ## Build the page that robots serve, if its sources are newer; needs no Node

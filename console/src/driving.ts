@@ -54,7 +54,7 @@ export type DriveEvent =
 
 export type Action = { do: "publish"; motion: Motion } | { do: "take" } | { do: "give" };
 
-export const PERIOD = 100; // [ms] of publishing; 500 ms after the last command, the gateway stops the base and ends the lease
+export const PERIOD = 100; // [ms] of publishing; the gateway stops the base and ends the lease after 500 ms without
 const SLACK = 15; // [ms] by which a timer may be early
 const IDLE = 2_000; // [ms] without input, while zero is published, after which the lease is given back
 const DEAD_ZONE = 0.06; // of the pad, around its middle

@@ -134,7 +134,7 @@ class FakeGateway:
     def _call(self, service: str, args: dict[str, Any]) -> dict[str, Any]:
         if service == "/console/drive":
             if self.others:
-                return {"success": False, "holder": self.others, "message": f"{self.others} is driving"}
+                return {"success": False, "holder": self.others, "message": f"'{self.others}' drives"}
             self.holder = args["name"] if args["take"] else ""
             return {"success": True, "holder": self.holder, "message": ""}
         return {"success": True, "message": ""}

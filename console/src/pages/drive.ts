@@ -105,7 +105,7 @@ function openDrive(host: HTMLElement, robot: Robot, config: DriveConfig): () => 
       const values = await link.call("/console/drive", { take: true, name });
       showHolder(values);
       if (isMessage(values) && values.success === false) {
-        return refuse(sentence(values.message));
+        return refuse(holder ? `${holder} is driving.` : sentence(values.message));
       }
       blocked = "";
       dispatch({ is: "granted" });
