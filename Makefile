@@ -51,7 +51,6 @@ docs: $(VENV)/.test  ## Write the generated pages, tables and schemas, and the p
 	$(BIN)/python docs/draw_screens.py
 	$(BIN)/python docs/draw_robots.py
 	$(BIN)/python docs/draw_console.py
-	$(BIN)/python docs/draw_console.py
 	$(BIN)/python -m rbxcompose.compiler.schema.documents schemas
 
 site: $(VENV)/.site  ## Build the searchable site of the documentation, build/site/html; a dead link is an error
