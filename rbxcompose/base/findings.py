@@ -115,7 +115,12 @@ class Span(NamedTuple):
     end_column: int
 
     def __str__(self) -> str:
-        return f"{self.file}:{self.line}:{self.column}"
+        return f"{self.place}:{self.column}"
+
+    @property
+    def place(self) -> str:
+        """Return the file and the line."""
+        return f"{self.file}:{self.line}"
 
     def contains(self, other: Span) -> bool:
         """Return whether another place lies inside this one."""
@@ -295,6 +300,11 @@ def suggest(name: str, valid: Iterable[str], what: str = VALID) -> str:
         return ""
     rest = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
     return f"{what}: {', '.join(_by_likeness(name, names)[:MOST_NAMES])}{rest}"
+
+
+def clauses(*parts: str) -> str:
+    """Return the parts of a sentence that are not empty, joined by semicolons."""
+    return "; ".join(filter(None, parts))
 
 
 def _is_chance(name: str, near: str) -> bool:

@@ -4,7 +4,7 @@ import inspect
 import json
 import shlex
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import MISSING, asdict, fields, is_dataclass
+from dataclasses import MISSING, fields, is_dataclass
 from enum import Enum
 from functools import cache
 from types import NoneType, UnionType
@@ -24,12 +24,17 @@ class UnreadableError(ValueError):
 
 def to_data(value: object) -> Any:
     """Return a value as plain data: a dataclass becomes a dict by field, in the order of its fields."""
-    match value:
-        case tuple() | list():
-            return [to_data(item) for item in value]
-        case _ if is_dataclass(value) and not isinstance(value, type):
-            return asdict(value)
-    return value
+    return [to_data(item) for item in value] if isinstance(value, tuple | list) else _plain(value)
+
+
+def _plain(value: Any) -> Any:
+    """Return what `dataclasses.asdict` makes of a value, without a copy of all that cannot change."""
+    cls = type(value)
+    if is_dataclass(cls):
+        return {field.name: _plain(getattr(value, field.name)) for field in fields(cls)}
+    if cls in (list, tuple):
+        return cls(map(_plain, value))
+    return {key: _plain(entry) for key, entry in value.items()} if cls is dict else value
 
 
 def from_data(wanted: Any, data: Any) -> Any:
@@ -121,8 +126,10 @@ def _at(place: str, wanted: Any, data: Any) -> Any:
         raise UnreadableError(error.problem, place, *error.path) from None
 
 
-def _first(wanted: Iterable[Any], data: Any) -> Any:
+def _first(wanted: Sequence[Any], data: Any) -> Any:
     """Return the value read as the first type that fits."""
+    if data is None and NoneType in wanted:
+        return None
     for one in wanted:
         try:
             return from_data(one, data)

@@ -13,11 +13,12 @@ from rbxcompose.compiler.doubts import Doubts, doubts_of, half_read
 from rbxcompose.compiler.model.robot import NOTHING, Robot
 from rbxcompose.manifest.registry import PLUGINS as SECTIONS
 from rbxcompose.manifest.registry import section_named
-from rbxcompose.missions.analysis.check_runner import mission_checks, rule_findings
+from rbxcompose.missions.analysis.check_runner import mission_checks
 from rbxcompose.missions.analysis.examined import Examined
 
 Check = Rule[Robot]
 Find = Callable[[Robot], Iterable[Finding]]
+FindBy = Callable[[Rule[Any], Robot | Examined], list[Finding]]
 
 PLUGINS = Plugins("check", "checks")
 _CODE = re.compile(r"[A-Z]+\d+")
@@ -41,7 +42,7 @@ def check(
     def declare(find: Find) -> Check:
         if not _CODE.fullmatch(code):
             raise ValueError(f"'{code}' is not a code: a code is capital letters followed by digits")
-        if _is_foreign(find) and code.startswith(OUR_CODES):
+        if is_foreign(find) and code.startswith(OUR_CODES):
             raise ValueError(f"the code {code} starts with {OUR_CODES}, which is reserved for this project")
         CHECKS[code] = declared(find, code, severity, is_fixable, closed)
         return CHECKS[code]
@@ -64,7 +65,7 @@ def checks_of(robot: Robot) -> list[Check]:
     components of this domain have otherwise: components of other packages may, and other robots' skills.
     """
     types = [component.cls for component in robot.components.values()]
-    if robot.outside is not NOTHING or any(map(_is_foreign, types)):
+    if robot.outside is not NOTHING or any(map(is_foreign, types)):
         return all_checks()
     sections = filter(None, map(section_named, robot.manifest.root.entries))
     used = {domain_of(part.__module__) for part in (*types, *(section.read for section in sections))}
@@ -84,7 +85,7 @@ def broken_checks() -> list[Finding]:
 
 def _problem(name: str) -> str:
     """Import a check of another package; return why it is left out, or nothing."""
-    if any(rule.find.__name__ == name and not _is_foreign(rule.find) for rule in CHECKS.values()):
+    if any(rule.find.__name__ == name and not is_foreign(rule.find) for rule in CHECKS.values()):
         return PLUGINS.left_out(name)
     try:
         PLUGINS.load_foreign(name)
@@ -93,14 +94,16 @@ def _problem(name: str) -> str:
     return ""
 
 
-def run_checks(robot: Robot, report: Report) -> None:
+def run_checks(robot: Robot, report: Report, find: FindBy | None = None) -> None:
     """Add the findings of the checks on missions and on the robot.
 
     Rules that conclude from what is there come first, then errors that conclude from what is not there, then warnings:
     each only if what it takes for known is known, in spite of the errors before it. A finding that rests on something
     in doubt may only follow from an error, so it is left out. A mission with a key that is written twice is not
-    checked: half of something in it was not read.
+    checked: half of something in it was not read. `find` may know the findings of a rule about the robot or a mission
+    from before.
     """
+    find = find or findings_of
     halves = half_read(report)
     programs = (mission.program for mission in robot.missions.values())
     missions = [Examined(program, robot.names) for program in programs if program.file not in halves]
@@ -114,8 +117,8 @@ def run_checks(robot: Robot, report: Report) -> None:
         found: list[tuple[Rule[Any], Finding]] = []
         about_missions = [rule for rule in mission_checks() if reports(rule)]
         for mission in missions:
-            found += rule_findings(mission, about_missions)
-        found += [(one, finding) for one in checks if reports(one) for finding in _found(one, robot)]
+            found += [(rule, finding) for rule in about_missions for finding in find(rule, mission)]
+        found += [(rule, finding) for rule in checks if reports(rule) for finding in find(rule, robot)]
         report.extend(finding for rule, finding in found if not doubts.touch(finding, rule.relies_on))
     report.extend(broken_checks())
 
@@ -128,18 +131,19 @@ def _turn(rule: Rule[Any]) -> int:
     return _TURNS - 1 if rule.severity is Severity.WARNING else int(bool(rule.relies_on))
 
 
-def _found(one: Check, robot: Robot) -> list[Finding]:
-    """Return the findings of a check. If one of another package raises an error, the rest still run."""
-    if not _is_foreign(one.find):
-        return list(one(robot))
+def findings_of(rule: Rule[Any], subject: Robot | Examined) -> list[Finding]:
+    """Return the findings of a rule. If one of another package raises an error, the rest still run."""
+    if not is_foreign(rule.find):
+        return list(rule(subject))
     try:
-        return list(one(robot))
+        return list(rule(subject))
     except Exception as error:  # third-party code may raise anything
         reason = plain(f"{type(error).__name__}: {error}")
-        return [LEFT_OUT.at(None, f"the check {one.code} of '{_package(one.find)}' has failed: {reason}")]
+        return [LEFT_OUT.at(None, f"the check {rule.code} of '{_package(rule.find)}' has failed: {reason}")]
 
 
-def _is_foreign(part: Callable[..., Any]) -> bool:
+def is_foreign(part: Callable[..., Any]) -> bool:
+    """Return whether something is of another package."""
     return _package(part) != _package(declared)
 
 

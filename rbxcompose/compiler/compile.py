@@ -5,7 +5,6 @@ from dataclasses import field, replace
 from pathlib import Path
 from types import MappingProxyType
 
-from rbxcompose.base.config import Config
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Related, Report, Severity, Span, kind, one_compile
 from rbxcompose.base.garbage_collection import paused_collection
@@ -118,17 +117,6 @@ def _with_used(robot: Robot, name: str) -> set[str]:
         nodes = robot.missions[text].program.nodes if text in robot.missions else ()
         waiting += [node.step.uses.text for node in nodes if node.step.uses and node.step.uses.text not in found]
     return found
-
-
-def check_settings(robot: Robot, configs: Mapping[str, Config]) -> Report:
-    """Check a compiled robot again, where some components have other configurations, such as those they have now."""
-    components = dict(robot.components)
-    for name, config in configs.items():
-        component = components[name]
-        components[name] = replace(component, config=config, capabilities=component.cls.capabilities(config))
-    report = Report()
-    run_checks(replace(robot, components=components), report)
-    return report
 
 
 def _steps_to_read(sources: Mapping[str, str]) -> int:

@@ -65,9 +65,13 @@ class PrepareChange:
 
 @dataclass(frozen=True, slots=True)
 class CommitChange:
-    """Apply the settings that were prepared, then send `ChangeFollowed`."""
+    """Apply the settings that were prepared, then send `ChangeFollowed`.
+
+    With the number of an `AskForChange`, nothing else is to be applied elsewhere: once applied, it is decided and over.
+    """
 
     number: int
+    decides: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +100,7 @@ class ChangeDecided:
 class AskRules:
     """For the judge: may components have the configurations of `new`, if others have those of `now`?
 
-    Both are plans as text. Rules of another `generation` of the plan are made of the robot's files anew.
+    Both are texts of configurations. Rules of another `generation` of the plan are made of the robot's files anew.
     """
 
     number: int
@@ -120,7 +124,7 @@ class ChangePrepared:
     """Why components of the process would refuse a change, or nothing.
 
     `now` are those of its components whose settings are not those of the plan, `new` those that rules could notice, as
-    they will be; both are plans as text, or empty.
+    they will be; both are texts of configurations, or empty.
     """
 
     number: int

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
+from dataclasses import field
 from pathlib import Path
 from types import MappingProxyType
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.findings import Finding, Span
-from rbxcompose.compiler.compile import Compilation, check_settings, compile_robot
+from rbxcompose.compiler.compile import Compilation, compile_robot
 from rbxcompose.compiler.model.robot import NOTHING, Robot
+from rbxcompose.compiler.setting_checks import SettingChecks
 from rbxcompose.compiler.systems.reader import compile_system
 from rbxcompose.runtime.folder import ChosenLayers
 from rbxcompose.sdk.parameters import ChangeRefusal, Configs
-
-Broken = frozenset[tuple[str, Span | None]]
 
 
 @dataclass(slots=True)
@@ -23,7 +22,10 @@ class LiveRules:
     """The rules of a compiled robot; a supervisor's judge asks them in a process of its own."""
 
     robot: Robot
-    _looked: tuple[Configs, Broken] = ({}, frozenset())  # what was broken when it looked last, with these settings
+    _checks: SettingChecks = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._checks = SettingChecks(self.robot)
 
     def remade(self, file: str, layers: ChosenLayers) -> LiveRules | None:
         """Return the rules of the robot as its files are now, with these layers; None if they have errors."""
@@ -34,13 +36,14 @@ class LiveRules:
         """Return the first rule that `new` configurations break, where others have those of `now`."""
         written = {name: component.config for name, component in self.robot.components.items()}
         before, after = {**written, **now}, {**written, **now, **new}
-        known = self._looked[1] if self._looked[0] == before else _broken(check_settings(self.robot, before))
-        found = list(check_settings(self.robot, after))
-        broken = next((setting for setting in found if (setting.code, setting.span) not in known), None)
-        if broken is None:
-            self._looked = after, _broken(found)  # most likely what there is when it looks next
-            return None
-        return ChangeRefusal(f"{broken.message} ({broken.code})", broken.help, breaks_rule=True)
+        known = {(finding.code, finding.span) for finding in self._checks.report(before)}
+        found = self._checks.report(after)
+        broken = next((finding for finding in found if (finding.code, finding.span) not in known), None)
+        return (
+            None
+            if broken is None
+            else ChangeRefusal(f"{broken.message} ({broken.code})", broken.help, breaks_rule=True)
+        )
 
 
 def compiled_with(file: str, layers: ChosenLayers, unsaved: Mapping[Path, str] = MappingProxyType({})) -> Compilation:
@@ -61,7 +64,3 @@ def compiled_with(file: str, layers: ChosenLayers, unsaved: Mapping[Path, str] =
         unsaved=unsaved,
         outside=outside,
     )
-
-
-def _broken(found: Iterable[Finding]) -> Broken:
-    return frozenset((finding.code, finding.span) for finding in found)

@@ -66,12 +66,15 @@ class Robot:
                 if text and int(text) != REFUSED:
                     self.prepared[name] = int(text), self.values[name]
                 self.changes.receive(name, tell.ChangePrepared(number, "no" if text == str(REFUSED) else "", "", text))
-            case tell.CommitChange(number):
+            case tell.CommitChange(number, decides):
                 wanted_value, _ = self.prepared[name]
                 is_taken = wanted_value != LATE
                 if is_taken:
                     self.values[name] = wanted_value
                 self.changes.receive(name, tell.ChangeFollowed(number, "" if is_taken else "not now"))
+                if decides is not None and is_taken:
+                    self.prepared.pop(name)
+                    self.answers[decides] = None
             case tell.UndoChange(number):
                 self.values[name] = self.prepared[name][1]
                 self.changes.receive(name, tell.ChangeFollowed(number, ""))

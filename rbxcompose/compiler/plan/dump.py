@@ -73,6 +73,22 @@ def load(text: str) -> Plan:
     return plan
 
 
+def dump_configs(configs: Mapping[str, tuple[str, Config]]) -> str:
+    """Return configurations by component, each with its type, as JSON with their secrets."""
+    data = {name: (type_name, _encode(config, type(config), list)) for name, (type_name, config) in configs.items()}
+    return json.dumps(data, default=Secret.reveal)
+
+
+def load_configs(text: str) -> dict[str, Config]:
+    """Return the configurations that `dump_configs` wrote.
+
+    Raises:
+        PlanTextError: if a configuration is none of its type.
+    """
+    types = {name: (component_type(type_name), data) for name, (type_name, data) in json.loads(text).items()}
+    return {name: _model(data, cls.config_type()) for name, (cls, data) in types.items()}
+
+
 def _encode(value: Any, hint: Any, order: EntryOrder) -> Any:
     """Return a value of a field's type as data for JSON."""
     hint = _plain_hint(hint)

@@ -207,7 +207,7 @@ class ArmWorks:
         self.solver, own = config.kinematics.settings, config.planner
         settings = PlannerSettings(own.type, own.time, own.attempts, own.seed, own.simplify)
         self.planner = MotionPlanner(self.space, self._fast(self._checker), settings, now, unlikely)
-        if isinstance(self.planner.checker, collisions.SearchingChecker):
+        if collisions.can_search(self.planner.checker):
             self.planner.checker.prepare(self.space)
         keep_libraries()
 

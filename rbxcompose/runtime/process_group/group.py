@@ -7,7 +7,6 @@ import os
 import signal
 import threading
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
@@ -20,7 +19,7 @@ from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.bus import Bus
 from rbxcompose.bus.names import admin_key
 from rbxcompose.bus.transport import Closable, Question, Transport
-from rbxcompose.compiler.plan.dump import dump, load
+from rbxcompose.compiler.plan.dump import dump, dump_configs, load
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.msgs.rosgraph_msgs import Clock as ClockMessage
 from rbxcompose.msgs.stamps import to_nanoseconds
@@ -84,8 +83,12 @@ def change_settings(host: Host, order: messages.SettingOrder, channel: messages.
     match order:
         case messages.PrepareChange():
             channel.send(_prepared(host, order))
-        case messages.CommitChange(number):
-            channel.send(messages.ChangeFollowed(number, changes.commit(number)))
+        case messages.CommitChange(number, decides):
+            reason = changes.commit(number)
+            channel.send(messages.ChangeFollowed(number, reason))
+            if decides is not None and not reason:
+                changes.end(number)
+                host.parameters.decided(decides, None)
         case messages.UndoChange(number):
             channel.send(messages.ChangeFollowed(number, changes.undo(number)))
         case messages.EndChange(number):
@@ -105,9 +108,12 @@ def _prepared(host: Host, order: messages.PrepareChange) -> messages.ChangePrepa
 
 
 def _text(host: Host, configs: dict[str, Config]) -> str:
-    """Return configurations of components as a plan in text; empty if there are none."""
-    instances = tuple(replace(host.hosted[name].instance, config=config) for name, config in configs.items())
-    return dump(replace(host.plan, instances=instances), reveals_secrets=True) if instances else ""
+    """Return configurations of components as text; empty if there are none."""
+    return (
+        dump_configs({name: (host.hosted[name].instance.type, config) for name, config in configs.items()})
+        if configs
+        else ""
+    )
 
 
 class Taping:

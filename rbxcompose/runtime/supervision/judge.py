@@ -19,7 +19,7 @@ import setproctitle
 from rbxcompose.base.config import Config
 from rbxcompose.base.processes import end_with
 from rbxcompose.base.scheduler import ScheduledCallback, Scheduler
-from rbxcompose.compiler.plan.dump import load
+from rbxcompose.compiler.plan.dump import load_configs
 from rbxcompose.runtime import channel as messages
 from rbxcompose.runtime.folder import ChosenLayers
 from rbxcompose.runtime.processes import close_all, in_child
@@ -148,4 +148,4 @@ class _Judging:
 
 
 def _configs(texts: Iterable[str]) -> dict[str, Config]:
-    return {instance.name: instance.config for text in texts for instance in load(text).instances}
+    return {name: config for text in texts for name, config in load_configs(text).items()}

@@ -64,6 +64,11 @@ class _Change:
     refusal: ChangeRefusal | None = None
     stuck: list[str] = field(default_factory=list)
 
+    @property
+    def is_own(self) -> bool:
+        """Return whether it concerns only the process where somebody wants it, which decides it by applying it."""
+        return self.parts.keys() == {self.process}
+
 
 class SettingChanges:
     """Makes the changes of settings that somebody wants anywhere."""
@@ -128,9 +133,10 @@ class SettingChanges:
             self._count += 1
             change = self._change = _Change(process, asked, self._count, parts)
             change.waiting = set(self._effects.reached())
-            for text in sorted(change.waiting):  # those without a part of it tell the values that they have now
-                part = parts.get(text, WantedChange({}, asked.wanted.by))
-                self._effects.send(text, messages.PrepareChange(change.number, part))
+            # Those without a part of it tell the values that they have now; the others have more to do, so they begin.
+            for name in sorted(change.waiting, key=lambda name: (name not in parts, name)):
+                part = parts.get(name, WantedChange({}, asked.wanted.by))
+                self._effects.send(name, messages.PrepareChange(change.number, part))
 
     def _parts(self, wanted: WantedChange) -> tuple[dict[str, WantedChange], ChangeRefusal | None]:
         """Return what is wanted of each process, or why that is impossible."""
@@ -173,7 +179,7 @@ class SettingChanges:
                 change.step = _Step.JUDGING
                 self._effects.judge(change.now, change.new, lambda refusal: self._judged(change, refusal))
             case _Step.PREPARING if change.refusal is None:
-                self._order(change, _Step.COMMITTING, change.parts, messages.CommitChange(change.number))
+                self._commit(change)
             case _Step.COMMITTING if change.refusal is not None and change.done:
                 self._order(change, _Step.GOING_BACK, change.done, messages.UndoChange(change.number))
             case _:
@@ -184,7 +190,11 @@ class SettingChanges:
         if change.refusal is not None:
             self._end(change)
         else:
-            self._order(change, _Step.COMMITTING, change.parts, messages.CommitChange(change.number))
+            self._commit(change)
+
+    def _commit(self, change: _Change) -> None:
+        decides = change.asked.number if change.is_own else None
+        self._order(change, _Step.COMMITTING, change.parts, messages.CommitChange(change.number, decides))
 
     def _order(self, change: _Change, step: _Step, processes: Iterable[str], order: messages.ChannelOrder) -> None:
         change.step, change.waiting = step, set(processes)
@@ -192,12 +202,15 @@ class SettingChanges:
             self._effects.send(process, order)
 
     def _end(self, change: _Change) -> None:
-        for process in change.prepared:
-            self._effects.send(process, messages.EndChange(change.number))
         refusal = change.refusal
+        is_over = {change.process} if change.is_own and change.done and refusal is None else set[str]()
+        for process in change.prepared:
+            if process not in is_over:
+                self._effects.send(process, messages.EndChange(change.number))
         if refusal is not None and change.stuck:
             reason = f"{refusal.reason}; not all are as before: {'; '.join(change.stuck)}"
             refusal = ChangeRefusal(reason, is_half_done=True)
-        self._effects.send(change.process, messages.ChangeDecided(change.asked.number, refusal))
+        if not is_over:
+            self._effects.send(change.process, messages.ChangeDecided(change.asked.number, refusal))
         self._change = None
         self._begin()

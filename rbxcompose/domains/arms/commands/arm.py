@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbxcompose.base.config import Config, Length, Time
-from rbxcompose.base.findings import suggest
+from rbxcompose.base.findings import clauses, suggest
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.base.units import ANGLE, LENGTH
 from rbxcompose.commands import options
@@ -290,7 +290,7 @@ def _target(arguments: argparse.Namespace, works: ArmWorks, start: NDArray[Any])
     """Return the pose that is asked for, in the frame of the root."""
     links, pose = works.kinematics.poses(start), read_written(FramePose, arguments.target).to_transform()
     if arguments.frame and arguments.frame not in links:
-        message = f"there is no link '{arguments.frame}'; {suggest(arguments.frame, links, 'links')}"
+        message = clauses(f"there is no link '{arguments.frame}'", suggest(arguments.frame, links, "links"))
         raise NotDoneError(NO_MOTION.at(None, message))
     return PoseTarget(
         links[arguments.frame].compose(pose) if arguments.frame else pose,

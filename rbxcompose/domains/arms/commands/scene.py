@@ -13,7 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from rbxcompose.base.files import replace_file
-from rbxcompose.base.findings import Finding, Report, kind, suggest
+from rbxcompose.base.findings import Finding, Report, clauses, kind, suggest
 from rbxcompose.base.printable import plain
 from rbxcompose.base.requests import Command, to_data
 from rbxcompose.commands.console import NotDoneError, emit, misused, refuse, table, write_report
@@ -206,7 +206,9 @@ def _distance(arguments: argparse.Namespace) -> int:
     view = _view(arguments, *arguments.pair)
     for name in arguments.pair:
         if name not in view.watched:
-            raise NotDoneError(NO_PAIR.at(None, f"no arm watches '{name}'; {suggest(name, view.watched, 'watched')}"))
+            raise NotDoneError(
+                NO_PAIR.at(None, clauses(f"no arm watches '{name}'", suggest(name, view.watched, "watched")))
+            )
     if not view.pairs:
         words = " and ".join(f"'{name}'" for name in arguments.pair)
         why = f"no arm watches {words}" if len(arguments.pair) > 1 else "there are too many pairs: name one or two"

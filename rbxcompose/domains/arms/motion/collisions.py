@@ -10,7 +10,7 @@ from importlib import import_module
 from itertools import chain, combinations, product
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Protocol, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -172,7 +172,6 @@ class Checker(Protocol):
         """Return the links and objects but those `ignored` that a shape, at a pose in the root's frame, is within."""
 
 
-@runtime_checkable
 class SearchingChecker(Checker, Protocol):
     """One that examines many positions at once, and can search a way by itself."""
 
@@ -186,6 +185,11 @@ class SearchingChecker(Checker, Protocol):
         self, space: JointSpace, start: Array, goal: Array, *, seed: int, resolution: float, simplify: bool
     ) -> Generator[int, None, Array | str]:
         """Search a way; return its points, of shape (m, n), or why there is none. Yield how many were examined."""
+
+
+def can_search(checker: Checker) -> TypeGuard[SearchingChecker]:
+    """Return whether a checker is one that searches; `isinstance` of a protocol takes as long as 50 positions."""
+    return hasattr(checker, "ways")
 
 
 def pairs_shown(pairs: Collection[LinkPair], most: int = 3) -> str:
@@ -358,10 +362,7 @@ class MeshChecker:
     @property
     def watched_parts(self) -> list[tuple[int, int, float]]:
         """Return the pairs of shapes that it examines, and how far they must be from each other [m]."""
-        margins = (request.security_margin for request in self._data.collisionRequests)
-        return [
-            (pair.first, pair.second, item) for pair, item in zip(self._geometry.collisionPairs, margins, strict=True)
-        ]
+        return self._watched_parts
 
     def collides(self, values: Array, pairs: Iterable[int]) -> bool:
         """Return whether one of some pairs collides, by their places in `watched_parts`."""
@@ -376,12 +377,14 @@ class MeshChecker:
         # Pairs with a plane, of which the tree overlooks some that are inclined or keep a distance; and
         # with a flat mesh, since it takes boxes without a thickness for empty.
         self._apart: list[int] = []
+        self._watched_parts: list[tuple[int, int, float]] = []
         # Asking coal for each pair takes long.
         overlooked = [self._is_overlooked(one) for one in range(len(self._owners))]
         requests = zip(self._data.collisionRequests, self._geometry.collisionPairs, strict=True)
         for index, (request, pair) in enumerate(requests):
             first, second = pair.first, pair.second
-            request.security_margin = self._margin(first, second)
+            request.security_margin = margin = self._margin(first, second)
+            self._watched_parts.append((first, second, margin))
             if overlooked[first] or overlooked[second]:
                 self._apart.append(index)
         self._manager = self._pinocchio.BroadPhaseManager_DynamicAABBTreeCollisionManager(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -113,9 +114,9 @@ class ArmJoint:
         return f"{position * 100:.1f} cm" if self.slides else f"{math.degrees(position):.1f} deg"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class JointSpace:
-    """The joints of an arm. All arrays of positions have the shape (n,), in [rad] or [m]."""
+    """The joints of an arm. All arrays of positions have the shape (n,), in [rad] or [m]; nobody changes limits."""
 
     joints: tuple[ArmJoint, ...]
 
@@ -128,12 +129,12 @@ class JointSpace:
         """Return the names of the joints."""
         return tuple(joint.name for joint in self.joints)
 
-    @property
+    @cached_property
     def lower(self) -> Array:
         """Return the least positions; -inf without a limit."""
         return np.array([-math.inf if joint.is_continuous else joint.limits.least for joint in self.joints])
 
-    @property
+    @cached_property
     def upper(self) -> Array:
         """Return the greatest positions; inf without a limit."""
         return np.array([math.inf if joint.is_continuous else joint.limits.greatest for joint in self.joints])

@@ -32,16 +32,21 @@ class PathTiming:
         """Return when each place is reached [s]."""
         return np.concatenate([[0.0], np.cumsum(2 * np.diff(self.way) / (self.speeds[1:] + self.speeds[:-1]))])
 
+    def at(self, when: Array) -> tuple[Array, Array]:
+        """Return the places and the speeds at some times [s]."""
+        return self._at(when)[:2]
+
     def mean(self, window: float, count: int) -> tuple[Array, Array, Array]:
         """Return times [s], and the mean place and speed over the last `window` seconds, each of shape (count,)."""
         end = float(self.times[-1])
         times = np.linspace(0.0, end + window, count)
-        (place, sum_), (place_before, sum_before) = self._at(times), self._at(times - window)
+        (place, _, sum_), (place_before, _, sum_before) = self._at(times), self._at(times - window)
         return times, np.clip((sum_ - sum_before) / window, 0.0, self.way[-1]), (place - place_before) / window
 
-    def _at(self, when: Array) -> tuple[Array, Array]:
-        """Return places at some times, before, while or after it moves, and the integral of the place until then."""
-        times, steps = self.times, np.diff(self.times)
+    def _at(self, when: Array) -> tuple[Array, Array, Array]:
+        """Return places and speeds at some times, before, while or after it moves, and the integrals of the place."""
+        times = self.times
+        steps = np.diff(times)
         slopes = np.diff(self.speeds) / steps
         parts = steps * (self.way[:-1] + steps * (self.speeds[:-1] / 2 + steps * slopes / 6))
         sums = np.concatenate([[0.0], np.cumsum(parts)])
@@ -50,7 +55,7 @@ class PathTiming:
         t, speed, slope = inside - times[index], self.speeds[index], slopes[index]
         place = self.way[index] + t * (speed + t * slope / 2)
         sum_ = sums[index] + t * (self.way[index] + t * (speed / 2 + t * slope / 6))
-        return place, sum_ + np.maximum(0.0, when - times[-1]) * self.way[-1]
+        return place, speed + t * slope, sum_ + np.maximum(0.0, when - times[-1]) * self.way[-1]
 
 
 def jerks_of(space: JointSpace) -> Array | None:
@@ -79,6 +84,7 @@ BEND, LONGEST, LEAST_GRID = 1e-3, 0.05, 100  # [rad or m] of a step of the grid,
 LEAST_WINDOW, IN_WINDOW = 0.01, 4  # [s] over which speeds are averaged for limits of jerk; samples in this time
 WINDOWS = (1.0, 0.5, 0.25, 0.125)  # shares of the time that keeps them for sure: the one that is done first is taken
 UNUSED = ("matplotlib", "matplotlib.pyplot", "scipy", "scipy.interpolate", "scipy.sparse")  # of what toppra imports
+SHORTEST = 1e-6  # of a straight line, on which the speed is constant
 SAMPLE, LEAST_SAMPLES = 0.05, 12  # [s] between samples, and how many there are at least
 
 
@@ -120,11 +126,11 @@ class Trajectory:
             turn = np.clip(np.nan_to_num(-bend / (3 * twist)), 0.0, 1.0)  # where it is fastest within a curve
         middle = first + turn * (2 * bend + 3 * turn * twist)
         fastest = np.abs(np.stack((first, second, middle))).max(axis=(0, 2))
-        found = [self.positions[:1]]
-        for index, count in enumerate(np.maximum(1, np.ceil(fastest / step)).astype(int).tolist()):
-            s = (np.arange(1, count + 1) / count)[:, None]
-            found.append(self.positions[index] + s * (first[index] + s * (bend[index] + s * twist[index])))
-        return np.concatenate(found)
+        counts = np.maximum(1, np.ceil(fastest / step)).astype(int)
+        index = np.repeat(np.arange(len(counts)), counts)
+        s = ((np.arange(1, len(index) + 1) - (np.cumsum(counts) - counts)[index]) / counts[index])[:, None]
+        between = self.positions[index] + s * (first[index] + s * (bend[index] + s * twist[index]))
+        return np.concatenate((self.positions[:1], between))
 
 
 class Spline:
@@ -218,18 +224,13 @@ def timed(waypoints: Array, velocities: Array, accelerations: Array, jerks: Arra
     """
     if np.any(velocities <= 0.0) or np.any(accelerations <= 0.0):
         return "a limit of speed or acceleration is 0"
-    path = Spline(waypoints)
-    constraints = _constraints(tuple(MARGIN * velocities), tuple(MARGIN * accelerations))
-    grid = _grid(path.knots, path.bends)
-    solver = toppra().algorithm.TOPPRA(constraints, path, gridpoints=grid, parametrizer="ParametrizeConstAccel")
-    found = solver.compute_trajectory(0, 0)
-    if found is None or not math.isfinite(found.duration):
+    path, planned, is_line = Spline(waypoints), (MARGIN * velocities, MARGIN * accelerations), len(waypoints) == 2
+    timing = _line_timing(path, *planned) if is_line else _curve_timing(path, *planned)
+    if timing is None or not math.isfinite(timing.times[-1]):
         return f"no velocities along {len(waypoints)} points keep the limits"
     if jerks is None:
-        times = np.linspace(0.0, found.duration, max(LEAST_SAMPLES, math.ceil(found.duration / SAMPLE)) + 1)
-        made = [Trajectory(times, found(times), found(times, 1))]
+        made = [_sampled(path, timing, timing.times if is_line else timing.times[[0, -1]])]
     else:
-        timing = PathTiming(grid, np.asarray(solver.problem_data.sd_vec))
         longest = max(LEAST_WINDOW, float(np.max(2.0 * accelerations / jerks)))
         made = [_averaged(path, timing, longest * share) for share in WINDOWS]
     limits = (velocities, accelerations, jerks)
@@ -242,6 +243,40 @@ def curve(waypoints: Array, step: float) -> Array:
     path = Spline(waypoints)
     length = path.knots[-1]
     return path(np.linspace(0.0, length, math.ceil(length / step) + 1))
+
+
+def _line_timing(path: Spline, velocities: Array, accelerations: Array) -> PathTiming:
+    """Return the fastest timing of a straight line: as hard as all joints can, as fast as all can, and as hard.
+
+    One that is hardly ever as fast has no samples there, which would be too near to each other in time.
+    """
+    shares = np.abs(path(path.knots[:1], 1)[0])
+    moves, length = shares > 0.0, float(path.knots[-1])
+    hardest = float(np.min(accelerations[moves] / shares[moves]))
+    fastest = min(float(np.min(velocities[moves] / shares[moves])), math.sqrt(hardest * length))
+    ramp = fastest**2 / (2 * hardest)
+    if length - 2 * ramp < SHORTEST * length:
+        return PathTiming(np.array([0.0, length / 2, length]), np.array([0.0, fastest, 0.0]))
+    return PathTiming(np.array([0.0, ramp, length - ramp, length]), np.array([0.0, fastest, fastest, 0.0]))
+
+
+def _curve_timing(path: Spline, velocities: Array, accelerations: Array) -> PathTiming | None:
+    """Return the fastest timing of a path by TOPP-RA, None if there is none."""
+    grid = _grid(path.knots, path.bends)
+    constraints = _constraints(tuple(velocities), tuple(accelerations))
+    solver = toppra().algorithm.TOPPRA(constraints, path, gridpoints=grid, parametrizer="ParametrizeConstAccel")
+    _, speeds, _ = solver.compute_parameterization(0, 0)
+    return None if speeds is None else PathTiming(grid, np.asarray(speeds))
+
+
+def _sampled(path: Spline, timing: PathTiming, between: Array) -> Trajectory:
+    """Return a trajectory as it is timed; with samples at the times [s] where accelerations change, it is exact."""
+    steps = np.diff(between)
+    counts = np.ceil(np.maximum(steps / SAMPLE, LEAST_SAMPLES / len(steps))).astype(int).tolist()
+    parts = [np.linspace(between[at], between[at + 1], count, endpoint=False) for at, count in enumerate(counts)]
+    times = np.concatenate((*parts, between[-1:]))
+    places, paces = timing.at(times)
+    return Trajectory(times, path(places), path(places, 1) * paces[:, None])
 
 
 @lru_cache(maxsize=8)

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.domains.arms.motion.collisions import Checker, SearchingChecker, pairs_shown
+from rbxcompose.domains.arms.motion.collisions import Checker, SearchingChecker, can_search, pairs_shown
 from rbxcompose.domains.arms.motion.constrained_search import kept_path
 from rbxcompose.domains.arms.motion.groups import Array, JointSpace, interpolated
 from rbxcompose.domains.arms.motion.parametrisation import Trajectory, curve, jerks_of, speeds_of, timed
@@ -48,7 +48,7 @@ def examined(points: Array, space: JointSpace, checker: Checker) -> Generator[No
 
 def first_bad(checker: Checker, points: Array) -> int | None:
     """Return the first of some points, of shape (m, n), where something collides; None if there is none."""
-    if isinstance(checker, SearchingChecker):
+    if can_search(checker):
         return checker.first_bad(points)
     return next((index for index, values in enumerate(points) if not checker.is_free(values)), None)
 
@@ -159,11 +159,14 @@ class _Run:
     def mistake(self) -> MotionFailure | None:
         """Return what is wrong with start and goal; a start just outside of its limits is moved to them."""
         space, checker = self._space, self._planner.checker
-        failure = mistake_in_start(space, checker, self.start) or _unfit(
-            space, checker, self.goal, (MotionReason.GOAL_OUTSIDE_LIMITS, MotionReason.GOAL_IN_COLLISION), 0.0
-        )
-        if failure is not None:
-            return failure
+        ends = space.clamped(np.stack((self.start, self.goal)))
+        is_inside = not space.outside(self.start, NEAR) and not space.outside(self.goal)
+        if not is_inside or first_bad(checker, ends) is not None:
+            failure = mistake_in_start(space, checker, self.start) or _unfit(
+                space, checker, self.goal, (MotionReason.GOAL_OUTSIDE_LIMITS, MotionReason.GOAL_IN_COLLISION), 0.0
+            )
+            if failure is not None:
+                return failure
         self.start, self.goal = space.clamped(self.start), space.nearest_turns(self.goal, self.start)
         for word, values in (("start", self.start), ("goal", self.goal)):
             if self._kept is not None and not self._kept.is_kept(values):
@@ -210,7 +213,7 @@ class _Run:
         settings, checker = self._planner.settings, self._planner.checker
         yield self._line()
         first = int(self._found_by == LINE)
-        if isinstance(checker, SearchingChecker) and self._kept is None:
+        if can_search(checker) and self._kept is None:
             for seed in range(settings.seed, settings.seed + FAST_TRIES):
                 if self._is_late(FAST_SHARE) or self._is_fast_hopeless:
                     break
@@ -225,7 +228,7 @@ class _Run:
         line = np.stack((self.start, self.goal))
         points, checker = interpolated(line, RESOLUTION), self._planner.checker
         self._examined += len(points)
-        if isinstance(checker, SearchingChecker) and self._kept is None:
+        if can_search(checker) and self._kept is None:
             is_free = checker.first_bad(points) is None
         else:
             is_free = all(map(self._fitness(0), points))
@@ -303,8 +306,9 @@ class _Run:
         limits = speeds_of(planner.space, request.speed, request.acceleration)
         last = Rejected(True, "", 0.0)
         for _ in range(ROUNDS):
-            # A look at the curve costs a tenth of its timing, which follows where nothing is seen.
-            rejected = yield from examined(curve(path, COARSE), self._space, planner.checker)
+            # A look at a curve costs a tenth of its timing, which follows where nothing is seen; lines take no time.
+            look = curve(path, COARSE) if len(path) > 2 else path[:0]
+            rejected = yield from examined(look, self._space, planner.checker)
             if rejected is None:
                 made = timed(path, *limits, jerks_of(planner.space))
                 if isinstance(made, str):

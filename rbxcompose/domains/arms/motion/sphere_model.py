@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.domains.arms.motion import compiled_collisions, sphere_trees
 from rbxcompose.domains.arms.motion.arm_kinematics import ArmKinematics
@@ -18,16 +19,52 @@ from rbxcompose.domains.arms.motion.octree_files import read_cells
 from rbxcompose.domains.body.model import Geometry
 
 Coal = Any  # of an extra, without types
+Chain = compiled_collisions.Chain
+Carriers = Mapping[str, tuple[int, Transform3]]
+"""The frame of the chain that moves each link, and where the link is in it."""
 NONE = sphere_trees.ball_tree(np.inf)  # of a half space, which no spheres cover
 
 
+@dataclass(frozen=True, slots=True)
+class PlacedTree:
+    """A shape with its spheres, where they are in the frame of the chain that moves it."""
+
+    tree: sphere_trees.SphereTree
+    owner: int
+    """The frame."""
+    pose: Array
+    """That of the shape, of shape (3, 4)."""
+    centres: Array
+    corners: Array
+    extent: float
+    """How far the shape is from the frame [m]; 0 for a half space, which has no end."""
+    kind: int
+    sizes: tuple[float, float, float, float]
+
+
 class Trees:
-    """Spheres of shapes, each fitted once, and forgotten when it is not among those that are asked for."""
+    """Spheres of shapes, each fitted and placed once, and forgotten when it is not among those that are asked for."""
 
     def __init__(self) -> None:
         self._made: dict[Geometry, sphere_trees.SphereTree] = {}
+        self._chain: tuple[Chain, Carriers] | None = None
+        self._chain_of: tuple[ArmKinematics, Mapping[str, float], frozenset[str]] | None = None
+        self._placed: dict[tuple[str, Transform3, int], PlacedTree] = {}
 
-    def of(self, parts: Iterable[CheckedPart]) -> list[sphere_trees.SphereTree]:
+    def placed(self, kinematics: ArmKinematics, parts: Sequence[CheckedPart]) -> tuple[Chain, list[PlacedTree]]:
+        """Return the chain of what moves, where the other joints are now, and the spheres of each part on it."""
+        wanted = kinematics, kinematics.positions, frozenset(part.link for part in parts)
+        if self._chain is None or wanted != self._chain_of:
+            self._chain, self._chain_of, self._placed = _chain(kinematics, wanted[2]), wanted, {}
+        chain, carriers = self._chain
+        before, self._placed, found = self._placed, {}, []
+        for part, tree in zip(parts, self._fitted(parts), strict=True):
+            key = part.link, part.origin, id(tree)  # which is not that of another one, while the value has the tree
+            self._placed[key] = placed = before.get(key) or _placed(tree, part, *carriers[part.link])
+            found.append(placed)
+        return chain, found
+
+    def _fitted(self, parts: Iterable[CheckedPart]) -> list[sphere_trees.SphereTree]:
         """Return the spheres that cover each of some shapes, in its own frame."""
         before, self._made, found = self._made, {}, []
         for part in parts:
@@ -38,55 +75,54 @@ class Trees:
         return found
 
 
+def _placed(tree: sphere_trees.SphereTree, part: CheckedPart, owner: int, carried: Transform3) -> PlacedTree:
+    pose = compiled_collisions.matrix_of(carried.compose(part.origin))
+    centres, corners = (points @ pose[:, :3].T + pose[:, 3] for points in (tree.centres, tree.corners))
+    extent = float(np.linalg.norm(centres[0]) + tree.radii[0]) if tree is not NONE else 0.0
+    return PlacedTree(tree, owner, pose, centres, corners, extent, *_solid(part.geometry))
+
+
 def compiled_model(checker: MeshChecker, trees: Trees) -> compiled_collisions.CompiledModel:
     """Return what a checker examines, for where the other joints of the body are now; pairs keep their places."""
-    parts, kinematics = checker.parts, checker.kinematics
-    chain, carriers = _chain(kinematics, {part.link for part in parts})
-    owners = np.array([carriers[part.link][0] for part in parts], dtype=np.int64)
-    poses = [compiled_collisions.matrix_of(carriers[part.link][1].compose(part.origin)) for part in parts]
-    fitted = trees.of(parts)
-    starts = np.cumsum([0, *(len(each.radii) for each in fitted)], dtype=np.int64)
-    solids = [_solid(part.geometry) for part in parts]
-    kinds = np.array([kind for kind, _ in solids], dtype=np.int64)
-    centres = [each.centres @ pose[:, :3].T + pose[:, 3] for each, pose in zip(fitted, poses, strict=True)]
-    corners = [each.corners @ pose[:, :3].T + pose[:, 3] for each, pose in zip(fitted, poses, strict=True)]
-    ends = np.cumsum([len(corner) for corner in corners], dtype=np.int64)
-    spans = [each.spans + (end - len(each.corners)) for each, end in zip(fitted, ends, strict=True)]
+    chain, parts = trees.placed(checker.kinematics, checker.parts)
+    owners = np.array([part.owner for part in parts], dtype=np.int64)
+    kinds = np.array([part.kind for part in parts], dtype=np.int64)
+    counts = np.array([len(part.tree.radii) for part in parts], dtype=np.int64)
+    corners = np.array([len(part.corners) for part in parts], dtype=np.int64)
+    starts, first_corners = np.cumsum(counts) - counts, np.repeat(np.cumsum(corners) - corners, counts)
+    children = np.concatenate((np.zeros(0, dtype=np.int64), *(part.tree.children for part in parts)))
+    spans = np.concatenate((np.zeros((0, 2), dtype=np.int64), *(part.tree.spans for part in parts)))
     extents = np.zeros(len(chain.parents))
-    for owner, middles, tree in zip(owners, centres, fitted, strict=True):
-        if tree is not NONE:
-            extents[owner] = max(extents[owner], float(np.linalg.norm(middles[0]) + tree.radii[0]))
-    radii = np.array([each.radii[0] for each in fitted])
+    np.maximum.at(extents, owners, np.array([part.extent for part in parts]))
+    radii = np.array([part.tree.radii[0] for part in parts])
     firsts, seconds, margins = _ordered(checker.watched_parts, kinds, radii)
-    frames = np.sort(np.stack((owners[firsts], owners[seconds]), axis=1), axis=1)
-    couples, coupled = np.unique(frames, axis=0, return_inverse=True)
+    low, high = np.minimum(owners[firsts], owners[seconds]), np.maximum(owners[firsts], owners[seconds])
+    codes, coupled = np.unique(low * len(extents) + high, return_inverse=True)
     return compiled_collisions.CompiledModel(
         chain=chain,
         groups=owners,
-        poses=np.array(poses).reshape(-1, 3, 4),
+        poses=np.array([part.pose for part in parts]).reshape(-1, 3, 4),
         kinds=kinds,
-        sizes=np.array([size for _, size in solids]).reshape(-1, 4),
-        roots=starts[:-1],
+        sizes=np.array([part.sizes for part in parts]).reshape(-1, 4),
+        roots=starts,
         spheres=compiled_collisions.Spheres(
-            np.concatenate((np.zeros((0, 3)), *centres)),
-            np.concatenate((np.zeros(0), *(each.radii for each in fitted))),
-            _children(fitted, starts),
-            np.concatenate((np.zeros((0, 2), dtype=np.int64), *spans)),
-            np.concatenate((np.zeros((0, 3)), *corners)),
+            np.concatenate((np.zeros((0, 3)), *(part.centres for part in parts))),
+            np.concatenate((np.zeros(0), *(part.tree.radii for part in parts))),
+            np.where(children < 0, -1, children + np.repeat(starts, counts)),
+            spans + first_corners[:, None],
+            np.concatenate((np.zeros((0, 3)), *(part.corners for part in parts))),
         ),
         firsts=firsts,
         seconds=seconds,
         margins=margins,
         reaches=radii[firsts] + radii[seconds] + margins,
         extents=extents,
-        couples=couples,
-        coupled=coupled.reshape(-1).astype(np.int64),
+        couples=np.stack(np.divmod(codes, len(extents)), axis=1),
+        coupled=coupled.astype(np.int64),
     )
 
 
-def _chain(
-    kinematics: ArmKinematics, links: Iterable[str]
-) -> tuple[compiled_collisions.Chain, Mapping[str, tuple[int, Transform3]]]:
+def _chain(kinematics: ArmKinematics, links: Iterable[str]) -> tuple[Chain, Carriers]:
     """Return the chain of what moves, and for each link its frame in the chain and where it is in that."""
     body, group, positions = kinematics.body, kinematics.group, kinematics.positions
 
@@ -157,10 +193,3 @@ def triangles_of(mesh: Coal) -> Array:
     each = map(mesh.tri_indices, range(mesh.num_tris))
     corners = np.array([(item[0], item[1], item[2]) for item in each], dtype=np.int64).reshape(-1, 3)
     return np.asarray(mesh.vertices(), dtype=np.float64)[corners]
-
-
-def _children(fitted: Sequence[sphere_trees.SphereTree], starts: NDArray[np.int64]) -> NDArray[np.int64]:
-    found = [
-        np.where(tree.children < 0, -1, tree.children + start) for tree, start in zip(fitted, starts, strict=False)
-    ]
-    return np.concatenate([np.zeros(0, dtype=np.int64), *found])
