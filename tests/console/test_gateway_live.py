@@ -14,12 +14,14 @@ import time
 import urllib.error
 import urllib.request
 from collections.abc import Awaitable, Callable, Iterator
+from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import pytest
 import websockets
+from playwright.sync_api import expect
 from websockets.asyncio.client import ClientConnection, connect
 
 from rbxcompose.commands.guest import Guest
@@ -27,6 +29,7 @@ from rbxcompose.msgs.geometry_msgs import Twist
 from rbxcompose.sdk.ports import Qos
 from tests.cli.live_robot import PATIENCE, Robot
 from tests.conftest import ROOT
+from tests.console.browser import CHROMIUM, chromium, console
 
 TELEOP = "/cmd_vel/teleop"
 pytestmark = pytest.mark.timeout(60)
@@ -44,6 +47,8 @@ HOST = f"127.0.0.1:{PORT}"
 
 @pytest.fixture(scope="module")
 def robot() -> Iterator[Robot]:
+    with suppress(console.CannotBuildError):
+        console.build()
     base = Path(tempfile.mkdtemp(prefix="rbx"))
     text = (ROOT / "robots/turtlebot/robot.yaml").read_text(encoding="utf-8").partition("\nmissions:")[0]
     made = Robot(base, f"{text}\nconsole: {{port: {PORT}, drive: {{max_speed: 0.25 m/s}}}}\n")
@@ -213,6 +218,32 @@ def test_a_cut_socket_stops_the_robot_at_once(robot: Robot) -> None:
         cut = time.monotonic()
         assert commands.until(0.0) - cut < 0.3
     assert [speed for _, speed in commands.got].count(0.0) == 1
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium here")
+def test_the_page_drives_the_robot(robot: Robot) -> None:
+    if not console.is_built():
+        pytest.skip("the page cannot be built here")
+    complaints: list[str] = []
+    with Commands(robot) as commands, chromium() as browser:
+        page = browser.new_page()
+        page.on("console", lambda message: complaints.append(message.text))
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.goto(f"http://{HOST}/")
+        expect(page.locator(".connection")).to_have_text("Connected", timeout=PATIENCE * 1000)
+        page.fill("#name", "Ada")
+        page.keyboard.press("Enter")
+        page.keyboard.down("Shift")
+        page.keyboard.down("ArrowUp")
+        expect(page.locator(".lease")).to_contain_text("You are driving", timeout=PATIENCE * 1000)
+        deadline = time.monotonic() + PATIENCE
+        while not any(speed > 0 for _, speed in commands.got) and time.monotonic() < deadline:
+            page.wait_for_timeout(20)
+        assert 0 < max(speed for _, speed in commands.got) <= 0.25
+        page.keyboard.up("Shift")
+        page.wait_for_timeout(500)
+        assert commands.got[-1][1] == 0.0
+    assert complaints == []
 
 
 def test_silence_stops_the_robot_and_frees_the_lease(robot: Robot) -> None:
