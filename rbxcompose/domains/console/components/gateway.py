@@ -304,6 +304,7 @@ class GatewaySession:
     def __init__(self, config: GatewayConfig, folder: RobotFolder, guest: Guest) -> None:
         self._config, self._folder, self._guest = config, folder, guest
         self._graph = LiveGraph(guest)
+        guest.graph()  # a round trip, after which the tokens of all others are here, too
         self._bridge = Bridge(self._graph, config.drive)
         self._bus = guest.bus()
         self._ends: dict[tuple[type[BusRequest], str], Any] = {}  # publishers, subscriptions and clients, by name

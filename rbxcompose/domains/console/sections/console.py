@@ -120,6 +120,6 @@ def console(reading: Reading[ConsoleModel]) -> ConsoleModel | None:
     read = reading.whole()
     if read is not None and read.listen == "lan":
         message = "the console cannot be opened from other machines yet: anybody there could drive the robot"
-        help_text = "write 'listen: local', and reach it by 'ssh -L 8080:127.0.0.1:8080 ROBOT'"
+        help_text = f"write 'listen: local', and reach it by 'ssh -L {read.port}:127.0.0.1:{read.port} ROBOT'"
         reading.report.add(NOT_BEYOND_THIS_MACHINE.at(reading.value("console", "listen"), message, help=help_text))
     return read
