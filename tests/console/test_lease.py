@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.domains.console.lease import LEASE, DriveLimits
-from rbxcompose.domains.console.protocol import Publish
+from rbxcompose.domains.console.protocol import MOST_SUBSCRIPTIONS, Publish, Unadvertise
 from rbxcompose.msgs.geometry_msgs import Twist, TwistStamped, Vector3
 from tests.console.clients import TELEOP, Client, Room
 
@@ -83,6 +83,28 @@ def test_who_lets_go_or_is_cut_off_stops_the_robot_once() -> None:
         room.wait(2.0)
         assert commands(room) == [REST]
         driver(room, "Ben")
+
+
+def test_who_withdraws_its_publisher_lets_go() -> None:
+    room = Room()
+    anna = driver(room)
+    drives(anna)
+    room.asked()
+    assert anna.does("unadvertise", topic=TELEOP) == []
+    assert room.asked() == [REST, Unadvertise(TELEOP)]
+    assert room.bridge.lease.holder == ""
+    room.wait(2.0)
+    assert room.asked() == []
+
+
+def test_who_cannot_advertise_more_cannot_drive() -> None:
+    room = Room()
+    anna = room.client()
+    for count in range(MOST_SUBSCRIPTIONS):
+        room.now += 0.1
+        anna.does("advertise", topic=f"/t{count}", type="std_msgs/String")
+    assert "at most" in anna.calls("/console/drive", {"take": True})
+    assert room.bridge.lease.client is None
 
 
 def test_a_gateway_that_ends_stops_the_robot() -> None:

@@ -398,8 +398,19 @@ def test_no_frame_raises_and_whatever_is_sent_is_json(frames: list[tuple[int, An
             client.gets()
     for client in clients:
         client.leaves()
-    opened = {type(request): 0 for request in room.requests}
+    subscribed, advertised = set[str](), set[str]()
     for request in room.requests:
-        opened[type(request)] += 1
-    assert opened.get(Subscribe, 0) == opened.get(Unsubscribe, 0)  # nothing is left on the bus
-    assert opened.get(Advertise, 0) == opened.get(Unadvertise, 0)
+        match request:
+            case Subscribe(topic):
+                assert topic not in subscribed
+                subscribed.add(topic)
+            case Unsubscribe(topic):
+                subscribed.remove(topic)
+            case Advertise(topic):
+                assert topic not in advertised
+                advertised.add(topic)
+            case Unadvertise(topic):
+                advertised.remove(topic)
+            case Publish(topic):
+                assert topic in advertised
+    assert (subscribed, advertised) == (set(), set())  # nothing is left on the bus

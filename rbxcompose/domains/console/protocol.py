@@ -440,6 +440,8 @@ class Bridge:
         name, topic = _topic_of(data)
         if client.advertised.pop(topic, None) is None:
             raise BadFrameError(f"'{name}' is not advertised")
+        if self._drive is not None and topic == self._drive.topic:
+            self._halt_if(self.lease.release(client.number))  # while there is a publisher
         self._unadvertise(topic)
 
     def _publish(self, client: _Client, data: Mapping[str, Any]) -> None:
@@ -521,10 +523,10 @@ class Bridge:
             self._halt_if(self.lease.release(client.number))
             return {"success": True, "holder": self.lease.holder, "message": ""}
         shown = "".join(letter for letter in name if letter.isprintable())[:LONGEST_NAME].strip() or "somebody"
+        self._declare(client, self._drive.topic, registry.message(self._drive.type))  # first: it may be refused
         if not self.lease.take(client.number, shown, self._now):
             holder = self.lease.holder
             return {"success": False, "holder": holder, "message": f"'{holder}' drives"}
-        self._declare(client, self._drive.topic, registry.message(self._drive.type))
         return {"success": True, "holder": shown, "message": ""}
 
     def _stop_service(self, client: _Client, given: Mapping[str, Any], number: int) -> None:
