@@ -1,6 +1,7 @@
 """Messages as plain data (maps, lists, numbers, texts, flags), and back with every mistake as a finding.
 
-Bytes are lists of numbers here, and may be bytes on the way back. Omitted fields keep their defaults.
+Bytes are lists of numbers here; on the way back, bytes and arrays of numpy are taken as they are. Omitted fields keep
+their defaults.
 """
 
 import struct
@@ -111,19 +112,20 @@ class _Reading(Generic[M]):
 
     def _value(self, type_: FieldType, value: object, path: KeyPath) -> Any:
         if type_.shape is not FieldShape.SINGLE:
-            is_bytes = isinstance(value, bytes) and type_.base in OCTETS
-            if not isinstance(value, list | tuple | bytes) or (isinstance(value, bytes) and not is_bytes):
+            is_ready = hasattr(value, "dtype") or (isinstance(value, bytes) and type_.base in OCTETS)
+            if not (is_ready or isinstance(value, list | tuple)):
                 return self._wrong(path, f"expected a list ({type_})")
-            count, length = len(value), type_.length
+            entries: Any = value
+            count, length = len(entries), type_.length
             if (type_.shape is FieldShape.ARRAY and count != length) or (
                 type_.shape is FieldShape.BOUNDED and count > length
             ):
                 most = "at most " if type_.shape is FieldShape.BOUNDED else ""
                 return self._wrong(path, f"{most}{length} values are expected, not {count}")
-            if is_bytes:
+            if is_ready:
                 return value
             single = FieldType(type_.base, text_limit=type_.text_limit)
-            values = [self._value(single, one, (*path, index)) for index, one in enumerate(value)]
+            values = [self._value(single, one, (*path, index)) for index, one in enumerate(entries)]
             if self.findings:
                 return None
             return bytes(values) if type_.base in OCTETS else tuple(values)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import time
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.domains.console import json_messages
-from rbxcompose.domains.console.json_messages import WrongMessageError, from_json, to_json
+from rbxcompose.domains.console.json_messages import WrongMessageError, from_json, numbers_of, to_json
 from rbxcompose.domains.console.protocol import (
     LARGEST,
     MOST_FRAMES,
@@ -414,3 +415,64 @@ def test_no_frame_raises_and_whatever_is_sent_is_json(frames: list[tuple[int, An
             case Publish(topic):
                 assert topic in advertised
     assert (subscribed, advertised) == (set(), set())  # nothing is left on the bus
+
+
+@pytest.mark.parametrize(
+    ("type_", "field", "item"),
+    [
+        ("sensor_msgs/LaserScan", "ranges", "1.5"),
+        ("sensor_msgs/LaserScan", "ranges", "null"),
+        ("sensor_msgs/LaserScan", "ranges", "[]"),
+        ("sensor_msgs/JointState", "name", '"a"'),
+        ("sensor_msgs/Image", "data", "7"),
+        ("geometry_msgs/PoseArray", "poses", "{}"),
+    ],
+)
+def test_a_long_message_holds_up_nobody(type_: str, field: str, item: str) -> None:
+    room = Room()
+    client = room.client()
+    frame = f'{{"op":"publish","topic":"/x","type":"{type_}","msg":{{"{field}":[{",".join([item] * 1_000_000)}]}}}}'
+    began = time.process_time()
+    client.sends(frame)
+    taken = time.process_time() - began
+    began = time.process_time()
+    json.loads(frame)
+    assert taken < 6 * (time.process_time() - began) + 0.2
+
+
+def test_many_wrong_fields_hold_up_nobody() -> None:
+    client = Room().client()
+    fields = ",".join(f'"field{count}":0' for count in range(300_000))
+    began = time.process_time()
+    client.sends(f'{{"op":"publish","topic":"/level","msg":{{{fields}}}}}')
+    assert time.process_time() - began < 2
+    assert "has no field 'field0'" in client.gets()[0]["msg"]
+
+
+@pytest.mark.parametrize(
+    ("type_", "data"),
+    [
+        ("uint8", [0, 256]),
+        ("byte", [-1]),
+        ("int32", [2**31]),
+        ("int32", [0.5]),
+        ("int64", [2**70]),
+        ("int32", [None]),
+        ("float32", [1e39]),
+        ("float32", ["1"]),
+        ("float64", [True, False]),
+        ("float64", [[1.0]]),
+        ("float64", [[1.0], [1.0, 2.0]]),
+        ("float64", [{}]),
+    ],
+)
+def test_lists_of_numbers_are_of_their_type(type_: str, data: list[Any]) -> None:
+    with pytest.raises(ValueError, match=r"expected a list of numbers|inhomogeneous"):
+        numbers_of(type_, data)
+
+
+@pytest.mark.parametrize("data", [[1.0, 2], [0, 255], []])
+@pytest.mark.parametrize("type_", ["uint8", "int16", "uint64", "float32", "float64"])
+def test_lists_of_numbers_are_taken_as_javascript_writes_them(type_: str, data: list[Any]) -> None:
+    made = numbers_of(type_, data)
+    assert (made.dtype, made.tolist()) == (np.dtype(type_), data)

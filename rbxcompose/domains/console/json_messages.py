@@ -10,6 +10,8 @@ from dataclasses import replace
 from functools import cache
 from typing import Any, TypeVar
 
+import numpy as np
+
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.builtin_interfaces import Time
 from rbxcompose.msgs.definitions import FLOATS, INTEGERS, OCTETS, FieldShape, FieldType, attribute, parse_type
@@ -19,6 +21,8 @@ from rbxcompose.msgs.types import Message
 
 M = TypeVar("M", bound=Message)
 
+MOST_ENTRIES = 10_000  # texts, flags and messages in all lists of a message, each of which takes some 10 µs
+_SHOWN = 60  # characters of a name that is wrong
 _HEADER = "std_msgs/msg/Header"
 _TIMES = ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")
 _ROS1 = {"secs": "sec", "nsecs": "nanosec"}
@@ -49,6 +53,9 @@ def _written(type_: FieldType, value: Any) -> Any:
     if type_.shape is not FieldShape.SINGLE:
         if type_.base in OCTETS:
             return b64encode(bytes(value)).decode()
+        if hasattr(value, "dtype") and type_.base in FLOATS:  # many numbers: numpy writes float32 the shortest way
+            numbers = value.astype(str).astype(float) if type_.base == "float32" else value
+            return [number if math.isfinite(number) else None for number in numbers.tolist()]
         single = FieldType(type_.base)
         return [_written(single, item) for item in (value.tolist() if hasattr(value, "tolist") else value)]
     if type_.is_message:
@@ -67,7 +74,7 @@ def from_json(message: type[M], data: object, stamp: int) -> M:
         WrongMessageError: if they represent none.
     """
     try:
-        made, findings = from_plain(message, _read(FieldType(message.TYPE), data))
+        made, findings = from_plain(message, _Reading().of(FieldType(message.TYPE), data))
     except ValueError as error:  # base64, or a text that no UTF-8 can hold
         raise WrongMessageError(str(error)) from error
     if made is None:
@@ -91,27 +98,67 @@ def arguments(message: type[Message], data: object) -> object:
     return dict(zip(message.FIELDS, data, strict=False))
 
 
-def _read(type_: FieldType, value: Any) -> Any:
-    """Return data as `from_plain` takes them."""
-    if type_.shape is not FieldShape.SINGLE:
-        if type_.base in OCTETS and isinstance(value, str):
-            return b64decode(value, validate=True)
+class _Reading:
+    """Turns data into what `from_plain` takes; a client must not hold up the others by a message that takes long."""
+
+    def __init__(self) -> None:
+        self._left = MOST_ENTRIES
+
+    def of(self, type_: FieldType, value: Any) -> Any:
+        """Return a value of a type."""
+        if type_.shape is not FieldShape.SINGLE:
+            return self._list(type_, value) if isinstance(value, list | str) else value
+        if type_.is_message:
+            return self._fields(type_.base, value) if isinstance(value, dict) else value
+        if type_.base in FLOATS:
+            return math.nan if value is None else value
+        if type_.base in INTEGERS and isinstance(value, float) and value.is_integer():
+            return int(value)
+        if isinstance(value, str):
+            value.encode()  # JSON can hold half of a pair of surrogates
+        return value
+
+    def _list(self, type_: FieldType, value: Any) -> Any:
+        if isinstance(value, str):
+            return b64decode(value, validate=True) if type_.base in OCTETS else value
+        if type_.base in FLOATS or type_.base in INTEGERS or type_.base in OCTETS:
+            numbers = numbers_of(type_.base, value)
+            return bytes(numbers) if type_.base in OCTETS else numbers
+        self._left -= len(value)
+        if self._left < 0:
+            raise WrongMessageError(f"its lists have more than {MOST_ENTRIES} texts and messages")
         single = FieldType(type_.base)
-        return [_read(single, item) for item in value] if isinstance(value, list) else value
-    if type_.is_message:
-        return _read_fields(type_.base, value) if isinstance(value, dict) else value
-    if type_.base in FLOATS:
-        return math.nan if value is None else value
-    if type_.base in INTEGERS and isinstance(value, float) and value.is_integer():
-        return int(value)
-    if isinstance(value, str):
-        value.encode()  # JSON can hold half of a pair of surrogates
-    return value
+        return [self.of(single, item) for item in value]
+
+    def _fields(self, name: str, data: dict[str, Any]) -> dict[str, Any]:
+        if name in _TIMES:
+            data = {_ROS1.get(key, key): value for key, value in data.items()}
+        types, read = {field: type_ for field, _, type_ in _fields(name)}, {}
+        for key, value in data.items():
+            if key in types:
+                read[key] = self.of(types[key], value)
+            elif not (key == "seq" and name == _HEADER):
+                raise WrongMessageError(f"{name} has no field '{key[:_SHOWN]}'")
+        return read
 
 
-def _read_fields(name: str, data: dict[str, Any]) -> dict[str, Any]:
-    if name in _TIMES:
-        data = {_ROS1.get(key, key): value for key, value in data.items()}
-    types = {field: type_ for field, _, type_ in _fields(name)}
-    ignored = "seq" if name == _HEADER else None
-    return {key: _read(types[key], value) if key in types else value for key, value in data.items() if key != ignored}
+def numbers_of(base: str, values: list[Any]) -> Any:
+    """Return numbers of a type of ROS as an array; null is NaN.
+
+    Raises:
+        WrongMessageError: if some are not of that type.
+    """
+    wanted = np.dtype({"byte": "uint8", "char": "uint8"}.get(base, base))
+    is_float = wanted.kind == "f"
+    found = np.array([math.nan if value is None else value for value in values] if is_float else values)
+    with np.errstate(all="ignore"):
+        made = found.astype(wanted) if found.dtype.kind in "iuf" else found
+        is_right = made is not found or found.dtype == wanted
+        if is_right and found.size:
+            is_same = np.isinf(made) == np.isinf(found) if is_float else made.astype(float) == found.astype(float)
+            limits = (0, 0) if is_float else (np.iinfo(wanted).min, np.iinfo(wanted).max)
+            is_within = is_float or (limits[0] <= found.min() and found.max() <= limits[1])
+            is_right = found.ndim == 1 and bool(is_within) and bool(is_same.all())
+    if found.size and not is_right:
+        raise WrongMessageError(f"expected a list of numbers ({base})")
+    return made if found.size else np.zeros(0, wanted)
