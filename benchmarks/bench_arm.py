@@ -40,6 +40,8 @@ from rbxcompose.domains.body.urdf import read_body
 from rbxcompose.domains.body.xml_reader import XmlElement, read_urdf
 from rbxcompose.domains.servos.limits import MotionLimits
 
+MEASURES = ("rbxcompose/domains/arms", "rbxcompose/domains/body")
+
 TARGETS, MOTIONS, PROBLEMS, SOME, EXACT, STEP = 1000, 40, 10, 30, 1e-4, 0.005
 PEER = "RBXCOMPOSE_ROBOPLAN"  # names a Python that has RoboPlan, if this one has not
 PUBLISHED = "RBXCOMPOSE_PROBLEMS"  # names the folder of a robot with an arm, and of published problems below it

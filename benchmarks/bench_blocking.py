@@ -22,6 +22,8 @@ from rbxcompose.sdk import Component, Config, In, component
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import instance
 
+MEASURES = ("rbxcompose/bus", "rbxcompose/runtime/process_group")
+
 COMPUTE = 0.02  # [s] per message
 PERIOD = 0.005  # [s] between two messages of the fast topic
 MESSAGES = 600

@@ -21,6 +21,8 @@ from rbxcompose.domains.body.sections.body import body
 from rbxcompose.domains.body.urdf import read_body
 from rbxcompose.domains.body.xml_reader import XmlElement, read_urdf
 
+MEASURES = ("rbxcompose/compiler", "rbxcompose/domains/body")
+
 ROBOT = ROOT / "robots" / "box_robot"
 TIMES, ROUNDS, CHECKS, JOINTS = 200, 15, 5, 7
 JOINT = """<link name="link{0}"/><joint name="joint{0}" type="revolute">

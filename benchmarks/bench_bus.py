@@ -20,6 +20,8 @@ from benchmarks.peers import ROS_PYTHON, Ros, free_port
 from rbxcompose.bus.endpoints import tcp_endpoint
 from rbxcompose.bus.zenoh_session import open_router
 
+MEASURES = ("rbxcompose/bus", "rbxcompose/msgs")
+
 ROUNDS = 5
 HOPS = 200  # per round
 FLOODED = 100_000  # messages per round

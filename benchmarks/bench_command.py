@@ -6,6 +6,8 @@ import time
 
 from benchmarks.measuring import BARE, COMMAND, Row, in_turns, program
 
+MEASURES = ("rbxcompose/commands", "rbxcompose/compiler", "rbxcompose/tools")
+
 
 def rows() -> list[Row]:
     """Return the time until help is there, and until the smallest robot is checked."""

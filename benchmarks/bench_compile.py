@@ -13,6 +13,8 @@ from benchmarks.generate import of_lines, robot, write
 from benchmarks.measuring import BARE, COMMAND, Row, in_turns, program
 from rbxcompose.compiler.compile import compile_robot
 
+MEASURES = ("rbxcompose/base", "rbxcompose/manifest", "rbxcompose/compiler", "rbxcompose/domains/diagnostics/checks.py")
+
 LINES, COMPONENTS = 3200, 1000
 
 

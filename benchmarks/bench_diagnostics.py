@@ -16,6 +16,8 @@ from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray, DiagnosticStatus, K
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench, instance
 
+MEASURES = ("rbxcompose/msgs", "rbxcompose/domains/diagnostics")
+
 RATE, GROUPS, ITEMS, MANY = 10, 20, 200, 10_000  # [Hz] in and out; groups; items of a robot, and of a flood
 ROUNDS = 15
 PARTS = tuple(f"part_{group}" for group in range(GROUPS))

@@ -12,6 +12,8 @@ from benchmarks.measuring import ROOT, Row, memory_now, processor_time, tree
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.testing.bench import Bench
 
+MEASURES = ("rbxcompose/bus", "rbxcompose/missions", "rbxcompose/runtime", "rbxcompose/domains/bases")
+
 WATCHED = 20.0  # [s] of real time
 SETTLED = 5.0  # [s] before that
 PATROLLED = 1800.0  # [s] of robot time

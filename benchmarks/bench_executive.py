@@ -11,6 +11,8 @@ from benchmarks.measuring import ROOT, Row, Samples, processor_time
 from benchmarks.peers import wait_for
 from rbxcompose.base.plugins import GROUP
 
+MEASURES = ("rbxcompose/bus", "rbxcompose/missions", "rbxcompose/runtime")
+
 WATCHED = 20.0  # [s] of real time
 SETTLED = 3.0  # [s] before that
 ROBOT = """rbx: 1

@@ -16,6 +16,8 @@ from rbxcompose.msgs.rbxcompose_msgs import PickObject
 from tests.motion.pi_hand import HandBench, made
 from tests.motion.test_ways_ahead import CONFINED, cluttered
 
+MEASURES = ("rbxcompose/domains/arms",)
+
 ROUNDS = 5
 LIMIT = 2.0  # [s] for each motion
 ROOF = PlacedObject("roof", Geometry("box", (0.1, 0.1, 0.02)), "base_footprint", Transform3((0.24, 0.0, 0.85)))

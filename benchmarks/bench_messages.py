@@ -15,6 +15,8 @@ from rbxcompose.msgs.cdr import decode, encode
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.sdk.ports import Qos
 
+MEASURES = ("rbxcompose/bus", "rbxcompose/msgs")
+
 MANY = 2000  # per sample
 TWIST = Twist(linear=Vector3(x=0.3), angular=Vector3(z=-1.0))
 NAME = "geometry_msgs/msg/Twist"

@@ -22,6 +22,8 @@ from rbxcompose.missions.language.reader import read_program
 from rbxcompose.missions.program.program import Program, RobotNames
 from rbxcompose.missions.view.replica import Mirror
 
+MEASURES = ("rbxcompose/manifest", "rbxcompose/missions")
+
 NODES = 1000
 TICKS = 50  # per sample
 ROBOT = RobotNames({"battery": TYPES["ratio"]})

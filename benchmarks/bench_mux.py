@@ -7,6 +7,8 @@ from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench, instance
 
+MEASURES = ("rbxcompose/bus", "rbxcompose/domains/muxes")
+
 MANY, ROUNDS = 500, 25  # commands per sample
 PACE = 0.01  # [s] of robot time between two commands
 TIMEOUT = 0.5  # [s]

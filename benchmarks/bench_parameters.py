@@ -15,6 +15,8 @@ from benchmarks.bench_bus import End, ros_ends, started_ends
 from benchmarks.measuring import COMMAND, Row, Samples, program
 from benchmarks.peers import free_port
 
+MEASURES = ("rbxcompose/bus", "rbxcompose/compiler", "rbxcompose/runtime")
+
 ROUNDS = 20
 SETS = 25  # per round
 WARM = 10  # before the first round: the first change that rules could notice starts their judge

@@ -16,6 +16,8 @@ from benchmarks.measuring import COMMAND, ROOT, Row, Samples, memory_of, program
 from benchmarks.peers import Dora, Ros, free_port, missing, running, wait_for
 from rbxcompose.base.plugins import GROUP
 
+MEASURES = ("rbxcompose/bus", "rbxcompose/runtime")
+
 RELAYS = 10
 KILLED = 5  # in the middle of the row
 ROUNDS = 3

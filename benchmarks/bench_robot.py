@@ -19,6 +19,8 @@ from rbxcompose.base.levels import Level
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.testing import run_robot
 
+MEASURES = ("rbxcompose/bus", "rbxcompose/missions", "rbxcompose/runtime", "rbxcompose/domains/diagnostics")
+
 ROBOT = str(ROOT / "robots/turtlebot/robot.yaml")
 ARM_ROBOT = str(ROOT / "robots/pi_robot/robot.yaml")
 STARTS = 3

@@ -20,6 +20,8 @@ from benchmarks.bench_robot import up
 from benchmarks.measuring import COMMAND, Row, program
 from rbxcompose.testing import FakeLine, FakePort, FakeServo
 
+MEASURES = ("rbxcompose/runtime", "rbxcompose/domains/servos")
+
 SERVOS, RATE = 20, 100  # [Hz]
 SECONDS = 20.0
 MODEL = "XL430-W250"

@@ -18,6 +18,8 @@ from benchmarks.servo_replies import BAUD, served
 from rbxcompose.domains.servos.dynamixel_bus import DynamixelBus
 from rbxcompose.domains.servos.models import servo_models
 
+MEASURES = ("rbxcompose/domains/servos",)
+
 PERIOD = 0.01  # [s]
 BLOCKS, CYCLES = 4, 60  # each side runs this many blocks of cycles, in turns
 MODEL = servo_models()["XL430-W250"]

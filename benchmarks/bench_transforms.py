@@ -18,6 +18,8 @@ from rbxcompose.msgs.tf2_msgs import TFMessage
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.testing import Bench, instance
 
+MEASURES = ("rbxcompose/base", "rbxcompose/msgs", "rbxcompose/domains/body")
+
 FRAMES, RATE, MANY = 12, 50, 200  # look-ups per sample
 JOINTS, STEP = 30, 1_000_000_000 // RATE  # [ns]
 ROUNDS = 25

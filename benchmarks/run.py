@@ -1,11 +1,13 @@
 """Measures every subject: `python -m benchmarks.run [SUBJECT ...]` writes the results and the page of the docs.
 
-A subject is a file of this folder with a function `rows()`. Each runs in a process of its own.
+A subject is a file of this folder with a function `rows()`, and the paths that it `MEASURES`. Each runs in a process of
+its own. Rows that got worse go to the changelog. `--marks` measures nothing; it marks rows whose paths have changed.
 """
 
 from __future__ import annotations
 
 import ast
+import datetime
 import importlib
 import json
 import os
@@ -22,13 +24,17 @@ from benchmarks.measuring import ROOT, Row
 FOLDER = Path(__file__).parent
 RESULTS = FOLDER / "results.json"
 PAGE = ROOT / "docs" / "benchmarks.md"
-ONE = "--one"
+CHANGELOG = ROOT / "CHANGELOG.md"
+CHANGED = "### Changed\n"
+ONE, MARKS = "--one", "--marks"
+NOISE = 1.2  # by which figures differ without a reason
 ABOUT = """# Benchmarks
 
 `make bench` measures all of this and writes the page. In each table, *ours* is rbxcompose, *peer* the program in
 brackets, *ratio* ours divided by theirs, and *bar* what we want to reach. Times are medians, *p99* is the 99th
 percentile: wall time for whole commands, processor time within a process. Ours and a peer are measured in turns, in the
-same run, so that ratios hold where times do not: these differ between machines by a factor of two or three.
+same run, so that ratios hold where times do not: these differ between machines by a factor of two or three. *Measured*
+has the date and the commit; where what is measured **has changed since**, the figure is an old one.
 
 {missed}
 
@@ -78,15 +84,16 @@ def _section(subject: str, rows: list[dict[str, Any]]) -> str:
     lines = [
         f"## {title}",
         *([f"{rest[:1].upper()}{rest[1:]}.", ""] if rest else []),
-        "| what | ours | p99 | peer | ratio | bar | | how |",
-        "| --- | ---: | ---: | ---: | ---: | --- | --- | --- |",
+        "| what | ours | p99 | peer | ratio | bar | | measured | how |",
+        "| --- | ---: | ---: | ---: | ---: | --- | --- | --- | --- |",
     ]
     for row in rows:
         met = {True: "met", False: "**missed**", None: ""}[row["met"]]
         peer = f"{_figure(row['peer'])} ({row['against']})" if row["peer"] else ""
         ratio = f"{_figure(row['ratio'])}x" if row["ratio"] else ""
         ours = f"{_figure(row['ours'])} {row['unit']}".strip()
-        cells = [row["name"], ours, _figure(row["p99"]), peer, ratio, row["bar"], met, row["how"]]
+        when = f"{row['date']}, {row['commit']}{', **changed since**' if row['changed'] else ''}"
+        cells = [row["name"], ours, _figure(row["p99"]), peer, ratio, row["bar"], met, when, row["how"]]
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
 
@@ -97,23 +104,70 @@ def _figure(value: float | None) -> str:
     return f"{value:.0f}" if abs(value) >= 100 or value == int(value) else f"{value:.3g}"
 
 
+def paths_of(subject: str) -> list[str]:
+    """Return the paths that a subject measures, its own file included."""
+    file = FOLDER / f"{subject}.py"
+    for node in ast.parse(file.read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "MEASURES":
+            return [*ast.literal_eval(node.value), str(file.relative_to(ROOT))]
+    raise ValueError(f"{subject} does not say what it measures")
+
+
+def has_changed(subject: str, commit: str) -> bool:
+    """Return whether what a subject measures differs from a commit; so it does if that is not known here."""
+    return subprocess.run(["git", "diff", "--quiet", commit, "--", *paths_of(subject)], cwd=ROOT).returncode != 0
+
+
+def worse(before: list[dict[str, Any]], after: list[dict[str, Any]]) -> list[str]:
+    """Return a line for each row with a bar that got worse: its ratio to a peer, else its figure."""
+    known = {(row["name"], row["how"], row["against"]): row for row in before}
+    lines = []
+    for row in after:
+        old = known.get((row["name"], row["how"], row["against"]))
+        if old is None or not row["bar"]:
+            continue
+        key = "ratio" if row["ratio"] and old["ratio"] else "ours"
+        grows = row["least"] is None and row["least_ratio"] is None
+        lost, least = (row[key], old[key]) if grows else (old[key], row[key])
+        if lost > least * NOISE:
+            unit = f"x of {row['against']}" if key == "ratio" else f" {row['unit']}"
+            lines.append(f"- Worse: {row['name']}: {_figure(row[key])}{unit}, before {_figure(old[key])}{unit}.")
+    return lines
+
+
 def main(arguments: list[str]) -> None:
     """Measure all subjects, or those that are named, and write down everything that is known."""
     if arguments[:1] == [ONE]:
         module = importlib.import_module(f"benchmarks.{arguments[1]}")
         sys.stdout.write(json.dumps([as_data(row, arguments[1]) for row in module.rows()]))
         return
-    load = os.getloadavg()[0]
-    known = json.loads(RESULTS.read_text(encoding="utf-8"))["rows"] if arguments and RESULTS.exists() else []
-    rows = {name: [row for row in known if row["subject"] == name] for name in subjects()}
-    for name in arguments or subjects():
-        rows[name] = measured(name)
-        for row in rows[name]:
-            sys.stderr.write(f"{row['name']}: {_figure(row['ours'])} {row['unit']}  [{row['bar']}] met: {row['met']}\n")
-    machine = f"{os.cpu_count()} cores, Python {platform.python_version()}, {platform.system()} {platform.machine()}"
-    results = {"machine": machine, "load": load, "rows": [row for name in rows for row in rows[name]]}
+    old = json.loads(RESULTS.read_text(encoding="utf-8"))
+    rows = {name: [row for row in old["rows"] if row["subject"] == name] for name in subjects()}
+    if arguments != [MARKS]:
+        old["load"] = os.getloadavg()[0]
+        python = f"Python {platform.python_version()}"
+        old["machine"] = f"{os.cpu_count()} cores, {python}, {platform.system()} {platform.machine()}"
+        for name in arguments or subjects():
+            rows[name] = _measured_now(name, rows[name])
+    for name, found in rows.items():
+        for row in found:
+            row["changed"] = has_changed(name, row["commit"])
+    results = {**old, "rows": [row for found in rows.values() for row in found]}
     RESULTS.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
     PAGE.write_text(page(results), encoding="utf-8")
+
+
+def _measured_now(subject: str, before: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Measure a subject; what got worse goes to the changelog."""
+    commit = subprocess.run(["git", "rev-parse", "--short=8", "HEAD"], stdout=subprocess.PIPE, text=True, cwd=ROOT)
+    today = datetime.date.today().isoformat()
+    rows = [{**row, "date": today, "commit": commit.stdout.strip()} for row in measured(subject)]
+    for row in rows:
+        sys.stderr.write(f"{row['name']}: {_figure(row['ours'])} {row['unit']}  [{row['bar']}] met: {row['met']}\n")
+    if lines := worse(before, rows):
+        text = CHANGELOG.read_text(encoding="utf-8")
+        CHANGELOG.write_text(text.replace(CHANGED, "\n".join([CHANGED.strip(), *lines, ""]), 1), encoding="utf-8")
+    return rows
 
 
 if __name__ == "__main__":

@@ -115,7 +115,12 @@ class Span(NamedTuple):
     end_column: int
 
     def __str__(self) -> str:
-        return f"{self.file}:{self.line}:{self.column}"
+        return f"{self.place}:{self.column}"
+
+    @property
+    def place(self) -> str:
+        """Return the file and the line."""
+        return f"{self.file}:{self.line}"
 
     def contains(self, other: Span) -> bool:
         """Return whether another place lies inside this one."""
@@ -297,10 +302,15 @@ def suggest(name: str, valid: Iterable[str], what: str = VALID) -> str:
     return f"{what}: {', '.join(_by_likeness(name, names)[:MOST_NAMES])}{rest}"
 
 
+def clauses(*parts: str) -> str:
+    """Return the parts of a sentence that are not empty, joined by semicolons."""
+    return "; ".join(filter(None, parts))
+
+
 def _is_chance(name: str, near: str) -> bool:
     """Return whether two names are only somewhat alike, in no word: `wheel_separation` and `acceleration`."""
     words, others = _words(name), _words(near)
-    if not _shared(words, others) and _edits(name, near) > max(1, len(name) // 4):
+    if not _shared(words, others) and _edits(name, near) > max(1, len(name) // 3):
         return True
     if min(len(name), len(near)) >= _LONG and _similarity(name, near) < _ALIKE and not _shared(words, others):
         return not any(_is_slip(word, other) for word in words for other in others)

@@ -11,7 +11,7 @@ from itertools import islice
 from typing import Generic, TypeVar
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.findings import Finding, FindingKind, Severity, register_kind
+from rbxcompose.base.findings import Finding, FindingKind, Severity, clauses, register_kind
 
 S = TypeVar("S")
 WIRING, NAMES, MISSIONS, OWN, ALL = "wiring", "names", "missions", "own file", "everything"
@@ -45,7 +45,7 @@ class Rule(FindingKind, Generic[S]):
         found = list(islice(self.find(subject), MOST + 1))
         if len(found) > MOST:
             rest = f"there are more than these {MOST} findings of {self.code}"
-            found[MOST - 1 :] = [replace(found[MOST - 1], help=f"{found[MOST - 1].help}; {rest}".removeprefix("; "))]
+            found[MOST - 1 :] = [replace(found[MOST - 1], help=clauses(found[MOST - 1].help, rest))]
         return found
 
 

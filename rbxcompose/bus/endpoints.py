@@ -6,12 +6,14 @@ import re
 import socket
 from pathlib import Path
 
+from rbxcompose.base.addresses import require_possible
+
 LINK_LEASE = 2.0  # [s] of silence after which a link counts as lost
 LOOPBACK, _UNIX = "127.0.0.1", "unixsock-stream/"
 _LONGEST_PATH, _LONGEST_NAME = 107, 16  # [bytes] of a Unix socket, which the kernel limits, and of ours in a folder
 _LONGEST = 1000
 _NETWORK = re.compile(
-    r"(tcp|udp|tls|quic|ws)/(\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9._-]+):(?P<port>[0-9]{1,5})(\?[\w=;.-]+)?(#[^\s#]+)?"
+    r"(tcp|udp|tls|quic|ws)/(?P<host>\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9._-]+):(?P<port>[0-9]{1,5})(\?[\w=;.-]+)?(#[^\s#]+)?"
 )
 _SOCKET = re.compile(r"unixsock-stream//[^\s#?]+")
 
@@ -72,4 +74,6 @@ def endpoint(text: str) -> str:
         raise ValueError("must be an endpoint of Zenoh, such as tcp/192.168.0.2:7447")
     if network is not None and not 0 < int(network["port"]) < 65536:
         raise ValueError("a port is between 1 and 65535")
+    if network is not None:
+        require_possible(network["host"].strip("[]"))
     return text

@@ -8,7 +8,7 @@ import json
 import os
 import re
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import field
 from typing import Any, NoReturn, TextIO
@@ -19,6 +19,7 @@ from rbxcompose.base.printable import plain
 from rbxcompose.commands.formats.text import render_text
 
 FINDINGS, USAGE = 1, 2  # exit codes
+_NO_ACTION = re.compile(r"-(?!h$|-help$)|.*[./]")  # an option, a path or a type
 
 
 @dataclass(slots=True)
@@ -110,12 +111,20 @@ def refuse(finding: Finding) -> int:
 class Parser(argparse.ArgumentParser):
     """Parses the words after a verb; what it refuses is noted as well.
 
-    A quantity below zero, `-90deg`, is a value and not an option.
+    A quantity below zero, `-90deg`, is a value and not an option. Without an action, the default of `action` is
+    carried out: `diag --json` is `diag tree --json`, and `arm robots/mini` is `arm ls robots/mini`.
     """
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         self._negative_number_matcher = re.compile(r"-\.?\d")  # by itself, it knows only numbers without a unit
+
+    def parse_known_args(self, args: Iterable[str] | None = None, namespace: Any = None) -> tuple[Any, list[str]]:
+        """Parse words, with the usual action before them if they begin with none: a plain word is a misspelt one."""
+        words = list(sys.argv[1:] if args is None else args)
+        if (usual := self.get_default("action")) and (not words or _NO_ACTION.match(words[0])):
+            words.insert(0, usual)
+        return super().parse_known_args(words, namespace)
 
     def error(self, message: str) -> NoReturn:
         """Note the error, report it with the usage, and end the command."""

@@ -16,7 +16,7 @@ from typing import Any, NoReturn
 import rbxcompose
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.garbage_collection import collect_rarely
-from rbxcompose.commands.verbs import about, load, module_of, parser_of, verbs
+from rbxcompose.commands.verbs import about, in_groups, load, module_of, parser_of, verbs
 
 USAGE, INTERRUPTED = 2, 130
 _ABOUT = "Docker Compose for robots: YAML in, a checked and running robot out."
@@ -116,7 +116,8 @@ def _system_of(arguments: Any, where: str) -> str:
 
 
 def _help() -> str:
-    width = max(len(name) for name in verbs())
-    lines = [f"  {name:<{width}}  {about(name)}" for name in verbs()]
-    usage = "usage: rbxcompose COMMAND ...  (COMMAND --help says more)"
-    return "\n".join([usage, "", _ABOUT, "", *lines]) + "\n"
+    width = max(map(len, verbs()))
+    lines = ["usage: rbxcompose COMMAND ...  (COMMAND --help says more)", "", _ABOUT]
+    for heading, names in in_groups().items():
+        lines += ["", f"{heading}:", *(f"  {name:<{width}}  {about(name)}" for name in names)]
+    return "\n".join(lines) + "\n"

@@ -17,7 +17,7 @@ from rbxcompose.base.findings import Finding, kind
 from rbxcompose.base.printable import FORBIDDEN, plain
 from rbxcompose.base.units import ANGLE, LENGTH, UnitError, format_quantity, to_si
 from rbxcompose.commands.console import NotDoneError, refuse
-from rbxcompose.manifest.files import shown_name
+from rbxcompose.manifest.files import ROBOT_FILE, shown_name
 
 LONGEST_NAME = 60  # characters
 LONGEST_TEXT = 200
@@ -123,6 +123,12 @@ def _exists(path: Path) -> Finding:
         f"'{plain(shown_name(path))}' already exists; nothing was written",
         help="choose another name, or another folder with '--into'",
     )
+
+
+def robot_file(written: str) -> Path:
+    """Return the file for a new robot: a path without an ending is that of its folder, as wherever a robot is named."""
+    path = Path(written)
+    return path if path.suffix and not path.is_dir() else path / ROBOT_FILE
 
 
 def write_new(folder: Path, files: Mapping[str, str]) -> Finding | None:

@@ -36,6 +36,11 @@ def argument(*names: str, **options: Any) -> Declare:
     return lambda parser: parser.add_argument(*names, **options)
 
 
+def out_option(words: str, *more: str, metavar: str = "FILE", **options: Any) -> Declare:
+    """Return what declares where the answer is written: `-o` and `--out`, and `more` names."""
+    return argument("-o", "--out", *more, metavar=metavar, help=words, **options)
+
+
 def deferred(module: str, function: str) -> Callable[..., int]:
     """Return what calls a function of a module that is imported only then, since it needs more than others do."""
     return lambda *arguments: int(getattr(import_module(module), function)(*arguments))
@@ -44,14 +49,19 @@ def deferred(module: str, function: str) -> Callable[..., int]:
 def add_actions(
     parser: argparse.ArgumentParser, actions: Iterable[Subcommand], *common: Declare, metavar: str = ""
 ) -> None:
-    """Declare subcommands, each with its own arguments and then the `common` ones; `metavar` names them all."""
+    """Declare subcommands, each with its own arguments and then the `common` ones; `metavar` names them all.
+
+    The first one is the most common reading, and is meant if none is written.
+    """
     made = parser.add_subparsers(dest="action", required=True)
     for subcommand in actions:
-        action = made.add_parser(subcommand.name, help=subcommand.help, description=subcommand.about)
+        words = subcommand.help if made.choices else f"{subcommand.help} (the default)"
+        action = made.add_parser(subcommand.name, help=words, description=subcommand.about)
         for declare in (*subcommand.declares, *common):
             declare(action)
         action.set_defaults(do=subcommand.do)
     made.metavar = metavar or "|".join(made.choices)
+    parser.set_defaults(action=next(iter(made.choices)))
 
 
 def run_action(arguments: argparse.Namespace, *before: object) -> int:

@@ -141,6 +141,18 @@ def robot_path(written: str | None, *, may_run: bool = True) -> str:
     raise NotDoneError(UNNAMED.at(None, f"no robot is named, and {words}", help="give the path of one"))
 
 
+def put_robot_last(arguments: argparse.Namespace, asked: str, robot: str = "path") -> None:
+    """Exchange what is `asked` about a robot and the robot if they are written the other way round."""
+    first, last = getattr(arguments, asked), getattr(arguments, robot)
+    if last is not None and _is_robot(first) and not _is_robot(last):
+        setattr(arguments, asked, last)
+        setattr(arguments, robot, first)
+
+
+def _is_robot(word: str) -> bool:
+    return "/" in word or isinstance(find(word), Path)
+
+
 class Layers(TypedDict):
     """The arguments of `compile_robot` besides the robot's file."""
 

@@ -19,10 +19,19 @@ FOLDER = "commands"
 """In which a room has its verbs."""
 
 
+GROUPS = ("write", "run", "look", "drive", "missions", "bodies and arms", "data", "system")
+"""What one wants of a verb, in the order of the help."""
+
+MOST_USED = "most used"
+
+
 class Verb(Protocol):
-    """The contents of a verb's module."""
+    """The contents of a verb's module; with `IS_COMMON = True`, it stands among the most used ones in the help."""
 
     __doc__: str | None
+
+    GROUP: str
+    """One of `GROUPS`, as a text in quotes, since it is read without an import."""
 
     def add_arguments(self, parser: argparse.ArgumentParser) -> None:
         """Declare options and arguments."""
@@ -45,8 +54,23 @@ def module_of(verb: str) -> str:
 
 def about(verb: str) -> str:
     """Return the first line of a verb's docstring, read from its text: importing all verbs would take too long."""
+    return _text(verb).partition("\n")[0].strip('"')
+
+
+def in_groups() -> dict[str, list[str]]:
+    """Return the verbs by their headings in the help: the most used ones, then the others by what one wants."""
+    texts = {verb: _text(verb) for verb in verbs()}
+    found: dict[str, list[str]] = {heading: [] for heading in (MOST_USED, *GROUPS)}
+    for group in GROUPS:
+        for verb, text in texts.items():
+            if f'\nGROUP = "{group}"\n' in text:
+                found[MOST_USED if "\nIS_COMMON = True\n" in text else group].append(verb)
+    return found
+
+
+def _text(verb: str) -> str:
     with open(file_of(module_of(verb)), encoding="utf-8") as file:
-        return file.readline().strip().strip('"')
+        return file.read()
 
 
 def load(verb: str) -> Verb:

@@ -13,7 +13,8 @@ from rbxcompose.base.printable import plain
 from rbxcompose.manifest.files import ROBOT_FILE, shown_name
 from rbxcompose.manifest.foreign_words import FOREIGN
 from rbxcompose.manifest.reader import Texts, read_file
-from rbxcompose.manifest.tree import Entry, MappingNode, ScalarNode, TreeNode
+from rbxcompose.manifest.shapes import field_types, keys_at
+from rbxcompose.manifest.tree import Entry, KeyPath, MappingNode, ScalarNode, SequenceNode, TreeNode, at
 from rbxcompose.manifest.validate import KEYS, UNKNOWN_KEY, validate, where
 
 KINDS = ("Robot", "Part", "Overlay", "Mission", "Test", "System")
@@ -51,6 +52,10 @@ def with_keys(root: MappingNode, meant: Mapping[str, str]) -> MappingNode:
 
 
 OTHER_KIND = kind("RBX1304", is_fixable=True)
+
+
+_Places = dict[KeyPath, list[str]]
+"""The keys that a file takes, by place; all entries of a section stand for the first."""
 
 
 @dataclass(slots=True)
@@ -103,6 +108,53 @@ class Documents:
                 self.report.add(UNKNOWN_KEY.misspelt(span, message, name, model.model_fields, KEYS, taken=root.entries))
         return with_keys(root, meant)
 
+    def placed(self, model: type[ManifestHeader], root: MappingNode, sections: Mapping[str, Any]) -> MappingNode:
+        """Return a file without the keys that belong elsewhere in it, after a finding for each that says where.
+
+        `sections` have the models of its sections: one map, a map of named entries, or a list of items.
+        """
+        places: _Places = {(): [name for name in field_types(model) if name not in ManifestHeader.model_fields]}
+        for name, section in sections.items():
+            for place in ((), (0,)):
+                if keys := keys_at(section, place):
+                    places[name, *place] = keys
+        entries = dict(root.entries)
+        for name in sections.keys() & root.entries.keys():
+            entries[name] = changed(entries[name], value=self._placed(entries[name].value, (name,), places, root))
+        whole = self._placed(changed(root, entries=entries), (), places, root)
+        return whole if isinstance(whole, MappingNode) else root
+
+    def _placed(self, node: TreeNode, path: KeyPath, places: _Places, root: MappingNode) -> TreeNode:
+        """Return a node without the keys of other places."""
+        place = path if len(path) < 2 else (path[0], 0)
+        if path and (*place, 0) in places:
+            match node:
+                case SequenceNode(items=items):
+                    inner = (self._placed(item, (*path, index), places, root) for index, item in enumerate(items))
+                    return changed(node, items=tuple(inner))
+                case MappingNode(entries=entries):
+                    values = {
+                        name: self._placed(entry.value, (*path, name), places, root) for name, entry in entries.items()
+                    }
+                    return changed(node, entries={name: changed(entries[name], value=values[name]) for name in entries})
+        own = places.get(place)
+        if own is None or not isinstance(node, MappingNode):
+            return node
+        left = dict(node.entries)
+        for name, entry in node.entries.items():
+            homes = [other for other, keys in places.items() if name in keys]
+            is_ours = (
+                name in (*own, *ManifestHeader.model_fields)
+                or FOREIGN.get(name) in own
+                or surely_meant(name, own) is not None
+            )
+            if not is_ours and len(homes) == 1:
+                del left[name]
+                message = f"unknown key '{plain(name, 60)}' in {where(path)}"
+                help_text = _home(homes[0], places, root)
+                self.report.add(UNKNOWN_KEY.at(entry.key.span, message, help=help_text, about=[name]))
+        return changed(node, entries=left)
+
     def check(self, model: type[ManifestHeader], root: MappingNode) -> None:
         """Add findings for the top-level keys of a file; the contents of a section are checked where it is read."""
         anything = {name for name, field in model.model_fields.items() if field.annotation is Any}
@@ -111,6 +163,21 @@ class Documents:
             for name, entry in root.entries.items()
         }
         validate(model, changed(root, entries=keys), (), self.report)
+
+
+def _home(place: KeyPath, places: _Places, root: MappingNode) -> str:
+    """Return in words where a key belongs, beside one that is written there if there is any."""
+    there = at(root, place)
+    keys = there.entries if isinstance(there, MappingNode) and len(place) < 2 else {}
+    beside = next((key for key in places[place] if key in keys), "")
+    match place:
+        case ():
+            where_ = "at the left margin"
+        case (section,):
+            where_ = f"below '{section}'"
+        case (section, *_):
+            return f"it belongs to an entry of '{section}'"
+    return f"it belongs {where_}" + (f", beside '{beside}'" if beside else "")
 
 
 def _trouble(root: TreeNode, wanted: str) -> Finding | None:

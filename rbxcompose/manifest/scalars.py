@@ -3,7 +3,7 @@
 import math
 import re
 
-from rbxcompose.manifest.tree import NUMBER, ScalarNode
+from rbxcompose.manifest.tree import NUMBER, ScalarNode, TreeNode
 
 PlainValue = bool | int | float | str | None
 
@@ -33,6 +33,11 @@ def plain_value(scalar: ScalarNode) -> PlainValue:
     if form == "float":
         return float(text)
     return int(text) if form == "decimal" else int(text, 0)
+
+
+def is_empty(node: TreeNode | None) -> bool:
+    """Return whether nothing is written there, in one of YAML's ways: `start:`, `start: null`, `start: ~`."""
+    return isinstance(node, ScalarNode) and node.plain and _WORDS.get(node.text, False) is None
 
 
 def number_trouble(scalar: ScalarNode) -> str:

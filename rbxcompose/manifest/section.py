@@ -20,6 +20,7 @@ from rbxcompose.base.printable import plain
 from rbxcompose.manifest.documents import Documents, ManifestHeader
 from rbxcompose.manifest.fields import ComponentName, TopicName
 from rbxcompose.manifest.salvage import salvaged
+from rbxcompose.manifest.scalars import is_empty
 from rbxcompose.manifest.shapes import below, keys_at, kinds_of, with_references
 from rbxcompose.manifest.tree import (
     Entry,
@@ -649,11 +650,6 @@ class Reading(Generic[M]):
         if self.node is None:
             return None
         return validate(self.section.model, self.node, (self.section.name,), self.report, self.contents.known)
-
-
-def is_empty(node: TreeNode) -> bool:
-    """Return whether a section has no contents."""
-    return isinstance(node, ScalarNode) and node.plain and not node.text
 
 
 def named_entries(root: MappingNode, path: tuple[str, ...], report: Report) -> Iterator[tuple[str, Entry]]:

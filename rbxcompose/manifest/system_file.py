@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
+from rbxcompose.base.addresses import require_possible
 from rbxcompose.base.config import BitRate, Config, Frequency, Name, Time
 from rbxcompose.manifest.documents import ManifestHeader
 
@@ -17,13 +18,15 @@ def _address(text: str) -> str:
     """Read an address or a name of a machine."""
     if not _ADDRESS.fullmatch(text):
         raise ValueError("must be an address or the name of a machine, such as 10.42.0.2 or robot.local")
-    return text
+    return require_possible(text)
 
 
 def _ssh(text: str) -> str:
     """Read what one types after `ssh`, but no options: with those, a text of others could run programs here."""
     if not _SSH.fullmatch(text):
         raise ValueError("must be a host as one types it after ssh, such as pi@robot; options go to ~/.ssh/config")
+    host = text.removeprefix("ssh://").rpartition("@")[2]
+    require_possible(host.partition(":")[0] if host.count(":") == 1 else host)
     return text
 
 

@@ -19,7 +19,7 @@ from rbxcompose.base.units import NUMBER, Quantity, UnitError, format_quantity, 
 from rbxcompose.manifest import tree
 from rbxcompose.manifest.foreign_words import CHOICES as FOREIGN_CHOICES
 from rbxcompose.manifest.foreign_words import FOREIGN
-from rbxcompose.manifest.scalars import describe, number_trouble, plain_value
+from rbxcompose.manifest.scalars import describe, is_empty, number_trouble, plain_value
 from rbxcompose.manifest.shapes import alternatives, dimension_at, field_types, keys_at, models_at
 from rbxcompose.manifest.slip_registry import RefusedValue, value_slip
 
@@ -157,16 +157,13 @@ def in_straight_quotes(finding: Finding, node: tree.TreeNode | None) -> Finding:
     )
 
 
-_NOTHING = ("", "~", "null", "Null", "NULL")  # as YAML writes it
-
-
 def help_of_form(model: Any, loc: tree.KeyPath, value: tree.TreeNode | None, error: str) -> str:
     """Return the help for a value at `loc` below `model` that pydantic refuses with this error; nothing for most."""
     if EXPECTED.get(error) == EXPECTED["model_type"] and isinstance(value, tree.SequenceNode):
         return _as_map(model, loc, value) or (_with_keys(model, loc) if loc else "")
-    if EXPECTED.get(error) == EXPECTED["model_type"] and loc and not _is_empty(value):
+    if EXPECTED.get(error) == EXPECTED["model_type"] and loc and not is_empty(value):
         return _with_keys(model, loc)
-    if EXPECTED.get(error) == EXPECTED["model_type"] and _is_empty(value):
+    if EXPECTED.get(error) == EXPECTED["model_type"] and is_empty(value):
         name = f"'{loc[-1]}: !remove'" if loc else "'!remove' behind the colon"
         return f"write its keys below it; in a profile or an overlay, {name} removes it"
     if not isinstance(value, tree.ScalarNode) or not loc:
@@ -174,11 +171,6 @@ def help_of_form(model: Any, loc: tree.KeyPath, value: tree.TreeNode | None, err
     if isinstance(value.filled, Secret):
         return "a secret may stand only in settings that hide it; what is not secret is '${env.NAME}', or written here"
     return _without_unit(model, loc, value) if error.startswith("int_") else ""
-
-
-def _is_empty(value: tree.TreeNode | None) -> bool:
-    """Return whether nothing is written there."""
-    return isinstance(value, tree.ScalarNode) and value.plain and value.text in _NOTHING
 
 
 def _with_keys(model: Any, loc: tree.KeyPath) -> str:

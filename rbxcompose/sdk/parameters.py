@@ -16,7 +16,7 @@ from pydantic_core import ErrorDetails
 from rbxcompose.base.config import Bound, Config, Dimensioned, field_docs, is_live, leaves, value_at, with_values
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions.types import COUNT, FLAG, TEXT, Type, choice_of, quantity_of
-from rbxcompose.base.findings import suggest
+from rbxcompose.base.findings import clauses, suggest
 from rbxcompose.base.units import NUMBER, RATIO, UNITS, Dimension, Quantity, UnitError, format_number, format_quantity
 from rbxcompose.manifest.written import is_nearly, rounder_unit
 from rbxcompose.msgs import rcl_interfaces
@@ -399,7 +399,7 @@ def _wanted(known: Mapping[str, ParameterField], parameter: rcl_interfaces.Param
     setting = known.get(parameter.name)
     if setting is None:
         help_text = suggest(parameter.name, known, "parameters")
-        raise UnsettableError(f"there is no parameter '{parameter.name}'" + (f"; {help_text}" if help_text else ""))
+        raise UnsettableError(clauses(f"there is no parameter '{parameter.name}'", help_text))
     if not setting.is_live:
         raise UnsettableError(f"'{parameter.name}' cannot change while the robot runs")
     value = from_message(parameter.value)

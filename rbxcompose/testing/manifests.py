@@ -122,7 +122,7 @@ class SteppedMission:
         self._arrived: dict[str, float] = {}
         self._counts: dict[str, int] = {}
         self._running: dict[int, str] = {}
-        self._story = MissionStory(program.name, robot.skills)
+        self._story = MissionStory(program.name)
         defaults = {name: input_.default.value for name, input_ in program.inputs.items() if input_.default}
         self.engine = Engine(program, robot, {**defaults, **(inputs or {})}, self)
 

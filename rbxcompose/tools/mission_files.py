@@ -17,7 +17,7 @@ from rbxcompose.base.requests import Refused
 from rbxcompose.base.units import example
 from rbxcompose.commands.console import FINDINGS, NotDoneError, ReportedError, emit, misused, table, write_report
 from rbxcompose.commands.lookup import answer_of, known_state, robots_up
-from rbxcompose.commands.targets import robot_path
+from rbxcompose.commands.targets import put_robot_last, robot_path
 from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.compiler.model.skills import python_skills
@@ -74,6 +74,7 @@ def _running_file() -> str | None:
 
 def show(arguments: argparse.Namespace) -> int:
     """Write the picture of a mission; without a path, that of the running robot, with the state of each node."""
+    put_robot_last(arguments, "name")
     picture, statuses = (None if arguments.path else _live(arguments.name)) or (None, ())
     if picture is None:
         robot = robot_of(arguments.path)
@@ -297,6 +298,7 @@ def _shown(records: Sequence[LogRecord]) -> str:
 
 def explore(arguments: argparse.Namespace) -> int:
     """Explore a mission and report the findings; the exit code is 1 if anything is wrong."""
+    put_robot_last(arguments, "name")
     robot = robot_of(arguments.path)
     program = mission_in(robot, arguments.name)
     try:

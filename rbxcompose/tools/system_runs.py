@@ -89,7 +89,7 @@ def compiled_for(path: str, arguments: argparse.Namespace, verb: str) -> System:
     Raises:
         ReportedError: if it has errors, or an option is not for systems.
     """
-    for word, given in (("-f", arguments.overlays), ("--set", arguments.sets)):
+    for word, given in (("-f", arguments.overlays), ("--set or --no-mission", arguments.sets)):
         if given:
             raise ReportedError(misused(verb, f"{word} is for a robot; a system says itself what its robots are"))
     system = compile_system(path, environment=os.environ, real=arguments.real, profiles=arguments.profile)

@@ -66,3 +66,16 @@ def test_what_is_near_is_what_difflib_tells(name: str, others: set[str], most: i
 
 def test_of_equally_similar_names_the_one_that_looks_the_same_comes_first() -> None:
     assert suggest("corner_l", ["corner_1", "corner_2", "corner_4"]) == "did you mean 'corner_1'?"
+
+
+@pytest.mark.parametrize(("name", "other"), [("gripper", "upper"), ("hand", "head"), ("arm", "aim_2"), ("tip", "lift")])
+def test_a_name_that_differs_in_more_than_a_slip_is_no_guess(name: str, other: str) -> None:
+    assert suggest(name, [other, "base"], "links") == f"links: {other}, base"
+
+
+@pytest.mark.parametrize(
+    ("name", "other"),
+    [("griper", "gripper"), ("haed", "head"), ("hands", "hand"), ("uper", "upper"), ("baudrate", "baud")],
+)
+def test_one_slip_or_a_common_word_is_one(name: str, other: str) -> None:
+    assert suggest(name, [other, "base"], "links") == f"did you mean '{other}'?"

@@ -182,3 +182,31 @@ def test_another_text_is_a_change_of_the_plan_that_can_be_read(tmp_path: Path) -
         assert change.key == "urdf"
         assert change.before != change.after
         assert len(str(change)) < 120
+
+
+@pytest.mark.parametrize(("present", "code"), [(False, "RBX2012"), (True, "RBX2015")])
+def test_a_bad_mesh_is_one_finding_with_all_places_that_name_it(present: bool, code: str, tmp_path: Path) -> None:
+    mesh = '<geometry><mesh filename="wheel.stl"/></geometry>'
+    shapes = f"\n<visual>{mesh}</visual>\n<collision>{mesh}</collision>\n"
+    joint = '<joint name="j" type="fixed"><parent link="base"/><child link="wheel"/></joint>'
+    text = (
+        f'<robot name="cart">\n<link name="base">{shapes}</link>\n<link name="wheel">{shapes}</link>\n{joint}</robot>'
+    )
+    if present:
+        (tmp_path / "wheel.stl").write_text("no mesh", encoding="utf-8")
+    checked = check_text(ROBOT, tmp_path, others={"cart.urdf": text})
+    [finding] = [finding for finding in checked.compilation.report if finding.code in ("RBX2012", "RBX2015")]
+    assert finding.code == code
+    assert finding.span
+    assert finding.span.line == 3
+    assert [related.span.line for related in finding.related] == [4, 7, 8]
+
+
+def test_of_very_many_places_of_a_mesh_the_first_are_shown(tmp_path: Path) -> None:
+    shapes = '<visual><geometry><mesh filename="bolt.stl"/></geometry></visual>\n' * 12
+    checked = check_text(
+        ROBOT, tmp_path, others={"cart.urdf": f'<robot name="cart"><link name="l">{shapes}</link></robot>'}
+    )
+    [finding] = [finding for finding in checked.compilation.report if finding.code == "RBX2012"]
+    assert len(finding.related) == 8
+    assert finding.related[-1].message == "and here, and 3 more"

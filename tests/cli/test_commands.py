@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import argparse
 import ast
 import json
 import os
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -19,6 +21,7 @@ from rbxcompose.commands import verbs
 from rbxcompose.runtime.folder import ComponentState, RobotFolder, RobotState, StopState
 from rbxcompose.runtime.log import Record, start_new
 from rbxcompose.runtime.processes import Process, boot_id
+from rbxcompose.testing.golden import Golden
 
 ROOT = Path(__file__).parents[2]
 RUNNING = ["ps", "down", "stop", "release", "logs"]
@@ -47,16 +50,79 @@ def test_without_a_command_it_shows_its_usage(capsys: pytest.CaptureFixture[str]
     assert capsys.readouterr().out.startswith("usage: rbxcompose COMMAND")
 
 
-def test_the_help_has_one_line_for_each_verb(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_help_has_one_line_for_each_verb_under_what_one_wants(
+    capsys: pytest.CaptureFixture[str], golden: Golden
+) -> None:
     command.main(["--help"])
-    shown = {line.split()[0] for line in capsys.readouterr().out.splitlines() if line.startswith("  ")}
-    assert shown == set(verbs.verbs())
-    assert {"up", "down", "ps", "logs", "stop", "release", "mission"} <= shown
+    text = capsys.readouterr().out
+    golden.check("help.txt", text)
+    assert sorted(line.split()[0] for line in text.splitlines() if line.startswith("  ")) == verbs.verbs()
+    assert len(verbs.in_groups()[verbs.MOST_USED]) == 10
+    assert all(verbs.load(verb).GROUP in verbs.GROUPS for verb in verbs.verbs())
 
 
 def test_an_unknown_command_is_wrong_usage_with_a_hint(capsys: pytest.CaptureFixture[str]) -> None:
     assert command.main(["dwon"]) == 2
     assert "did you mean 'down'?" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("written", "usual"),
+    [
+        ("action", "action ls"),
+        ("arm", "arm ls"),
+        ("arm robots/mini --json", "arm ls robots/mini --json"),
+        ("body mini.urdf", "body show mini.urdf"),
+        ("controller", "controller ls"),
+        ("diag", "diag tree"),
+        ("diag -v", "diag tree -v"),
+        ("fleet", "fleet ls"),
+        ("mission --robot mini", "mission ls --robot mini"),
+        ("msg std_msgs/Bool", "msg show std_msgs/Bool"),
+        ("mux", "mux ls"),
+        ("param", "param ls"),
+        ("scene", "scene ls"),
+        ("security systems/two.yaml", "security audit systems/two.yaml"),
+        ("service", "service ls"),
+        ("servo --port /dev/ttyUSB0", "servo scan --port /dev/ttyUSB0"),
+        ("tf --timeout 1s", "tf tree --timeout 1s"),
+        ("topic -a", "topic ls -a"),
+        ("udev", "udev scan"),
+    ],
+)
+def test_without_an_action_the_most_common_one_is_meant(written: str, usual: str) -> None:
+    verb, *words = written.split()
+    parser = verbs.parser_of(verb, verbs.load(verb))
+    assert parser.parse_args(words) == parser.parse_args(usual.split()[1:])
+
+
+def parsers() -> Iterator[argparse.ArgumentParser]:
+    """Yield the parsers of all verbs and actions."""
+    waiting: list[argparse.ArgumentParser] = [verbs.parser_of(verb, verbs.load(verb)) for verb in verbs.verbs()]
+    while waiting:
+        yield (parser := waiting.pop())
+        for action in parser._actions:
+            waiting += action.choices.values() if isinstance(action, argparse._SubParsersAction) else ()
+
+
+def test_where_an_answer_is_written_is_called_o_and_out_everywhere() -> None:
+    names = {"-o", "--out", "--output"}
+    found = {
+        parser.prog.removeprefix("rbxcompose "): {*action.option_strings}
+        for parser in parsers()
+        for action in parser._actions
+        if names & {*action.option_strings}
+    }
+    assert found.keys() >= {"record", "graph", "body picture", "import mux", "export", "mission show", "arm setup"}
+    assert found.pop("record") == names
+    assert {*map(frozenset, found.values())} == {frozenset({"-o", "--out"})}
+
+
+def test_a_misspelt_action_is_no_argument_of_the_usual_one(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as caught:
+        command.main(["diag", "treee"])
+    assert caught.value.code == 2
+    assert "invalid choice: 'treee' (choose from 'tree', 'watch'" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("verb", RUNNING)

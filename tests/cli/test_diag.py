@@ -68,3 +68,5 @@ def test_the_exit_code_of_tree_is_the_level_of_the_robot(
     assert main(["diag", "tree", "--json"]) == int(level)
     told = json.loads(capsys.readouterr().out)
     assert (told["robot"], told["level"]) == ("turtlebot", level.name.lower())
+    assert main(["diag"]) == int(level)
+    assert capsys.readouterr().out == f"turtlebot  {level.name}\n"

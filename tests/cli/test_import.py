@@ -47,6 +47,14 @@ def test_a_new_file_is_written_and_none_is_overwritten(folder: Path, capsys: pyt
     assert made.read_text() == before
 
 
+@pytest.mark.parametrize("target", ["tb", "tb/", "robots/tb", "."])
+def test_a_target_without_an_ending_is_a_folder(target: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert command.main(["import", "arbotix", "My-head.yaml", "-o", target]) == 0
+    made = folder / target / "robot.yaml"
+    assert capsys.readouterr().out == f"wrote {made.relative_to(folder)}\n"
+    assert "\nkind: Robot\n" in made.read_text()
+
+
 def test_errors_decide_the_exit_code_and_the_rest_is_written(capsys: pytest.CaptureFixture[str]) -> None:
     assert command.main(["import", "arbotix", "wrong.yaml", "nowhere.yaml"]) == 1
     captured = capsys.readouterr()

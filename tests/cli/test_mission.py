@@ -110,6 +110,7 @@ def test_each_verb_tells_what_a_person_wants_to_know(
         lines.append(f"$ mission {words}\n{told(capsys, *words.split(), code=code)}")
         robot.advance(0.0)
     golden.check("mission.txt", "\n".join(lines))
+    assert told(capsys) == told(capsys, "ls")
 
 
 @pytest.mark.parametrize("ending", ["mermaid", "dot", "html"])

@@ -41,7 +41,7 @@ def robot() -> Iterator[Robot]:
 
 
 def test_muxes_are_listed_and_each_tells_who_holds_it(robot: Robot) -> None:
-    assert [(entry["name"], entry["mode"], entry["holder"]) for entry in robot.told("mux", "ls")] == [
+    assert [(entry["name"], entry["mode"], entry["holder"]) for entry in robot.told("mux")] == [
         ("cmd_vel", "priority", None),
         ("head_vel", "select", "joystick"),
     ]

@@ -128,7 +128,7 @@ def test_the_tree_of_frames_is_shown(robot: Robot) -> None:
     links = {entry["frame"]: entry for entry in robot.told("tf", "tree")}
     assert (links["odom"]["parent"], links["odom"]["is_static"]) == ("map", True)
     assert (links["base_footprint"]["parent"], links["base_footprint"]["is_static"]) == ("odom", False)
-    assert robot.do("tf", "tree").stdout.startswith("map\n  odom  (static: x 0 m")
+    assert robot.do("tf").stdout.startswith("map\n  odom  (static: x 0 m")
     assert len(robot.told("tf", "echo", "map", "base_footprint", "--once")["translation"]) == 3
     assert (
         "did you mean 'base_footprint'?" in robot.do("tf", "echo", "map", "base_footprin", "--timeout", "0.5s").stderr

@@ -76,7 +76,8 @@ def test_all_parameters_of_all_components_are_listed(do: Do) -> None:
     assert found["/left/battery", "runtime"] == (45.0, False)
     assert found["/left/battery", "initial"] == (1.0, True)
     assert found["/left/base", "max_speed"] == (0.5, False)
-    shown = do("param", "ls", "battery").stdout
+    shown = do("param", "get", "battery").stdout
+    assert shown == do("param", "ls", "battery").stdout
     assert [line.split()[:4] for line in shown.splitlines()][:2] == [
         ["component", "parameter", "value", "about"],
         ["/left/battery", "runtime", "45", "s"],

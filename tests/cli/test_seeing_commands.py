@@ -58,6 +58,42 @@ def test_a_robot_that_is_not_there_is_a_finding(words: list[str], capsys: pytest
     assert "error[RBX1301]" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("why", TURTLEBOT, "battery.runtime"),
+        ("mission show", TURTLEBOT, "patrol"),
+        ("mission explore", TURTLEBOT, "patrol", "--states", "5"),
+        ("arm fk", "robots/pi_robot", "wave"),
+    ],
+)
+def test_a_robot_and_what_is_asked_of_it_are_understood_in_either_order(
+    words: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    (verb, robot, asked), more = words[:3], words[3:]
+    code = command.main([*verb.split(), asked, robot, *more])
+    usual = capsys.readouterr().out
+    assert usual
+    assert output(capsys, *verb.split(), robot, asked, *more, code=code) == usual
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        (("robots/mini", "controllers.wheels"), 1, "'robots/mini' does not exist"),
+        (("controllers.wheels", "mini"), 1, "'mini' does not exist"),
+        ((TURTLEBOT,), 2, f"'{TURTLEBOT}' is a robot, and no value of it is named"),
+    ],
+)
+def test_why_says_how_it_is_written(
+    words: tuple[str, ...], code: int, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert command.main(["why", *words]) == code
+    error = capsys.readouterr().err
+    assert said in error
+    assert "write 'rbxcompose why VALUE [ROBOT]'" in error
+
+
 def test_a_path_that_leads_nowhere_is_a_finding(capsys: pytest.CaptureFixture[str]) -> None:
     assert command.main(["why", "batery.runtime", TURTLEBOT]) == 1
     assert "did you mean 'battery'?" in capsys.readouterr().err

@@ -59,6 +59,11 @@ def test_profiles_and_values_come_in_their_order() -> None:
     assert (arguments.profile, arguments.sets, arguments.detach) == (["a", "b"], ["x.y=1", "z=2"], True)
 
 
+def test_without_a_mission_it_is_as_if_start_were_empty() -> None:
+    assert parse("--set", "a.b=1", "--no-mission").sets == ["a.b=1", "start=null"]
+    assert parse().sets == []
+
+
 IDLE = "rbx: 1\nkind: Robot\nname: idle\ncomponents:\n  base:\n    type: diff_drive_sim\n"
 
 

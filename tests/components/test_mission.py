@@ -97,9 +97,9 @@ def test_it_waits_for_every_value_that_is_read_then_tells_its_story() -> None:
         "9.5 interrupt low done, back to go_to dock",
         "9.5 go_to dock",
         "10.5 go_to dock: failure (1 s): stuck",
-        "10.5 mission test: failure: do.sequence.go_to.1: stuck",
+        "10.5 mission test: failure: mission.yaml:8: stuck",
     ]
-    assert robot.events == [MissionOver("test", "failure", "do.sequence.go_to.1: stuck")]
+    assert robot.events == [MissionOver("test", "failure", "mission.yaml:8: stuck")]
     assert robot.mission.summary() == {
         "mission": "test: failure",
         "skills": "go_to 3 (1 success, 1 halted, 1 failure), recharge 1 (1 success)",
@@ -150,7 +150,7 @@ def test_it_fails_when_the_server_stays_away() -> None:
     robot.go_to.is_available = False
     robot.go_to.end(Outcome.LOST)
     robot.advance(5.2)
-    assert robot.ends[0].message == "do.go_to: its server is gone"
+    assert robot.ends[0].message == "mission.yaml:2: its server is gone"
     assert 5.0 <= robot.clock.now() < 5.3
 
 
@@ -204,7 +204,7 @@ def test_a_goal_that_someone_else_cancelled_is_a_failure() -> None:
     robot.start()
     robot.go_to.end(Outcome.CANCELED)
     robot.advance(1.0)
-    assert robot.ends[0].message == "do.go_to: cancelled by someone else"
+    assert robot.ends[0].message == "mission.yaml:2: cancelled by someone else"
 
 
 def test_a_pause_cancels_the_goal_and_a_resume_sends_it_again() -> None:

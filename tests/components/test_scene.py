@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from rbxcompose.base.geometry import Transform3
+from rbxcompose.domains.arms.motion import octree_files
 from rbxcompose.domains.arms.motion.scene_messages import pose_message
 from rbxcompose.domains.body.description import rooted_text
 from rbxcompose.msgs.builtin_interfaces import Time
@@ -251,6 +252,14 @@ def test_an_octomap_becomes_cells() -> None:
     assert object_.shapes[0].points.tolist() == pytest.approx([0.05, 0.05, 0.05])
 
 
+def test_an_octomap_of_too_many_nodes_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(octree_files, "MOST_NODES", 1000)
+    tree = Octomap(binary=True, id="OcTree", resolution=0.1, data=np.full(4000, -1, dtype=np.int8))
+    scene = Scene()
+    scene.send(PlanningScene(is_diff=True, world=world(octomap=OctomapWithPose(octomap=tree))))
+    assert "there are more than 1,000 nodes" in scene.refusal()
+
+
 def octomap_of_one_cell() -> list[int]:
     """Return the bits of a tree whose only occupied cell is the first above the origin: child 7, then 0, and so on."""
     first, inner, last = 3 << 14, 3, 2
@@ -272,5 +281,5 @@ def test_more_objects_than_there_may_be_are_refused() -> None:
     many = tuple(CollisionObject(id=f"box {number}", primitives=(BOX,)) for number in range(1_001))
     scene = Scene()
     scene.send(PlanningScene(is_diff=True, world=world(*many)))
-    assert "there would be more than 1,000 shapes" in scene.refusal()
+    assert "shapes, and may be 1,000" in scene.refusal()
     assert scene.names == []

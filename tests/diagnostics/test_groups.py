@@ -18,6 +18,12 @@ NESTED: Groups = {
 }
 
 
+def test_a_prefix_may_go_without_matching_anything() -> None:
+    cameras = {"match": [{"contains": "camera"}], "remove_prefix": ["head"]}
+    found = fed(status("head camera: rate", OK), status("head: pan", OK), analyzers={"cameras": cameras})
+    assert list(tree(found, 0.0)) == ["/cameras", "/cameras/camera: rate", "/Other", "/Other/head: pan"]
+
+
 def test_groups_nest_and_a_level_rises_through_all_of_them() -> None:
     made = fed(status("laser", OK), status("cam_front: rate", ERROR, "slow"), analyzers=NESTED, base="robot")
     assert tree(made, 0.0) == {

@@ -38,7 +38,7 @@ def test_a_place_becomes_a_pose_in_a_message() -> None:
 
 
 @pytest.mark.parametrize(
-    ("is_success", "end"), [(True, "success"), (False, "do.call: not now")], ids=["success", "failure"]
+    ("is_success", "end"), [(True, "success"), (False, "mission.yaml:2: not now")], ids=["success", "failure"]
 )
 def test_the_answer_of_a_service_tells_whether_the_call_succeeded(is_success: bool, end: str) -> None:
     robot = started("do:\n  call: reset")
@@ -58,7 +58,7 @@ def test_a_call_that_nobody_answers_fails_with_the_reason() -> None:
     robot = started("do:\n  call: reset")
     robot.reset.answer(None, "no answer within 5 s")
     robot.advance(0.0)
-    assert end_of(robot) == "do.call: no answer within 5 s"
+    assert end_of(robot) == "mission.yaml:2: no answer within 5 s"
 
 
 def test_a_server_that_never_comes_is_a_failure_after_five_seconds() -> None:
@@ -68,7 +68,7 @@ def test_a_server_that_never_comes_is_a_failure_after_five_seconds() -> None:
     robot.advance(4.8)
     assert not robot.events
     robot.advance(0.5)
-    assert end_of(robot) == "do.call: nothing serves reset"
+    assert end_of(robot) == "mission.yaml:2: nothing serves reset"
 
 
 def test_a_service_can_be_a_skill() -> None:
@@ -152,7 +152,7 @@ def test_the_reason_in_a_result_is_told() -> None:
     robot = started("do: recharge")
     robot.recharge.end(Outcome.ABORTED, result=Recharge.Result(message="away from the dock"))
     robot.advance(0.0)
-    assert end_of(robot) == "do.recharge: away from the dock"
+    assert end_of(robot) == "mission.yaml:1: away from the dock"
 
 
 # Python
@@ -166,16 +166,16 @@ def test_a_function_is_a_skill_with_arguments_and_results() -> None:
 
 def test_a_function_may_end_with_an_outcome_of_its_own() -> None:
     robot = started("do:\n  toy_count:\n    room: dock\n    least: 3")
-    assert end_of(robot) == "do.toy_count: nobody"
+    assert end_of(robot) == "mission.yaml:2: nobody"
 
 
 def test_what_python_raises_is_a_failure_that_is_told() -> None:
     robot = started("do:\n  fallback:\n    - toy_raise\n    - log: went on")
-    assert "0 do.fallback.toy_raise.0: ZeroDivisionError: no such thing" in robot.lines
+    assert "0 mission.yaml:3: ZeroDivisionError: no such thing" in robot.lines
     assert end_of(robot) == "success"
 
 
-@pytest.mark.parametrize(("fails", "end"), [("false", "success"), ("true", "do.toy_slow failed")])
+@pytest.mark.parametrize(("fails", "end"), [("false", "success"), ("true", "mission.yaml:2: toy_slow failed")])
 def test_an_activity_takes_its_time(fails: str, end: str) -> None:
     robot = started(f"do:\n  toy_slow: {fails}")
     robot.advance(0.85)

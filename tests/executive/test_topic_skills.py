@@ -33,7 +33,7 @@ class Hand:
         text = f"rbx: 1\nkind: Mission\nname: test\n{textwrap.dedent(mission)}"
         found = check_text(robot, folder, others={"test.yaml": text})
         assert not found.compilation.report.has_errors, found.text
-        self.bench = Bench(plan=found.plan)
+        self.bench, self._folder = Bench(plan=found.plan), folder
 
     @property
     def gripper(self) -> Gripper:
@@ -51,7 +51,7 @@ class Hand:
     def end(self) -> str:
         """Return how the last mission ended, with the reason; empty while it runs."""
         ends = [event for event in self.bench.events if isinstance(event, MissionOver)]
-        return f"{ends[-1].outcome} {ends[-1].message}".strip() if ends else ""
+        return f"{ends[-1].outcome} {ends[-1].message}".strip().replace(f"{self._folder}/", "") if ends else ""
 
     def lose_gripper(self) -> None:
         """Have the gripper's process die."""
@@ -72,9 +72,9 @@ def make(tmp_path: Path) -> Make:
     ("width", "end"),
     [
         ("0.02", "success"),
-        ("0", "failure do.grip: empty"),
-        ("0.1", "failure do.grip: too wide"),
-        ("0.2", "failure do.grip: the skill 'grip' ended with an outcome that it does not declare: 'slippery'"),
+        ("0", "failure test.yaml:5: empty"),
+        ("0.1", "failure test.yaml:5: too wide"),
+        ("0.2", "failure test.yaml:5: the skill 'grip' ended with an outcome that it does not declare: 'slippery'"),
     ],
     ids=["success", "outcome", "failure", "undeclared"],
 )
@@ -221,7 +221,7 @@ def test_an_order_to_which_nobody_listens_fails_after_five_seconds(make: Make) -
     hand.bench.advance(5.8)
     assert hand.end == ""
     hand.bench.advance(0.5)
-    assert hand.end == "failure do.sequence.grip.1: nothing subscribes to /grip"
+    assert hand.end == "failure test.yaml:6: nothing subscribes to /grip"
 
 
 def test_that_somebody_looks_on_carries_nothing_out(make: Make) -> None:
@@ -259,7 +259,7 @@ def test_an_order_that_is_lost_for_good_is_a_failure(make: Make, skill: str) -> 
     hand.bench.advance(0.5)
     hand.lose_gripper()
     hand.bench.advance(0.0 if skill == "press" else 5.2)
-    assert hand.end == f"failure do.{skill}: its server is gone"
+    assert hand.end == "failure test.yaml:5: its server is gone"
 
 
 def test_a_gripper_that_breaks_at_an_order_gets_it_again(make: Make) -> None:

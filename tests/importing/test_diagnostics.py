@@ -10,6 +10,9 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rbxcompose.domains.diagnostics.ros1 import Ros1Aggregator
+from rbxcompose.domains.diagnostics.settings import DiagnosticsModel
+from rbxcompose.msgs.diagnostic_msgs import DiagnosticStatus
 from rbxcompose.testing import check_text
 from rbxcompose.testing.golden import Golden
 from tests.importing.imports import EXAMPLES, Imported, import_files, import_texts
@@ -58,6 +61,17 @@ def test_several_files_make_one_tree(tmp_path: Path) -> None:
     assert found.told == [("RBX2232", 1)]
 
 
+def test_an_item_that_loses_its_prefix_shows_as_in_ros(tmp_path: Path) -> None:
+    laser = "{type: GenericAnalyzer, path: Laser, contains: Frequency, remove_prefix: hokuyo_node}"
+    found = diagnostics(tmp_path, f"base_path: Robot\nanalyzers: {{laser: {laser}}}\n")
+    assert found.told == []
+    tree = Ros1Aggregator(DiagnosticsModel.model_validate(found.data["diagnostics"]))
+    tree.feed(0.0, [DiagnosticStatus(0, "hokuyo_node: Frequency"), DiagnosticStatus(0, "hokuyo_node: Port")])
+    names = [row.status.name for row in tree.report(0.0)]
+    assert "/Robot/Laser/Frequency" in names
+    assert "/Robot/Other/hokuyo_node: Port" in names  # nothing matches by such a prefix
+
+
 WRONG = {
     "a list": ("[1]\n", "RBX2231", 1),
     "another program": ("topics: []\n", "RBX2231", 1),
@@ -71,7 +85,7 @@ WRONG = {
     "a time in words": (f"analyzers:\n  a: {ONE[:-1]}, timeout: five}}\n", "RBX1003", 2),
     "a rate in words": (f"pub_rate: fast\nanalyzers: {{a: {ONE}}}\n", "RBX1003", 1),
     "no regex": (f"analyzers:\n  a: {ONE[:-1]}, regex: '(b'}}\n", "RBX2297", 2),
-    "a prefix that only goes": (f"analyzers:\n  a: {ONE[:-1]}, remove_prefix: b}}\n", "RBX2230", 2),
+    "simulated time": (f"use_sim_time: true\nanalyzers: {{a: {ONE}}}\n", "RBX2230", 1),
     "critical": (f"critical: true\nanalyzers: {{a: {ONE}}}\n", "RBX2230", 1),
 }
 
@@ -87,7 +101,9 @@ TEXTS = WORDS | st.lists(WORDS, max_size=3)
 GENERIC = st.fixed_dictionaries(
     {"type": st.sampled_from([f"{PATH}GenericAnalyzer", "DiscardAnalyzer", "IgnoreAnalyzer"]), "path": WORDS},
     optional={
-        **dict.fromkeys(("startswith", "contains", "name", "regex", "expected", "find_and_remove_prefix"), TEXTS),
+        **dict.fromkeys(
+            ("startswith", "contains", "name", "regex", "expected", "find_and_remove_prefix", "remove_prefix"), TEXTS
+        ),
         "timeout": st.floats(-1, 100),
         "num_items": st.integers(-1, 9),
         "discard_stale": st.booleans(),

@@ -192,3 +192,20 @@ def test_a_path_with_backslashes_is_corrected_where_the_file_is(tmp_path: Path) 
     (finding,) = checked.compilation.report
     assert finding.fix
     assert (finding.fix.is_safe, finding.fix.edits[0].text) == (True, "missions/patrol.yaml")
+
+
+@pytest.mark.parametrize(
+    ("components", "cure"),
+    [
+        ("", "without 'from' the input is open to the outside"),
+        (
+            "components: {base: {type: diff_drive_sim}}\n",
+            "components of this robot: base; without 'from' the input is open to the outside",
+        ),
+        ("components: {planner: {type: go_to}}\n", "did you mean 'planner'?"),
+    ],
+)
+def test_the_source_of_an_input_that_is_missing_may_be_left_out(components: str, cure: str, tmp_path: Path) -> None:
+    muxes = "muxes: {cmd_vel: {inputs: {driver: {from: planer, priority: 1, timeout: 1 s}}}}\n"
+    checked = check_text(f"rbx: 1\nkind: Robot\nname: one\n{components}{muxes}", tmp_path)
+    assert [finding.help for finding in checked.compilation.report if finding.code == "RBX3003"] == [cure]

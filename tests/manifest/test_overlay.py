@@ -9,12 +9,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbxcompose.base.findings import Report, Span
+from rbxcompose.compiler.compile import compile_robot
 from rbxcompose.compiler.composition.layers import read_sets
 from rbxcompose.compiler.composition.overlay import compose, settled
 from rbxcompose.compiler.composition.robot_manifest import History, HistoryStep
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.tree import BROKEN, Entry, KeyPath, MappingNode, ScalarNode, TreeNode, at, children, value_span
 from rbxcompose.manifest.validate import to_plain
+from tests.conftest import ROOT
 
 HERE = Span("f", 1, 1, 1, 2)
 
@@ -230,6 +232,15 @@ def test_a_value_of_a_set_that_is_no_yaml_is_a_finding_in_the_argument() -> None
     (finding,) = report
     assert finding.span
     assert (finding.code, finding.span.file) == ("RBX1102", "--set")
+
+
+@pytest.mark.parametrize("nothing", ["", "null", "~"])
+def test_a_robot_starts_no_mission_if_start_is_empty(nothing: str) -> None:
+    for robot in ("robots/turtlebot", "robots/box_robot"):
+        compilation = compile_robot(str(ROOT / robot), sets=[f"start={nothing}"], environment={})
+        assert not compilation.report.has_errors
+        assert compilation.plan
+        assert compilation.plan.start is None
 
 
 def test_an_empty_value_of_a_set_is_empty() -> None:

@@ -71,6 +71,7 @@ class Outcome:
 
     case: Case
     found: frozenset[Mark] = field(default_factory=frozenset)
+    findings: tuple[Finding, ...] = ()
 
     @property
     def is_caught(self) -> bool:
@@ -152,7 +153,7 @@ def run(case: Case, folder: Path) -> Outcome:
         real=("--real", "") in options,
         environment=environment,
     )
-    return Outcome(case, frozenset(_mark(finding) for finding in out.report))
+    return Outcome(case, frozenset(_mark(finding) for finding in out.report), tuple(out.report))
 
 
 def _mark(finding: Finding) -> Mark:

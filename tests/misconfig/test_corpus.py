@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -55,6 +56,28 @@ def test_every_kind_is_described_and_has_a_case() -> None:
 
 def test_every_wrong_case_says_what_is_wrong_with_it() -> None:
     assert [case.name for case in wrong() if bool(case.expected) == bool(case.misses)] == []
+
+
+def frayed(text: str) -> bool:
+    """Return whether a text begins or ends with what joins two texts, or with a blank."""
+    return text != text.strip() or bool(re.match(r"[,;:.]", text)) or bool(re.search(r"[,;:]$", text))
+
+
+def test_no_message_and_no_help_begins_or_ends_with_a_separator() -> None:
+    texts = {
+        text
+        for outcome in outcomes()
+        for finding in outcome.findings
+        for text in (finding.message, finding.label, finding.help, *(related.message for related in finding.related))
+    }
+    assert [text for text in texts if frayed(text)] == []
+
+
+def test_no_help_in_a_golden_file_begins_or_ends_with_a_separator() -> None:
+    files = (Path(__file__).parents[1]).rglob("golden/**/*.txt")
+    helps = [line.partition("= help: ")[2] for file in files for line in file.read_text("utf-8").splitlines()]
+    assert len([text for text in helps if text]) > 100
+    assert [text for text in helps if frayed(text)] == []
 
 
 # No component that ships has an action that cannot be restarted, a topic in another QoS class, or sends heartbeats.

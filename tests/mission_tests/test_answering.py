@@ -128,8 +128,9 @@ def test_an_end_of_its_own_is_an_outcome(trying: Trying) -> None:
     test = "mocks:\n  go_to: failure\nexpect:\n  outcome: {}\n  steps:\n    - away:\n      ended: failure\n"
     assert trying.problems(test.format("stranded"), "states") == []
     assert trying.problems(test.format("failure"), "states") == []
+    place = f"{trying.folder}/missions/states.yaml:12"
     assert trying.problems(test.format("success"), "states") == [
-        "expected outcome success, the mission ended with stranded: machine.away.go_to failed"
+        f"expected outcome success, the mission ended with stranded: {place}: go_to failed"
     ]
 
 
@@ -176,7 +177,7 @@ def test_a_loop_that_does_not_wait_ends_after_a_fixed_amount_of_work(
     first, second = (trying.verdict(f"expect:\n  {expect}\n", "spinning") for _ in range(2))
     (problem,) = first.problems
     assert problem.message.startswith("did not end: 60,000 nodes started or continued within")
-    assert problem.message.endswith(": do.repeat does not wait")
+    assert problem.message.endswith("missions/spinning.yaml:6 does not wait")
     assert first.record.now == second.record.now < 600
 
 

@@ -15,7 +15,7 @@ SPAN = Span("a.test.yaml", 1, 1, 1, 2)
 
 
 def record(count: int) -> TrialRecord:
-    made = TrialRecord("m", {})
+    made = TrialRecord("m")
     made.steps = [Done("go_to", f"go_to {n}", {"to": float(n)}, float(n), n) for n in range(count)]
     return made
 

@@ -84,7 +84,7 @@ DONE = st.lists(st.tuples(NAMES, ENDS), max_size=12)
 
 def recorded(done: list[tuple[str, str]]) -> TrialRecord:
     steps = [Done(name, name, {}, float(time), -1, ended) for time, (name, ended) in enumerate(done)]
-    return TrialRecord("m", {}, steps=steps)
+    return TrialRecord("m", steps=steps)
 
 
 @given(done=DONE, data=st.data())

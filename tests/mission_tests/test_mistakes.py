@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import pytest
 
@@ -183,3 +184,67 @@ def test_a_slip_of_the_hand_can_be_fixed(trying: Trying) -> None:
     path = trying.folder / "tried.test.yaml"
     fixes = [finding.fix for finding in trying.reading.read(path)[1] if finding.fix]
     assert [fix.title for fix in fixes] == ["'rechrge' -> 'recharge'"]
+
+
+@pytest.mark.parametrize(
+    ("text", "message", "cure"),
+    [
+        (FINE + "for: 3 min\n", "unknown key 'for' in this file", "it belongs below 'expect', beside 'outcome'"),
+        (
+            FINE + "  profile: home\n",
+            "unknown key 'profile' in 'expect'",
+            "it belongs at the left margin, beside 'robot'",
+        ),
+        (FINE + "  takes: 3 s\n", "unknown key 'takes' in 'expect'", "it belongs to an entry of 'mocks'"),
+        (
+            FINE.replace("  go_to:\n", "  go_to: {at: 3 s}\n"),
+            "unknown key 'at' in 'mocks.go_to'",
+            "it belongs to an entry of 'events'",
+        ),
+        (
+            "events: [{at: 3 s, never: [go_to], resume: true}]\n" + FINE,
+            "unknown key 'never' in 'events.0'",
+            "it belongs below 'expect', beside 'outcome'",
+        ),
+    ],
+)
+def test_a_key_of_another_place_in_the_file_says_where_it_belongs(
+    text: str, message: str, cure: str, trying: Trying
+) -> None:
+    _, found = trying.read(text)
+    assert message in found
+    assert f"= help: {cure}\n" in found
+    assert found.count("error[RBX1001]") == 1
+
+
+TOUR = """\
+rbx: 1
+kind: Mission
+name: ending
+inputs:
+  room: {type: text, default: corner_1}
+  pause: {type: time, default: 5 min}
+do:
+  - go_to: dock
+  - go_to: $room
+    timeout: $pause
+"""
+
+
+@pytest.mark.parametrize(
+    ("test", "code"),
+    [
+        ("with: {room: attic}\nexpect: {outcome: success}", "RBX4131"),
+        ("with: {pause: 1 s}\nexpect: {outcome: success}", "RBX4120"),
+        ("expect: {outcome: success}", ""),
+        ("with: {room: corner_2, pause: 4 min}\nexpect: {outcome: success}", ""),
+        ("with: {room: attic}\nexpect: {outcome: failure}", ""),  # it is to fail
+        ("with: {room: attic}\nmocks: {go_to: success}\nexpect: {outcome: success}", ""),  # nothing drives there
+    ],
+)
+def test_inputs_with_which_the_robot_cannot_do_a_step_are_a_finding(test: str, code: str, tmp_path: Path) -> None:
+    trying = Trying(tmp_path)
+    (tmp_path / "missions/ending.yaml").write_text(TOUR, encoding="utf-8")
+    trial, found = trying.read(test, "ending")
+    assert (trial is None) == (code == "RBX4131")
+    assert (f"[{code}]" in found and "--> tried.test.yaml:6:" in found) if code else not found, found

@@ -84,7 +84,7 @@ class Simulated:
         self.calls: dict[str, int] = {}
         self.events: list[tuple[float, MissionEvent]] = []
         self.told: list[str] = []
-        self.story = MissionStory("test", SKILLS)
+        self.story = MissionStory("test")
         self.changes: list[tuple[float, Callable[[], None]]] = []
         defaults = {name: input_.default.value for name, input_ in self.program.inputs.items() if input_.default}
         self.engine = Engine(self.program, self.robot, {**defaults, **self.inputs}, self, self.settings)

@@ -200,7 +200,7 @@ def test_a_mission_that_a_sub_mission_fails_tells_why() -> None:
     used = {"inner": "do: [a, {end: failure, message: no way in}]"}
     simulated = simulate("do: [{use: inner}]", used)
     simulated.advance(20)
-    assert simulated.told[-1].endswith("failure: do.sequence.use.0: no way in")
+    assert simulated.told[-1].endswith("failure: mission.yaml:1: no way in")
 
 
 def test_a_sub_mission_that_its_reaction_ends_has_a_plain_outcome() -> None:

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from rbxcompose.base.expressions.types import choice_of
+from rbxcompose.base.expressions.types import FLAG, choice_of, quantity_of
+from rbxcompose.base.units import LENGTH
 from rbxcompose.missions.engine.events import SkillStarted
-from rbxcompose.missions.engine.story import MissionStory
 from rbxcompose.missions.program.program import Skill
 from tests.missions.simulated import ROBOT, SKILLS, Simulated, program_of, simulate
 
@@ -32,7 +32,7 @@ def test_a_sequence_does_its_nodes_in_order_without_a_gap() -> None:
 def test_a_sequence_fails_with_the_first_failure_and_says_which_it_was() -> None:
     simulated = simulate("do: [a, b, c]", fails={"b": fails(1)})
     assert simulated.advance(10) == "failure"
-    assert simulated.told[-1] == "2 mission test: failure: do.sequence.b.1: no luck"
+    assert simulated.told[-1] == "2 mission test: failure: mission.yaml:1: no luck"
     assert "c" not in simulated.calls
 
 
@@ -224,7 +224,7 @@ def test_text_arguments_are_templates_and_take_their_scalar_as_written() -> None
 def test_arguments_of_numbers_are_expressions() -> None:
     simulated = simulate("do:\n  go_to:\n    pose: dock\n    tolerance: 2 * 5 cm")
     simulated.advance(10)
-    assert skills(simulated) == ["0 go_to dock tolerance 0.1 m"]
+    assert skills(simulated) == ["0 go_to pose dock, tolerance 0.1 m"]
 
 
 @pytest.mark.parametrize(
@@ -249,7 +249,7 @@ def test_a_node_without_a_value_is_a_reported_failure(node: str, report: str) ->
 def test_an_exception_of_a_leaf_is_a_reported_failure() -> None:
     simulated = simulate("do: {fallback: [a, b]}", raises=frozenset({"a"}))
     assert simulated.advance(10) == "success"
-    assert simulated.told[:3] == ["0 a", "0 do.fallback.a.0: RuntimeError: out of order", "0 b"]
+    assert simulated.told[:3] == ["0 a", "0 mission.yaml:1: RuntimeError: out of order", "0 b"]
 
 
 def test_in_texts_a_name_of_a_place_has_no_underscores_wherever_it_comes_from() -> None:
@@ -271,6 +271,17 @@ def test_in_texts_a_name_of_a_place_has_no_underscores_wherever_it_comes_from() 
     assert "2 Left are corner 1: corner 2, far_away" in simulated.told
 
 
+def test_the_story_shows_a_step_as_it_was_written_and_what_an_expression_gives() -> None:
+    lengths = {name: quantity_of(LENGTH) for name in "xyz"}
+    reach = Skill("reach", {**lengths, "any_orientation": FLAG}, "z")
+    robot = replace(ROBOT, skills={**SKILLS, "reach": reach})
+    text = "data: {up: 25 cm}\ndo: {reach: {x: 25 cm, y: -5cm, z: $up, any_orientation: true}}"
+    simulated = Simulated(program_of(text, robot), robot=robot)
+    assert simulated.advance(5) == "success"
+    shown = "reach x 25 cm, y -5cm, z 0.25 m, any_orientation true"
+    assert simulated.told[:2] == [f"0 {shown}", f"1 {shown}: success (1 s)"]
+
+
 def test_in_a_message_to_programs_a_text_stays_as_it_was_written() -> None:
     simulated = simulate("data: {room: corner_1}\ndo: {publish: greetings, message: $room}")
     assert simulated.advance(5) == "success"
@@ -281,7 +292,6 @@ def test_a_bare_word_is_a_choice_where_one_is_expected_also_if_a_place_has_that_
     paint = Skill("paint", {"where": choice_of("dock", "wall")}, "where")
     robot = replace(ROBOT, skills={**SKILLS, "paint": paint})
     simulated = Simulated(program_of("do: [{paint: dock}, {paint: wall}]", robot), robot=robot)
-    simulated.story = MissionStory("test", robot.skills)
     assert simulated.advance(5) == "success"
     given = [event.arguments["where"] for _, event in simulated.events if isinstance(event, SkillStarted)]
     assert given == ["dock", "wall"]

@@ -35,6 +35,12 @@ CURES = [
         "do: {for: guest, in: [anna, uncle bob], do: {log: $guest}}",
         ["a text needs quotes: write '\"anna\"'", "a text needs quotes: write '\"uncle bob\"'"],
     ),
+    (
+        "do: {for: room, in: [a, b], do: {go_to: $room}}",
+        ["places: dock, kitchen, window", "places: dock, kitchen, window"],
+    ),
+    ("do: {for: room, in: [a], do: [{log: $room}, {go_to: {pose: $room}}]}", ["places: dock, kitchen, window"]),
+    ("do: {for: room, in: [a], do: [{log: $room}, {go_to: dock}]}", ["a text needs quotes: write '\"a\"'; places: "]),
     ("data: {n: 0}\ndo: {set: {n: $n $n}}", [""]),
     ("do: {wait: five seconds}", [""]),
     (OUTCOMES, ["it ends with success or failure", "it ends with success"]),

@@ -97,7 +97,7 @@ def test_one_that_still_holds_after_its_reaction_is_reported_and_does_not_act_ag
     simulated.set("battery", 0.1)
     assert simulated.advance(20) == "success"
     assert skills(simulated) == ["0 react", "1 a"]
-    assert "1 interrupts.low: its condition still holds" in "\n".join(simulated.told)
+    assert "1 mission.yaml:3: its condition still holds" in "\n".join(simulated.told)
 
 
 def test_a_value_that_has_not_arrived_cuts_nothing() -> None:
@@ -109,7 +109,7 @@ def test_a_value_that_has_not_arrived_cuts_nothing() -> None:
 def test_a_failed_reaction_ends_the_mission_in_failure() -> None:
     simulated = low("- a\n- b", fails={"recharge": fails(1)})
     assert simulated.advance(20) == "failure"
-    assert simulated.told[-1].endswith("the reaction of 'low' failed: interrupts.low.recharge: no luck")
+    assert simulated.told[-1].endswith("the reaction of 'low' failed: mission.yaml:5: no luck")
     assert simulated.running == {}
 
 

@@ -61,7 +61,7 @@ def test_an_end_of_its_own_keeps_its_name_and_counts_as_it_says() -> None:
     simulated = simulate(text, fails={"b": fails(1)})
     assert simulated.advance(20) == "failure"
     assert simulated.ended == "lost"
-    assert simulated.told[-1].endswith("mission test: failure: ended in lost: machine.back.b: no luck")
+    assert simulated.told[-1].endswith("mission test: failure: ended in lost: mission.yaml:16: no luck")
 
 
 @pytest.mark.parametrize("counts_as", ["success", "failure"])

@@ -55,7 +55,7 @@ def test_a_timeout_halts_the_leaf_and_fails_the_node() -> None:
     assert simulated.told == [
         "0 a",
         "2 a: halted (2 s): timeout of 2 s",
-        "2 mission test: failure: do.a: timeout of 2 s",
+        "2 mission test: failure: mission.yaml:2: timeout of 2 s",
     ]
     assert simulated.running == {}
 

@@ -119,7 +119,7 @@ def test_why_it_failed_is_that_of_the_last_attempt() -> None:
     )
     simulated.takes = {"a": 1.0, "b": 9.0}
     assert simulated.advance(20) == "failure"
-    assert simulated.told[-1] == "2.5 mission test: failure: do.sequence.a.0: no luck"
+    assert simulated.told[-1] == "2.5 mission test: failure: mission.yaml:2: no luck"
 
 
 def test_the_order_of_all_modifiers_in_the_text_does_not_matter() -> None:

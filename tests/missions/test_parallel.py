@@ -248,4 +248,4 @@ def test_the_failure_of_a_branch_that_does_not_count_is_not_the_reason() -> None
     text = "do:\n  parallel:\n    one: b\n    two: {check: false}\n  ends_with: one"
     simulated = simulate(text, fails={"b": fails(1)})
     assert simulated.advance(5) == "failure"
-    assert simulated.told[-1] == "1 mission test: failure: do.parallel.one.b: no luck"
+    assert simulated.told[-1] == "1 mission test: failure: mission.yaml:3: no luck"

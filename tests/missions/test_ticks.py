@@ -44,7 +44,7 @@ def test_one_attempt_per_tick_and_a_hundred_ticks_at_one_instant() -> None:
 def test_the_loop_that_does_not_wait_is_named_once() -> None:
     simulated = simulate("rate: 10 Hz\ndo:\n  repeat: forever\n  do:\n    check: 1 < 2")
     assert simulated.advance(1.0) == "running"
-    assert simulated.told == ["0 do.repeat: does not wait: 100 ticks at one instant, slowed down from now on"]
+    assert simulated.told == ["0 mission.yaml:3: does not wait: 100 ticks at one instant, slowed down from now on"]
 
 
 def test_a_failing_leaf_that_is_tried_for_ever_at_once_does_not_hang_the_engine() -> None:
@@ -170,7 +170,7 @@ def test_results_are_told_in_the_order_in_which_they_came_and_before_what_follow
         "1 a: success (1 s)",
         "1 b",
         "2 b: failure (1 s): no luck",
-        "2 mission test: failure: do.sequence.b.1: no luck",
+        "2 mission test: failure: mission.yaml:1: no luck",
     ]
 
 

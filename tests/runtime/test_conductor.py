@@ -347,6 +347,13 @@ def test_facts_and_time_come_from_the_processes() -> None:
     assert (stage.conductor.time, stage.conductor.facts) == (12.5, {"base": {"distance": "8.0 m"}})
 
 
+def test_the_router_has_no_robot_time() -> None:
+    stage = Stage(options=RunOptions(is_stepped=True)).start()
+    stage.speak("router", say.Alive(80.0))  # while code is compiled, stepped time stands still
+    stage.speak("world", say.Summary(2.45, {}))
+    assert stage.conductor.time == 2.45
+
+
 def test_answers_reach_who_asked() -> None:
     stage = Stage().start()
     stage.speak("mission", say.Answered(7, {"next": 3}))

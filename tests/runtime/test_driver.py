@@ -45,7 +45,7 @@ class Rig:
 
     def __init__(self, supervisor: Channel, channel: Channel, rate: float | None) -> None:
         self.clock, self.scheduler, self.inbox = SteppedClock(), Scheduler(), CallbackInbox()
-        self.supervisor = supervisor
+        self.supervisor, self.channel = supervisor, channel
         self.driven = Driven(lambda: self.scheduler.next_due() is None)
         self.driver = SteppedDriver(self.scheduler, self.clock, self.inbox, channel, self.driven, rate=rate)
         self.story: list[tuple[float, str]] = []
@@ -104,6 +104,22 @@ def test_after_halt_time_stands_still_for_good() -> None:
         r.driver.go()
         r.driver.run()
         assert (r.story, r.clock.now()) == ([(1.0, "first")], 1.0)
+
+
+def test_an_answer_too_long_for_one_send_does_not_wait_for_the_next_beats() -> None:
+    with rig() as r:
+        answer, received = say.Answered(1, "x" * 5_000_000), list[say.ChannelMessage]()
+        r.driven.on_message = lambda message: r.channel.send(answer)
+
+        def has_arrived() -> bool:
+            received.extend(r.supervisor.receive())
+            return bool(received)
+
+        r.driven.until = has_arrived
+        r.supervisor.send(say.Ask(1, "camera", {}))
+        r.driver.run()
+        assert received == [answer]
+        assert not r.channel.is_behind
 
 
 def test_each_message_is_carried_out_to_its_end_before_the_next() -> None:

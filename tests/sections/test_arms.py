@@ -9,7 +9,9 @@ import pytest
 
 from rbxcompose.domains.arms.motion.inverse_kinematics import SolverSettings
 from rbxcompose.domains.body.link_pairs import digest_of
+from rbxcompose.testing.manifests import check_text
 from tests.body.described import described
+from tests.misconfig.corpus import HERE
 from tests.parts.project import Project
 
 ROBOT = """
@@ -242,3 +244,29 @@ def test_settings_of_the_searches_reach_the_arm(tmp_path: Path) -> None:
     config = arm_of(project).config
     assert not config.planner.simplify
     assert config.kinematics.settings == SolverSettings(3, 1.0, 0.01)
+
+
+@pytest.mark.parametrize(
+    ("arm", "cure"),
+    [
+        (
+            "chain: {from: right_elbow_flex_link, to: gripper}",
+            "links that move below 'right_elbow_flex_link': right_tip, ",
+        ),
+        ("chain: {to: right_tp}", "did you mean 'right_tip'?"),
+        ("gripper: hand", "add 'hand: {type: gripper, ...}' below 'controllers'"),
+        ("gripper: right_controler", "add 'right_controler: {type: gripper, ...}' below 'controllers'"),
+        ("controller: hand", "controllers of type joint_trajectory: right_controller"),
+    ],
+)
+def test_a_name_that_is_missing_brings_those_that_could_stand_there(arm: str, cure: str, tmp_path: Path) -> None:
+    checked = Project(tmp_path).check(ROBOT.replace("right_arm:", "right:") + f"arms: {{right_arm: {{{arm}}}}}\n")
+    (finding,) = checked.compilation.report
+    assert (finding.code, finding.help[: len(cure)]) == ("RBX1004", cure)
+
+
+def test_only_grippers_are_listed_for_a_gripper(tmp_path: Path) -> None:
+    text = (HERE / "wrong/gripper_of_another_arm/left_and_right.yaml").read_text(encoding="utf-8")
+    checked = check_text(text.replace("gripper: right_gripper_controller", "gripper: hand"), tmp_path)
+    (finding,) = checked.compilation.report
+    assert (finding.code, finding.help) == ("RBX1004", "controllers of type gripper: right_gripper_controller")

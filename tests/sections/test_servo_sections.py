@@ -212,3 +212,45 @@ def test_real_servos_need_a_port(tmp_path: Path) -> None:
     checked = check_text(HEAD + SERVOS, tmp_path, others={"head.urdf": BODY}, real=True)
     assert checked.codes == ["RBX1002"]
     assert "robot.yaml:6:3" in checked.text
+
+
+def first_help(text: str, tmp_path: Path) -> tuple[str, str]:
+    """Return the code of the first finding about a robot with the head above, and what its help says."""
+    checked = check_text(HEAD + text, tmp_path, others={"head.urdf": BODY})
+    finding = next(iter(checked.compilation.report))
+    return finding.code, finding.help
+
+
+@pytest.mark.parametrize("word", ["baudrate", "baud_rate", "bitrate"])
+def test_words_of_other_programs_for_the_rate_of_a_line_are_baud(word: str, tmp_path: Path) -> None:
+    text = SERVOS.replace("rate: 50 Hz", f"{word}: 1000000")
+    assert first_help(text, tmp_path) == ("RBX1001", "did you mean 'baud'?")
+
+
+PUBLISHED = "what is measured is published without a controller: remove it"
+
+
+@pytest.mark.parametrize(
+    ("written", "cure"),
+    [
+        ("joint_trajectory_controller/JointTrajectoryController", "did you mean 'joint_trajectory'?"),
+        ("position_controllers/JointTrajectoryController", "did you mean 'joint_trajectory'?"),
+        ("joint_trajectory_controller", "did you mean 'joint_trajectory'?"),
+        ("forward_command_controller/ForwardCommandController", "did you mean 'joint_command'?"),
+        ("position_controllers/JointGroupPositionController", "did you mean 'joint_command'?"),
+        ("position_controllers/GripperActionController", "did you mean 'gripper'?"),
+        ("parallel_gripper_action_controller/GripperActionController", "did you mean 'gripper'?"),
+        ("diff_drive_controller/DiffDriveController", "did you mean 'diff_drive'?"),
+        ("gpio_controllers/GpioCommandController", "did you mean 'gpio'?"),
+        ("joint_state_broadcaster/JointStateBroadcaster", PUBLISHED),
+        ("JointStateBroadcaster", PUBLISHED),
+        ("joint_state_broadcaster", PUBLISHED),
+        ("imu_sensor_broadcaster/IMUSensorBroadcaster", PUBLISHED),
+        ("joint_state_controller/JointStateController", PUBLISHED),
+        ("mecanum_drive_controller/MecanumDriveController", ""),
+        ("admittance_controller/AdmittanceController", ""),
+        ("joint_trajectry", "did you mean 'joint_trajectory'?"),
+    ],
+)
+def test_types_of_ros2_control_have_ours_as_their_cure_or_none(written: str, cure: str, tmp_path: Path) -> None:
+    assert first_help(SERVOS.replace("type: joint_trajectory", f"type: {written}"), tmp_path) == ("RBX1004", cure)

@@ -31,6 +31,7 @@ WRONG = {
     "RBX6141": {"robots:": "links:\n  wifi: {between: [robot, desk], protocol: quic, "
                 "priorities: {cmd_vel: low}}\nrobots:"},
     "RBX6108b": {"file:places:": "bus: {access: user}\n\nplaces:"},
+    "RBX6153": {"stop_within: 0.6 s": "stop_within: 600"},
     "RBX6140": {"stop_within: 0.6 s": "stop_within: 0.5 s"},
     "RBX6108": {"file:places:": "bus: {router: tcp/10.0.0.1:7447}\n\nplaces:"},
     "RBX6123": {"on: desk": "on: desk\n    share: [odm, go_to]"},
@@ -60,9 +61,12 @@ WRONG = {
     "RBX6146": {"{address: 10.42.0.1}": "{address: 10.42.0.2}"},
     "RBX1302": {"profile: linked": "profile: garden"},
     "RBX1001": {"hosts:": "hots:"},
+    "RBX1001b": {"kind: System": "kind: System\nstop_within: 1 s", "on: desk": "on: desk\n    address: 10.42.0.3"},
     "RBX1002": {"robots:": "other:"},
     "RBX1003b": {"  robot: {address": "  - {name: robot, address", "  desk: {address": "  - {name: desk, address"},
     "RBX1003": {"address: 10.42.0.2": "address: [1, 2]"},
+    "RBX1003c": {"address: 10.42.0.2": "address: 10.42.0.300", "address: 10.42.0.1":
+                 "address: 10.42.0.1, ssh: pi@10.42.0"},
 }  # fmt: skip
 
 

@@ -22,7 +22,7 @@ from rbxcompose.base.expressions.types import (
     list_of,
     quantity_of,
 )
-from rbxcompose.base.findings import DID_YOU_MEAN, suggest, surely_meant
+from rbxcompose.base.findings import DID_YOU_MEAN, clauses, suggest, surely_meant
 
 
 def _written(node: tree.ExpressionNode) -> tree.Number | None:
@@ -198,7 +198,7 @@ class _Checker:
         meant = surely_meant(node.name, self.scope.variables())
         fix = suggest(f"${node.name}", names, "names")
         if not fix.startswith(DID_YOU_MEAN):
-            fix = f"{fix}; new ones are declared as {_DECLARED}".removeprefix("; ")
+            fix = clauses(fix, f"new ones are declared as {_DECLARED}")
         return self.wrong(node, f"unknown name '${node.name}'", fix, f"${meant}" if meant else "")
 
     def word(self, node: tree.Word, expected: Type) -> Type:
@@ -214,7 +214,7 @@ class _Checker:
             known = list(self.scope.words())
             fix, meant = suggest(node.name, known, "places"), surely_meant(node.name, known) or ""
             if expected == UNKNOWN and not fix.startswith(DID_YOU_MEAN):
-                fix = f"{quotes_needed(node.name)}{f'; {fix}' if fix else ''}"
+                fix = clauses(quotes_needed(node.name), fix)
             variable = "" if meant else surely_meant(node.name, self.scope.variables())
             if variable:
                 fix, meant = f"did you mean '${variable}'?", f"${variable}"

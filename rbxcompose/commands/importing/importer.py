@@ -15,6 +15,7 @@ OTHER_PROGRAM = kind("RBX2231")
 DISAGREES = kind("RBX2232")
 
 NOTHING_LEFT = kind("RBX2238")
+CLOCK = "'bus: {clock: external}' makes robot time follow '/clock'"  # instead of `use_sim_time`
 
 PLUGINS = Plugins("importer", "importers")
 _IMPORTERS: dict[str, Importer] = {}  # those that have been imported, by name

@@ -18,8 +18,7 @@ from rbxcompose.manifest.files import files_named
 from rbxcompose.manifest.reader import read_file
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, at
 from rbxcompose.missions.analysis.bounds import Bounds, Known, truth
-from rbxcompose.missions.analysis.effects import replaced, written
-from rbxcompose.missions.analysis.facts import Constants, place_in_text
+from rbxcompose.missions.analysis.facts import Constants, place_in_text, shortened
 from rbxcompose.missions.analysis.travel_times import too_short
 from rbxcompose.missions.language.asked import expression_of, inner_span
 from rbxcompose.missions.program.program import END, Interrupt, MissionNode, Program
@@ -87,26 +86,21 @@ def _expressions(program: Program) -> Iterator[tuple[ScalarNode, syntax.Expressi
 
 @check("RBX4131", closed=("places",))
 def place_in_data(robot: Robot) -> Iterator[Finding]:
-    """The data of a mission name a place that the robot does not know."""
+    """The data or inputs of a mission name a place that the robot does not know."""
     places = robot.manifest.places
     for mission in robot.missions.values():
-        program, known = mission.program, {**_shortened(mission.program), **constants(mission)}
-        wrong = {name: _without(value, places) for name, value in known.items() if name in program.data}
+        program, known = mission.program, {**shortened(mission.program), **constants(mission)}
+        names = program.data.keys() | mission.given.keys()
+        wrong = {name: _without(value, places) for name, value in known.items() if name in names}
         for node, name in _goals(robot, program):
             for text, datum in _texts(program, node, name, wrong):
                 yield place_in_data.at(
-                    _place_of(program, datum, text),
+                    _place_of(program, datum, text) if datum in program.data else mission.given[datum],
                     f"there is no place '{text}', which '{node.skill}' gets from '${name}'",
                     help=suggest(text, places, "places of this robot"),
                     related=[Related(node.span, "used here")],
                     about=(text, node.skill),
                 )
-
-
-def _shortened(program: Program) -> Constants:
-    """Return the data that only ever lose items: what remains of them was there from the start."""
-    names = (written(program) & program.data.keys()) - replaced(program)
-    return {name: program.data[name].value for name in names}
 
 
 def _without(value: Value, places: Collection[str]) -> Value:

@@ -155,7 +155,7 @@ def timeout_and_way(robot: Robot) -> Iterator[Finding]:
                 what = f"the way from '{here.name}' to '{there.name}' ({away})"
                 related = [Related(robot.key("places", place.name), f"'{place.name}'") for place in one.leg]
             yield timeout_and_way.at(
-                place_in_text(one.node, one.node.limit),
+                place_in_text(one.node, one.limit),
                 f"{what} takes at least {format_quantity(round(one.needs, 2), TIME)}, "
                 f"but has {format_quantity(one.given, TIME)}",
                 help="give it two or three times as long as it needs",

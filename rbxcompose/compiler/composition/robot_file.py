@@ -18,8 +18,9 @@ from rbxcompose.manifest import registry
 from rbxcompose.manifest.documents import Documents, ManifestHeader
 from rbxcompose.manifest.files import find, project_of, shown_name
 from rbxcompose.manifest.fill import SHOWN_SECRET, fill, names_of
+from rbxcompose.manifest.scalars import is_empty
 from rbxcompose.manifest.secrets import Secrets
-from rbxcompose.manifest.section import ROBOT, Contents, Section, is_empty
+from rbxcompose.manifest.section import ROBOT, Contents, Section
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, all_nodes, at, key_span
 from rbxcompose.manifest.validate import UNKNOWN_KEY
 from rbxcompose.manifest.yaml_nodes import is_moderate

@@ -78,7 +78,8 @@ def read_missions(
             places = places_of(manifest)
             inputs, findings = bind_inputs(program, given, places, entry.span, gone, is_begun=is_begun)
             report.extend(findings)
-            found[name] = RobotMission(name, program, inputs)
+            written_at = {key: written.value.span for key, written in given.items()}
+            found[name] = RobotMission(name, program, inputs, written_at)
     using = Using({name: mission.program for name, mission in found.items()})
     report.extend(using.findings)
     written = frozenset(missions.names_in(manifest.root))

@@ -130,6 +130,8 @@ class RobotMission:
     name: str
     program: Program
     inputs: Mapping[str, object] = field(default_factory=dict)
+    given: Mapping[str, Span] = field(default_factory=dict)
+    """The places of the values that inputs are given instead of their defaults."""
 
 
 @dataclass(frozen=True, eq=False)

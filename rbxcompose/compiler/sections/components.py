@@ -7,7 +7,18 @@ from typing import Any
 
 from rbxcompose.base.config import COMPONENT, Config, Name
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.findings import DID_YOU_MEAN, SIMILAR, Finding, Report, Span, kind, nearest, replacement, suggest
+from rbxcompose.base.findings import (
+    DID_YOU_MEAN,
+    SIMILAR,
+    Finding,
+    Report,
+    Span,
+    clauses,
+    kind,
+    nearest,
+    replacement,
+    suggest,
+)
 from rbxcompose.base.plugins import BROKEN, LEFT_OUT, BrokenPluginError
 from rbxcompose.base.printable import plain
 from rbxcompose.manifest.foreign_words import COMPONENTS as FOREIGN_TYPES
@@ -184,7 +195,7 @@ def _report_other_type(type_name: str, unknown: Set[str], keys: Collection[str],
     for index, finding in enumerate(report.findings[before:], before):
         is_meant = finding.code == UNKNOWN_KEY.code and not finding.help.startswith(DID_YOU_MEAN)
         if is_meant and not unknown.isdisjoint(finding.about):
-            text = f"the type '{fitting[0]}' takes this key; {finding.help}".removesuffix("; ")
+            text = clauses(f"the type '{fitting[0]}' takes this key", finding.help)
             report.findings[index] = replace(finding, help=text)
 
 

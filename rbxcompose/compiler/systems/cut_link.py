@@ -8,8 +8,8 @@ lease of the link, and what it moved commands nothing from then on. So the lease
 from collections.abc import Iterator
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.findings import Finding, kind
-from rbxcompose.base.units import TIME, format_quantity
+from rbxcompose.base.findings import Finding, Severity, kind
+from rbxcompose.base.units import LENGTH, TIME, format_quantity
 from rbxcompose.bus.endpoints import LINK_LEASE
 from rbxcompose.compiler.model.flow import MessageFlow
 from rbxcompose.compiler.model.robot import RobotComponent
@@ -22,7 +22,10 @@ CYCLES = 2
 SLOWEST = 50.0  # [Hz] of a base that does not tell its rate
 SHORTEST_LEASE = 0.4  # [s]; links that pause for less are common
 
+LONGEST = 60.0  # [s] that a system may let a base drive on: links do not pause for so long
+
 LATE_STOP = kind("RBX6140")
+LONG_STOP = kind("RBX6153", Severity.WARNING)
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,6 +137,8 @@ def every_stop(robot: PlacedRobot) -> Iterator[tuple[str, StopAfterCut | StopOfG
 def slow_stops(system: System, robot: PlacedRobot) -> Iterator[Finding]:
     """Yield the bases that move on for longer than the system allows."""
     allowed, reported = robot.model.stop_within, set[str]()
+    if allowed > LONGEST:
+        yield from _long_stop(system, robot)
     for base, one in every_stop(robot):
         if base not in reported and (one.time is None or one.time > allowed + 1e-9):
             reported.add(base)
@@ -141,3 +146,13 @@ def slow_stops(system: System, robot: PlacedRobot) -> Iterator[Finding]:
             span = robot.span(system.root, "stop_within" if written else "robot")
             message = f"after a link is cut, {one.text}; allowed is {format_quantity(allowed, TIME)}"
             yield LATE_STOP.at(span, message, help="shorten its 'command_timeout' or limit its speeds in a profile")
+
+
+def _long_stop(system: System, robot: PlacedRobot) -> Iterator[Finding]:
+    """Yield the finding about a `stop_within` that was surely meant in milliseconds, with how far a base may drive."""
+    allowed = robot.model.stop_within
+    speeds = [drives.max_speed.value for _, drives in robot.robot.declared(Drives) if drives.max_speed]
+    far = f": {format_quantity(round(allowed * max(speeds), 1), LENGTH)}" if speeds else ""
+    message = f"'{robot.name}' may drive on for {format_quantity(allowed, TIME)} after a link is cut{far}"
+    help_text = f"a second or two is usual; if these are milliseconds, write '{allowed:g} ms'"
+    yield LONG_STOP.at(robot.span(system.root, "stop_within"), message, help=help_text)

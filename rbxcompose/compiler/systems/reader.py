@@ -87,6 +87,7 @@ def compile_system(
     if root is None:
         return out
     out.root = root = documents.meant(SystemFile, root)
+    out.root = root = documents.placed(SystemFile, root, {**SECTIONS, **LINKS})
     documents.check(SystemFile, root)
     out.root = root = _with_profiles(root, out, documents)
     out.root = root = fill(root, names_of(_text(root, "name"), not real, environment), out.report)

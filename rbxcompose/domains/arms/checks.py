@@ -34,6 +34,9 @@ from rbxcompose.msgs.moveit_msgs import CollisionObject
 from rbxcompose.sdk.capabilities import Drives, PutsThings, WritesFrame
 from rbxcompose.sdk.ports import Out
 
+_ELSEWHERE = (NodeFlow.FIRST, NodeFlow.ONE_OF, NodeFlow.OPEN)
+"""How nodes go through children after whose failure others may follow."""
+
 
 @dataclass(frozen=True, slots=True)
 class WrittenReach:
@@ -51,7 +54,7 @@ class WrittenReach:
         node: MissionNode | None = self.node
         while node is not None:
             above = None if node.parent is None else self.mission.program.nodes[node.parent]
-            if node.is_forgiven or (above is not None and above.step.flow in (NodeFlow.ONE_OF, NodeFlow.OPEN)):
+            if node.is_forgiven or (above is not None and above.step.flow in _ELSEWHERE):
                 return True
             node = above
         return False

@@ -12,7 +12,7 @@ import numpy as np
 
 from rbxcompose.base.config import Angle, Config, Length, Ratio, Speed
 from rbxcompose.base.files import replace_file
-from rbxcompose.base.findings import Report, kind, suggest
+from rbxcompose.base.findings import Report, clauses, kind, suggest
 from rbxcompose.base.units import ANGLE, LENGTH, Dimension
 from rbxcompose.commands.console import NotDoneError, misused, refuse, write_report
 from rbxcompose.commands.targets import compiled, missing_extras, robot_path
@@ -173,7 +173,7 @@ def chosen_arm(arguments: argparse.Namespace, *, is_fast: bool = False) -> tuple
     found = robot.manifest.contents.of(arms)
     name = arguments.arm or (next(iter(found)) if len(found) == 1 else "")
     if name not in found:
-        words = f"there is no arm '{name}'; {suggest(name, found, 'arms')}" if name else "name one with --arm"
+        words = clauses(f"there is no arm '{name}'", suggest(name, found, "arms")) if name else "name one with --arm"
         raise NotDoneError(NO_MOTION.at(None, words if found else "this robot has no arms"))
     config, description = robot.components[name].config, robot.manifest.contents.of(body)
     if not isinstance(config, ArmConfig) or description is None:
@@ -205,7 +205,7 @@ def positions_in(works: ArmWorks, robot: ArmOfRobot, written: str) -> dict[str, 
     if written in robot.model.poses:
         return {joint: position.value for joint, position in robot.model.poses[written].items()}
     if not written.startswith("{"):
-        message = f"there is no pose '{written}'; {suggest(written, robot.model.poses, 'poses')}"
+        message = clauses(f"there is no pose '{written}'", suggest(written, robot.model.poses, "poses"))
         raise NotDoneError(NO_MOTION.at(None, message))
     return read_joints(written, {joint.name: LENGTH if joint.slides else ANGLE for joint in works.space.joints})
 
@@ -219,7 +219,7 @@ def read_joints(written: str, dimensions: Mapping[str, Dimension]) -> dict[str, 
     read = read_written(dict[str, JointPosition], written)
     for name, position in read.items():
         if name not in dimensions:
-            message = f"'{name}' is no joint of this arm; {suggest(name, dimensions, 'joints')}"
+            message = clauses(f"'{name}' is no joint of this arm", suggest(name, dimensions, "joints"))
             raise NotDoneError(NO_MOTION.at(None, message))
         if position.dimension != dimensions[name]:
             word = "slides" if dimensions[name] == LENGTH else "turns"

@@ -11,7 +11,7 @@ from rbxcompose.base.printable import plain
 from rbxcompose.base.scheduler import Scheduler
 from rbxcompose.bus.local import Inbox
 from rbxcompose.bus.names import admin_key
-from rbxcompose.bus.transport import Arrival, Transport, TransportReply
+from rbxcompose.bus.transport import LONGEST_WAIT, Arrival, Transport, TransportReply
 from rbxcompose.bus.window import SCHEMA
 from rbxcompose.commands.console import NotDoneError, emit
 from rbxcompose.commands.guest import Guest
@@ -97,7 +97,8 @@ class WindowViews:
             return
         self._asked.add(path)
         inbox: Inbox[TransportReply] = Inbox(NAME, None, partial(self._answered, path), self._guest.scheduler.post)
-        self._guest.transport.ask(admin_key(self._robot, path), b"", b"", partial(self._put, inbox))
+        answered = partial(self._put, inbox)
+        self._guest.transport.ask(admin_key(self._robot, path), b"", b"", answered, of_all=True, within=LONGEST_WAIT)
 
     def _answered(self, path: str, answer: TransportReply) -> None:
         if path not in self._asked:

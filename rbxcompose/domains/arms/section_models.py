@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import Field, ValidationInfo, WithJsonSchema, field_validator
 
-from rbxcompose.base.config import OBJECT, Angle, Config, Frequency, Length, LinkName, Name, Refers, Time
+from rbxcompose.base.config import LINK, OBJECT, Angle, Config, Frequency, Length, LinkName, Name, Refers, Time
 from rbxcompose.manifest.fields import TopicName
 
 AUTOMATIC, FAST = "automatic", "fast"
@@ -129,7 +129,7 @@ class ChainModel(Config):
 
     from_: LinkName = Field(alias="from")
     """The link that carries it."""
-    to: LinkName
+    to: Annotated[str, Refers(LINK, is_reported=True)]
     """The link at its end, whose frame its goals are for."""
 
 

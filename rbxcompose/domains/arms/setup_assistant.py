@@ -16,7 +16,8 @@ from rbxcompose.base.files import replace_file
 from rbxcompose.base.findings import Finding, Report, Severity, Sources, kind
 from rbxcompose.base.printable import plain
 from rbxcompose.commands.console import FINDINGS, emit, refuse, write_report
-from rbxcompose.commands.new_files import name_like, write_new
+from rbxcompose.commands.new_files import name_like, robot_file, write_new
+from rbxcompose.commands.options import out_option
 from rbxcompose.commands.targets import compiled, missing_extras, robot_path
 from rbxcompose.compiler.compile import Compilation
 from rbxcompose.compiler.model.robot import Robot
@@ -46,7 +47,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--seed", type=whole_number(0), default=1, metavar="S", help="the same one gives the same file")
     words = "the file (default: the one under 'collisions', or ROBOT.collisions.yaml; a profile has its own)"
-    parser.add_argument("--out", metavar="FILE", help=words)
+    out_option(words)(parser)
     words = "examine all poses on the shapes of the body instead, and report what collides"
     parser.add_argument("--check", action="store_true", help=words)
     words = "print a robot with the arms that a .urdf file seems to have, or write it to the file of --out"
@@ -244,7 +245,7 @@ def run_proposal(arguments: argparse.Namespace, description: Description, file: 
     if arguments.out is None:
         emit(text.rstrip("\n"))
         return 0
-    out = Path(arguments.out)
+    out = robot_file(arguments.out)
     if (problem := write_new(out.parent, {out.name: text})) is not None:
         return refuse(problem)
     emit(f"wrote {shown_name(out.absolute())}: {', '.join(draft.name for draft in drafts)}")

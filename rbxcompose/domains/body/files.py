@@ -6,12 +6,11 @@ import re
 import struct
 from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequence
 from dataclasses import field, replace
-from functools import cache
 from pathlib import Path
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.files import open_regular
-from rbxcompose.base.findings import Finding, Span, kind
+from rbxcompose.base.findings import Finding, Related, Span, kind
 from rbxcompose.base.printable import plain
 from rbxcompose.domains.body.model import Body
 from rbxcompose.domains.body.xacro import Expanded, XacroFile, expand_all
@@ -24,6 +23,7 @@ BAD_MESH = kind("RBX2015")
 LARGEST = 64_000_000  # [bytes]
 _HEAD = 8_192  # [bytes] that are read
 _SHOWN = 200
+_MOST_PLACES = 8
 _TEXT = {7, 8, 9, 10, 12, 13, 27, *range(32, 256)}
 _ELEMENTS = re.compile(rb"^element\s+\w+\s+(\d{1,20})\s*$", re.MULTILINE)
 PACKAGE = "package://"
@@ -32,15 +32,27 @@ LIBRARY = "rbxcompose"
 
 
 def mesh_mistakes(body: Body, meshes: Mapping[str, Path]) -> Iterator[Finding]:
-    """Yield the shapes whose mesh cannot be read; `meshes` are the files that exist, by their names in the URDF."""
-    problem = cache(mesh_problem)
+    """Yield the meshes that cannot be read; `meshes` are the files that exist, by their names in the URDF."""
+    for name, (first, *others) in mesh_places(body).items():
+        if name in meshes and (words := mesh_problem(meshes[name])):
+            yield BAD_MESH.at(first, f"the mesh '{plain(name, _SHOWN)}' {words}", related=named_also(others))
+
+
+def mesh_places(body: Body) -> dict[str, list[Span]]:
+    """Return the places that name each mesh, once each, in the order of the body."""
+    found: dict[str, dict[Span, None]] = {}
     for link in body.links.values():
         for shape in (*link.visuals, *link.collisions):
-            path = meshes.get(shape.geometry.file)
-            if path is not None and (words := problem(path)):
-                yield BAD_MESH.at(
-                    shape.size_span or shape.span, f"the mesh '{plain(shape.geometry.file, _SHOWN)}' {words}"
-                )
+            if shape.geometry.kind == "mesh":
+                found.setdefault(shape.geometry.file, {})[shape.size_span or shape.span] = None
+    return {name: [*spans] for name, spans in found.items()}
+
+
+def named_also(places: Sequence[Span]) -> list[Related]:
+    """Return the other places that name a mesh: the first of them, if there are many."""
+    rest = len(places) - _MOST_PLACES
+    related = [Related(span, "and here") for span in places[:_MOST_PLACES]]
+    return related if rest <= 0 else [*related[:-1], Related(related[-1].span, f"and here, and {rest} more")]
 
 
 def mesh_problem(path: Path, most: int = LARGEST) -> str:

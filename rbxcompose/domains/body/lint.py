@@ -10,6 +10,7 @@ from types import MappingProxyType
 from rbxcompose.base.findings import DID_YOU_MEAN, Finding, Severity, kind
 from rbxcompose.base.geometry import Transform3, Vector3, rotate
 from rbxcompose.base.printable import plain
+from rbxcompose.domains.body.files import mesh_places, named_also
 from rbxcompose.domains.body.model import Body, BodyJoint, BodyLink, Geometry, Inertial, JointLimits, Shape
 from rbxcompose.domains.body.urdf import rpy_of
 from rbxcompose.domains.body.xml_reader import XmlElement
@@ -211,8 +212,14 @@ def lint(body: Body, meshes: Collection[str], respelt: Mapping[str, str] = Mappi
     `respelt` has names of files that exist, for those that differ only in their capitals.
     """
     yield from mass_mistakes(body)
+    for name, (first, *others) in mesh_places(body).items():
+        if name not in meshes:
+            near = respelt.get(name, "")
+            help_text = f"{DID_YOU_MEAN} '{near}'? Capitals count" if near else _where_meshes_are(name)
+            message = f"the mesh '{plain(name)}' does not exist"
+            yield NO_MESH.at(first, message, help=help_text, related=named_also(others))
     for link in body.links.values():
-        yield from _shapes(link, meshes, respelt)
+        yield from _shapes(link)
     for joint in body.joints.values():
         if (away := math.hypot(*joint.origin.translation)) > LARGEST:
             message = f"joint '{plain(joint.name, _SHOWN)}' is {away:g} m away from the link that carries it"
@@ -260,16 +267,10 @@ def _stuck(joint: BodyJoint, limits: JointLimits) -> Iterator[str]:
             yield "effort"
 
 
-def _shapes(link: BodyLink, meshes: Collection[str], respelt: Mapping[str, str]) -> Iterator[Finding]:
+def _shapes(link: BodyLink) -> Iterator[Finding]:
     for shape in (*link.visuals, *link.collisions):
-        geometry = shape.geometry
-        if geometry.kind == "mesh" and geometry.file not in meshes:
-            message = f"the mesh '{plain(geometry.file)}' does not exist"
-            near = respelt.get(geometry.file, "")
-            help_text = f"{DID_YOU_MEAN} '{near}'? Capitals count" if near else _where_meshes_are(geometry.file)
-            yield NO_MESH.at(shape.size_span or shape.span, message, help=help_text)
         if largest := _extent(shape):
-            message = f"a {geometry.kind} of link '{plain(link.name, _SHOWN)}' is {largest:g} m long"
+            message = f"a {shape.geometry.kind} of link '{plain(link.name, _SHOWN)}' is {largest:g} m long"
             yield MILLIMETRES.at(shape.size_span or shape.span, message, help=_LACKS_UNIT)
 
 

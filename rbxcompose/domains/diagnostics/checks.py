@@ -31,14 +31,15 @@ from rbxcompose.sdk.component import Component
 from rbxcompose.sdk.ports import Out
 
 REPORTS = 1.0  # [s] between two reports of a component's status
-_OF_ITEMS = ("match", "expected", "strip_prefix", "discard_stale", "count")
+_OF_ITEMS = ("match", "expected", "strip_prefix", "remove_prefix", "discard_stale", "count")
 _OF_LEVELS = ("debounce", "latch", "suppressed_by")
+_HIDDEN = ("timeout", "discard_stale", "count", "path", "remove_prefix", "analyzers", *_OF_LEVELS)
 _WITHOUT_EFFECT = {
     "generic": ("analyzers",),
     "group": (*_OF_ITEMS, "timeout"),
-    "other": ("match", "expected", "strip_prefix", "discard_stale", "analyzers"),
-    "ignore": ("timeout", "discard_stale", "count", "path", "analyzers", *_OF_LEVELS),
-    "discard": ("timeout", "discard_stale", "count", "path", "analyzers", *_OF_LEVELS),
+    "other": ("match", "expected", "strip_prefix", "remove_prefix", "discard_stale", "analyzers"),
+    "ignore": _HIDDEN,
+    "discard": _HIDDEN,
 }
 _MOST_COMPARED = 200_000  # of patterns with names
 

@@ -98,7 +98,7 @@ class GroupItem:
 
     def __init__(self, item: Item, group: Group) -> None:
         self.item, self.group = item, group
-        self.name = stripped(flat(item.name), group.analyzer.strip_prefix)
+        self.name = stripped(flat(item.name), group.analyzer.prefixes)
         self.path = f"{group.path}/{self.name}"
         self.level = OK
 

@@ -80,7 +80,7 @@ class Generic:
         self.analyzer, self.path, self.name, self._is_classic = analyzer, path, name, is_classic
         self.items = {expected: _missing(expected, now) for expected in analyzer.expected}
         self._discards = analyzer.discard_stale and analyzer.timeout > 0
-        self._prefixes = [prefix.replace("/", " ") for prefix in analyzer.strip_prefix]
+        self._prefixes = [prefix.replace("/", " ") for prefix in analyzer.prefixes]
         self._reported, self._reported_at = OK, now  # the level of the header, and since when it has it
 
     @property

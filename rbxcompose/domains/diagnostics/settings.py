@@ -164,6 +164,8 @@ class AnalyzerModel(Config):
     """Whether what is STALE disappears, except what is expected; an empty group disappears after another `timeout`."""
     strip_prefix: tuple[Annotated[str, Field(min_length=1)], ...] = ()
     """Beginnings of names that match, too, and are left out in the tree."""
+    remove_prefix: tuple[Annotated[str, Field(min_length=1)], ...] = ()
+    """Beginnings of names that are left out in the tree, and match nothing by themselves."""
     count: Annotated[Annotated[int, Field(ge=0), Tag("word")] | Annotated[Count, Tag("map")], Discriminator(_shape)] | (
         None
     ) = None
@@ -192,6 +194,11 @@ class AnalyzerModel(Config):
     def conditions(self) -> tuple[Condition, ...]:
         """Return what `match` lists."""
         return self.match or ()
+
+    @property
+    def prefixes(self) -> tuple[str, ...]:
+        """Return the beginnings of names that are left out in the tree."""
+        return self.strip_prefix + self.remove_prefix
 
     @property
     def holds(self) -> tuple[float, float]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from itertools import groupby
 
-from rbxcompose.base.findings import Finding, Related, Severity, correction, suggest, surely_meant
+from rbxcompose.base.findings import Finding, Related, Severity, clauses, correction, suggest, surely_meant
 from rbxcompose.base.rules import NAMES, WIRING
 from rbxcompose.base.units import TIME, format_quantity
 from rbxcompose.compiler.check_runner import check
@@ -209,10 +209,9 @@ def missing(robot: Robot, source: str) -> Wrong | None:
     if component not in robot.written:
         message = f"takes from a component that the robot does not have: '{component}'"
         valid = robot.manifest.components
-        help_text = suggest(component, valid, "components of this robot")
-        if surely_meant(component, set(valid)) is None:
-            help_text += "; without 'from' the input is open to the outside"
-        return Wrong(message, help_text, component, valid)
+        is_sure = surely_meant(component, set(valid)) is not None
+        is_open = "" if is_sure else "without 'from' the input is open to the outside"
+        return Wrong(message, clauses(suggest(component, valid, "components of this robot"), is_open), component, valid)
     part = robot.components.get(component)
     if part is None:
         return None  # it exists, but has mistakes, which are reported at their own place

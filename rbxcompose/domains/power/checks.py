@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.expressions.tree import Comparison, Variable
+from rbxcompose.base.expressions.tree import Comparison, Junction, Variable
 from rbxcompose.base.findings import Finding, Related, Severity
 from rbxcompose.base.rules import MISSIONS, OWN, WIRING
 from rbxcompose.base.units import LENGTH, RATIO, TIME, format_quantity
@@ -16,7 +16,7 @@ from rbxcompose.compiler.model.flow import OTHER_TYPE, is_written, setting_span
 from rbxcompose.compiler.model.mission_facts import batteries, blamed, constants, is_served, navigator_of, ways_of
 from rbxcompose.compiler.model.robot import Robot, RobotComponent, RobotMission
 from rbxcompose.missions.analysis.bounds import truth
-from rbxcompose.missions.analysis.facts import goal_place, number_in
+from rbxcompose.missions.analysis.facts import Constants, goal_place, number_in
 from rbxcompose.missions.analysis.travel_times import Ways, distance, too_short
 from rbxcompose.missions.language.asked import Asked
 from rbxcompose.missions.program.answers import NodeFlow
@@ -150,7 +150,7 @@ def charge_elsewhere(robot: Robot) -> Iterator[Finding]:
         for number, here in ways.starts_at.items():
             node = mission.program.nodes[number]
             charger, charges = charger_of(robot, node.skill) or (None, None)
-            may_fail = node.may_be_left_out or node.is_forgiven
+            may_fail = node.may_be_left_out or not _counts_failures(mission.program, node)
             if charger is None or charges is None or charges.place is None or may_fail:
                 continue
             dock = charges.place.value
@@ -185,6 +185,49 @@ def _ends_of_loops(program: Program, call: ChargeInterrupt) -> Iterator[Asked]:
     for node in program.nodes:
         if node.children and node not in call.reaction:
             yield from (asked for asked in node.asked[: node.own] if asked.is_watched)
+
+
+@check("RBX4190", Severity.WARNING, closed=(OWN,))
+def given_up_before(robot: Robot) -> Iterator[Finding]:
+    """A step gives up at a level above that at which the battery is charged."""
+    for mission in robot.missions.values():
+        for call in calls(robot, mission):
+            for node in mission.program.below(mission.program.main):
+                watched = [asked for asked in node.asked[node.own :] if asked.is_watched]  # those of 'as_long_as'
+                for asked in watched if _counts_failures(mission.program, node) else ():
+                    least = _least_level(asked, call, constants(mission))
+                    if least is not None and call.level < least <= 1.0:
+                        level, limit = format_quantity(call.level, RATIO), format_quantity(least, RATIO)
+                        yield given_up_before.at(
+                            asked.scalar.span,
+                            f"this fails at {limit}, before '{call.interrupt.name}' charges the battery below {level}",
+                            help=f"charge it at {limit} or above, or let this go on until below {level}",
+                            related=[Related(call.interrupt.when.scalar.span, "it charges at this")],
+                        )
+
+
+def _least_level(asked: Asked, call: ChargeInterrupt, known: Constants) -> float | None:
+    """Return the level of the battery that a condition needs at least, None if it needs none."""
+    when, tree = call.interrupt.when.expression.tree, asked.expression.tree
+    level = when.left if isinstance(when, Comparison) else None
+    parts = tree.operands if isinstance(tree, Junction) and tree.operator == "and" else (tree,)
+    for part in parts:
+        match part:
+            case Comparison(operator=">" | ">=", left=Variable(name=name), right=limit):
+                if isinstance(level, Variable) and name == level.name:
+                    return number_in(limit, known)
+    return None
+
+
+def _counts_failures(program: Program, node: MissionNode) -> bool:
+    """Return whether nothing else follows a failure of a step, which may then not be meant."""
+    mission_node: MissionNode | None = node
+    while mission_node is not None:
+        above = None if mission_node.parent is None else program.nodes[mission_node.parent]
+        if mission_node.is_forgiven or (above and above.step.flow in (NodeFlow.FIRST, NodeFlow.OPEN)):
+            return False
+        mission_node = above
+    return True
 
 
 @check("RBX3505", Severity.WARNING, closed=())

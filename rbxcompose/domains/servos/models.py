@@ -12,7 +12,7 @@ from itertools import pairwise
 from types import MappingProxyType
 
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.findings import suggest
+from rbxcompose.base.findings import clauses, suggest
 
 _DIRECTION = 10  # bit of a speed or load in protocol 1.0: set means clockwise, which is negative
 
@@ -351,7 +351,7 @@ class ServoModel:
         try:
             return self.items[name]
         except KeyError:
-            raise KeyError(f"{self.name} has no item '{name}'; {suggest(name, self.items, 'items')}") from None
+            raise KeyError(clauses(f"{self.name} has no item '{name}'", suggest(name, self.items, "items"))) from None
 
     def to_si(self, item: str, raw: int) -> float:
         """Return a raw value in the SI unit of its item."""

@@ -7,7 +7,7 @@ from rbxcompose.base.expressions import tree as syntax
 from rbxcompose.base.expressions.values import Value
 from rbxcompose.base.findings import Span
 from rbxcompose.manifest.tree import ScalarNode
-from rbxcompose.missions.analysis.effects import written
+from rbxcompose.missions.analysis.effects import replaced, written
 from rbxcompose.missions.language.asked import expression_of
 from rbxcompose.missions.program.answers import Skipped
 from rbxcompose.missions.program.program import MissionNode, Program, RobotNames
@@ -19,6 +19,12 @@ def constants_of(program: Program, inputs: Constants) -> dict[str, Value]:
     """Return the inputs and the data that nothing changes."""
     changed = written(program)
     return {**{name: datum.value for name, datum in program.data.items() if name not in changed}, **inputs}
+
+
+def shortened(program: Program) -> Constants:
+    """Return the data that only ever lose items: what remains of them was there from the start."""
+    names = (written(program) & program.data.keys()) - replaced(program)
+    return {name: program.data[name].value for name in names}
 
 
 def number_of(expression: syntax.Expression | None, constants: Constants) -> float | None:

@@ -6,8 +6,9 @@ from dataclasses import field
 
 from rbxcompose.base.config import Place
 from rbxcompose.base.dataclass import dataclass
+from rbxcompose.base.expressions.tree import Expression
 from rbxcompose.base.geometry import Pose2
-from rbxcompose.missions.analysis.facts import Constants, goal_place, items_of, number_of
+from rbxcompose.missions.analysis.facts import Constants, goal_place, items_of, number_of, shortened
 from rbxcompose.missions.program.answers import NodeFlow
 from rbxcompose.missions.program.program import ROOT, MissionNode, Program
 
@@ -33,6 +34,8 @@ class TooShort:
     node: MissionNode
     given: float
     needs: float
+    limit: Expression | None
+    """What gives it the time."""
     leg: tuple[Place, Place] | None = None
 
 
@@ -58,10 +61,11 @@ class Ways:
         node = self.program.nodes[number]
         there, takes = self._inside(node, here, constants)
         given = number_of(node.limit, constants)
-        if given and takes > given:
+        for limit in (node.attempt_limit, node.limit):
+            least = number_of(limit, constants)
             worst = self.short.get(number)
-            if worst is None or worst.needs < takes:
-                self.short[number] = TooShort(node, given, takes, self.leg if node.skill else None)
+            if least and takes > least and (worst is None or worst.needs < takes):
+                self.short[number] = TooShort(node, least, takes, limit, self.leg if node.skill else None)
         takes = takes if given is None else min(takes, given)
         if node.may_be_left_out:
             return (there if there is here else None), 0.0
@@ -77,7 +81,12 @@ class Ways:
                 return self._in_turn(node, here, constants)
             case NodeFlow.PER_ITEM:
                 return self._loop(node, here, constants)
-            case NodeFlow.ONE_OF:
+            case NodeFlow.FIRST:
+                there, _ = self.go(node.children[0], here, constants)
+                for child in node.children[1:]:
+                    self.go(child, None, constants)
+                return there, 0.0
+            case NodeFlow.ONE_OF | NodeFlow.OPEN:  # which one may depend on where the robot is
                 for child in node.children:
                     self.go(child, None, constants)
         return None, 0.0
@@ -102,17 +111,26 @@ class Ways:
         return self.driving.least_time(Pose2(here.x, here.y, heading), _pose(there))
 
     def _in_turn(self, node: MissionNode, here: Here, constants: Constants) -> tuple[Here, float]:
+        here, takes = self._round(node, here, constants)
+        every = number_of(node.step.lasts, constants)
+        if every and takes > every:
+            self.late[node.number] = TooShort(node, every, takes, node.step.lasts)
+        rounds = math.inf if node.step.rounds is None else number_of(node.step.rounds, constants)
+        if not node.step.comes_again or not rounds or rounds < 2:
+            return here, takes
+        here, again = self._round(node, here, constants)
+        ends_early = math.isinf(rounds) or any(asked.is_watched for asked in node.asked[: node.own])
+        return here, takes if ends_early else takes + (rounds - 1) * max(again, every or 0.0)
+
+    def _round(self, node: MissionNode, here: Here, constants: Constants) -> tuple[Here, float]:
         takes = 0.0
         for child in node.children:
             here, took = self.go(child, here, constants)
             takes += took
-        every = number_of(node.step.lasts, constants)
-        if every and takes > every:
-            self.late[node.number] = TooShort(node, every, takes)
         return here, takes
 
     def _loop(self, node: MissionNode, here: Here, constants: Constants) -> tuple[Here, float]:
-        items = items_of(node, constants, self.places)
+        items = items_of(node, {**shortened(self.program), **constants}, self.places)
         if items is None or not node.children:
             for child in node.children:
                 self.go(child, None, {name: value for name, value in constants.items() if name != node.item})

@@ -167,7 +167,7 @@ def idle_modifier(mission: Examined) -> Iterator[Finding]:
 
 def _attempt(node: MissionNode, known: Constants) -> Iterator[Finding]:
     """Yield the finding about a limit of each attempt that the limit of all forestalls."""
-    each = next((modifier.attempt_limit for modifier in node.modifiers.values() if modifier.attempt_limit), None)
+    each = node.attempt_limit
     value, whole = number_of(each, known), number_of(node.limit, known)
     if each is not None and value is not None and whole is not None and value >= whole:
         yield idle_modifier.at(

@@ -7,7 +7,7 @@ from rbxcompose.base.expressions.check import check
 from rbxcompose.base.expressions.tree import Expression, ExpressionNode, FieldAccess, Text, Variable, Word
 from rbxcompose.base.expressions.types import Type, TypeKind
 from rbxcompose.base.expressions.values import Value
-from rbxcompose.base.findings import Finding, Related, Severity, suggest
+from rbxcompose.base.findings import Finding, Related, Severity, clauses, suggest
 from rbxcompose.base.rules import OWN
 from rbxcompose.manifest.tree import ScalarNode
 from rbxcompose.missions.analysis.check_runner import mission_check
@@ -65,8 +65,8 @@ def _is_place(view: View, word: str) -> bool:
 
 
 def _not_a_place(view: View, word: str) -> tuple[str, str]:
-    help_text = suggest(word, view.robot.places, "places")
-    return f"{_ASKED}, and '{word}' is not a place", f"{_HELP}; {help_text}".removesuffix("; ")
+    help_text = clauses(_HELP, suggest(word, view.robot.places, "places"))
+    return f"{_ASKED}, and '{word}' is not a place", help_text
 
 
 @mission_check("RBX4107", Severity.WARNING, closed=(OWN,))

@@ -4,9 +4,9 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 
 from rbxcompose.base.expressions.check import check
-from rbxcompose.base.expressions.tree import Number, walk
+from rbxcompose.base.expressions.tree import Number, Word, walk
 from rbxcompose.base.expressions.types import COUNT, PLACE, TEXT, UNKNOWN, Type, TypeKind, choice_of, quantity_of
-from rbxcompose.base.findings import Finding, Related, Span, nearest, suggest
+from rbxcompose.base.findings import Finding, Related, Span, clauses, nearest, suggest
 from rbxcompose.base.printable import plain
 from rbxcompose.base.units import NUMBER, QUOTIENT, Dimension, example
 from rbxcompose.manifest.tree import MappingNode, ScalarNode, SequenceNode, TreeNode
@@ -103,7 +103,7 @@ def _argument(view: View, skill: Skill, argument: WrittenArgument) -> Iterator[F
         finding = wrong_argument.misspelt(argument.span, message, name, arguments, "its arguments", taken=taken)
         if skill.main and skill.main not in taken and "" not in taken and not nearest(name, arguments):
             value = plain(argument.value.text, 60) if isinstance(argument.value, ScalarNode) else "..."
-            finding = replace(finding, help=f"{finding.help}; write '{skill.name}: {value}'".removeprefix("; "))
+            finding = replace(finding, help=clauses(finding.help, f"write '{skill.name}: {value}'"))
         yield finding
     elif isinstance(argument.value, ScalarNode):
         if argument.value.plain and not argument.value.text:
@@ -301,9 +301,12 @@ LISTED = (TypeKind.LIST, TypeKind.MAP, TypeKind.UNKNOWN)
 def wrong_type(mission: Examined) -> Iterator[Finding]:
     """Yield the expressions that have the wrong type, or name something that does not exist."""
     for view in mission.views:
+        is_placed = _goes_to_places(view)
         for asked in view.node.asked:
             if not asked.is_assigned:
-                yield from view.typed(asked.expression, asked.wanted, asked.scalar, WRONG_TYPE)
+                is_word = asked.wanted == UNKNOWN and isinstance(asked.expression.tree, Word)
+                wanted = PLACE if is_placed and is_word else asked.wanted
+                yield from view.typed(asked.expression, wanted, asked.scalar, WRONG_TYPE)
         for assignment in assignments(view.node):
             yield from _assigned(view, assignment)
         yield from _not_listed(view)
@@ -312,6 +315,19 @@ def wrong_type(mission: Examined) -> Iterator[Finding]:
     whole = [*(interrupt.when for interrupt in mission.program.interrupts), *mission.program.outputs.values()]
     for asked in whole:
         yield from findings_of(asked.expression, asked.wanted, asked.scalar, mission.scope, WRONG_TYPE)
+
+
+def _goes_to_places(view: View) -> bool:
+    """Return whether a node is a loop that gives its item to a skill as a place."""
+    node = view.node
+    for below in view.program.nodes[node.number + 1 : node.end] if node.item else ():
+        skill = view.robot.skills.get(below.skill)
+        for argument in below.step.arguments if skill else ():
+            wanted = skill.arguments.get(argument.name or skill.main) if skill else None
+            is_item = isinstance(argument.value, ScalarNode) and argument.value.text == f"${node.item}"
+            if is_item and wanted is not None and wanted.kind in PLACED:
+                return True
+    return False
 
 
 def _assigned(view: View, assignment: Assignment) -> Iterator[Finding]:

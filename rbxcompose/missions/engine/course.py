@@ -77,7 +77,7 @@ class Reaction(Course):
 
     def __init__(self, order: int, definition: Interrupt, scope: SinceScope) -> None:
         super().__init__(order)
-        self.name = definition.name
+        self.name, self.place = definition.name, definition.span.place
         self.afterwards = definition.afterwards
         self.targets = definition.targets
         self.restarts = definition.restarts.text if definition.restarts else ""  # the name of the targets
@@ -85,11 +85,6 @@ class Reaction(Course):
         self.scope = scope
         self.is_armed = True  # it may act: its condition has been false since it last acted
         self.trouble = ""  # why the condition had no value when it was last evaluated
-
-    @property
-    def path(self) -> str:
-        """Return its path in the mission."""
-        return f"interrupts.{self.name}"
 
     def holds(self) -> bool:
         """Return whether the condition holds; raises what an expression may raise."""

@@ -145,7 +145,7 @@ class Engine(EngineBase):
         return f"all {count} optional steps failed" if count > 1 else "its only optional step failed"
 
     def _why(self) -> str:
-        """Return the path of the node that made the mission fail and its reason; empty if the outcome says it all."""
+        """Return the place of the node that made the mission fail and its reason; empty if the outcome says it all."""
         if self.main.ending is not None:
             return self.main.message
         course = self.main.failed
@@ -155,11 +155,11 @@ class Engine(EngineBase):
             if not failed:
                 break
             number = failed[-1]
-        path, reason = self.program.nodes[number].path, self.reasons.get(number)
-        trouble = f"{path}: {reason}" if reason else f"{path} failed"
+        node = self.program.nodes[number]
+        trouble = f"{node.span.place}: {self.reasons.get(number) or f'{node.name or node.step.word} failed'}"
         if isinstance(course, Reaction):
             return f"the reaction of '{course.name}' failed: {trouble}"
-        says_it_all = self.outcome and not reason and number == self.program.main
+        says_it_all = self.outcome and not self.reasons.get(number) and number == self.program.main
         return "" if says_it_all else trouble
 
     def _deciding(self, number: int) -> tuple[int, ...]:
@@ -176,7 +176,7 @@ class Engine(EngineBase):
     def _slow_down(self) -> None:
         self.held_until = self.now + 1 / self.program.rate
         source = self.wants_again
-        path = source.path if source else self.program.nodes[self.program.main].path
-        if path not in self.named:
-            self.named.add(path)
-            self.say(Reported(path, f"does not wait: {TICKS_AT_ONCE} ticks at one instant, slowed down from now on"))
+        place = source.place if source else self.program.nodes[self.program.main].span.place
+        if place not in self.named:
+            self.named.add(place)
+            self.say(Reported(place, f"does not wait: {TICKS_AT_ONCE} ticks at one instant, slowed down from now on"))

@@ -23,8 +23,8 @@ class TickSource(Protocol):
     """Something that may request another tick."""
 
     @property
-    def path(self) -> str:
-        """Return its path in the mission."""
+    def place(self) -> str:
+        """Return its file and line."""
         ...
 
 

@@ -8,11 +8,12 @@ from rbxcompose.base.expressions.values import Value
 
 @dataclass(frozen=True, slots=True)
 class SkillStarted:
-    """A skill was started; `leaf` is the number of its node."""
+    """A skill was started; `leaf` is the number of its node, `text` the step as people read it."""
 
     leaf: int
     skill: str
     arguments: Mapping[str, Value]
+    text: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,9 +106,9 @@ class Logged:
 
 @dataclass(frozen=True, slots=True)
 class Reported:
-    """Something is wrong with the mission at the node with this path."""
+    """Something is wrong with the mission at this place, a file and line."""
 
-    path: str
+    place: str
     message: str
 
 

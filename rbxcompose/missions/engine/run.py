@@ -115,7 +115,7 @@ class Run(RunBase):
         except Exception as error:  # a condition without a value does not hold
             holding, trouble = False, words(error)
         if trouble and trouble != reaction.trouble:
-            self.engine.say(Reported(reaction.path, trouble))
+            self.engine.say(Reported(reaction.place, trouble))
         reaction.trouble = trouble
         return holding
 
@@ -161,7 +161,7 @@ class Run(RunBase):
             reaction.is_armed = False
         self.engine.say(InterruptEnded(reaction.name, afterwards, back, restarted))
         if not reaction.is_armed and self._holds(reaction):
-            self.engine.say(Reported(reaction.path, STILL_HOLDS))
+            self.engine.say(Reported(reaction.place, STILL_HOLDS))
         self.engine.again(reaction)
         return RUNNING
 

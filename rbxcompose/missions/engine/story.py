@@ -1,15 +1,13 @@
 """The story of a mission: one line of text per event, and how often each skill ended with each result."""
 
 from collections import Counter
-from collections.abc import Mapping
 from typing import assert_never
 
-from rbxcompose.base.expressions.values import Value, is_named_pose
 from rbxcompose.base.levels import Level
 from rbxcompose.base.units import format_number
 from rbxcompose.missions.engine import events
 from rbxcompose.missions.engine.value_text import show
-from rbxcompose.missions.program.program import RESTART, Skill
+from rbxcompose.missions.program.program import RESTART
 
 LEVELS = {"info": Level.OK, "warn": Level.WARN, "error": Level.ERROR}
 RESULTS = {"success": Level.OK, "halted": Level.OK, "failure": Level.WARN}
@@ -18,18 +16,17 @@ RESULTS = {"success": Level.OK, "halted": Level.OK, "failure": Level.WARN}
 class MissionStory:
     """Tells the story of one mission."""
 
-    def __init__(self, mission: str, skills: Mapping[str, Skill]) -> None:
+    def __init__(self, mission: str) -> None:
         self._mission = mission
-        self._skills = skills
         self._labels: dict[int, str] = {}  # what each leaf did last: `go_to corner_1`
         self._results: dict[str, Counter[str]] = {}
 
     def line(self, event: events.MissionEvent) -> tuple[Level, str]:
         """Return how bad an event is, and its line, which is empty if other events say the same."""
         match event:
-            case events.SkillStarted(leaf=leaf, skill=skill, arguments=arguments):
-                self._labels[leaf] = " ".join([skill, *self._written(skill, arguments)])
-                return Level.OK, self._labels[leaf]
+            case events.SkillStarted(leaf=leaf, text=text):
+                self._labels[leaf] = text
+                return Level.OK, text
             case events.SkillEnded(leaf=leaf, skill=skill, result=result, duration=duration, message=message):
                 self._results.setdefault(skill, Counter())[result] += 1
                 text = f"{self._labels[leaf]}: {result} ({format_number(round(duration, 1))} s)"
@@ -52,8 +49,8 @@ class MissionStory:
                 return Level.OK, f"published on {topic}: {show(None, fields)}"
             case events.Logged(level=level, text=text):
                 return LEVELS[level], text
-            case events.Reported(path=path, message=message):
-                return Level.WARN, f"{path}: {message}"
+            case events.Reported(place=place, message=message):
+                return Level.WARN, f"{place}: {message}"
             case events.MissionEnded(result=result):
                 text = f"mission {self._mission}: {result}"
                 otherwise = Level.WARN if event.doubt else Level.OK
@@ -67,14 +64,6 @@ class MissionStory:
             each = ", ".join(f"{results[result]} {result}" for result in sorted(results, key=_usual_first))
             counted.append(f"{skill} {results.total()} ({each})")
         return ", ".join(counted)
-
-    def _written(self, name: str, arguments: Mapping[str, Value]) -> list[str]:
-        skill = self._skills[name]
-        texts = []
-        for argument, value in arguments.items():
-            text = value.name if is_named_pose(value) else show(skill.arguments.get(argument), value)
-            texts.append(text if argument == skill.main else f"{argument} {text}")
-        return texts
 
 
 def _usual_first(result: str) -> tuple[int, str]:

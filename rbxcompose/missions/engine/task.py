@@ -163,9 +163,9 @@ class Task(ABC):
         return int(value)
 
     @property
-    def path(self) -> str:
-        """Return its path in the mission."""
-        return self.engine.program.nodes[self.number].path
+    def place(self) -> str:
+        """Return its file and line."""
+        return self.engine.program.nodes[self.number].span.place
 
     def cut(self, because: str) -> None:
         """Stop what runs below, since this task fails, and keep the reason."""
@@ -178,7 +178,7 @@ class Task(ABC):
         """Report why this task cannot continue."""
         message = words(error)
         self.engine.reasons[self.number] = message
-        self.engine.say(Reported(self.path, message))
+        self.engine.say(Reported(self.place, message))
 
     def _broken(self, error: Exception) -> int:
         self.halt_below()

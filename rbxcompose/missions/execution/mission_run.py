@@ -79,7 +79,7 @@ class MissionRun:
         self.end: MissionEnded | None = None
         self.began: float | None = None  # [s] of robot time
         self.patient_until: float | None = None  # [s] of the next warning while it waits for its first values
-        self.story = MissionStory(name, names.skills)
+        self.story = MissionStory(name)
         self.transitions: deque[dict[str, Any]] = deque(maxlen=LAST)
         self._on_line, self._now = on_line, 0.0
         world, self.robot = make(self._ended, self._said)

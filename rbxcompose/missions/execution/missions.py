@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 from rbxcompose.base.expressions.values import Value
-from rbxcompose.base.findings import suggest
+from rbxcompose.base.findings import clauses, suggest
 from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import Query, Refused
 from rbxcompose.missions.engine.inputs import NoSuchState, bind_texts, start_at
@@ -136,7 +136,7 @@ class RunningMissions:
     def _program(self, name: str) -> Program:
         programs = self._equipment.programs
         if name not in programs:
-            raise Refused(f"the robot has no mission '{name}': {suggest(name, programs, 'its missions')}")
+            raise Refused(clauses(f"the robot has no mission '{name}'", suggest(name, programs, "its missions")))
         return programs[name]
 
     def _inputs(self, name: str, program: Program, given: Mapping[str, str]) -> Mapping[str, Value]:

@@ -25,7 +25,7 @@ class FallbackStep(sdk.InTurn):
 
     __slots__ = ()
     decides = sdk.SUCCEEDS
-    flow = sdk.NodeFlow.ONE_OF
+    flow = sdk.NodeFlow.FIRST
     look = sdk.NodeLook("?")
 
     @property

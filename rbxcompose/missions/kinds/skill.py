@@ -6,15 +6,18 @@ from collections.abc import Iterator, Mapping
 from dataclasses import field
 from typing import Self
 
+from rbxcompose.base.expressions.values import is_named_pose
+from rbxcompose.base.units import written_unit
 from rbxcompose.manifest.tree import MappingNode, SequenceNode, TreeNode
 from rbxcompose.missions import sdk
+from rbxcompose.missions.engine.value_text import show
 from rbxcompose.missions.program.registry import SKILL
 
 
 class SkillTask(sdk.Leaf):
     """A leaf that runs a skill of the robot."""
 
-    __slots__ = ("arguments", "claims", "getters", "is_restartable", "skill", "started")
+    __slots__ = ("arguments", "claims", "getters", "is_restartable", "skill", "started", "written")
     saved = (*sdk.Leaf.saved, "arguments", "started")
     fresh = ("arguments",)
     reported = ("started",)
@@ -23,9 +26,9 @@ class SkillTask(sdk.Leaf):
         super().__init__(site)
         self.skill = site.engine.robot.skills[step.skill]
         self.claims, self.is_restartable = self.skill.claims, self.skill.restartable
-        names = [(argument.name or self.skill.main, argument.value) for argument in step.arguments]
+        self.written = {argument.name or self.skill.main: argument for argument in step.arguments}
         self.getters: Mapping[str, sdk.Getter] = {
-            name: sdk.getter(value, self.skill.arguments[name]) for name, value in names
+            name: sdk.getter(argument.value, self.skill.arguments[name]) for name, argument in self.written.items()
         }
         self.arguments: dict[str, sdk.Value] = {}
         self.started = 0.0  # [s] of robot time
@@ -38,7 +41,8 @@ class SkillTask(sdk.Leaf):
     def ask(self) -> int:
         """Start the skill; this happens again after a pause."""
         self.started, self.status = self.engine.now, sdk.RUNNING
-        self.engine.say(sdk.SkillStarted(self.number, self.skill.name, self.arguments))
+        text = f"{self.skill.name} {', '.join(self._shown())}".rstrip()
+        self.engine.say(sdk.SkillStarted(self.number, self.skill.name, self.arguments, text))
         self.is_asked = True
         try:
             self.engine.world.start(self.number, self.skill.name, self.arguments)
@@ -46,6 +50,16 @@ class SkillTask(sdk.Leaf):
             self.is_asked = False
             raise
         return sdk.RUNNING
+
+    def _shown(self) -> Iterator[str]:
+        """Yield the arguments as they were written, where that is no expression, and else their values."""
+        for name, value in self.arguments.items():
+            argument = self.written[name]
+            if isinstance(argument.value, sdk.ScalarNode) and written_unit(argument.value.text) is None:
+                text = value.name if is_named_pose(value) else show(self.skill.arguments[name], value)
+            else:
+                text = _written(argument.value)
+            yield f"{argument.name} {text}".lstrip()
 
     def ended(self, result: sdk.Result) -> None:
         """Take the result from the world."""
@@ -60,7 +74,7 @@ class SkillTask(sdk.Leaf):
             return super().judged(result)
         if outcome not in self.skill.outcomes:
             message = f"the skill '{self.skill.name}' ended with an outcome that it does not declare: '{outcome}'"
-            self.engine.say(sdk.Reported(self.path, message))
+            self.engine.say(sdk.Reported(self.place, message))
             return sdk.FAILURE, "", message
         status = sdk.SUCCESS if self.skill.outcomes[outcome] == sdk.SUCCEEDS else sdk.FAILURE
         return status, outcome, result.message or outcome

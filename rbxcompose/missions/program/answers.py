@@ -156,6 +156,7 @@ class NodeFlow(Enum):
 
     IN_TURN = auto()
     PER_ITEM = auto()  # once for each item of a list
+    FIRST = auto()  # through the first; the others are for its failures
     ONE_OF = auto()  # through one of them
     OPEN = auto()  # the text does not say which of them run, and when
 

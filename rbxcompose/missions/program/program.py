@@ -225,6 +225,11 @@ class Step(Declared, ABC):
         return None
 
     @property
+    def rounds(self) -> Expression | None:
+        """Return how often it goes through its children, if it comes again and a number says so."""
+        return None
+
+    @property
     def choice(self) -> BranchChoice | None:
         """Return the value and the cases by which it chooses one of its children."""
         return None
@@ -284,6 +289,11 @@ class MissionNode:
     def limit(self) -> Expression | None:
         """Return its time limit."""
         return next((modifier.limit for modifier in self.modifiers.values() if modifier.limit), None)
+
+    @property
+    def attempt_limit(self) -> Expression | None:
+        """Return the time limit of each of its attempts."""
+        return next((modifier.attempt_limit for modifier in self.modifiers.values() if modifier.attempt_limit), None)
 
     @property
     def may_be_left_out(self) -> bool:

@@ -265,6 +265,7 @@ class Driver:
         self._selector = selectors.SelectSelector()  # its timeouts have microseconds; epoll rounds up to milliseconds
         self._selector.register(inbox, selectors.EVENT_READ)
         self._selector.register(channel, selectors.EVENT_READ)
+        self._is_sending = False
         self._next_beat = 0.0  # [s] on the monotonic clock
         self._beats_from = 0.0  # [s] on that clock; on this grid, beats need no waking of their own
 
@@ -296,13 +297,22 @@ class Driver:
                 math.floor((time.monotonic() + EARLY - self._beats_from) / BEAT) + 1
             )
             until_beat = BEAT
+        self._watch_channel()
         ready = self._wait(max(0.0, min(pause, until_beat)))
         self._inbox.drain(self._scheduler)
         if any(key.fileobj is self._channel for key, _ in ready):
+            self._channel.flush()
             self._receive(self._channel.receive())
 
+    def _watch_channel(self) -> None:
+        """Wait for messages, and until the supervisor can take the rest of one too long for one send."""
+        if self._channel.is_open and self._is_sending != self._channel.is_behind:
+            self._is_sending = not self._is_sending
+            events = selectors.EVENT_READ | (selectors.EVENT_WRITE if self._is_sending else 0)
+            self._selector.modify(self._channel, events)
+
     def _wait(self, longest: float) -> list[tuple[selectors.SelectorKey, int]]:
-        """Wait for channel and inbox, `longest` [s] at most, and return which of them can be read."""
+        """Wait for channel and inbox, `longest` [s] at most, and return which of them are ready."""
         return self._selector.select(longest)
 
     def _receive(self, messages: Sequence[ChannelMessage]) -> None:

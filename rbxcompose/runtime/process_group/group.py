@@ -296,7 +296,6 @@ class ProcessGroup:
             self._lifeline.beat()
         if self._host is not None:
             self._host.look_at_workers()
-        self._channel.flush()
         if not self._channel.is_behind:
             moves, runs = self._host.work() if self._host is not None else ([], {})
             self._channel.send(messages.Alive(self._clock.now(), moves, runs))

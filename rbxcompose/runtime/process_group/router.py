@@ -266,7 +266,6 @@ class Router:
             Thread(target=self._seek, daemon=True).start()  # a host that is not there lets whoever dials it wait
         if self._must_reopen:
             self._reopen()
-        self._channel.flush()
         if not self._channel.is_behind:
             self._channel.send(messages.Alive(self._clock.now()))
 

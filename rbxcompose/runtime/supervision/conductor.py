@@ -178,7 +178,8 @@ class Conductor:
             case messages.Reconfigured(refused) if self._changing:
                 self._reconfigured(self._changing, name, refused)
             case messages.Alive(time, moves, runs):
-                self.time = max(self.time, time)
+                if name != self._router:  # whose time is that of this computer, also where the robot's is not
+                    self.time = max(self.time, time)
                 member.moves, member.runs = moves, runs
                 self._alive(member)
                 self._look_at_duration()

@@ -256,8 +256,7 @@ def _import_what_is_common(plan: Plan) -> None:
 
     for name in {instance.type for instance in plan.instances}:
         component_type(name)
-    wires = [wire for instance in plan.instances for wire in instance.wires]
-    _make_messages({wire.type for wire in wires if wire.type})  # a look-up has none
+    _make_messages({wire.type for instance in plan.instances for wire in instance.wires if wire.type})
 
 
 def _make_messages(names: Collection[str]) -> None:

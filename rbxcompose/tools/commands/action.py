@@ -9,6 +9,7 @@ import argparse
 from rbxcompose.commands.guest import Guest, add_server_verbs, visit, write_names
 from rbxcompose.commands.options import BUS, deferred
 
+GROUP = "data"
 ON_SYSTEM = BUS
 _VERB = ("send", "send a goal, print feedback and result")
 

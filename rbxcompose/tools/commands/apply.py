@@ -15,6 +15,7 @@ from rbxcompose.commands.targets import add_layer_options, add_path_argument, ch
 from rbxcompose.runtime.plan_requests import RevertPlan
 from rbxcompose.tools.robot_changes import LONGEST_CHANGE, Proposal, carry_out, unsure
 
+GROUP = "run"
 _LAST = -1  # generation of the last change
 
 

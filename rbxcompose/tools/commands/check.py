@@ -27,6 +27,8 @@ from rbxcompose.compiler.plan.model import Plan, extent
 from rbxcompose.manifest.documents import KINDS
 from rbxcompose.manifest.tree import FILE_BYTES
 
+GROUP = "write"
+IS_COMMON = True
 TEXT = "text"
 FOR_PEOPLE = (TEXT, "github")  # formats that may contain lines without a finding
 _KIND = re.compile(r"^[ \t]*+(?:[{,]\s*+|\{[^\n]*?,\s*+)?+['\"]?kind['\"]?\s*+:\s*+['\"]?(\w++)", re.MULTILINE)

@@ -24,6 +24,7 @@ from rbxcompose.commands.verbs import load, parser_of, verbs
 from rbxcompose.domains.muxes.requests import MUX, LookAtMux
 from rbxcompose.runtime.folder import ComponentState
 
+GROUP = "system"
 # A script queries the candidates each time, so that it need not change with each version.
 _BASH = r"""_rbxcompose() {
     local one

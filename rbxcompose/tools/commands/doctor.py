@@ -25,6 +25,7 @@ from rbxcompose.runtime.folder import BrokenStateError, RobotFolder, base_folder
 from rbxcompose.tools import doctor as machine
 from rbxcompose.tools.doctor import BusFacts, ExaminationResult, HostFacts, RunningRobot, examine_all, has_errors
 
+GROUP = "system"
 _LISTENING = 1.0  # [s] of listening to messages, for their stamps
 _NANOSECONDS = 1e9
 

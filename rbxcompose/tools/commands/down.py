@@ -13,6 +13,8 @@ from rbxcompose.runtime.processes import Process, wait_until_ended
 from rbxcompose.runtime.requests import BringDown
 from rbxcompose.runtime.supervision.leftovers import end_leftovers, kill_supervisor
 
+GROUP = "run"
+IS_COMMON = True
 _ANSWER = 1.0  # [s]
 _ORDERLY = 3.0  # [s] for a supervisor to bring everything down, after it has come to rest
 

@@ -12,6 +12,8 @@ from rbxcompose.commands.console import FINDINGS, emit, write_report
 from rbxcompose.commands.targets import add_layer_options, add_path_argument, compiled, robot_path
 from rbxcompose.tools.inspection.expand import expand, expand_data
 
+GROUP = "write"
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""

@@ -10,6 +10,7 @@ from rbxcompose.base.findings import FindingKind, suggest
 from rbxcompose.commands.console import emit, misused
 from rbxcompose.commands.finding_pages import all_kinds, body_of, family_of, text_of, title_of
 
+GROUP = "write"
 _PREFIX = "RBX"
 
 

@@ -17,7 +17,7 @@ from pathlib import Path
 from rbxcompose import __version__
 from rbxcompose.base.findings import Finding, kind
 from rbxcompose.commands.console import FINDINGS, emit, refuse, write_report
-from rbxcompose.commands.options import is_system
+from rbxcompose.commands.options import is_system, out_option
 from rbxcompose.compiler.compile import Compilation, compile_robot
 from rbxcompose.compiler.systems.bundle import files_of
 from rbxcompose.compiler.systems.model import System
@@ -25,6 +25,7 @@ from rbxcompose.compiler.systems.reader import compile_system
 from rbxcompose.tools.exporting import compose, kubernetes, ros2, systemd
 from rbxcompose.tools.exporting.exported_share import shares
 
+GROUP = "system"
 NOT_EXPORTED = kind("RBX6115")
 SRDF, ROS2 = "srdf", "ros2"
 PROGRAMS = ("systemd", "compose", "k8s", ROS2, SRDF)
@@ -34,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("program", choices=PROGRAMS, help="for which program")
     parser.add_argument("path", metavar="SYSTEM", help="the file of the system; for srdf a robot, for ros2 either")
-    parser.add_argument("--out", metavar="FOLDER", required=True, help="a new or empty folder")
+    out_option("a new or empty folder", metavar="FOLDER", required=True)(parser)
     parser.add_argument("--host", metavar="NAME", help="only what this host runs")
     parser.add_argument("--profile", action="append", default=[], metavar="P", help="apply this profile of the system")
     parser.add_argument("--real", action="store_true", help="use the real devices; without it, they are simulated")

@@ -21,6 +21,7 @@ from rbxcompose.commands.lookup import NOT_UP
 from rbxcompose.commands.options import add_system_options
 from rbxcompose.missions.execution.requests import MISSION
 
+GROUP = "system"
 NO_LABEL = kind("RBX6130")
 _COLUMNS = ("robot", "host", "state", "mission", "battery")
 ShareFacts = tuple[
@@ -32,7 +33,8 @@ _UP = "up"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     actions = parser.add_subparsers(dest="action", metavar="ls|run|logs", required=True)
-    ls = actions.add_parser("ls", help="list robots: hosts, state, mission, batteries")
+    parser.set_defaults(action="ls")
+    ls = actions.add_parser("ls", help="list robots: hosts, state, mission, batteries (the default)")
     run_ = actions.add_parser("run", help="start a mission on each")
     run_.add_argument("mission", metavar="MISSION", help="which one")
     run_.add_argument("--set", action="append", default=[], dest="sets", metavar="K=V", help="give it an input")

@@ -8,10 +8,12 @@ from pathlib import Path
 
 from rbxcompose.base.files import replace_file
 from rbxcompose.commands.console import FINDINGS, emit, misused, write_report
+from rbxcompose.commands.options import out_option
 from rbxcompose.commands.targets import add_layer_options, add_path_argument, compiled, robot_path
 from rbxcompose.tools.inspection.diagram import MANY, diagram_of, dot, folded, mermaid
 from rbxcompose.tools.inspection.graph_html import html
 
+GROUP = "look"
 TEXTS = {"mermaid": mermaid, "dot": dot}
 HTML = "html"
 
@@ -23,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     words = f"draw every mission and every open wire, also if there are more than {MANY} that are alike"
     parser.add_argument("--all", action="store_true", help=words)
     parser.add_argument("--format", choices=[*TEXTS, HTML], default="mermaid", help="output format")
-    parser.add_argument("--out", metavar="FILE", help="write it to this file")
+    out_option("write it to this file")(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:

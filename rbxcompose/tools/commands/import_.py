@@ -15,10 +15,11 @@ from rbxcompose.commands.console import FINDINGS, emit, write_report
 from rbxcompose.commands.formats.json_ import as_data
 from rbxcompose.commands.importing.foreign_files import read_files
 from rbxcompose.commands.importing.importer import ImportedFiles, broken_importers, imported, importers
-from rbxcompose.commands.new_files import EXISTS, name_like, read_name, write_new
-from rbxcompose.commands.options import add_json_option
+from rbxcompose.commands.new_files import EXISTS, name_like, read_name, robot_file, write_new
+from rbxcompose.commands.options import add_json_option, out_option
 from rbxcompose.manifest.files import shown_name
 
+GROUP = "write"
 OTHERWISE = "imported"  # the name of a robot if the first file's has no letter
 
 
@@ -28,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     for name, importer in importers().items():
         program = programs.add_parser(name, help=f"import {importer.about}", description=f"Import {importer.about}.")
         program.add_argument("files", nargs="+", metavar="FILE", help="its files; together they make one robot")
-        program.add_argument("--out", metavar="FILE", help="write the manifest to this new file")
+        out_option("write the manifest to this new file, or as robot.yaml to this folder")(program)
         program.add_argument("--name", metavar="NAME", help="the robot's name (default: that of the first file)")
         add_json_option(program)
 
@@ -36,16 +37,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Read the files, write the manifest, and report the findings."""
     report, sources = Report(broken_importers()), dict[str, str]()
+    out = robot_file(arguments.out) if arguments.out is not None else None
     name = _name(arguments)
     files = read_files(map(Path, arguments.files), report, sources)
     made = imported(arguments.program, files, name, report)
     findings = Report(
         [replace(one, fix=None) for one in report]
     )  # fixes are for manifests, which `check --fix` corrects
-    if made.text and arguments.out is not None and (finding := _write(Path(arguments.out), made)) is not None:
+    if made.text and out is not None and (finding := _write(out, made)) is not None:
         findings.add(finding)
         made = ImportedFiles("")
-    return _answer(made, findings, sources, arguments)
+    return _answer(made, findings, sources, out, in_json=arguments.json)
 
 
 def _name(arguments: argparse.Namespace) -> str:
@@ -61,15 +63,15 @@ def _write(path: Path, made: ImportedFiles) -> Finding | None:
     return finding
 
 
-def _answer(made: ImportedFiles, report: Report, sources: Sources, arguments: argparse.Namespace) -> int:
+def _answer(made: ImportedFiles, report: Report, sources: Sources, out: Path | None, *, in_json: bool) -> int:
     """Write the findings, and the manifest if there is one; return the exit code."""
     text = made.text
-    if not text or not arguments.json:
+    if not text or not in_json:
         write_report(report, sources)
     if not text:
         return FINDINGS
-    shown = shown_name(Path(arguments.out)) if arguments.out is not None else None
-    if arguments.json:
+    shown = shown_name(out) if out is not None else None
+    if in_json:
         findings = [as_data(finding, sources) for finding in report]
         data = {"manifest": text, "file": shown, "beside": dict(made.beside), "findings": findings}
         emit(json.dumps(data, ensure_ascii=False))

@@ -17,6 +17,8 @@ from rbxcompose.commands.story import StoryWriter
 from rbxcompose.runtime.folder import RobotFolder, base_folder
 from rbxcompose.runtime.log import NAME, Follower, Record
 
+GROUP = "look"
+IS_COMMON = True
 _PAUSE = 0.05  # [s] between checks for new records
 
 

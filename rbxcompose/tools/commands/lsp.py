@@ -10,6 +10,7 @@ from importlib.util import find_spec
 from rbxcompose.base.findings import kind
 from rbxcompose.commands.console import refuse
 
+GROUP = "write"
 NOT_INSTALLED = kind("RBX9010")
 
 

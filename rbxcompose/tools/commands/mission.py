@@ -12,9 +12,11 @@ from typing import TypeVar
 from rbxcompose.base.requests import Command, Query, Refused, to_data
 from rbxcompose.commands.console import NotDoneError, emit, refuse
 from rbxcompose.commands.lookup import REFUSED, WHICH, add_asking_options, answer_of, find_robot, pass_on
-from rbxcompose.commands.options import Declare, Subcommand, add_actions, argument, deferred, run_action
+from rbxcompose.commands.options import Declare, Subcommand, add_actions, argument, deferred, out_option, run_action
 from rbxcompose.missions.execution import requests
 
+GROUP = "missions"
+IS_COMMON = True
 A = TypeVar("A")
 
 ON_SYSTEM = requests.MISSION
@@ -46,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         the_mission,
         robot,
         argument("--format", choices=_FORMATS, default="text", help="output format"),
-        argument("--out", metavar="FILE", help="write it to this file"),
+        out_option("write it to this file"),
     )
     explored = (
         the_mission,

@@ -15,13 +15,17 @@ from rbxcompose.manifest.files import shown_name
 from rbxcompose.msgs.definitions import Structures, type_hash
 from rbxcompose.msgs.packages import OWN, all_names, package_files, parts_of, short, whole_text
 
+GROUP = "data"
 LICENCE = "Apache-2.0"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     actions = parser.add_subparsers(dest="action", metavar="show|export", required=True)
-    show = actions.add_parser("show", help="print a definition with all types that it uses, and its type hash")
+    parser.set_defaults(action="show")
+    show = actions.add_parser(
+        "show", help="print a definition with all types that it uses, and its type hash (the default)"
+    )
     show.add_argument("type", metavar="TYPE", help="such as geometry_msgs/Twist")
     export = actions.add_parser("export", help=f"write the package {OWN} for a ROS 2 workspace")
     export.add_argument("folder", metavar="DIR", type=Path, help=f"the folder in which to create {OWN}")

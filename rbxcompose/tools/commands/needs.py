@@ -18,6 +18,8 @@ from rbxcompose.commands.targets import add_layer_options, compiled, targets
 from rbxcompose.compiler.model.robot import Robot
 from rbxcompose.sdk.capabilities import NeedsExtra
 
+GROUP = "run"
+
 
 @dataclass(frozen=True, slots=True)
 class NeededExtra:

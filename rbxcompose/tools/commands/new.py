@@ -23,6 +23,8 @@ from rbxcompose.manifest.tree import FILE_BYTES
 from rbxcompose.tools import scaffold
 from rbxcompose.tools.scaffold import MissionAnswers, with_entry
 
+GROUP = "write"
+IS_COMMON = True
 INTERRUPTED = 130
 _WIDEST = 4096  # characters per line, enough for any path
 ABOUT = "What is it for?"

@@ -16,6 +16,7 @@ from rbxcompose.commands.hosts import SystemCommand
 from rbxcompose.commands.lookup import add_bus_options
 from rbxcompose.tools.parameters.nodes import ParameterNodes
 
+GROUP = "data"
 ON_SYSTEM = options.BUS
 _WITH_FILES = ("load", "save", "diff", "reset")
 
@@ -24,7 +25,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     only = options.argument("component", metavar="COMPONENT", nargs="?", help="only those of this component or node")
     component = options.argument("component", metavar="COMPONENT", help="a component or node, such as battery")
-    name = options.argument("name", metavar="PARAMETER", help="the parameter, such as runtime")
     any_name = options.argument("name", metavar="PARAMETER", nargs="?", help="the parameter, such as runtime; else all")
     words = "COMPONENT PARAMETER VALUE, or several COMPONENT.PARAMETER=VALUE; values as in a manifest: '30 s', [1, 2]"
     values = options.argument("words", metavar="COMPONENT|SETTING|PARAMETER", nargs="+", help=words)
@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     dry = options.argument("--dry-run", action="store_true", help="only show what would be written")
     table: tuple[tuple[str, str, str, tuple[options.Declare, ...]], ...] = (
         ("ls", "nodes", "list parameters with their values", (only,)),
-        ("get", "nodes", "print the value of a parameter", (component, name)),
+        ("get", "nodes", "print the value of a parameter, or all of a component", (component, any_name)),
         ("describe", "nodes", "show what a parameter is, its limits, and whether it may change", (component, any_name)),
         ("set", "changes", "change parameters, all or none", (values,)),
         ("load", "changes", "set all parameters of a file, all or none", (file,)),

@@ -21,6 +21,7 @@ from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.manifest.tree import ALL_BYTES
 from rbxcompose.tools.inspection.plan_text import plan_text
 
+GROUP = "look"
 NO_PLAN = kind("RBX9012")
 SAVED = ".json"
 USAGE = 2

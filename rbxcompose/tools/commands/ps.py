@@ -14,6 +14,8 @@ from rbxcompose.runtime.folder import SUSPENDED, ClockOffset, ComponentState, Ro
 from rbxcompose.runtime.processes import Process
 from rbxcompose.runtime.requests import RobotStatus
 
+GROUP = "look"
+IS_COMMON = True
 ON_SYSTEM = EACH
 _COLUMNS = ("name", "type", "state", "process", "pid", "restarts")
 _ANSWER = 0.4  # [s] for a supervisor to answer; its state file is as recent, except for what died since

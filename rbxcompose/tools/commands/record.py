@@ -25,12 +25,13 @@ from rbxcompose.bus.transport import Arrival
 from rbxcompose.commands.console import emit, refuse, table, write_report
 from rbxcompose.commands.guest import Guest
 from rbxcompose.commands.lookup import BusPlace, add_bus_options, find_place, find_robot
-from rbxcompose.commands.options import add_json_option, seconds
+from rbxcompose.commands.options import add_json_option, out_option, seconds
 from rbxcompose.runtime.recording.codes import LOST, RECOVERED, UNWRITABLE
 from rbxcompose.runtime.recording.files import ENDING, Recorder, Split, recover_all
 from rbxcompose.runtime.recording.topics import Recorded, RecordedTopic, Selection, by_name, definition_of, topic_of
 from rbxcompose.sdk.ports import Qos
 
+GROUP = "data"
 _PAUSE = 0.02  # [s] between checks for messages
 _SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*([kMG])B")
 _TIMES = {"k": 1e3, "M": 1e6, "G": 1e9}
@@ -43,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_bus_options(parser)
     add_selection_options(parser)
     add_json_option(parser)
-    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="the file, else ROBOT-DATE-TIME.mcap")
+    out_option("the file, else ROBOT-DATE-TIME.mcap", "--output", type=Path)(parser)
     parser.add_argument("--for", type=seconds, dest="duration", metavar="30s", help="end after this time")
     parser.add_argument(
         "--split", type=_split, default=Split(), metavar="SIZE|TIME", help="start a new file after 500MB, or 10min"
@@ -103,7 +104,7 @@ def _write(recorder: Recorder, tap: Tap, guest: Guest, end: float, *, is_json: b
 
 
 def _path(arguments: argparse.Namespace) -> Path:
-    wanted: Path | None = arguments.output
+    wanted: Path | None = arguments.out
     if wanted is not None:
         return wanted if wanted.suffix == ENDING else wanted.with_name(wanted.name + ENDING)
     name = "recording" if arguments.router else find_robot(arguments.robot).path.name

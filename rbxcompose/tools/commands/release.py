@@ -9,6 +9,7 @@ from rbxcompose.commands.lookup import add_asking_options, pass_on
 from rbxcompose.commands.options import BUS
 from rbxcompose.runtime.requests import ReleaseRobot
 
+GROUP = "drive"
 ON_SYSTEM = BUS
 
 

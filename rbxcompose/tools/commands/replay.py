@@ -52,6 +52,7 @@ from rbxcompose.runtime.replay import ReplayResult, RunDifference, missing_topic
 from rbxcompose.sdk.ports import Qos
 from rbxcompose.tools.commands.record import add_selection_options, count_table, recover_in, selection_of, warn
 
+GROUP = "data"
 _MATCHING = 1.0  # [s] maximum wait until subscribers have found a new publisher
 _MATCH_PAUSE = 0.01  # [s] between two checks for them
 _PAUSE = 0.05  # [s] before a recording restarts

@@ -8,6 +8,8 @@ import argparse
 from rbxcompose.commands.console import emit
 from rbxcompose.compiler.schema.documents import MAKERS, as_text, installed_schema
 
+GROUP = "write"
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""

@@ -25,6 +25,7 @@ from rbxcompose.compiler.systems.audit import listeners, reachable_keys
 from rbxcompose.compiler.systems.model import System
 from rbxcompose.compiler.systems.reader import compile_system
 
+GROUP = "system"
 NOT_MADE = kind("RBX6116")
 _RECEIVE = """set -e; umask 077
 d="${XDG_CONFIG_HOME:-$HOME/.config}/rbxcompose/systems/NAME/HOST"
@@ -39,9 +40,10 @@ SOON_EXPIRED = kind("RBX6144", Severity.WARNING)
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     actions = parser.add_subparsers(dest="action", metavar="init|audit", required=True)
+    parser.set_defaults(action="audit")
     for name, about in (
         ("init", "make certificates for all hosts"),
-        ("audit", "list what listens, and who may reach it"),
+        ("audit", "list what listens, and who may reach it (the default)"),
     ):
         action = actions.add_parser(name, help=about)
         action.add_argument("path", metavar="SYSTEM", help="the file of the system")

@@ -8,6 +8,7 @@ import argparse
 from rbxcompose.commands.guest import Guest, add_server_verbs, visit, write_names
 from rbxcompose.commands.options import BUS, deferred
 
+GROUP = "data"
 ON_SYSTEM = BUS
 _VERB = ("call", "send a request and print the response")
 

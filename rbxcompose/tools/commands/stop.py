@@ -12,6 +12,8 @@ from rbxcompose.commands.options import EACH
 from rbxcompose.runtime.folder import RobotFolder
 from rbxcompose.runtime.requests import StopRobot
 
+GROUP = "drive"
+IS_COMMON = True
 ON_SYSTEM = EACH
 _ANSWER = 1.0  # [s] for all processes together
 _OTHERS = ("parent", "router")  # processes in which nothing moves

@@ -22,6 +22,7 @@ from rbxcompose.tools.mission_tests.reader import TrialReader, WrittenTrial
 from rbxcompose.tools.mission_tests.report import FileOutcome, TrialWriter, as_json, coverage_text, junit
 from rbxcompose.tools.mission_tests.runner import run_trial
 
+GROUP = "missions"
 HERE = Path("missions")
 
 

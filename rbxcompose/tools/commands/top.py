@@ -24,6 +24,8 @@ from rbxcompose.commands.options import EACH, add_json_option, add_system_option
 from rbxcompose.commands.terminal import LiveScreen, is_terminal
 from rbxcompose.tools.top import RobotPicture, Sampler, ShareView, lines_of, system_lines
 
+GROUP = "look"
+IS_COMMON = True
 ON_SYSTEM = EACH
 _PERIOD = 1.0  # [s] between two samples
 _WIDTH, _HEIGHT = 100, 1000  # columns and lines of a picture without a terminal

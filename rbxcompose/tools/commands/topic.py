@@ -19,6 +19,7 @@ from rbxcompose.commands.console import emit, table
 from rbxcompose.commands.guest import Guest, described, visit, wanted, write_names
 from rbxcompose.commands.lookup import add_bus_options
 
+GROUP = "data"
 ON_SYSTEM = options.BUS
 _ENDS = ("publishers", "subscriptions")
 _WINDOW = 100  # messages

@@ -18,6 +18,9 @@ from rbxcompose.tools.live_rules import LiveRules
 from rbxcompose.tools.robot_changes import LiveReload
 from rbxcompose.tools.run_view import is_fit, run_plan
 
+GROUP = "run"
+IS_COMMON = True
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
@@ -30,6 +33,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--record", type=Path, metavar="FILE", help="with --rate: record everything that happens, for replay"
     )
+    words = "start no mission, as --set start=null does"
+    parser.add_argument("--no-mission", action="append_const", dest="sets", const="start=null", help=words)
     parser.add_argument("--watch", action="store_true", help="apply changes to its files as you edit them")
     parser.add_argument("--host", metavar="NAME", help="of a system: run what this host runs")
     add_system_options(parser, has_profile=True)

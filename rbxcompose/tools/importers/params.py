@@ -11,7 +11,7 @@ from rbxcompose.base.printable import plain
 from rbxcompose.base.units import UNITS, Dimension
 from rbxcompose.commands.importing import ros_parameters
 from rbxcompose.commands.importing.foreign_files import ForeignFile, FreeNames, Given
-from rbxcompose.commands.importing.importer import DISAGREES, NOT_CARRIED_OVER, OTHER_PROGRAM, importer
+from rbxcompose.commands.importing.importer import CLOCK, DISAGREES, NOT_CARRIED_OVER, OTHER_PROGRAM, importer
 from rbxcompose.commands.importing.manifest_text import Row, header, place, quantity, row, section
 from rbxcompose.compiler.composition.dump import exact
 from rbxcompose.manifest.scalars import plain_value
@@ -22,7 +22,7 @@ from rbxcompose.sdk.registry import component_type, usable_names
 GUESSED_TYPE = kind("RBX2293", Severity.WARNING)
 # What programs of ROS have by themselves, and what decides here.
 _OF_ROS = {
-    "use_sim_time": "'bus: {clock: external}' makes robot time follow '/clock'",
+    "use_sim_time": CLOCK,
     "qos_overrides": "the class of a port decides",
     "start_type_description_service": "there is no such service",
 }

@@ -29,7 +29,7 @@ class Origin:
         if self.span.file == SET:
             return self.layer.strip("'")
         layer = "overlay" if self.layer.startswith("overlay ") else self.layer
-        shown = [f"{self.span.file}:{self.span.line}", *([layer] if layer not in ("", ROBOT_LAYER) else [])]
+        shown = [self.span.place, *([layer] if layer not in ("", ROBOT_LAYER) else [])]
         return ", ".join(shown) + (f" = {plain(self.written, LONGEST)}" if self.written else "")
 
 

@@ -16,7 +16,6 @@ from rbxcompose.missions.engine.engine import Engine
 from rbxcompose.missions.engine.events import MissionEnded, MissionEvent, Reported, SkillStarted
 from rbxcompose.missions.engine.run import STILL_HOLDS
 from rbxcompose.missions.engine.snapshot import restore, save
-from rbxcompose.missions.engine.story import MissionStory
 from rbxcompose.missions.engine.task import Task
 from rbxcompose.missions.engine.value_text import show_briefly
 from rbxcompose.missions.engine.world import POSE
@@ -282,7 +281,6 @@ class ExploredWorld:
         self.held: dict[int, str] = {}
         self.reports: list[str] = []
         self.end: MissionEnded | None = None
-        self.story = MissionStory(mission, robot.skills)
 
     def enter(self, moment: Moment) -> None:
         """Restore the world of a moment."""
@@ -334,12 +332,11 @@ class ExploredWorld:
 
     def say(self, event: MissionEvent, /) -> None:
         """Record faults, and the texts of calls."""
-        _, text = self.story.line(event) if isinstance(event, SkillStarted) else (None, "")
         match event:
-            case SkillStarted(leaf=leaf):
+            case SkillStarted(leaf=leaf, text=text):
                 self.calls[leaf] = text
-            case Reported(path=path, message=message) if message != STILL_HOLDS:
-                self.reports.append(f"{path}: {message}")
+            case Reported(place=place, message=message) if message != STILL_HOLDS:
+                self.reports.append(f"{place}: {message}")
             case MissionEnded():
                 self.end = event
 

@@ -10,9 +10,10 @@ from rbxcompose.base.config import Time
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.expressions.types import UNKNOWN, Type
 from rbxcompose.base.expressions.values import Value
-from rbxcompose.base.findings import Finding, Related, Report, Span
+from rbxcompose.base.findings import Finding, Related, Report, Span, one_compile
+from rbxcompose.compiler.check_runner import run_checks
 from rbxcompose.compiler.compile import Compilation, compile_robot, robot_for_mission
-from rbxcompose.compiler.model.robot import Robot, resolve
+from rbxcompose.compiler.model.robot import Robot, RobotMission, resolve
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.domains.servos.sections.faults import buses_of_joints
 from rbxcompose.domains.servos.twins.fault_script import InjectFault
@@ -539,11 +540,15 @@ class TrialReader:
         root, report = written.root, written.report
         if root is None:
             return None
-        Documents(report, self.sources).check(TrialFile, _without_values(root))
+        documents = Documents(report, self.sources)
+        root = documents.placed(TrialFile, root, SECTIONS)
+        documents.check(TrialFile, _without_values(root))
         found = self._robot(root, written.path, report)
         if found is None:
             return None
         trial = _read(root, *found, report)
+        if trial is not None and not report.has_errors:
+            report.extend(_with_its_inputs(root, found[0], trial))
         return None if report.has_errors or trial is None else replace(trial, name=written.name)
 
     def summed_up(self, findings: Iterable[Finding]) -> Iterator[Finding]:
@@ -668,6 +673,35 @@ def _read(root: MappingNode, robot: Robot, plan: Plan, report: Report) -> Trial 
         expect,
         is_complete,
     )
+
+
+def _with_its_inputs(root: MappingNode, robot: Robot, trial: Trial) -> Iterator[Finding]:
+    """Yield what is wrong with the mission only because of the inputs that the test gives to it.
+
+    A test that mocks skills, or expects another end than success, may give any.
+    """
+    written, mission = root.get("with"), robot.missions[trial.mission]
+    if trial.mocks or trial.expect.outcome != SUCCEEDS or not isinstance(written, MappingNode):
+        return
+    spans = {name: entry.value.span for name, entry in written.entries.items()}
+    own = replace(mission, inputs=trial.inputs, given={**mission.given, **spans})
+    if not (found := _findings_of(robot, own)):
+        return
+    known = {(finding.code, finding.message) for finding in _findings_of(robot, mission)}
+    place = next(iter(spans.values())) if len(spans) == 1 else key_span(root, ("with",))
+    for finding in found:
+        if (finding.code, finding.message) not in known and finding.span is not None:
+            if finding.span.file != place.file:
+                there = Related(finding.span, "with the inputs of the test")
+                finding = replace(finding, span=place, related=(there, *finding.related))
+            yield replace(finding, fix=None)
+
+
+def _findings_of(robot: Robot, mission: RobotMission) -> list[Finding]:
+    report = Report()
+    with one_compile():
+        run_checks(replace(robot, missions={**robot.missions, mission.name: mission}), report)
+    return report.findings
 
 
 def _faults_without_servos(events: tuple[TrialEvent, ...]) -> Iterator[Finding]:

@@ -8,7 +8,6 @@ from rbxcompose.base.expressions.values import Value
 from rbxcompose.base.levels import Level
 from rbxcompose.missions.engine import events
 from rbxcompose.missions.engine.story import MissionStory
-from rbxcompose.missions.program.program import Skill
 from rbxcompose.tools.mission_tests.model import RUNS
 
 
@@ -42,7 +41,6 @@ class TrialRecord:
     """Records the events of a mission, and the actions of the test."""
 
     mission: str
-    skills: Mapping[str, Skill]
     now: float = 0.0  # [s] since the start
     lines: list[TraceLine] = field(default_factory=list)
     steps: list[Done] = field(default_factory=list)
@@ -57,7 +55,7 @@ class TrialRecord:
 
     def __post_init__(self) -> None:
         """Begin the story."""
-        self._story = MissionStory(self.mission, self.skills)
+        self._story = MissionStory(self.mission)
 
     def note(self, text: str) -> None:
         """Add a line on an action of the test."""

@@ -197,7 +197,7 @@ class TrialStage:
         self.watcher = watcher
         self.now = 0.0
         self.is_paused = False
-        self.record = TrialRecord(trial.mission, trial.names.skills)
+        self.record = TrialRecord(trial.mission)
         self.mocked = Mocked(trial.mocks)
         self.values = SetValues(trial.names, trial.inputs)
         self.setter = Setter(trial, self.record, self.values)
@@ -327,7 +327,7 @@ class RobotRun:
     def __init__(self, trial: Trial, watcher: Watcher) -> None:
         self.trial = trial
         self.watcher = watcher
-        self.record = TrialRecord(trial.mission, trial.names.skills)
+        self.record = TrialRecord(trial.mission)
         self.mocked = Mocked(trial.mocks)
         self.values = SetValues(trial.names, trial.inputs)
         self.setter = Setter(trial, self.record, self.values)

@@ -174,7 +174,9 @@ def param_ls(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
 
 
 def param_get(nodes: ParameterNodes, arguments: argparse.Namespace) -> int:
-    """Print the value of a parameter."""
+    """Print the value of a parameter; without a name, list all of the component."""
+    if arguments.name is None:
+        return param_ls(nodes, arguments)
     node = nodes.find(arguments.component)
     (parameter,) = described(nodes, {node: (arguments.name,)}) or (None,)
     if parameter is None or parameter.about.type == rcl.ParameterType.PARAMETER_NOT_SET or parameter.value is None:

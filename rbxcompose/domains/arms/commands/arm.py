@@ -24,14 +24,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbxcompose.base.config import Config, Length, Time
-from rbxcompose.base.findings import suggest
+from rbxcompose.base.findings import clauses, suggest
 from rbxcompose.base.geometry import Transform3
 from rbxcompose.base.units import ANGLE, LENGTH
 from rbxcompose.commands import options
 from rbxcompose.commands.console import NotDoneError, emit, misused, table
 from rbxcompose.commands.guest import Guest, visit, wanted
 from rbxcompose.commands.lookup import add_bus_options
-from rbxcompose.commands.targets import add_layer_options, add_path_argument
+from rbxcompose.commands.targets import add_layer_options, add_path_argument, put_robot_last
 from rbxcompose.domains.arms.arm_config import ArmWorks
 from rbxcompose.domains.arms.command_line import (
     NO_MOTION,
@@ -64,6 +64,7 @@ from rbxcompose.manifest.fields import FramePose
 from rbxcompose.msgs.plain import from_plain
 from rbxcompose.msgs.rbxcompose_msgs import MoveArm, TraceArm
 
+GROUP = "bodies and arms"
 M = TypeVar("M", MoveArm.Goal, TraceArm.Goal)
 
 
@@ -106,7 +107,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     options.add_actions(parser, actions)
 
 
-run = options.run_action
+def run(arguments: argparse.Namespace) -> int:
+    """Run the chosen subcommand."""
+    for asked in ("goal", "target", "way"):
+        if asked in arguments and "path" in arguments:
+            put_robot_last(arguments, asked)
+    return options.run_action(arguments)
 
 
 def _ls(arguments: argparse.Namespace) -> int:
@@ -284,7 +290,7 @@ def _target(arguments: argparse.Namespace, works: ArmWorks, start: NDArray[Any])
     """Return the pose that is asked for, in the frame of the root."""
     links, pose = works.kinematics.poses(start), read_written(FramePose, arguments.target).to_transform()
     if arguments.frame and arguments.frame not in links:
-        message = f"there is no link '{arguments.frame}'; {suggest(arguments.frame, links, 'links')}"
+        message = clauses(f"there is no link '{arguments.frame}'", suggest(arguments.frame, links, "links"))
         raise NotDoneError(NO_MOTION.at(None, message))
     return PoseTarget(
         links[arguments.frame].compose(pose) if arguments.frame else pose,
@@ -508,7 +514,7 @@ class _ReachModel(Config):
 def add_reach_options(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `arm picture`."""
     parser.add_argument("what", choices=(REACH, EASE), help=f"{REACH}: of {DIRECTIONS} directions; {EASE}: Yoshikawa's")
-    parser.add_argument("--out", metavar="FILE", required=True, help="the picture, a PNG")
+    options.out_option("the picture, a PNG", required=True)(parser)
     words = "the layer that is shown, such as 'y: -10 cm' of the root, or 'all' (default: through the arm's base)"
     parser.add_argument("--layer", metavar="AXIS: AT", default="", help=words)
     parser.add_argument("--cell", metavar="LENGTH", default="4 cm", help="side of a cell (default: 4 cm)")

@@ -13,12 +13,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from rbxcompose.base.files import replace_file
-from rbxcompose.base.findings import Finding, Report, kind, suggest
+from rbxcompose.base.findings import Finding, Report, clauses, kind, suggest
 from rbxcompose.base.printable import plain
 from rbxcompose.base.requests import Command, to_data
 from rbxcompose.commands.console import NotDoneError, emit, misused, refuse, table, write_report
 from rbxcompose.commands.lookup import add_asking_options, answer_of, find_robot, pass_on
-from rbxcompose.commands.options import Declare, Subcommand, add_actions, argument, run_action
+from rbxcompose.commands.options import Declare, Subcommand, add_actions, argument, out_option, run_action
 from rbxcompose.domains.arms import scene_view
 from rbxcompose.domains.arms.motion.scene import PairDistance, PlacedObject
 from rbxcompose.domains.arms.motion.scene_text import written_scene
@@ -30,6 +30,7 @@ from rbxcompose.domains.body.xml_reader import read_urdf
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.validate import validate
 
+GROUP = "bodies and arms"
 NO_PAIR = kind("RBX9426")
 ON_SYSTEM = scene_view.SCENE
 _SHOWN = "OBJECT"  # name of the object's text in findings
@@ -49,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     link = argument("--link", metavar="LINK", default="", help=words)
     arm = argument("--arm", metavar="NAME", default="", help="the arm that watches (default: the first one)")
     pair = argument("pair", metavar="NAME", nargs="*", help="one or two links or objects")
-    out = argument("--out", metavar="FILE", default="scene.png", help="the picture (default: scene.png)")
+    out = out_option("the picture (default: scene.png)", default="scene.png")
     ask = add_asking_options
     hold = "let an object move with a link, as when a gripper holds it"
     stays = "It stays where it is, and may touch the link and all that this carries, or the links of --touch."
@@ -205,7 +206,9 @@ def _distance(arguments: argparse.Namespace) -> int:
     view = _view(arguments, *arguments.pair)
     for name in arguments.pair:
         if name not in view.watched:
-            raise NotDoneError(NO_PAIR.at(None, f"no arm watches '{name}'; {suggest(name, view.watched, 'watched')}"))
+            raise NotDoneError(
+                NO_PAIR.at(None, clauses(f"no arm watches '{name}'", suggest(name, view.watched, "watched")))
+            )
     if not view.pairs:
         words = " and ".join(f"'{name}'" for name in arguments.pair)
         why = f"no arm watches {words}" if len(arguments.pair) > 1 else "there are too many pairs: name one or two"

@@ -111,6 +111,7 @@ class Scene(Component[SceneConfig]):
 
     made_by = "A robot with arms runs one."
     process = "scene"
+    blocking = True  # an octree may take a second to read
     joint_states = In(JointState, "joint_states", is_open=True)
     collision_object = In(CollisionObject, "collision_object", qos="event", is_open=True, limits=SCENE_LIMITS)
     attached_collision_object = In(

@@ -232,7 +232,11 @@ class _Drafts:
             if effector.parent_group == group.name or (not effector.parent_group and is_carried and not group.groups):
                 joints = self.joints_of(self.said.groups[hand])
                 if len(joints) == 1:
-                    return GripperDraft(self._named(self.names, group, hand, "gripper"), joints[0])
+                    taken = self._named(self.names, group, hand, "gripper")
+                    if effector.name not in ("", hand):
+                        words = f"the end effector '{plain(effector.name, 60)}' is called '{taken}', as its group"
+                        self.report.add(RENAMED.at(effector.span, words))
+                    return GripperDraft(taken, joints[0])
                 words = f"the gripper '{plain(hand, 60)}' has {len(joints)} joints: describe it by hand"
                 self.report.add(NOT_CARRIED_OVER.at(effector.span, words))
         return None

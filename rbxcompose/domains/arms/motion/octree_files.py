@@ -16,6 +16,7 @@ LARGEST = 20_000_000  # [bytes]
 DEPTH = 16  # levels of OctoMap's trees
 BINARY = ".bt"
 _HEAD = b"# Octomap OcTree binary file"
+MOST_NODES = 2 * MOST_POINTS  # of a tree; some seconds of work
 _FREE, _OCCUPIED, _INNER = 1, 2, 3  # the two bits that OctoMap stores for each of eight children; 0 is unknown
 
 
@@ -84,6 +85,8 @@ def _occupied(data: bytes, side: float) -> Iterator[tuple[float, float, float]]:
     place, count = 0, 0
     waiting = [(0, (0, 0, 0))]  # depth, and the lowest corner in cells of the deepest level
     while waiting:
+        if place > 2 * MOST_NODES:
+            raise ValueError(f"there are more than {MOST_NODES:,} nodes")
         depth, corner = waiting.pop()
         (bits,) = struct.unpack_from("<H", data, place)
         place += 2

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Annotated
 
 from pydantic import Field, model_validator
 
 from rbxcompose.base.config import ARM, CONTROLLER, Config, JointName, Length, LinkName, Name, Refers
 from rbxcompose.base.dataclass import dataclass
-from rbxcompose.base.findings import Finding, Related, kind
+from rbxcompose.base.findings import Finding, Related, Span, kind
 from rbxcompose.base.units import ANGLE, LENGTH, Quantity, format_quantity
 from rbxcompose.domains.arms import section_models
 from rbxcompose.domains.arms.motion.groups import ArmGroup, carrying, chain, group_of, moved_links, together
@@ -23,7 +24,7 @@ from rbxcompose.domains.servos.sections.joints import JointPosition, limits_in
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import Contents, Reading, WantedComponent, Wiring
 from rbxcompose.manifest.tree import at, value_span
-from rbxcompose.manifest.validate import not_a_choice
+from rbxcompose.manifest.validate import NOT_A_CHOICE, not_a_choice
 from rbxcompose.msgs.control_msgs import FollowJointTrajectory, GripperCommand
 from rbxcompose.sdk.capabilities import BoundsGoals
 
@@ -54,9 +55,9 @@ class ArmModel(Config):
     """Arms whose joints are its own, instead of a chain; the last one has the tip."""
     passive: list[JointName] = []
     """Joints of the chain that nothing drives: motions take them as they are."""
-    controller: Annotated[Name, Refers(CONTROLLER)]
+    controller: Annotated[Name, Refers(CONTROLLER, is_reported=True)]
     """The controller that leads its joints."""
-    gripper: Annotated[Name, Refers(CONTROLLER)] | None = None
+    gripper: Annotated[Name, Refers(CONTROLLER, is_reported=True)] | None = None
     """The controller of its gripper, if it has one."""
     grasp: LinkName | None = None
     """The frame between the fingers of the gripper: x ahead, y across; without it, the tip."""
@@ -222,6 +223,8 @@ def arms(reading: Reading[ArmModel]) -> dict[str, ArmOfRobot]:
             path = ("arms", name, "planner", "type")
             node = at(reading.contents.root, path)
             reading.report.add(not_a_choice(reading.value(*path), "type", node, list(section_models.PLANNERS)))
+        unknown = list(_unknown_controllers(reading, name, entry))
+        reading.report.extend(unknown)
         if description is None:
             continue  # it is missing or has a mistake, which is reported
         group = _group_of(reading, name, entries, groups, description.body)
@@ -229,7 +232,8 @@ def arms(reading: Reading[ArmModel]) -> dict[str, ArmOfRobot]:
             continue
         wrong = list(_mistakes(reading, name, entry, group, description.body))
         reading.report.extend(wrong)
-        found[name] = ArmOfRobot(entry, group, not wrong and entry.planner.type in section_models.PLANNERS)
+        is_sound = not wrong and not unknown and entry.planner.type in section_models.PLANNERS
+        found[name] = ArmOfRobot(entry, group, is_sound)
     return found
 
 
@@ -287,6 +291,9 @@ def _group(reading: Reading[ArmModel], name: str, model: ArmModel, known: Body) 
                 reading.report.add(NO_CHAIN.at(span, f"'{joint}' {words}, so the arm '{name}' cannot move it"))
                 return None
         return group_of(known, model.joints)
+    if model.chain.to not in known.links:
+        reading.report.add(_no_such_tip(reading.value("arms", name, "chain", "to"), model.chain, known))
+        return None
     found = chain(known, model.chain.from_, model.chain.to)
     for index, joint in enumerate(model.passive if found is not None else ()):
         if found is not None and joint not in found.joints:
@@ -307,6 +314,14 @@ def _group(reading: Reading[ArmModel], name: str, model: ArmModel, known: Body) 
     return None
 
 
+def _no_such_tip(span: Span, written: section_models.ChainModel, known: Body) -> Finding:
+    """Return the finding about an end that is no link, with the links that could be: the farthest come first."""
+    below = reversed([joint.child for joint in known.joints_downwards])
+    tips = [link for link in below if (found := chain(known, written.from_, link)) and found.joints]
+    message, what = f"'to': there is no link '{written.to}'", f"links that move below '{written.from_}'"
+    return NOT_A_CHOICE.misspelt(span, message, written.to, tips, what)
+
+
 def _mistakes(
     reading: Reading[ArmModel], name: str, model: ArmModel, group: ArmGroup, known: Body
 ) -> Iterator[Finding]:
@@ -323,6 +338,21 @@ def _mistakes(
     for pose, written in model.poses.items():
         for joint, position in written.items():
             yield from _unfit(reading, (name, pose, joint), position, group, known)
+
+
+def _unknown_controllers(reading: Reading[ArmModel], name: str, model: ArmModel) -> Iterator[Finding]:
+    """Yield the findings about controllers that the robot does not have, with those that could be meant."""
+    there, known = reading.contents.of(controllers), reading.contents.known.get(CONTROLLER, {})
+    for key, written, type_, action in (
+        ("controller", model.controller, "joint_trajectory", FollowJointTrajectory),
+        ("gripper", model.gripper, "gripper", GripperCommand),
+    ):
+        if written is not None and written not in known:
+            fitting = [other for other, config in there.items() if served_topic(other, config, action)]
+            message, what = f"'{key}': there is no controller '{written}'", f"controllers of type {type_}"
+            finding = NOT_A_CHOICE.misspelt(reading.value("arms", name, key), message, written, fitting, what)
+            added = f"add '{written}: {{type: {type_}, ...}}' below 'controllers'"
+            yield finding if fitting else replace(finding, help=added)
 
 
 def _gripper_elsewhere(

@@ -24,6 +24,8 @@ from rbxcompose.commands.terminal import NO_TERMINAL, LiveScreen
 from rbxcompose.msgs.geometry_msgs import Twist, Vector3
 from rbxcompose.sdk.ports import Qos
 
+GROUP = "drive"
+IS_COMMON = True
 _HELP = "ready: arrows or w a s d: drive   space: stop   q: quit"
 HOLD = 0.3  # [s] that a key counts as pressed; terminals report only presses, and repeat them while a key is held
 PERIOD = 0.1  # [s] between two commands

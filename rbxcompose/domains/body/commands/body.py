@@ -29,6 +29,7 @@ from rbxcompose.domains.body.model import Body
 from rbxcompose.domains.body.picture import draw
 from rbxcompose.manifest.files import find, shown_name
 
+GROUP = "bodies and arms"
 TEXT, PDF = "text", "pdf"
 _FAMILY = "RBX20"  # codes of findings about bodies
 WOULD_REPLACE = kind("RBX2017")
@@ -51,12 +52,12 @@ of these. 0, c and r move it to zero, to the centre of its range, or anywhere; Z
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    out = options.argument("--out", metavar="FILE", help="write it to this file")
+    out = options.out_option("write it to this file")
     words = "lines, or a picture as a graph"
     form = options.argument("--format", choices=(TEXT, *texts.FORMATS), default=TEXT, help=words)
     words = "write it to this file (default of a PDF: NAME.pdf)"
-    out_or_pdf = options.argument("--out", metavar="FILE", help=words)
-    picture = options.argument("--out", metavar="FILE", help="the picture (default: NAME.png)")
+    out_or_pdf = options.out_option(words)
+    picture = options.out_option("the picture (default: NAME.png)")
     words = "a joint's position, such as '35 deg'; a bare number is in rad or m"
     joint = options.argument("--joint", action="append", default=[], metavar="NAME=POSITION", help=words)
     tree = "show which link hangs on which, by which joint"
@@ -206,7 +207,7 @@ def _add_simplify_options(parser: argparse.ArgumentParser) -> None:
     amount.add_argument("--ratio", type=_ratio, default=_RATIO, metavar="R", help=words)
     amount.add_argument("--faces", type=_faces, metavar="N", help="how many triangles each mesh has at most")
     parser.add_argument("--mesh", action="append", default=[], metavar="NAME", help="only this mesh of the body")
-    parser.add_argument("--out", required=True, metavar="DIR", help="the folder for the files")
+    options.out_option("the folder for the files", metavar="DIR", required=True)(parser)
     parser.add_argument("--force", action="store_true", help="replace files that exist")
 
 

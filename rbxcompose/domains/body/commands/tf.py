@@ -29,6 +29,7 @@ from rbxcompose.msgs.std_msgs import Header
 from rbxcompose.msgs.tf2_msgs import TFMessage
 from rbxcompose.sdk.ports import Qos
 
+GROUP = "bodies and arms"
 ON_SYSTEM = options.BUS
 _DIGITS = 4  # decimal places of metres and degrees
 _TOPIC = "/tf_static"

@@ -33,6 +33,7 @@ from rbxcompose.domains.devices.serial_ports import ROOT, SerialPort, serial_por
 from rbxcompose.domains.devices.usb import UsbDevice
 from rbxcompose.manifest.tree import key_span
 
+GROUP = "system"
 _GROUP_NAME = re.compile(r"[a-z_][a-z0-9_-]{0,31}")
 _HEAD = ("port", "vendor", "product", "serial", "USB port", "driver", "what it is", "device")
 _NUMBERS = ("vendor", "product", "interface", "usb_port")  # as they are; a serial number may need quotes

@@ -24,6 +24,7 @@ from rbxcompose.commands.terminal import LiveScreen, is_terminal
 from rbxcompose.domains.diagnostics import requests
 from rbxcompose.runtime.folder import RobotFolder
 
+GROUP = "look"
 ON_SYSTEM = requests.TYPE
 _PERIOD = 0.2  # [s] between two requests to a robot that is followed
 _RESET, _FAINT = "\x1b[0m", "\x1b[2m"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 
-from rbxcompose.base.findings import suggest
+from rbxcompose.base.findings import clauses, suggest
 from rbxcompose.base.levels import Level
 from rbxcompose.domains.diagnostics import requests
 from rbxcompose.domains.diagnostics.core import Aggregator, TreeRow
@@ -165,7 +165,7 @@ class Diagnostics(Component[DiagnosticsConfig]):
         path = f"/{request.path.strip('/')}" if request.path else ""
         known = self.core.paths()
         if path and path not in known:
-            raise Refused(f"there is no group '{path}'; {suggest(path, known, 'groups')}")
+            raise Refused(clauses(f"there is no group '{path}'", suggest(path, known, "groups")))
         done = self.core.acknowledge(self.now, path)
         self.settle()
         if not done:

@@ -11,7 +11,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Related, Report, Severity, Span, kind
 from rbxcompose.base.printable import plain
 from rbxcompose.commands.importing.foreign_files import ForeignFile, ForeignMap, FreeNames, Given, maps_in
-from rbxcompose.commands.importing.importer import DISAGREES, NOT_CARRIED_OVER, OTHER_PROGRAM, importer
+from rbxcompose.commands.importing.importer import CLOCK, DISAGREES, NOT_CARRIED_OVER, OTHER_PROGRAM, importer
 from rbxcompose.commands.importing.manifest_text import (
     WIDEST,
     Row,
@@ -38,6 +38,11 @@ TYPES = {
     "DiscardAnalyzer": "discard",
 }
 MATCHERS = ("startswith", "contains", "name", "regex")
+_OF_ITEMS = ("remove_prefix", "timeout", "num_items", "discard_stale")
+_WITHOUT_EFFECT = {  # in ROS either, by type
+    "group": (*MATCHERS, "expected", "find_and_remove_prefix", *_OF_ITEMS),
+    "discard": ("path", *_OF_ITEMS),
+}
 _BELOW = ("analyzers", "analyzers_params")
 _MOST = 1_000_000  # items
 _ELSEWHERE = {
@@ -59,6 +64,7 @@ class ForeignAnalyzer:
     matched: dict[str, list[Given[str]]] = field(default_factory=dict)
     expected: list[Given[str]] = field(default_factory=list)
     stripped: list[Given[str]] = field(default_factory=list)
+    removed: list[Given[str]] = field(default_factory=list)
     timeout: Given[float] | None = None
     count: Given[int] | None = None
     discards: Given[bool] | None = None
@@ -112,7 +118,8 @@ def _aggregator(node: NodeParameters, report: Report) -> ForeignAggregator:
     base = entries.text("base_path")
     other = entries.text("path")
     found = ForeignAggregator(node.span, entries.above_zero("pub_rate"), base or other, entries.flag("other_as_errors"))
-    entries.flag("use_sim_time")
+    if (time := entries.flag("use_sim_time")) is not None and time.value:
+        report.add(NOT_CARRIED_OVER.at(time.span, f"'use_sim_time' is not carried over: {CLOCK}"))
     for key, span in entries.places(*_ELSEWHERE).items():
         report.add(NOT_CARRIED_OVER.at(span, f"'{key}' is not carried over: {_ELSEWHERE[key]}"))
     entries.report_unknown_keys()
@@ -131,17 +138,22 @@ def _analyzer(name: str, entries: ForeignMap) -> ForeignAnalyzer | None:
     type_ = _type(entries)
     if type_ is None:
         return None
+    idle = entries.places(*_WITHOUT_EFFECT.get(type_, ()))
+    for key, span in idle.items():
+        entries.add(NOT_CARRIED_OVER.at(span, f"'{key}' of {entries.what} is not carried over: it has no effect"))
+    others = {key: entry for key, entry in entries.node.entries.items() if key not in idle}
+    entries = ForeignMap(MappingNode(others, entries.node.span), entries.what, entries.span, entries.report)
+    entries.places("type")  # which is known
     analyzer = ForeignAnalyzer(name, entries.span, type_, entries.text("path"))
     for key in MATCHERS:
         analyzer.matched[key] = [each for each in _texts(entries, key) if key != "regex" or _is_regex(each, entries)]
     analyzer.expected, analyzer.stripped = _texts(entries, "expected"), _texts(entries, "find_and_remove_prefix")
-    for key, span in entries.places("remove_prefix").items():
-        words = f"'{key}' of {entries.what} is not carried over: 'find_and_remove_prefix' strips what it matches"
-        entries.add(NOT_CARRIED_OVER.at(span, words))
+    analyzer.removed = _texts(entries, "remove_prefix")
     analyzer.timeout, analyzer.discards = entries.number("timeout"), entries.flag("discard_stale")
     analyzer.count = entries.whole("num_items", -1, _MOST)
     below = _analyzers(entries.node) if type_ == "group" else {}
-    entries.places(*_BELOW, *below)
+    if type_ == "group":
+        entries.places(*_BELOW, *(below.keys() & entries.node.entries.keys()))
     entries.report_unknown_keys()
     analyzer.below = list(_read(below, entries.report))
     if type_ == "ignore":
@@ -258,9 +270,11 @@ def _diagnostics_analyzer(analyzer: ForeignAnalyzer, name: str, depth: int) -> I
     if analyzer.path and path != name and analyzer.type in ("generic", "group"):
         yield row(depth, f"path: {word(path)}", place(analyzer.path.span))
     conditions = [_condition(key, each) for key, ones in analyzer.matched.items() for each in ones]
+    conditions += [(_EVERYTHING, each) for each in analyzer.stripped if not each.value]
     yield from _list("match", conditions, depth)
     yield from _list("expected", [(word(each.value), each) for each in analyzer.expected], depth)
-    yield from _list("strip_prefix", [(word(each.value), each) for each in analyzer.stripped if each.value], depth)
+    for key, prefixes in (("strip_prefix", analyzer.stripped), ("remove_prefix", analyzer.removed)):
+        yield from _list(key, [(word(each.value), each) for each in prefixes if each.value], depth)
     if analyzer.timeout:
         never = ": never" if analyzer.timeout.value <= 0 else ""
         yield row(

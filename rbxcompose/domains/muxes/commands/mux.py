@@ -11,7 +11,7 @@ import json
 import time
 from collections.abc import Callable, Iterator
 
-from rbxcompose.base.findings import suggest
+from rbxcompose.base.findings import clauses, suggest
 from rbxcompose.base.requests import Command, to_data
 from rbxcompose.commands.console import NotDoneError, emit, table
 from rbxcompose.commands.lookup import REFUSED, add_asking_options, answer_of, find_robot, known_state, show_answer
@@ -19,6 +19,7 @@ from rbxcompose.commands.options import Subcommand, add_actions, argument, count
 from rbxcompose.domains.muxes import requests
 from rbxcompose.runtime.folder import RobotFolder
 
+GROUP = "drive"
 ON_SYSTEM = requests.MUX
 _LOOK = 0.2  # [s] between two looks of `watch`; no change is missed between them
 
@@ -66,14 +67,16 @@ def _chosen(arguments: argparse.Namespace, folder: RobotFolder) -> tuple[str, li
         return known[0], given
     if not known:
         raise NotDoneError(REFUSED.at(None, "this robot has no mux"))
-    first = f"there is no mux '{given[0]}'; " if given else "this robot has several muxes, so name one; "
-    raise NotDoneError(REFUSED.at(None, f"{first}{suggest(given[0] if given else '', known, 'muxes')}"))
+    first = f"there is no mux '{given[0]}'" if given else "this robot has several muxes, so name one"
+    raise NotDoneError(REFUSED.at(None, clauses(first, suggest(given[0] if given else "", known, "muxes"))))
 
 
 def _only_mux(arguments: argparse.Namespace, folder: RobotFolder) -> str:
     mux, others = _chosen(arguments, folder)
     if others:
-        raise NotDoneError(REFUSED.at(None, f"there is no mux '{others[0]}'; {suggest(others[0], [mux], 'muxes')}"))
+        raise NotDoneError(
+            REFUSED.at(None, clauses(f"there is no mux '{others[0]}'", suggest(others[0], [mux], "muxes")))
+        )
     return mux
 
 

@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable, Collection, Iterable, Mapping
 from typing import Any
 
-from rbxcompose.base.findings import suggest
+from rbxcompose.base.findings import clauses, suggest
 from rbxcompose.base.requests import Command, Refused, answers
 from rbxcompose.domains.muxes import requests
 from rbxcompose.domains.muxes.account import lock_states, states_of, why
@@ -358,7 +358,7 @@ class Mux(Component[MuxConfig]):
             Refused: if there is none.
         """
         if (name := input_at(text, self.topics)) is None:
-            raise Refused(f"'{self.name}' has no input '{text}'; {suggest(text, self.topics, 'inputs')}")
+            raise Refused(clauses(f"'{self.name}' has no input '{text}'", suggest(text, self.topics, "inputs")))
         return name
 
     def listen(self) -> None:

@@ -10,7 +10,7 @@ from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.findings import Related, Report, Severity, Span, kind
 from rbxcompose.base.printable import plain
 from rbxcompose.commands.importing.foreign_files import ForeignFile, ForeignMap, FreeNames, Given
-from rbxcompose.commands.importing.importer import DISAGREES, NOT_CARRIED_OVER, OTHER_PROGRAM, importer
+from rbxcompose.commands.importing.importer import CLOCK, DISAGREES, NOT_CARRIED_OVER, OTHER_PROGRAM, importer
 from rbxcompose.commands.importing.manifest_text import Row, flow, header, place, quantity, row, section
 from rbxcompose.commands.importing.ros_parameters import NodeParameters, parameters_with
 from rbxcompose.domains.muxes.words import OWN_NAMES
@@ -82,8 +82,7 @@ def _mux(node: NodeParameters, program: str, report: Report) -> ForeignMux:
     else:
         mux.output = given.text("publisher")
     if (time := given.flag("use_sim_time")) is not None and time.value:
-        words = "'use_sim_time' is not carried over: 'bus: {clock: external}' makes robot time follow '/clock'"
-        report.add(NOT_CARRIED_OVER.at(time.span, words))
+        report.add(NOT_CARRIED_OVER.at(time.span, f"'use_sim_time' is not carried over: {CLOCK}"))
     given.report_unknown_keys()
     return mux
 

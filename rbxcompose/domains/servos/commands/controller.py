@@ -6,7 +6,7 @@ import argparse
 import json
 from collections.abc import Iterator
 
-from rbxcompose.base.findings import suggest
+from rbxcompose.base.findings import clauses, suggest
 from rbxcompose.base.requests import to_data
 from rbxcompose.base.units import RATIO, UnitError, to_si
 from rbxcompose.commands.console import NotDoneError, emit, table
@@ -15,6 +15,7 @@ from rbxcompose.commands.options import Subcommand, add_actions, argument, run_a
 from rbxcompose.domains.servos import controller_manager
 from rbxcompose.runtime.folder import RobotFolder
 
+GROUP = "drive"
 ON_SYSTEM = controller_manager.BUS
 
 
@@ -75,7 +76,7 @@ def _switch(arguments: argparse.Namespace) -> int:
         raise NotDoneError(REFUSED.at(None, "name a controller to switch on, or one to switch off with --off"))
     for name in names:
         if name not in buses:
-            message = f"there is no controller '{name}'; {suggest(name, buses, 'controllers')}"
+            message = clauses(f"there is no controller '{name}'", suggest(name, buses, "controllers"))
             raise NotDoneError(REFUSED.at(None, message))
     if len({buses[name] for name in names}) > 1:
         raise NotDoneError(REFUSED.at(None, "these controllers are on different buses: switch those of one at a time"))
@@ -88,7 +89,7 @@ def _speed(arguments: argparse.Namespace) -> int:
     folder = find_robot(arguments.robot)
     buses = {state.name: bus for bus, state in _listed(folder)}
     if arguments.name not in buses:
-        message = f"there is no controller '{arguments.name}'; {suggest(arguments.name, buses, 'controllers')}"
+        message = clauses(f"there is no controller '{arguments.name}'", suggest(arguments.name, buses, "controllers"))
         raise NotDoneError(REFUSED.at(None, message))
     try:
         share = to_si(arguments.share, RATIO)

@@ -15,6 +15,7 @@ from rbxcompose.commands.console import refuse
 from rbxcompose.domains.devices.serial_ports import PortError
 from rbxcompose.domains.servos.bus import NOT_INSTALLED
 
+GROUP = "bodies and arms"
 LAST_ID = 252
 USUAL = (57_600, 1_000_000)  # [bit/s], at which servos are sold
 _SURVEYS = ("scan", "new-robot")

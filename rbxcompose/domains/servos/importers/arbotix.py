@@ -70,7 +70,9 @@ def read_controller(name: str, entry: ForeignMap) -> FollowController | DiffCont
 
 def _follow(name: str, entry: ForeignMap) -> FollowController | None:
     joints = entry.needs("joints", entry.texts("joints"))
-    entry.places("rate", "index")  # that of the bus counts, and nothing has a number here
+    for key, span in entry.places("rate", "index").items():
+        why = "that of the bus counts" if key == "rate" else "controllers have names here"
+        entry.add(NOT_CARRIED_OVER.at(span, f"'{key}' of {entry.what} is not carried over: {why}"))
     if entry.is_set("onboard"):
         words = f"'onboard' of {entry.what} is not carried over: trajectories are interpolated here, not on a board"
         entry.add(NOT_CARRIED_OVER.at(entry.places("onboard")["onboard"], words))

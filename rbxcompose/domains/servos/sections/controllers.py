@@ -119,10 +119,16 @@ def _unknown_type(written: ScalarNode, names: Sequence[str]) -> Finding:
     """Return the finding for a type of controller that does not exist; `package/Class` is that of ros2_control."""
     finding = not_a_choice(written.span, "type", written, [*names])
     package, _, cls = written.text.partition("/")
-    if cls.endswith("Broadcaster"):
-        return replace(finding, help="the states of joints are published without a controller: remove it", fix=None)
+    if written.text.lower().endswith(_PUBLISHING):
+        return replace(finding, help="what is measured is published without a controller: remove it", fix=None)
     ours = CONTROLLERS.get(cls) or CONTROLLERS.get(package)
-    return replace(finding, help=f"{DID_YOU_MEAN} '{ours}'?") if ours in names else finding
+    if ours in names:
+        return replace(finding, help=f"{DID_YOU_MEAN} '{ours}'?", fix=None)
+    return replace(finding, help="", fix=None) if cls else finding
+
+
+_PUBLISHING = ("broadcaster", "joint_state_controller", "jointstatecontroller")
+"""How the names of those end that only publish, in ros2_control and ros_control."""
 
 
 def _mistakes(
