@@ -1,6 +1,6 @@
 """Messages as plain data (maps, lists, numbers, texts, flags), and back with every mistake as a finding.
 
-Bytes are lists of numbers here. Omitted fields keep their defaults.
+Bytes are lists of numbers here, and may be bytes on the way back. Omitted fields keep their defaults.
 """
 
 import struct
@@ -66,10 +66,11 @@ def _plain(type_: FieldType, value: Any) -> Any:
         return [_plain(single, one) for one in (value.tolist() if hasattr(value, "tolist") else value)]
     if type_.is_message:
         return to_plain(value)
-    return _shortest(value) if type_.base == "float32" else value
+    return shortest(value) if type_.base == "float32" else value
 
 
-def _shortest(value: float) -> float:
+def shortest(value: float) -> float:
+    """Return the shortest number that reads back as the same `float32`."""
     for digits in _DIGITS:
         short = float(f"{value:.{digits}g}")
         if _is_same(short, value):
@@ -110,7 +111,8 @@ class _Reading(Generic[M]):
 
     def _value(self, type_: FieldType, value: object, path: KeyPath) -> Any:
         if type_.shape is not FieldShape.SINGLE:
-            if not isinstance(value, list | tuple):
+            is_bytes = isinstance(value, bytes) and type_.base in OCTETS
+            if not isinstance(value, list | tuple | bytes) or (isinstance(value, bytes) and not is_bytes):
                 return self._wrong(path, f"expected a list ({type_})")
             count, length = len(value), type_.length
             if (type_.shape is FieldShape.ARRAY and count != length) or (
@@ -118,6 +120,8 @@ class _Reading(Generic[M]):
             ):
                 most = "at most " if type_.shape is FieldShape.BOUNDED else ""
                 return self._wrong(path, f"{most}{length} values are expected, not {count}")
+            if is_bytes:
+                return value
             single = FieldType(type_.base, text_limit=type_.text_limit)
             values = [self._value(single, one, (*path, index)) for index, one in enumerate(value)]
             if self.findings:
