@@ -3,6 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 ROBOT ?= robots/turtlebot/robot.yaml
+WITH ?= --set console.port=8080
 PYTEST ?= -n auto
 
 # Each command that a test starts would compile the package again.
@@ -10,13 +11,13 @@ unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: up console test lint types unit soak bench docs site messages lock clean
 
-# What the robot needs beside rbxcompose, such as the planning libraries of an arm, in the versions of the lock file.
+# The robot with its page, and what it needs beside rbxcompose, such as libraries for arms, in the versions of the lock file.
 up: $(VENV)/.up
-	@extras=$$($(BIN)/rbxcompose needs $(ROBOT) --missing --pip 2>/dev/null || true); [ -z "$$extras" ] || { \
+	@extras=$$($(BIN)/rbxcompose needs $(ROBOT) $(WITH) --missing --pip 2>/dev/null || true); [ -z "$$extras" ] || { \
 		sed -n 's/^\([a-zA-Z0-9._-]*==[^ ;\\]*\).*/\1/p' requirements-test.lock > $(VENV)/versions.txt && \
 		$(BIN)/python -m pip install -q --disable-pip-version-check -c $(VENV)/versions.txt "$$extras"; }
-	@! grep -qs '^console:' $(ROBOT) || $(MAKE) -s console || true  # the robot runs without its page
-	@trap : INT; $(BIN)/rbxcompose up $(ROBOT) || test $$? -eq 130  # Ctrl-C is how a run ends
+	@$(MAKE) -s console || true  # the robot runs without its page
+	@trap : INT; $(BIN)/rbxcompose up $(ROBOT) $(WITH) || test $$? -eq 130  # Ctrl-C is how a run ends
 
 console: | $(VENV)/bin/python  ## Build the page that robots serve, if its sources are newer; needs no Node
 	@[ -x $(BIN)/npm ] || { command -v npm && node -e 'process.exit(+(parseInt(process.version.slice(1)) < 20))'; } > /dev/null 2>&1 \
