@@ -617,16 +617,22 @@ class Bridge:
 
     def _status(self, client: _Client, level: str, text: str, identity: object = None) -> None:
         if LEVELS.index(level) >= client.level:
-            told = {} if not isinstance(identity, str | int | float) else {"id": identity}
-            self._send(client, {"op": "status", "level": level, "msg": text, **told})
+            identified = {} if not isinstance(identity, str | int | float) else {"id": identity}
+            self._send(client, {"op": "status", "level": level, "msg": text, **identified})
 
     def _respond(self, number: int, values: object, *, is_good: bool) -> None:
         if (waiting := self._calls.pop(number, None)) is None:
             return  # its client is gone
         client = self._clients[waiting.client]
         client.open_calls -= 1
-        told = {} if waiting.id is None else {"id": waiting.id}
-        frame = {"op": "service_response", **told, "service": waiting.service, "values": values, "result": is_good}
+        identified = {} if waiting.id is None else {"id": waiting.id}
+        frame = {
+            "op": "service_response",
+            **identified,
+            "service": waiting.service,
+            "values": values,
+            "result": is_good,
+        }
         self._send(client, frame)
 
     def _send(self, client: _Client, frame: Mapping[str, object]) -> None:
