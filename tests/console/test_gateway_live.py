@@ -160,7 +160,7 @@ def test_the_page_learns_what_the_robot_has(robot: Robot) -> None:
     assert config["stop"] == "/console/stop"
 
 
-@pytest.mark.parametrize("origin", [f"http://{HOST}", f"http://localhost:{PORT}", None])
+@pytest.mark.parametrize("origin", [f"http://{HOST}", f"http://localhost:{PORT}", None], ids=["own", "local", "none"])
 def test_its_own_pages_and_programs_of_this_machine_may_talk(robot: Robot, origin: Any) -> None:
     async def talk(browser: Browser) -> None:
         assert "/odom" in (await browser.calls("/rosapi/topics"))["topics"]

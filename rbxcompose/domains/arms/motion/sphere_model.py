@@ -20,7 +20,6 @@ from rbxcompose.domains.arms.motion.octree_files import read_cells
 from rbxcompose.domains.body.model import Geometry
 
 Coal = Any  # of an extra, without types
-Chain = compiled_collisions.Chain
 Carriers = Mapping[str, tuple[int, Transform3]]
 """The frame of the chain that moves each link, and where the link is in it."""
 NONE = sphere_trees.ball_tree(np.inf)  # of a half space, which no spheres cover
@@ -48,11 +47,13 @@ class Trees:
 
     def __init__(self) -> None:
         self._made: dict[Geometry, sphere_trees.SphereTree] = {}
-        self._chain: tuple[Chain, Carriers] | None = None
+        self._chain: tuple[compiled_collisions.Chain, Carriers] | None = None
         self._chain_of: tuple[ArmKinematics, Mapping[str, float], frozenset[str]] | None = None
         self._placed: dict[tuple[str, Transform3, int], PlacedTree] = {}
 
-    def placed(self, kinematics: ArmKinematics, parts: Sequence[CheckedPart]) -> tuple[Chain, list[PlacedTree]]:
+    def placed(
+        self, kinematics: ArmKinematics, parts: Sequence[CheckedPart]
+    ) -> tuple[compiled_collisions.Chain, list[PlacedTree]]:
         """Return the chain of what moves, where the other joints are now, and the spheres of each part on it."""
         wanted = kinematics, kinematics.positions, frozenset(part.link for part in parts)
         if self._chain is None or wanted != self._chain_of:
@@ -124,7 +125,7 @@ def compiled_model(checker: MeshChecker, trees: Trees) -> compiled_collisions.Co
     )
 
 
-def _chain(kinematics: ArmKinematics, links: Iterable[str]) -> tuple[Chain, Carriers]:
+def _chain(kinematics: ArmKinematics, links: Iterable[str]) -> tuple[compiled_collisions.Chain, Carriers]:
     """Return the chain of what moves, and for each link its frame in the chain and where it is in that."""
     body, group, positions = kinematics.body, kinematics.group, kinematics.positions
 
