@@ -111,7 +111,7 @@ class Publish:
 
 @dataclass(frozen=True, slots=True)
 class ServiceCall:
-    """ServiceCall a service within `timeout` [s], and pass the reply to `Bridge.answered`."""
+    """Call a service within `timeout` [s], and pass the reply to `Bridge.answered`."""
 
     number: int
     service: str
