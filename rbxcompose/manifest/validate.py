@@ -233,7 +233,9 @@ def to_plain(node: tree.TreeNode) -> object:
 @cache
 def validator(model: Any) -> SchemaValidator:
     """Return what validates against a model, without the layer of Python that `TypeAdapter` has around it."""
-    return cast(SchemaValidator, TypeAdapter(model).validator)
+    adapter = TypeAdapter(model)
+    adapter.rebuild()  # else a model that is built late leaves a stand-in here, which looks for it in each call
+    return cast(SchemaValidator, adapter.validator)
 
 
 def is_valid(model: Any, data: object) -> bool:

@@ -153,8 +153,8 @@ class Walk:
         return _UNKNOWN
 
     def _scalar(self, node: yaml.ScalarNode) -> tree.ScalarNode:
-        scalar = tree.ScalarNode(node.value, span_of(node, self.file), not node.style)
-        text = scalar.text
+        text: str = node.value
+        scalar = tree.ScalarNode(text, span_of(node, self.file), not node.style)
         if len(text) > tree.TEXT:
             message = f"this text has {len(text):,} characters, {tree.TEXT:,} are the limit"
             self.add(TOO_LARGE.at(scalar.span, message))
