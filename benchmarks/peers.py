@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 from benchmarks.measuring import ROOT
@@ -18,6 +19,7 @@ from benchmarks.measuring import ROOT
 PATIENCE = 60.0  # [s] for anything to come up
 LOOK = 0.002  # [s] between two looks
 ROS_PYTHON = "/usr/bin/python3"  # for which Debian's packages of ROS 1 are made
+ROS_PACKAGES = ("rospy", "dynamic_reconfigure.server", "geometry_msgs.msg", "std_srvs.srv")
 
 
 def free_port() -> int:
@@ -75,12 +77,16 @@ class Ros:
     port: int
 
     name = "ROS 1"
-    package = "ROS 1 (rospy, roslaunch)"
+    package = "ROS 1 (rospy, roslaunch, dynamic_reconfigure, geometry_msgs, std_srvs)"
 
     @staticmethod
+    @cache
     def is_here() -> bool:
-        """Tell whether it is installed."""
-        return all(map(shutil.which, ("roslaunch", "rosmaster", "rostopic"))) and Path(ROS_PYTHON).exists()
+        """Tell whether it is installed, with what our nodes import: without that, they would never come up."""
+        if not all(map(shutil.which, (ROS_PYTHON, "roslaunch", "rosmaster", "rostopic"))):
+            return False
+        imports = f"import {', '.join(ROS_PACKAGES)}"
+        return subprocess.run([ROS_PYTHON, "-c", imports], stderr=subprocess.DEVNULL).returncode == 0
 
     @property
     def environment(self) -> dict[str, str]:

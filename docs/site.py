@@ -39,6 +39,7 @@ MENU: Mapping[str, str | Mapping[str, str]] = {
     },
     "Tools": {
         "Seeing a robot": "inspection.md",
+        "The console": "console.md",
         "Editors": "editors.md",
         "Continuous integration": "ci.md",
         "Components of your own": "sdk.md",

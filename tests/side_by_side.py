@@ -13,6 +13,8 @@ REAL_TIME = {
         "tests/faults/",
     ),
     "robots and systems": (
+        "tests/console/test_gateway_live",
+        "tests/console/test_page",
         "tests/net/",
         "tests/robots/test_real_picking",
         "tests/robots/test_three_levels",

@@ -34,6 +34,7 @@ FAMILIES = {
     "92": "recordings",
     "93": "plug-ins of other packages",
     "94": "this machine, and what runs on it",
+    "96": "the console in a browser",
 }
 """Meaning of the first two digits of a code."""
 

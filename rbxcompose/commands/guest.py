@@ -167,6 +167,16 @@ class Guest:
                 key.data()
             self._inbox.drain(self.scheduler)
 
+    def fileno(self) -> int:
+        """Return the descriptor that is readable when something has arrived, for a loop of somebody else."""
+        return self._inbox.fileno()
+
+    def pump(self) -> float | None:
+        """Run what has arrived or is due, in such a loop; return when to do so again [s], None if nothing is due."""
+        self._inbox.drain(self.scheduler)
+        self.scheduler.advance(self.clock.now())
+        return self.scheduler.next_due()
+
     @contextmanager
     def interruptible(self, interrupted: Callable[[], None] = lambda: None) -> Iterator[None]:
         """Let an interrupt, or the end of the terminal, call `interrupted` in the loop instead of ending the process.

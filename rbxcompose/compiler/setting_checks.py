@@ -20,8 +20,8 @@ from rbxcompose.missions.analysis.examined import Examined
 from rbxcompose.sdk.capabilities import Capability
 
 K = TypeVar("K", bound=Capability)
-Reads = dict[str, set[type]]
-"""The kinds of capabilities that were read of each component; `Config` stands for its configuration."""
+Reads = set[tuple[str, type]]
+"""Components with the kinds of capabilities that were read of them; `Config` stands for the whole configuration."""
 
 
 class SettingChecks:
@@ -30,7 +30,8 @@ class SettingChecks:
     def __init__(self, robot: Robot) -> None:
         self._robot, self._components, self._recorder = robot, dict(robot.components), _Recorder()
         self._watched = {name: _Watched.of(component, self._recorder) for name, component in robot.components.items()}
-        self._of_missions: Reads = {}
+        self._of_missions: Reads = set()
+        self._all: Reads = set()
         self._results: dict[tuple[str, int], _Result] = {}
         self._report: Report | None = None
 
@@ -43,18 +44,19 @@ class SettingChecks:
                 new = replace(old, config=config, capabilities=old.cls.capabilities(config))
                 before[name], self._components[name] = old, new
                 self._watched[name] = _Watched.of(new, self._recorder)
-        is_known = self._report is not None
-        if before and self._differ(self._of_missions, before):
+        is_known, other = self._report is not None, self._other(before)
+        if not other.isdisjoint(self._of_missions):
             is_known = False
             self._results = {key: result for key, result in self._results.items() if result.is_of_robot}
         for key, known in list(self._results.items()) if before else ():
-            if known.is_foreign or self._differ(known.reads, before):
+            if known.is_foreign or not other.isdisjoint(known.reads):
                 self._results[key] = found = self._run(known.rule, self._robot)
                 is_known &= found.findings == known.findings
         if self._report is None or not is_known:
             self._report = Report()
-            self._of_missions = self._recorder.reads = {}
+            self._of_missions = self._recorder.reads = set()
             run_checks(replace(self._robot, components=self._watched), self._report, self._found)
+            self._all |= self._of_missions
         return self._report
 
     def _found(self, rule: Rule[Any], subject: Robot | Examined) -> list[Finding]:
@@ -66,21 +68,23 @@ class SettingChecks:
     def _run(self, rule: Rule[Any], subject: Robot | Examined) -> _Result:
         """Run a rule: about the robot, on a robot of its own, so that it reads what others have found out before."""
         if not isinstance(subject, Robot):
-            return _Result(rule, findings_of(rule, subject), {}, is_of_robot=False)
-        outer, self._recorder.reads = self._recorder.reads, {}
+            return _Result(rule, findings_of(rule, subject), set(), is_of_robot=False)
+        outer, self._recorder.reads = self._recorder.reads, set()
         try:
             found = findings_of(rule, replace(self._robot, components=dict(self._watched)))
+            self._all |= self._recorder.reads
             return _Result(rule, found, self._recorder.reads, is_foreign(rule.find))
         finally:
             self._recorder.reads = outer
 
-    def _differ(self, reads: Reads, before: Mapping[str, RobotComponent]) -> bool:
-        """Return whether anything is other now that was read of the components that were like this before."""
-        return any(
-            kind is Config or old.declared(kind) != self._components[name].declared(kind)
-            for name, old in before.items()
-            for kind in reads.get(name, ())
-        )
+    def _other(self, before: Mapping[str, RobotComponent]) -> Reads:
+        """Return what is other now of all that was ever read of the components that were like this before."""
+        return {
+            (name, kind)
+            for name, kind in (self._all if before else ())
+            if (old := before.get(name)) is not None
+            and (kind is Config or old.declared(kind) != self._components[name].declared(kind))
+        }
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,35 +100,48 @@ class _Result:
 
 @dataclass(slots=True)
 class _Recorder:
-    reads: Reads = field(default_factory=dict)
+    reads: Reads = field(default_factory=set)
+
+
+def _slot(name: str) -> Any:
+    return RobotComponent.__dict__[name]
+
+
+_CONFIG, _CAPABILITIES = _slot("config"), _slot("capabilities")
 
 
 class _Watched(RobotComponent):
-    """A component that notes what is read of it."""
+    """A component that notes what is read of it; a changed copy, which a rule makes of it, is an ordinary one."""
 
     __slots__ = ("_recorder",)
     _recorder: _Recorder
 
+    def __new__(cls, /, **given: Any) -> RobotComponent:  # type: ignore[misc]
+        """Return what `replace` asks for."""
+        return RobotComponent(**given)
+
     @classmethod
     def of(cls, component: RobotComponent, recorder: _Recorder) -> _Watched:
         """Return a component like this one."""
-        made = cls.__new__(cls)
+        made = object.__new__(cls)
         object.__setattr__(made, "_recorder", recorder)
         for each in fields(RobotComponent):
-            slot: Any = RobotComponent.__dict__[each.name]
-            slot.__set__(made, getattr(component, each.name))
+            _slot(each.name).__set__(made, getattr(component, each.name))
         return made
 
-    def __getattribute__(self, name: str) -> Any:
-        if name in ("config", "capabilities"):
-            self._note(Config)
-        return super().__getattribute__(name)
+    @property
+    def config(self) -> Any:
+        """Return its configuration."""
+        self._recorder.reads.add((self.name, Config))
+        return _CONFIG.__get__(self)
+
+    @property
+    def capabilities(self) -> Any:
+        """Return all that it can do, which may be anything of its configuration."""
+        self._recorder.reads.add((self.name, Config))
+        return _CAPABILITIES.__get__(self)
 
     def declared(self, kind: type[K]) -> list[K]:
         """Return the capabilities of a kind."""
-        self._note(kind)
-        capabilities = RobotComponent.__dict__["capabilities"].__get__(self)
-        return [capability for capability in capabilities if isinstance(capability, kind)]
-
-    def _note(self, kind: type) -> None:
-        self._recorder.reads.setdefault(self.name, set()).add(kind)
+        self._recorder.reads.add((self.name, kind))
+        return [capability for capability in _CAPABILITIES.__get__(self) if isinstance(capability, kind)]

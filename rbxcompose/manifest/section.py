@@ -240,6 +240,11 @@ class WantedComponent:
 class Wiring(Protocol):
     """The wires of the components known so far."""
 
+    @property
+    def components(self) -> Mapping[str, Any]:
+        """Return these components by name, each a `RobotComponent`: a section without names of its own sees all."""
+        ...
+
     def message_of(self, topic: str) -> str:
         """Return the type of a subscriber of a topic, else of a publisher below it; empty if there is none."""
         ...

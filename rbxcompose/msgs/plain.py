@@ -1,6 +1,7 @@
 """Messages as plain data (maps, lists, numbers, texts, flags), and back with every mistake as a finding.
 
-Bytes are lists of numbers here. Omitted fields keep their defaults.
+Bytes are lists of numbers here; on the way back, bytes and arrays of numpy are taken as they are. Omitted fields keep
+their defaults.
 """
 
 import struct
@@ -66,10 +67,11 @@ def _plain(type_: FieldType, value: Any) -> Any:
         return [_plain(single, one) for one in (value.tolist() if hasattr(value, "tolist") else value)]
     if type_.is_message:
         return to_plain(value)
-    return _shortest(value) if type_.base == "float32" else value
+    return shortest(value) if type_.base == "float32" else value
 
 
-def _shortest(value: float) -> float:
+def shortest(value: float) -> float:
+    """Return the shortest number that reads back as the same `float32`."""
     for digits in _DIGITS:
         short = float(f"{value:.{digits}g}")
         if _is_same(short, value):
@@ -110,16 +112,20 @@ class _Reading(Generic[M]):
 
     def _value(self, type_: FieldType, value: object, path: KeyPath) -> Any:
         if type_.shape is not FieldShape.SINGLE:
-            if not isinstance(value, list | tuple):
+            is_ready = hasattr(value, "dtype") or (isinstance(value, bytes) and type_.base in OCTETS)
+            if not (is_ready or isinstance(value, list | tuple)):
                 return self._wrong(path, f"expected a list ({type_})")
-            count, length = len(value), type_.length
+            entries: Any = value
+            count, length = len(entries), type_.length
             if (type_.shape is FieldShape.ARRAY and count != length) or (
                 type_.shape is FieldShape.BOUNDED and count > length
             ):
                 most = "at most " if type_.shape is FieldShape.BOUNDED else ""
                 return self._wrong(path, f"{most}{length} values are expected, not {count}")
+            if is_ready:
+                return value
             single = FieldType(type_.base, text_limit=type_.text_limit)
-            values = [self._value(single, one, (*path, index)) for index, one in enumerate(value)]
+            values = [self._value(single, one, (*path, index)) for index, one in enumerate(entries)]
             if self.findings:
                 return None
             return bytes(values) if type_.base in OCTETS else tuple(values)

@@ -222,6 +222,16 @@ class NeedsExtra(Capability):
 
 
 @dataclass(frozen=True, slots=True)
+class ServesPage(Capability):
+    """It serves a page for browsers of this machine; `up` shows the link."""
+
+    port: Setting[int]
+    """TCP port."""
+    commands: Setting[str] = Setting("")
+    """The topic on which people drive by it, by its full name; empty if they cannot."""
+
+
+@dataclass(frozen=True, slots=True)
 class RunsMissions(Capability):
     """It runs the robot's missions: its skills are those of the robot, and values may come from outside."""
 

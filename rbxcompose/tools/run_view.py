@@ -17,6 +17,8 @@ from rbxcompose.runtime.folder import RobotFolder, RunOptions
 from rbxcompose.runtime.log import NAME, Follower, Record
 from rbxcompose.runtime.supervision import launch
 from rbxcompose.runtime.supervision.conductor import ROBOT_FAILED
+from rbxcompose.sdk.capabilities import ServesPage
+from rbxcompose.sdk.registry import declared
 from rbxcompose.tools.live_rules import LiveRules
 from rbxcompose.tools.robot_changes import LiveReload
 
@@ -87,6 +89,10 @@ class _Watch:
                 self._is_up = True
                 took = "" if self._options.is_stepped else f", {seconds:.2f} s"  # all stepped runs write the same
                 emit(f"{name} is up: {extent(components, processes)}{took}")
+                if not self._options.is_stepped:
+                    for instance in self._plan.instances:
+                        for page in declared(instance.type, instance.config, ServesPage):
+                            emit(f"console: http://127.0.0.1:{page.port.value}/")
                 if self._options.is_detached:
                     self._started.let_go()
                     return 0

@@ -15,6 +15,7 @@ from rbxcompose.msgs.cdr import HEADER, CdrError, decode
 from rbxcompose.msgs.diagnostic_msgs import DiagnosticArray
 from rbxcompose.msgs.geometry_msgs import Twist
 from rbxcompose.msgs.nav_msgs import Odometry
+from tests.console.clients import Room
 from tests.properties.random_expressions import Trap, attempt
 
 FILE = "robot.yaml"
@@ -53,4 +54,20 @@ def wire(data: bytes) -> None:
     parse_token(data.decode("utf-8", "replace"))
 
 
-TARGETS: dict[str, Callable[[bytes], None]] = {"loader": loader, "expressions": expressions, "plan": plan, "wire": wire}
+def rosbridge(data: bytes) -> None:
+    """Take what a browser may send: each line is a frame."""
+    room = Room()
+    client = room.client()
+    for frame in data.split(b"\n"):
+        client.sends(frame)
+        client.gets()
+    client.leaves()
+
+
+TARGETS: dict[str, Callable[[bytes], None]] = {
+    "loader": loader,
+    "expressions": expressions,
+    "plan": plan,
+    "rosbridge": rosbridge,
+    "wire": wire,
+}

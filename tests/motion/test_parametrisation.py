@@ -9,7 +9,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbxcompose.domains.arms.motion.parametrisation import Spline, Trajectory, curve, timed
+from rbxcompose.domains.arms.motion.parametrisation import MARGIN, Spline, Trajectory, curve, timed
 
 SEEDS = st.integers(0, 2**31)
 
@@ -37,6 +37,25 @@ def test_a_trajectory_stays_on_the_curve_that_was_looked_at_before(seed: int, co
     assert isinstance(made, Trajectory), made
     away = [np.min(np.linalg.norm(path - position, axis=1)) for position in made.positions]
     assert max(away) <= 0.005
+
+
+@given(SEEDS, st.floats(0.01, 2.0))
+def test_a_straight_line_is_at_least_as_fast_as_the_same_way_through_its_middle(seed: int, length: float) -> None:
+    rng = np.random.default_rng(seed)
+    way, fast, hard = rng.uniform(-length, length, (2, 3)), rng.uniform(0.3, 2.0, 3), rng.uniform(0.5, 5.0, 3)
+    made, through = (timed(points, fast, hard) for points in (way, np.stack((way[0], way.mean(axis=0), way[1]))))
+    assert isinstance(made, Trajectory)
+    assert isinstance(through, Trajectory)
+    assert made.excess(fast, hard) <= 1.0
+    assert made.duration <= through.duration * (1.0 + 1e-6)
+
+
+@given(st.floats(0.0, 1.0), st.integers(1, 16))
+def test_a_line_that_is_hardly_ever_at_its_speed_has_samples_apart_in_time(share: float, places: int) -> None:
+    made = timed(np.array(((0.0,), (MARGIN * (1.0 + share * 10.0**-places),))), np.ones(1), np.ones(1))
+    assert isinstance(made, Trajectory)
+    assert np.min(np.diff(made.times)) > 1e-9
+    assert made.excess(np.ones(1), np.ones(1)) <= 1.0
 
 
 @given(SEEDS, st.integers(2, 30))

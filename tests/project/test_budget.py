@@ -45,6 +45,7 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
     "domains/arms": (12336, 74, 2, 1130),
     "domains/bases": (1442, 14, 0, 113),
     "domains/body": (3531, 28, 2, 372),
+    "domains/console": (1246, 9, 1, 105),
     "domains/devices": (740, 9, 0, 80),
     "domains/diagnostics": (2328, 24, 4, 214),
     "domains/muxes": (1983, 15, 1, 116),

@@ -12,7 +12,7 @@ from rbxcompose.compiler.model.instances import answers, cycle_of, part_of, shar
 from rbxcompose.compiler.model.robot import PortEnd, Robot, RobotComponent
 from rbxcompose.manifest.tree import at
 from rbxcompose.msgs.definitions import parse_type
-from rbxcompose.sdk.capabilities import ConnectedBy, Drives, Forwards, RunsMissions
+from rbxcompose.sdk.capabilities import ConnectedBy, Drives, Forwards, RunsMissions, ServesPage
 from rbxcompose.sdk.ports import Calls, CallsAction, In, Looks, Out, Qos, Serves, ServesAction, ServesTopic
 from rbxcompose.sdk.registry import types_with
 
@@ -43,6 +43,7 @@ SERVED_BY = {Calls: Serves, CallsAction: ServesAction, In: Out}
 def needed_port(robot: Robot) -> Iterator[Finding]:
     """A component needs something that nothing in the robot provides."""
     given = {(type(end.port), end.topic) for end in robot.ends}
+    by_people = {page.commands.value for _, page in robot.declared(ServesPage)}
     lost = {end.type_name for ends in robot.writers.values() for end in ends if has_no_subscriber(robot, end)}
     for component in robot.components.values():
         if component.declared(RunsMissions):
@@ -51,7 +52,7 @@ def needed_port(robot: Robot) -> Iterator[Finding]:
             end for end in component.ends if type(end.port) in SERVED_BY and not getattr(end.port, "is_open", False)
         ]
         missing = [end for end in needed if (SERVED_BY[type(end.port)], end.topic) not in given]
-        missing = [end for end in missing if end.topic not in robot.outside.names]
+        missing = [end for end in missing if end.topic not in {*robot.outside.names, *by_people}]
         # A command without a subscriber is reported at its publisher.
         ends = [end for end in missing if not (_is_command(end) and end.type_name in lost)]
         if ends:

@@ -113,7 +113,7 @@ def chain_of(
 def matrix_of(pose: Transform3) -> Array:
     """Return a pose as its rotation and translation [m] beside each other, of shape (3, 4)."""
     axes = [rotate(pose.rotation, axis) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
-    return np.ascontiguousarray(np.array([*axes, pose.translation]).T)
+    return np.array(list(zip(*axes, pose.translation, strict=True)))
 
 
 def _arrays(rows: list[ChainRow]) -> Chain:

@@ -154,6 +154,9 @@ class Spline:
 
     def __call__(self, at: Array, order: int = 0) -> Array:
         """Return positions, or derivatives of this order up to 2, of shape (k, n)."""
+        if len(self.knots) == 2:  # a straight line
+            start, slope, *_ = self._pieces
+            return start + at[:, None] * slope if order == 0 else np.repeat(slope * (order == 1), len(at), axis=0)
         index = np.clip(np.searchsorted(self.knots, at, side="right") - 1, 0, len(self.knots) - 2)
         t = (at - self.knots[index])[:, None]
         a, b, c, d = (each[index] for each in self._pieces)

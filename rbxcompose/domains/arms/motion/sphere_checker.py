@@ -60,11 +60,12 @@ class SphereChecker:
         self._refresh()
         points, begin = np.ascontiguousarray(points), 0  # another layout would be compiled anew
         while begin < len(points):
-            count = near_pairs(self._model, points[begin:], self._found, self._work)
+            if not (count := near_pairs(self._model, points[begin:], self._found, self._work)):
+                return None
             near = self._found[:count]
             whole = len(points) - begin if count < len(self._found) else int(near[-1, 0])
             indices, starts = np.unique(near[:, 0], return_index=True)
-            for index, some in zip(indices.tolist(), np.split(near[:, 1], starts[1:]) if count else (), strict=True):
+            for index, some in zip(indices.tolist(), np.split(near[:, 1], starts[1:]), strict=True):
                 if index < whole and self.mesh.collides(points[begin + index], some.tolist()):
                     return int(begin + index)
             begin += whole

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -77,8 +78,9 @@ class Trees:
 
 def _placed(tree: sphere_trees.SphereTree, part: CheckedPart, owner: int, carried: Transform3) -> PlacedTree:
     pose = compiled_collisions.matrix_of(carried.compose(part.origin))
-    centres, corners = (points @ pose[:, :3].T + pose[:, 3] for points in (tree.centres, tree.corners))
-    extent = float(np.linalg.norm(centres[0]) + tree.radii[0]) if tree is not NONE else 0.0
+    turned, moved = pose[:, :3].T, pose[:, 3]
+    centres, corners = tree.centres @ turned + moved, tree.corners @ turned + moved
+    extent = math.hypot(*centres[0]) + float(tree.radii[0]) if tree is not NONE else 0.0
     return PlacedTree(tree, owner, pose, centres, corners, extent, *_solid(part.geometry))
 
 

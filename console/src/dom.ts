@@ -1,0 +1,53 @@
+/** Elements in one expression. Attributes are strings; properties and listeners are set on what this returns. */
+
+type Child = Node | string;
+
+export function h<K extends keyof HTMLElementTagNameMap>(
+  tag: K,
+  attributes: Record<string, string> = {},
+  ...children: Child[]
+): HTMLElementTagNameMap[K] {
+  const element = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
+  element.append(...children);
+  return element;
+}
+
+const SVG = "http://www.w3.org/2000/svg";
+
+/** Paths of icons, drawn with strokes in a square of 24. */
+const ICONS = {
+  link: "M4 12.5a11 11 0 0 1 16 0M7.5 16a6 6 0 0 1 9 0M12 20h.01",
+  unlink: "M4 12.5a11 11 0 0 1 6-3.4M20 12.5a11 11 0 0 0-3-2.300M7.500 16a6 6 0 0 1 4.500-2M12 20h.01M4 4l16 16",
+  wait: "M12 7v5l3 2M21 12a9 9 0 1 1-18 0 9 9 0 0 1 18 0",
+  stop: "M8 3h8l5 5v8l-5 5H8l-5-5V8z",
+  warning: "M12 4 2.800 20h18.400zM12 10v4M12 17h.01",
+  person: "M12 12a4 4 0 1 0 0-8 4 4 0 0 0 0 8M5 20c.6-3.600 3.400-5 7-5s6.400 1.400 7 5",
+  wheel:
+    "M12 3v18M3 12h18M12 3 9.500 5.500M12 3l2.500 2.500M12 21l-2.500-2.500M12 21l2.500-2.500M3 12l2.500-2.500M3 12l2.500 2.500M21 12l-2.500-2.500M21 12l-2.500 2.500",
+  play: "M7 4.500v15l12-7.500z",
+} as const;
+
+export type Icon = keyof typeof ICONS;
+
+/** Returns a picture that stands beside the text that says the same. */
+export function icon(name: Icon): SVGSVGElement {
+  const path = svg("path", { d: ICONS[name] });
+  return svg("svg", { viewBox: "0 0 24 24", class: "icon", "aria-hidden": "true" }, path);
+}
+
+export function svg<K extends keyof SVGElementTagNameMap>(
+  tag: K,
+  attributes: Record<string, string> = {},
+  ...children: Node[]
+): SVGElementTagNameMap[K] {
+  const element = document.createElementNS(SVG, tag);
+  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
+  element.append(...children);
+  return element;
+}
+
+/** Sets a text only if it is another, so that nothing is drawn or read out again for nothing. */
+export function setText(element: Element, text: string): void {
+  if (element.textContent !== text) element.textContent = text;
+}

@@ -1,0 +1,124 @@
+/** What stands around every page: the robot's name, the connection, tabs, STOP, and what went wrong. */
+import type { Config } from "./config";
+import { h, icon, setText } from "./dom";
+import { formatAge } from "./format";
+import { pages, type Robot } from "./page";
+import type { LinkState, Rosbridge } from "./rosbridge";
+import { Signal } from "./signal";
+import { stopButtons } from "./stop";
+
+const NOTICE = 6_000; // [ms] for which a notice is shown
+
+/** Shows a screen without a robot: loading, or an error with a button to try again. */
+export function showState(kind: "loading" | "error", text: string, retry?: () => void): void {
+  const children: Node[] = [
+    icon(kind === "loading" ? "wait" : "warning"),
+    h("p", { role: kind === "error" ? "alert" : "status" }, text),
+  ];
+  if (retry) {
+    const button = h("button", { type: "button" }, "Try again");
+    button.onclick = retry;
+    children.push(button);
+  }
+  document.body.replaceChildren(h("main", { class: `state ${kind}` }, h("h1", {}, "Robot console"), ...children));
+}
+
+/** Shows the frame with the page that the address names, else the first one of the robot. */
+export function showFrame(config: Config, link: Rosbridge): void {
+  const notice = h("div", { class: "notice", role: "status" });
+  let timer: ReturnType<typeof setTimeout> | undefined;
+  const robot: Robot = {
+    config,
+    link,
+    stopped: new Signal(false),
+    notify: (text) => {
+      clearTimeout(timer);
+      setText(notice, text);
+      timer = setTimeout(() => setText(notice, ""), NOTICE);
+    },
+  };
+  const title = h("h1", {}, config.robot);
+  const tabs = h("nav", { "aria-label": "Pages" });
+  const bar = h("header", {}, h("div", { class: "who" }, title, h("p", {}, config.about)), tabs, connection(link));
+  const stops = stopButtons(link, robot.stopped, robot.notify);
+  const host = h("main", { id: "page" });
+  document.body.replaceChildren(bar, stops, lostBanner(link), stoppedBanner(robot.stopped), host, notice);
+  link.state.watch((state) => document.body.classList.toggle("offline", state.is !== "open"));
+  route(host, tabs, robot);
+}
+
+function route(host: HTMLElement, tabs: HTMLElement, robot: Robot): void {
+  const links = pages.map((page) => h("a", { href: `#${page.name}` }, page.title));
+  tabs.append(...links);
+  let close = () => undefined as void;
+  const open = () => {
+    const wanted = [location.hash.slice(1), robot.config.firstPage];
+    const turn = Math.max(
+      0,
+      wanted.map((name) => pages.findIndex((page) => page.name === name)).find((at) => at >= 0) ?? 0,
+    );
+    const page = pages[turn];
+    close();
+    host.replaceChildren();
+    if (!page) return;
+    links.forEach((link, at) =>
+      at === turn ? link.setAttribute("aria-current", "page") : link.removeAttribute("aria-current"),
+    );
+    document.title = `${page.title} \u00b7 ${robot.config.robot}`;
+    close = page.open(host, robot);
+  };
+  window.addEventListener("hashchange", open);
+  open();
+}
+
+function connection(link: Rosbridge): HTMLElement {
+  const box = h("p", { class: "connection", role: "status" });
+  const words: Record<LinkState["is"], string> = {
+    connecting: "Connecting",
+    open: "Connected",
+    lost: "Not connected",
+    closed: "Not connected",
+  };
+  link.state.watch((state) => {
+    box.dataset.state = state.is;
+    const picture = { connecting: "wait", open: "link", lost: "unlink", closed: "unlink" } as const;
+    box.replaceChildren(icon(picture[state.is]), h("span", {}, words[state.is]));
+  });
+  return box;
+}
+
+function lostBanner(link: Rosbridge): HTMLElement {
+  const text = h("span", { "aria-hidden": "true" });
+  const button = h("button", { type: "button" }, "Try now");
+  const message = h("span", { role: "alert" });
+  const banner = h("div", { class: "banner lost" }, icon("unlink"), h("p", {}, message, text), button);
+  button.onclick = () => link.connect();
+  let lost = false;
+  const show = () => {
+    const state = link.state.value;
+    if (state.is === "open") lost = false;
+    if (state.is === "lost") lost = true;
+    banner.hidden = !lost;
+    setText(message, lost ? "Connection lost. The robot stops by itself. " : "");
+    setText(
+      text,
+      state.is === "lost"
+        ? `Next attempt in ${formatAge(Math.max(1_000, state.retry - Date.now()))}.`
+        : "Connecting\u2026",
+    );
+    button.disabled = state.is !== "lost";
+  };
+  link.state.watch(show);
+  setInterval(show, 500);
+  return banner;
+}
+
+function stoppedBanner(stopped: Signal<boolean>): HTMLElement {
+  const message = h("p", { role: "alert" });
+  const banner = h("div", { class: "banner stopped" }, icon("stop"), message);
+  stopped.watch((value) => {
+    banner.hidden = !value;
+    setText(message, value ? "Stopped. Nothing moves until you press Release." : "");
+  });
+  return banner;
+}

@@ -1,0 +1,196 @@
+import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
+import { CallError, parseFrame, Rosbridge, waitBefore, type Message, type Socket } from "./rosbridge";
+
+class FakeSocket implements Socket {
+  static all: FakeSocket[] = [];
+  onopen: Socket["onopen"] = null;
+  onclose: Socket["onclose"] = null;
+  onmessage: Socket["onmessage"] = null;
+  sent: Message[] = [];
+  closed = false;
+
+  constructor() {
+    FakeSocket.all.push(this);
+  }
+  send(text: string): void {
+    this.sent.push(JSON.parse(text));
+  }
+  close(): void {
+    this.closed = true;
+  }
+  open(): this {
+    this.onopen?.({} as Event);
+    return this;
+  }
+  lose(): void {
+    this.onclose?.({} as CloseEvent);
+  }
+  receive(frame: unknown): void {
+    this.onmessage?.({ data: typeof frame === "string" ? frame : JSON.stringify(frame) } as MessageEvent);
+  }
+}
+
+const make = () => new Rosbridge("ws://robot/rosbridge", () => new FakeSocket());
+const last = () => FakeSocket.all.at(-1) as FakeSocket;
+
+beforeEach(() => {
+  vi.useFakeTimers();
+  FakeSocket.all = [];
+});
+afterEach(() => vi.useRealTimers());
+
+describe("frames", () => {
+  it.each<unknown>([
+    "",
+    "nonsense",
+    "1",
+    "null",
+    "[]",
+    "{}",
+    '{"op":"publish","topic":"/a","msg":3}',
+    '{"op":7}',
+    new ArrayBuffer(1),
+  ])("that mean nothing are ignored: %s", (text) => expect(parseFrame(text)).toBeUndefined());
+
+  it("of services may have no values", () => {
+    expect(parseFrame('{"op":"service_response","id":"a","result":true}')).toMatchObject({
+      values: null,
+      result: true,
+    });
+  });
+});
+
+describe("the connection", () => {
+  it("comes back, later each time", () => {
+    const link = make();
+    last().open();
+    expect(link.state.value.is).toBe("open");
+    last().lose();
+    expect(link.state.value.is).toBe("lost");
+    vi.advanceTimersByTime(250);
+    expect(FakeSocket.all).toHaveLength(2);
+    last().lose();
+    vi.advanceTimersByTime(250);
+    expect(FakeSocket.all).toHaveLength(2);
+    vi.advanceTimersByTime(250);
+    last().open();
+    expect(FakeSocket.all).toHaveLength(3);
+    expect(link.state.value.is).toBe("open");
+  });
+
+  it("waits from 0.25 s up to 5 s, and not all clients equally long", () => {
+    expect([0, 1, 2, 10].map((attempt) => waitBefore(attempt, () => 0))).toEqual([250, 500, 1000, 5000]);
+    expect(waitBefore(10, () => 1)).toBe(3750);
+  });
+
+  it("that does not open in 5 s is given up", () => {
+    const link = make();
+    const first = last();
+    vi.advanceTimersByTime(5000);
+    expect([first.closed, link.state.value.is]).toEqual([true, "lost"]);
+    first.open();
+    expect(link.state.value.is).toBe("lost");
+  });
+
+  it("is tried at once when a person says so, and never twice at a time", () => {
+    const link = make();
+    last().lose();
+    link.connect();
+    link.connect();
+    vi.advanceTimersByTime(1000);
+    expect(FakeSocket.all).toHaveLength(2);
+  });
+
+  it("ends for good when it is closed", () => {
+    const link = make();
+    last().open();
+    link.close();
+    vi.advanceTimersByTime(60_000);
+    expect([FakeSocket.all.length, last().closed, link.state.value.is]).toEqual([1, true, "closed"]);
+  });
+});
+
+describe("topics", () => {
+  it("are subscribed to once for all listeners, and again after a lost connection", () => {
+    const link = make();
+    const first = vi.fn();
+    const second = vi.fn();
+    link.subscribe("/a", first, { type: "std_msgs/String", throttle: 100 });
+    link.subscribe("/a", second);
+    last().open();
+    const frame = { op: "subscribe", topic: "/a", type: "std_msgs/String", throttle_rate: 100, queue_length: 1 };
+    expect(last().sent).toMatchObject([frame]);
+    last().receive({ op: "publish", topic: "/a", msg: { data: "x" } });
+    last().receive({ op: "publish", topic: "/b", msg: { data: "y" } });
+    expect([first.mock.calls, second.mock.calls]).toEqual([[[{ data: "x" }]], [[{ data: "x" }]]]);
+    last().lose();
+    vi.advanceTimersByTime(250);
+    expect(last().open().sent).toMatchObject([frame]);
+  });
+
+  it("are unsubscribed from with the last listener", () => {
+    const link = make();
+    last().open();
+    const ends = [link.subscribe("/a", vi.fn()), link.subscribe("/a", vi.fn())];
+    ends.forEach((end) => end());
+    ends.forEach((end) => end());
+    expect(last().sent.map(({ op }) => op)).toEqual(["subscribe", "unsubscribe"]);
+    expect(last().sent[1]?.id).toBe(last().sent[0]?.id);
+  });
+
+  it("are advertised again, but what could not be published is not sent later", () => {
+    const link = make();
+    link.advertise("/a", "std_msgs/String");
+    expect(link.publish("/a", { data: "early" })).toBe(false);
+    last().open();
+    expect(link.publish("/a", { data: "x" }, { id: "p", sent: 5 })).toBe(true);
+    expect(last().sent).toMatchObject([{ op: "advertise" }, { op: "publish", msg: { data: "x" }, id: "p", sent: 5 }]);
+  });
+});
+
+describe("services", () => {
+  const answer = (frame: Message) =>
+    last().receive({ op: "service_response", service: "/s", id: last().sent.at(-1)?.id, ...frame });
+
+  it("answer the call that has their id", async () => {
+    const link = make();
+    last().open();
+    const [first, second] = [link.call("/s", { a: 1 }), link.call("/s", { a: 2 })];
+    const [one, two] = last().sent;
+    last().receive({ op: "service_response", id: two?.id, values: { b: 2 }, result: true });
+    last().receive({ op: "service_response", id: one?.id, values: { b: 1 }, result: true });
+    expect(await Promise.all([first, second])).toEqual([{ b: 1 }, { b: 2 }]);
+  });
+
+  it.each<[Message, string]>([
+    [{ result: false, values: "no such service" }, "no such service"],
+    [{ result: false, values: { message: "too hot" } }, "too hot"],
+    [{ result: false }, "the robot refused"],
+  ])("refuse with a reason: %o", async (frame, reason) => {
+    const link = make();
+    last().open();
+    const call = link.call("/s");
+    answer(frame);
+    await expect(call).rejects.toThrow(new CallError(reason));
+  });
+
+  it("are not waited for for ever, nor beyond the connection", async () => {
+    const link = make();
+    await expect(link.call("/s")).rejects.toThrow("not connected");
+    last().open();
+    const late = expect(link.call("/s", {}, 2000)).rejects.toThrow("no answer from /s in 2 s");
+    vi.advanceTimersByTime(2000);
+    await late;
+    answer({ result: true });
+    const lost = expect(link.call("/s")).rejects.toThrow("the connection was lost");
+    last().lose();
+    await lost;
+  });
+});
+
+it("status frames say which request was wrong", () => {
+  const link = make();
+  link.onStatus = vi.fn();
+  last().open().receive({ op: "status", level: "error", msg: "not yours", id: "drive:3" });
+  expect(link.onStatus).toHaveBeenCalledWith({ op: "status", level: "error", msg: "not yours", id: "drive:3" });
+});

@@ -1,0 +1,249 @@
+/** A client of the rosbridge protocol, version 2: JSON over a WebSocket that comes back when it was lost. */
+import { Signal } from "./signal";
+
+export type Json = null | boolean | number | string | Json[] | { [key: string]: Json };
+export type Message = { [key: string]: Json };
+
+/** What a server sends and this client understands. */
+export type Frame =
+  | { op: "publish"; topic: string; msg: Message }
+  | { op: "service_response"; id: string; service: string; result: boolean; values: Json }
+  | { op: "status"; id: string; level: string; msg: string };
+
+/** `retry` is when the next attempt begins [ms, of the clock of `Date.now`]. */
+export type LinkState = { is: "connecting" } | { is: "open" } | { is: "lost"; retry: number } | { is: "closed" };
+
+/** The part of a WebSocket that the client uses. */
+export interface Socket {
+  onopen: ((event: Event) => void) | null;
+  onclose: ((event: CloseEvent) => void) | null;
+  onmessage: ((event: MessageEvent) => void) | null;
+  send(text: string): void;
+  close(): void;
+}
+
+export interface SubscribeOptions {
+  type?: string;
+  /** At most one message in this time [ms]. */
+  throttle?: number;
+}
+
+const FIRST_WAIT = 250; // [ms]
+const LONGEST_WAIT = 5_000;
+const CALL_TIMEOUT = 5_000;
+const OPEN_TIMEOUT = 5_000;
+
+/** A call of a service that brought no result: refused by the server, not answered in time, or the link was lost. */
+export class CallError extends Error {
+  override name = "CallError";
+}
+
+/** Returns how long to wait before an attempt [ms]: doubled each time, with up to a quarter taken off at random. */
+export function waitBefore(attempt: number, random: () => number = Math.random): number {
+  return Math.min(LONGEST_WAIT, FIRST_WAIT * 2 ** attempt) * (1 - random() / 4);
+}
+
+/** Returns the frame that a text holds, or undefined if it is none that this client understands. */
+export function parseFrame(text: unknown): Frame | undefined {
+  if (typeof text !== "string") return undefined;
+  let frame: unknown;
+  try {
+    frame = JSON.parse(text);
+  } catch {
+    return undefined;
+  }
+  if (!isMessage(frame)) return undefined;
+  const { op, id, topic, msg, service, level } = frame;
+  if (op === "publish" && typeof topic === "string" && isMessage(msg)) return { op, topic, msg };
+  if (op === "service_response" && typeof id === "string") {
+    return {
+      op,
+      id,
+      service: typeof service === "string" ? service : "",
+      result: frame.result !== false,
+      values: frame.values ?? null,
+    };
+  }
+  if (op === "status" && typeof msg === "string") {
+    return { op, id: typeof id === "string" ? id : "", level: typeof level === "string" ? level : "", msg };
+  }
+  return undefined;
+}
+
+export function isMessage(value: unknown): value is Message {
+  return typeof value === "object" && value !== null && !Array.isArray(value);
+}
+
+interface Subscription {
+  id: string;
+  options: SubscribeOptions;
+  listeners: Set<(msg: Message) => void>;
+}
+
+interface Call {
+  resolve(values: Json): void;
+  reject(error: CallError): void;
+  timer: ReturnType<typeof setTimeout>;
+}
+
+/**
+ * The link to a robot. Subscriptions and advertisements outlive a lost connection: they are sent again when it is back.
+ * Publishing and calling do not wait for it: a command that comes late is worse than none.
+ */
+export class Rosbridge {
+  readonly state = new Signal<LinkState>({ is: "connecting" });
+  /** Called with each status frame: errors of the server about what this client sent, by the id of that. */
+  onStatus: (frame: Frame & { op: "status" }) => void = () => undefined;
+
+  readonly #url: string;
+  readonly #open: (url: string) => Socket;
+  #socket: Socket | undefined;
+  #attempt = 0;
+  #timer: ReturnType<typeof setTimeout> | undefined;
+  #lastId = 0;
+  readonly #subscriptions = new Map<string, Subscription>();
+  readonly #advertised = new Map<string, string>();
+  readonly #calls = new Map<string, Call>();
+
+  constructor(url: string, open: (url: string) => Socket = (address) => new WebSocket(address)) {
+    this.#url = url;
+    this.#open = open;
+    this.connect();
+  }
+
+  /** Connects at once, without waiting for the next attempt. */
+  connect(): void {
+    if (this.#socket || this.state.value.is === "closed") return;
+    clearTimeout(this.#timer);
+    this.state.set({ is: "connecting" });
+    const socket = this.#open(this.#url);
+    this.#socket = socket;
+    this.#timer = setTimeout(() => this.#lose(socket), OPEN_TIMEOUT);
+    socket.onopen = () => this.#opened(socket);
+    socket.onclose = () => this.#lose(socket);
+    socket.onmessage = (event) => this.#receive(event.data);
+  }
+
+  /** Ends the link for good. */
+  close(): void {
+    this.state.set({ is: "closed" });
+    if (this.#socket) this.#lose(this.#socket);
+    clearTimeout(this.#timer);
+  }
+
+  /** Calls the listener with each message of a topic, until the function that this returns is called. */
+  subscribe(topic: string, listener: (msg: Message) => void, options: SubscribeOptions = {}): () => void {
+    let subscription = this.#subscriptions.get(topic);
+    if (!subscription) {
+      subscription = { id: this.#nextId("subscribe"), options, listeners: new Set() };
+      this.#subscriptions.set(topic, subscription);
+      this.#sendSubscribe(topic, subscription);
+    }
+    const { id, listeners } = subscription;
+    listeners.add(listener);
+    return () => {
+      if (!listeners.delete(listener) || listeners.size > 0) return;
+      this.#subscriptions.delete(topic);
+      this.#send({ op: "unsubscribe", id, topic });
+    };
+  }
+
+  /** Announces that this client publishes on a topic. */
+  advertise(topic: string, type: string): void {
+    if (this.#advertised.get(topic) === type) return;
+    this.#advertised.set(topic, type);
+    this.#send({ op: "advertise", id: this.#nextId("advertise"), topic, type });
+  }
+
+  /** Publishes a message, with further keys of the frame; returns whether there was a connection to send it on. */
+  publish(topic: string, msg: Message, extra: Message = {}): boolean {
+    return this.#send({ op: "publish", topic, msg, ...extra });
+  }
+
+  /** Calls a service and returns its values. Throws a CallError if there are none. */
+  call(service: string, args: Message = {}, timeout: number = CALL_TIMEOUT): Promise<Json> {
+    const id = this.#nextId("call");
+    return new Promise((resolve, reject) => {
+      if (!this.#send({ op: "call_service", id, service, args })) {
+        reject(new CallError("not connected"));
+        return;
+      }
+      const timer = setTimeout(() => {
+        this.#calls.delete(id);
+        reject(new CallError(`no answer from ${service} in ${timeout / 1000} s`));
+      }, timeout);
+      this.#calls.set(id, { resolve, reject, timer });
+    });
+  }
+
+  #nextId(what: string): string {
+    this.#lastId += 1;
+    return `${what}:${this.#lastId}`;
+  }
+
+  #send(frame: Message): boolean {
+    if (this.state.value.is !== "open" || !this.#socket) return false;
+    this.#socket.send(JSON.stringify(frame));
+    return true;
+  }
+
+  #sendSubscribe(topic: string, { id, options }: Subscription): void {
+    const frame: Message = { op: "subscribe", id, topic };
+    if (options.type !== undefined) frame.type = options.type;
+    if (options.throttle !== undefined) Object.assign(frame, { throttle_rate: options.throttle, queue_length: 1 });
+    this.#send(frame);
+  }
+
+  #opened(socket: Socket): void {
+    if (socket !== this.#socket) return;
+    clearTimeout(this.#timer);
+    this.#attempt = 0;
+    this.state.set({ is: "open" });
+    for (const [topic, type] of this.#advertised) {
+      this.#send({ op: "advertise", id: this.#nextId("advertise"), topic, type });
+    }
+    for (const [topic, subscription] of this.#subscriptions) this.#sendSubscribe(topic, subscription);
+  }
+
+  #lose(socket: Socket): void {
+    if (socket !== this.#socket) return;
+    clearTimeout(this.#timer);
+    this.#socket = undefined;
+    socket.onopen = socket.onclose = socket.onmessage = null;
+    socket.close();
+    for (const call of this.#calls.values()) {
+      clearTimeout(call.timer);
+      call.reject(new CallError("the connection was lost"));
+    }
+    this.#calls.clear();
+    if (this.state.value.is === "closed") return;
+    const wait = waitBefore(this.#attempt);
+    this.#attempt += 1;
+    this.#timer = setTimeout(() => this.connect(), wait);
+    this.state.set({ is: "lost", retry: Date.now() + wait });
+  }
+
+  #receive(text: unknown): void {
+    const frame = parseFrame(text);
+    if (!frame) return;
+    if (frame.op === "status") {
+      this.onStatus(frame);
+    } else if (frame.op === "publish") {
+      for (const listener of [...(this.#subscriptions.get(frame.topic)?.listeners ?? [])]) listener(frame.msg);
+    } else {
+      const call = this.#calls.get(frame.id);
+      if (!call) return;
+      this.#calls.delete(frame.id);
+      clearTimeout(call.timer);
+      if (frame.result) call.resolve(frame.values);
+      else call.reject(new CallError(reasonOf(frame.values)));
+    }
+  }
+}
+
+/** Returns why a call failed, of the values of its response: a text, or its message. */
+function reasonOf(values: Json): string {
+  if (typeof values === "string" && values) return values;
+  if (isMessage(values) && typeof values.message === "string" && values.message) return values.message;
+  return "the robot refused";
+}

@@ -1,0 +1,55 @@
+/** STOP and RELEASE: the two buttons that stand on every page and need no lease. */
+import { h, icon } from "./dom";
+import { CallError, isMessage, type Rosbridge } from "./rosbridge";
+import type { Signal } from "./signal";
+
+/** Returns the buttons. A STOP without a connection is sent as soon as there is one again. */
+export function stopButtons(link: Rosbridge, stopped: Signal<boolean>, notify: (text: string) => void): HTMLElement {
+  let owed = false;
+  const stop = h("button", { type: "button", class: "stop", "aria-keyshortcuts": "Space" }, icon("stop"), "STOP");
+  const release = h("button", { type: "button", class: "release" }, icon("play"), "Release");
+
+  const sendStop = async () => {
+    const answer = ask(link, "/console/stop"); // before all that follows from it
+    stopped.set(true);
+    owed = link.state.value.is !== "open";
+    try {
+      await answer;
+    } catch (error) {
+      owed ||= link.state.value.is !== "open";
+      if (owed) notify("Not connected: the robot stops by itself. STOP is sent when the connection is back.");
+      else notify(`STOP failed: ${(error as Error).message}. Use the switch on the robot.`);
+    }
+  };
+  stop.onclick = () => void sendStop();
+  release.onclick = async () => {
+    release.disabled = true;
+    try {
+      await ask(link, "/console/release");
+      owed = false;
+      stopped.set(false);
+      stop.focus();
+    } catch (error) {
+      notify(`The robot stays stopped: ${(error as Error).message}.`);
+    } finally {
+      release.disabled = false;
+    }
+  };
+  stopped.watch((value) => (release.hidden = !value));
+  link.state.watch((state) => {
+    if (state.is === "open" && owed) void sendStop();
+  });
+  window.addEventListener("keydown", (event) => {
+    const on = event.target instanceof Element ? event.target.closest("a, button, input, select, textarea") : null;
+    if (event.code !== "Space" || event.repeat || on) return;
+    event.preventDefault();
+    void sendStop();
+  });
+  return h("section", { class: "stops", "aria-label": "Emergency" }, release, stop);
+}
+
+/** Calls a service that may answer that it did not succeed. */
+async function ask(link: Rosbridge, service: string): Promise<void> {
+  const values = await link.call(service);
+  if (isMessage(values) && values.success === false) throw new CallError(String(values.message || "the robot refused"));
+}

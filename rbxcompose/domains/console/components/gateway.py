@@ -1,0 +1,554 @@
+"""The gateway: serves the console's page and rosbridge to browsers and clients on this machine."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import os
+import socket
+import threading
+from collections.abc import Awaitable, Callable, MutableMapping, Sequence
+from contextlib import suppress
+from functools import cached_property, partial
+from pathlib import Path
+from queue import SimpleQueue
+from typing import TYPE_CHECKING, Any
+
+from rbxcompose.base.clock import SteppedClock
+from rbxcompose.base.config import AngularSpeed, Config, Speed
+from rbxcompose.base.levels import Level
+from rbxcompose.base.requests import Command, Refused
+from rbxcompose.bus.graph import Graph, GraphName
+from rbxcompose.bus.tokens import SPACE
+from rbxcompose.bus.transport import Closable
+from rbxcompose.commands.console import NotDoneError
+from rbxcompose.commands.guest import NAME, Guest
+from rbxcompose.commands.lookup import place_of
+from rbxcompose.domains.console.lease import DriveLimits
+from rbxcompose.domains.console.protocol import (
+    LARGEST,
+    Advertise,
+    AskRobot,
+    Bridge,
+    BusRequest,
+    Publish,
+    ServiceCall,
+    Subscribe,
+    Unadvertise,
+    Unsubscribe,
+)
+from rbxcompose.runtime.control import NoAnswerError, ask
+from rbxcompose.runtime.folder import BrokenStateError, RobotFolder, all_folders
+from rbxcompose.runtime.process_group.group import stop_key
+from rbxcompose.runtime.requests import ReleaseRobot, StopRobot
+from rbxcompose.sdk import Capability, Component, NeedsExtra, Qos, Setting, TaskStatus, component
+from rbxcompose.sdk.bound import Reply
+from rbxcompose.sdk.capabilities import ServesPage
+from rbxcompose.sdk.ports import BULK
+
+if TYPE_CHECKING:
+    from starlette.requests import Request
+    from starlette.responses import Response
+    from starlette.websockets import WebSocket
+
+STATIC = Path(__file__).parents[1] / "static"  # the built page
+HOST = "127.0.0.1"
+MOST_CLIENTS = 64
+PACKAGES = ("starlette", "uvicorn", "websockets")
+SOCKETS = ("/", "/rosbridge")  # where WebSockets are taken
+_PAUSE = 0.1  # [s] between two looks for the robot's own state
+_LOOKS = 100
+_AGAIN = 2.0  # [s] between two tries to get the port
+_PING = 5.0  # [s] until a client that does not read counts as gone
+_FAREWELL = 1  # [s] for clients to let go
+_GOODBYE = 3.0  # [s] to wait for the thread to end
+_STOPPED = 1.0  # [s] for all processes to answer to a stop over the bus
+_HEADERS = (
+    (b"content-security-policy", b"default-src 'self'; frame-ancestors 'none'; base-uri 'none'; object-src 'none'"),
+    (b"x-content-type-options", b"nosniff"),
+    (b"x-frame-options", b"DENY"),
+    (b"referrer-policy", b"no-referrer"),
+)
+_NOT_BUILT = Path(__file__).parents[1] / "not_built.html"
+
+
+class GatewayConfig(Config):
+    """What the page shows."""
+
+    robot: str
+    """The name of the robot."""
+    about: str = ""
+    """What it is for."""
+    port: int = 8080
+    """TCP port."""
+    first_page: str = "drive"
+    """The page that is shown first."""
+    drive_topic: str = ""
+    """Where velocities go, by its full name; empty if people cannot drive."""
+    drive_type: str = ""
+    """The type of that topic."""
+    max_speed: Speed = math.inf
+    """The fastest that is let through."""
+    max_turn_rate: AngularSpeed = math.inf
+    """The fastest turn that is let through."""
+    values: dict[str, dict[str, str]] = {}
+    """The values of the manifest: topic, type and field of each, and the unit of the number in the message."""
+
+    @property
+    def drive(self) -> DriveLimits | None:
+        """Return how people drive; None if they cannot."""
+        if not self.drive_topic:
+            return None
+        return DriveLimits(self.drive_topic, self.drive_type, self.max_speed, self.max_turn_rate)
+
+
+@component("gateway")
+class Gateway(Component[GatewayConfig]):
+    """Serves the console, and rosbridge, to browsers and clients on this machine.
+
+    Example:
+        gateway: {type: gateway, robot: turtlebot}
+    """
+
+    made_by = "The section `console` runs it."
+    process = "gateway"
+
+    @classmethod
+    def capabilities(cls, config: GatewayConfig) -> tuple[Capability, ...]:
+        """Declare the page, and what it needs."""
+        needed = (NeedsExtra(Setting(package), Setting("console")) for package in PACKAGES)
+        return (ServesPage(Setting(config.port, "port"), Setting(config.drive_topic, "drive_topic")), *needed)
+
+    def configure(self) -> None:
+        """Serve nothing yet: the robot must be known from outside first."""
+        self.server: GatewayThread | None = None
+
+    def activate(self) -> None:
+        """Take the port, unless robot time is stepped: browsers live in real time."""
+        self.add_diagnostic("clients", self._report)
+        if type(self.context.clock) is not SteppedClock:
+            self.server = GatewayThread(self.config)
+
+    def start(self) -> None:
+        """Serve; who has come before has waited."""
+        if self.server is not None:
+            self.server.start()
+
+    def cleanup(self) -> None:
+        """Let all clients go, and free the port."""
+        if self.server is not None:
+            self.server.close()
+            self.server = None
+
+    def _report(self, now: float) -> TaskStatus:
+        if self.server is None:
+            return TaskStatus(Level.OK, "serves nobody on a stepped clock")
+        while not self.server.said.empty():
+            self.warn(self.server.said.get())
+        return TaskStatus(*self.server.status)
+
+
+class GatewayThread:
+    """A thread with an event loop: the web server, and a guest on the robot's bus."""
+
+    def __init__(self, config: GatewayConfig) -> None:
+        self.said: SimpleQueue[str] = SimpleQueue()  # warnings for the log
+        self.status: tuple[Level, str] = (Level.OK, "starts")
+        self._config = config
+        self._thread = threading.Thread(target=self._run, name="gateway", daemon=True)
+        self._is_closed = threading.Event()
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._stop = asyncio.Event()
+        self._over: asyncio.Task[bool] | None = None
+        self._listener = self._at_port()
+
+    def start(self) -> None:
+        """Begin to serve."""
+        self._thread.start()
+
+    def close(self) -> None:
+        """End the thread; who drove is stopped."""
+        self._is_closed.set()
+        if self._loop is not None:
+            with suppress(RuntimeError):  # it has ended by itself
+                self._loop.call_soon_threadsafe(self._stop.set)
+        if self._thread.ident is not None:
+            self._thread.join(_GOODBYE)
+        if self._listener is not None:
+            self._listener.close()
+
+    def _run(self) -> None:
+        try:
+            asyncio.run(self._serve())
+        except Exception as error:  # whatever a library raises: the robot goes on without a console
+            self._complain(f"the console has ended: {type(error).__name__}: {error}")
+
+    async def _serve(self) -> None:
+        self._loop = asyncio.get_running_loop()
+        if self._is_closed.is_set():
+            return
+        while self._listener is None:
+            if await self._is_over(_AGAIN):
+                return
+            self._listener = self._at_port()
+        if (folder := await self._own_folder()) is None:
+            return
+        with Guest(place_of(folder), stays=True) as guest:
+            session = GatewaySession(self._config, folder, guest)
+            self.status = (Level.OK, f"serves http://{HOST}:{self._config.port}/")
+            try:
+                await session.serve(self._listener, self._stop)
+            finally:
+                session.close()
+
+    async def _own_folder(self) -> RobotFolder | None:
+        """Return the folder of the robot that this process belongs to, as soon as its state names the process."""
+        for _ in range(_LOOKS):
+            for folder in all_folders():
+                try:
+                    state = folder.read_state()
+                    if state and state.router and any(each.pid == os.getpid() for each in state.processes.values()):
+                        place_of(folder)
+                        return folder
+                except (BrokenStateError, NotDoneError):
+                    continue  # it is just being written
+            if await self._is_over(_PAUSE):
+                return None
+        self._complain("the console is not served: the robot's own state cannot be found")
+        return None
+
+    def _at_port(self) -> socket.socket | None:
+        """Return a socket at the port; None while another program has it."""
+        listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            listener.bind((HOST, self._config.port))
+            listener.listen()
+        except OSError as error:
+            listener.close()
+            if self.status[0] is not Level.ERROR:
+                self._complain(f"the console is not served: port {self._config.port}: {error.strerror}")
+            return None
+        return listener
+
+    async def _is_over(self, seconds: float) -> bool:
+        """Wait, and return whether the thread is to end."""
+        self._over = self._over or asyncio.create_task(self._stop.wait())
+        await asyncio.wait({self._over}, timeout=seconds)
+        return self._over.done()
+
+    def _complain(self, text: str) -> None:
+        self.status = (Level.ERROR, text)
+        self.said.put(text)
+
+
+class LiveGraph:
+    """What is on the bus, followed by the tokens of all ends."""
+
+    def __init__(self, guest: Guest) -> None:
+        self._keys: set[str] = set()
+        transport = guest.transport
+        self._watched = transport.watch(
+            f"{SPACE}/{guest.domain}/**",
+            lambda key, is_there: transport.wake(NAME, partial(self._change, key, is_there=is_there)),
+        )
+
+    def close(self) -> None:
+        """Follow no more."""
+        self._watched.close()
+
+    def _change(self, key: str, *, is_there: bool) -> None:
+        (self._keys.add if is_there else self._keys.discard)(key)
+        self.__dict__.pop("_graph", None)
+
+    @cached_property
+    def _graph(self) -> Graph:
+        return Graph.of(self._keys)
+
+    def topics(self) -> dict[str, str]:
+        """Return the types of the topics."""
+        return _types(self._graph.topics)
+
+    def services(self) -> dict[str, str]:
+        """Return the types of the services that somebody serves."""
+        return _types([service for service in self._graph.services if service.givers])
+
+    def nodes(self) -> Sequence[str]:
+        """Return the names of the nodes."""
+        return [node for node in self._graph.nodes if not node.startswith("/_")]
+
+    def publishers(self, topic: str) -> Sequence[str]:
+        """Return the names of the nodes that publish on a topic."""
+        return self._ends(topic, "givers")
+
+    def subscribers(self, topic: str) -> Sequence[str]:
+        """Return the names of the nodes that subscribe to a topic."""
+        return self._ends(topic, "takers")
+
+    def is_latched(self, topic: str) -> bool:
+        """Return whether the last message of a topic is kept for late subscribers."""
+        ends = (end for found in self._graph.topics if found.name == topic for end in found.givers)
+        return any(end.qos is not None and end.qos.is_transient_local for end in ends)
+
+    def _ends(self, topic: str, side: str) -> list[str]:
+        return sorted({end.node for found in self._graph.topics if found.name == topic for end in getattr(found, side)})
+
+
+def _types(names: Sequence[GraphName]) -> dict[str, str]:
+    return {found.name: found.types[0] for found in names if not found.is_hidden}
+
+
+class GatewaySession:
+    """The web application, the bridge and the bus, all in one event loop."""
+
+    def __init__(self, config: GatewayConfig, folder: RobotFolder, guest: Guest) -> None:
+        self._config, self._folder, self._guest = config, folder, guest
+        self._graph = LiveGraph(guest)
+        guest.graph()  # a round trip, after which the tokens of all others are here, too
+        self._bridge = Bridge(self._graph, config.drive)
+        self._bus = guest.bus()
+        self._ends: dict[tuple[type[BusRequest], str], Any] = {}  # publishers, subscriptions and clients, by name
+        self._wakes: dict[int, asyncio.Event] = {}  # by client
+        self._loop = asyncio.get_running_loop()
+        self._pump_timer: asyncio.TimerHandle | None = None
+        self._lease_timer: asyncio.TimerHandle | None = None
+        self._tasks: set[asyncio.Task[None]] = set()
+        guest.scheduler.on_error = lambda owner, error: self._loop.call_exception_handler(
+            {"message": str(error), "exception": error}
+        )
+
+    async def serve(self, listener: socket.socket, stop: asyncio.Event) -> None:
+        """Serve until `stop`."""
+        import uvicorn
+
+        class Quiet(uvicorn.Server):
+            """A server that sleeps until something happens; others wake ten times a second."""
+
+            async def main_loop(self) -> None:
+                await stop.wait()
+
+        self._loop.add_reader(self._guest.fileno(), self._pump)
+        self._pump()
+        settings = uvicorn.Config(
+            self._guarded(self._application()),
+            log_config=None,
+            log_level="warning",
+            access_log=False,
+            lifespan="off",
+            ws="websockets-sansio",
+            ws_max_size=2 * LARGEST,  # beyond that, the connection is closed
+            ws_per_message_deflate=False,  # within a machine it costs more than it saves
+            ws_ping_interval=_PING,
+            ws_ping_timeout=_PING,
+            timeout_graceful_shutdown=_FAREWELL,
+            date_header=False,
+            server_header=False,
+        )
+        await Quiet(settings).serve(sockets=[listener])
+
+    def close(self) -> None:
+        """Stop who drives, and leave the bus."""
+        self._loop.remove_reader(self._guest.fileno())
+        self._do(self._bridge.stop_driving(self._now, self._stamp))
+        for timer in (self._pump_timer, self._lease_timer):
+            if timer is not None:
+                timer.cancel()
+        for task in self._tasks:
+            task.cancel()
+        self._graph.close()
+
+    @property
+    def _now(self) -> float:
+        return self._guest.clock.now()
+
+    @property
+    def _stamp(self) -> int:
+        return self._guest.clock.stamp()
+
+    # The web
+
+    def _application(self) -> Any:
+        from starlette.applications import Starlette
+        from starlette.responses import HTMLResponse, JSONResponse
+        from starlette.routing import BaseRoute, Mount, Route, WebSocketRoute
+        from starlette.staticfiles import StaticFiles
+
+        async def config(request: Request) -> Response:
+            return JSONResponse(self._shown_config(), headers={"cache-control": "no-store"})
+
+        async def not_built(request: Request) -> Response:
+            return HTMLResponse(_NOT_BUILT.read_text(encoding="utf-8"))
+
+        is_built = (STATIC / "index.html").exists()
+        page: BaseRoute = Mount("/", StaticFiles(directory=STATIC, html=True)) if is_built else Route("/", not_built)
+        sockets = [WebSocketRoute(path, self._talk) for path in SOCKETS]
+        return Starlette(routes=[*sockets, Route("/console/config", config), page])
+
+    def _shown_config(self) -> dict[str, object]:
+        config, shown = self._config, None
+        if (drive := config.drive) is not None:
+            limits = {"max_speed": drive.max_speed, "max_turn_rate": drive.max_turn_rate}
+            finite = {name: limit if math.isfinite(limit) else None for name, limit in limits.items()}
+            shown = {"topic": drive.topic, "type": drive.type, **finite, "holder": self._bridge.lease.holder}
+        about = {"robot": config.robot, "about": config.about, "first_page": config.first_page}
+        return {**about, "drive": shown, "values": config.values, "stop": "/console/stop"}
+
+    def _guarded(self, application: Any) -> Callable[..., Awaitable[None]]:
+        """Return the application behind a door that pages of others do not pass."""
+        port = self._config.port
+        hosts = {f"{name}{end}" for name in ("127.0.0.1", "localhost", "[::1]") for end in (f":{port}", "")}
+        origins = {f"http://{host}" for host in hosts if port == 80 or host.endswith(f":{port}")}
+
+        async def guarded(scope: MutableMapping[str, Any], receive: Any, send: Any) -> None:
+            headers = dict(scope["headers"])
+            origin = headers.get(b"origin", b"").decode("latin-1").lower()
+            is_known = headers.get(b"host", b"").decode("latin-1").lower() in hosts and (
+                not origin or origin in origins
+            )
+            if scope["type"] == "websocket":
+                if is_known and scope["path"] in SOCKETS:
+                    await application(scope, receive, send)
+                else:
+                    await receive()
+                    await send({"type": "websocket.close", "code": 1008})
+                return
+
+            async def hardened(message: MutableMapping[str, Any]) -> None:
+                if message["type"] == "http.response.start":
+                    message["headers"] = [*message.get("headers", ()), *_HEADERS]
+                await send(message)
+
+            if is_known:
+                await application(scope, receive, hardened)
+            else:
+                await hardened({"type": "http.response.start", "status": 403, "headers": []})
+                await hardened({"type": "http.response.body", "body": b"the console answers its own pages only\n"})
+
+        return guarded
+
+    async def _talk(self, web_socket: WebSocket) -> None:
+        """Serve one client until it leaves."""
+        await web_socket.accept()
+        if len(self._bridge) >= MOST_CLIENTS:
+            await web_socket.close(1013)
+            return
+        number = self._bridge.open()
+        self._wakes[number] = asyncio.Event()
+        sender = asyncio.create_task(self._send(web_socket, number))
+        try:
+            while (message := await web_socket.receive())["type"] == "websocket.receive":
+                text = message.get("text")
+                frame = text if text is not None else message.get("bytes") or b""
+                self._do(self._bridge.receive(number, frame, self._now, self._stamp))
+        finally:
+            sender.cancel()
+            del self._wakes[number]
+            self._do(self._bridge.close(number, self._now, self._stamp))
+
+    async def _send(self, web_socket: WebSocket, number: int) -> None:
+        """Send a client what is due for it; one that reads slowly holds up only itself."""
+        wake = self._wakes[number]
+        while not self._bridge.is_overrun(number):
+            wake.clear()
+            if (frame := self._bridge.next_frame(number, self._now)) is not None:
+                await web_socket.send_text(frame)
+                continue
+            pause = self._bridge.pause(number, self._now)
+            timer = None if math.isinf(pause) else self._loop.call_later(pause, wake.set)
+            await wake.wait()
+            if timer is not None:
+                timer.cancel()
+        await web_socket.close(1008)
+
+    # The bus
+
+    def _do(self, requests: Sequence[BusRequest]) -> None:
+        for request in requests:
+            self._carry_out(request)
+        self._pump()
+        until = self._bridge.lease.until
+        if self._lease_timer is None and math.isfinite(until):
+            self._lease_timer = self._loop.call_later(max(0.0, until - self._now), self._look_at_lease)
+
+    def _look_at_lease(self) -> None:
+        self._lease_timer = None
+        self._do(self._bridge.expire(self._now, self._stamp))
+
+    def _pump(self) -> None:
+        """Let the bus do what is due, wake the clients that it brought something, and plan when to look again."""
+        due = self._guest.pump()
+        if self._pump_timer is not None:
+            self._pump_timer.cancel()
+        later = partial(self._loop.call_later, callback=self._pump)
+        self._pump_timer = None if due is None else later(max(0.0, due - self._now))
+        while self._bridge.woken:
+            if (wake := self._wakes.get(self._bridge.woken.pop())) is not None:
+                wake.set()
+
+    def _carry_out(self, request: BusRequest) -> None:
+        match request:
+            case Subscribe(topic, message):
+                qos = Qos.LATCHED if self._graph.is_latched(topic) else Qos.STATE
+                self._ends[Subscribe, topic] = self._bus.subscribe(
+                    NAME,
+                    topic,
+                    message,
+                    qos,
+                    lambda arrived: self._bridge.arrived(topic, arrived, self._now),
+                    max_rate=math.inf,
+                    limits=BULK,
+                    may_be_silent=True,
+                )
+            case Advertise(topic, message, is_latched):
+                qos = Qos.COMMAND if topic == self._config.drive_topic else Qos.LATCHED if is_latched else Qos.STATE
+                self._ends[Advertise, topic] = self._bus.publisher(NAME, topic, message, qos)
+            case Unsubscribe(topic):
+                self._withdraw(self._ends.pop((Subscribe, topic)))
+            case Unadvertise(topic):
+                self._withdraw(self._ends.pop((Advertise, topic)))
+            case Publish(topic, message):
+                self._ends[Advertise, topic](message)
+            case ServiceCall():
+                self._call(request)
+            case AskRobot():
+                task = self._loop.create_task(self._ask_robot(request))
+                self._tasks.add(task)
+                task.add_done_callback(self._tasks.discard)
+
+    def _withdraw(self, end: Closable) -> None:
+        self._bus.withdraw(NAME, end)
+
+    def _call(self, request: ServiceCall) -> None:
+        """ServiceCall a service as soon as its server is known to a client of it."""
+        caller = self._ends.get((ServiceCall, request.service))
+        if caller is None:
+            caller = self._ends[ServiceCall, request.service] = self._bus.client(NAME, request.service, request.type)
+        deadline = self._now + request.timeout
+
+        def answered(reply: Reply[Any]) -> None:
+            self._bridge.answered(request.number, reply.response, reply.error)
+
+        def attempt() -> None:
+            left = deadline - self._now
+            if caller.is_available or left <= 0:
+                caller(request.request, answered, timeout=max(_PAUSE, left))
+            else:
+                self._guest.scheduler.at(self._now + _PAUSE / 10, NAME, attempt)
+
+        attempt()
+
+    async def _ask_robot(self, request: AskRobot) -> None:
+        """Stop or release the robot as the command line does, in a thread: its supervisor may be slow."""
+        command: Command = StopRobot() if request.what == "stop" else ReleaseRobot()
+        try:
+            answer, is_good = await asyncio.to_thread(ask, self._folder, command), True
+        except Refused as refusal:
+            answer, is_good = str(refusal), False
+        except NoAnswerError as error:
+            answer, is_good = str(error), False
+            if request.what == "stop":
+                stopped = await asyncio.to_thread(self._guest.ask, stop_key(self._config.robot), _STOPPED)
+                names = ", ".join(sorted(name.decode() for name in stopped))
+                answer, is_good = f"the supervisor does not answer: stopped over the bus: {names}", bool(names)
+        self._bridge.robot_answered(request.number, answer, is_good=is_good)
+        self._pump()

@@ -1,0 +1,751 @@
+"""The rosbridge protocol v2 on the robot's side: frames of clients in, frames for clients and requests for the bus out.
+
+It knows no socket, no bus and no clock: times are arguments [s], stamps are those of messages [ns].
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import field
+from typing import Any, Protocol
+
+from rbxcompose.base.dataclass import dataclass
+from rbxcompose.domains.console.json_messages import WrongMessageError, arguments, encoded, from_json, to_json
+from rbxcompose.domains.console.lease import LATEST, DriveLease, DriveLimits, Lateness, limited
+from rbxcompose.msgs import registry
+from rbxcompose.msgs.types import Message, Service
+
+LARGEST = 8 * 1024 * 1024  # [characters] of a frame
+MOST_PER_SECOND = 200  # frames of a client
+MOST_SUBSCRIPTIONS = 200  # of a client; as many topics may it advertise, and as many calls may be open
+MOST_FRAMES = 1000  # statuses and answers that wait for a client, which is then given up
+LONGEST_QUEUE = 1000  # messages of a topic that wait for a client
+DEPTH = 10  # messages of a topic that wait for a client that wants no queue, but reads slowly
+LONGEST_NAME = 64  # characters of the name of who drives
+PATIENCE = 10.0  # [s] for an answer, if a client does not say
+LONGEST_PATIENCE = 60.0  # [s]
+
+LEVELS = ("info", "warning", "error", "none")
+LATER = re.compile(
+    r"(un)?advertise_(service|action)|(send|cancel)_action_goal|action_(feedback|result)|service_response"
+    r"|fragment|png|cbor(-raw)?|auth"
+)
+"""Operations of the protocol that are not served yet."""
+
+_NAME = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
+_TYPE = re.compile(r"\w+(/(msg|srv|action))?/\w+", re.ASCII)
+_LONGEST_ROS_NAME = 247
+_SHOWN = 60  # characters of what a client sent, in a status
+
+
+class GraphView(Protocol):
+    """What is on the bus now; all names are absolute."""
+
+    def topics(self) -> Mapping[str, str]:
+        """Return the types of the topics."""
+        ...
+
+    def services(self) -> Mapping[str, str]:
+        """Return the types of the services."""
+        ...
+
+    def nodes(self) -> Sequence[str]:
+        """Return the names of the nodes."""
+        ...
+
+    def publishers(self, topic: str) -> Sequence[str]:
+        """Return the names of the nodes that publish on a topic."""
+        ...
+
+    def subscribers(self, topic: str) -> Sequence[str]:
+        """Return the names of the nodes that subscribe to a topic."""
+        ...
+
+    def is_latched(self, topic: str) -> bool:
+        """Return whether the last message of a topic is kept for late subscribers."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Subscribe:
+    """Pass the messages of a topic to `Bridge.arrived`."""
+
+    topic: str
+    message: type[Message]
+
+
+@dataclass(frozen=True, slots=True)
+class Unsubscribe:
+    """No client wants this topic any more."""
+
+    topic: str
+
+
+@dataclass(frozen=True, slots=True)
+class Advertise:
+    """Declare a publisher."""
+
+    topic: str
+    message: type[Message]
+    is_latched: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Unadvertise:
+    """No client publishes on this topic any more."""
+
+    topic: str
+
+
+@dataclass(frozen=True, slots=True)
+class Publish:
+    """Publish on a topic that was advertised."""
+
+    topic: str
+    message: Message
+
+
+@dataclass(frozen=True, slots=True)
+class ServiceCall:
+    """ServiceCall a service within `timeout` [s], and pass the reply to `Bridge.answered`."""
+
+    number: int
+    service: str
+    type: type[Service[Any, Any]]
+    request: Message
+    timeout: float
+
+
+@dataclass(frozen=True, slots=True)
+class AskRobot:
+    """Ask the robot itself to `stop` or to `release`, and pass what it answers to `Bridge.robot_answered`."""
+
+    number: int
+    what: str
+
+
+BusRequest = Subscribe | Unsubscribe | Advertise | Unadvertise | Publish | ServiceCall | AskRobot
+
+
+class BadFrameError(ValueError):
+    """Raised for a frame that cannot be carried out; its text goes to the client."""
+
+
+class _Shared:
+    """A message for several clients, which is encoded when the first of them takes it."""
+
+    __slots__ = ("_message", "_text")
+
+    def __init__(self, message: Message) -> None:
+        self._message = message
+        self._text = ""
+
+    @property
+    def text(self) -> str:
+        self._text = self._text or encoded(self._message)
+        return self._text
+
+
+@dataclass(frozen=True, slots=True)
+class _Wish:
+    """One subscription of a client: least time between two messages [s], and how many may wait meanwhile."""
+
+    throttle: float
+    queue: int
+
+
+class _Stream:
+    """A topic on its way to one client, under the name by which the client knows it."""
+
+    def __init__(self, name: str, topic: str) -> None:
+        self.topic = topic
+        self.wishes: dict[str | None, _Wish] = {}
+        self._head = f'{{"op":"publish","topic":{json.dumps(name)},"msg":'
+        self._waiting: deque[_Shared] = deque()
+        self._due = -math.inf  # [s], when the next one may be sent
+        self._throttle, self._queue = 0.0, 0
+
+    def follow_wishes(self, now: float) -> None:
+        """Do what suits all subscriptions: the lowest throttle, the longest queue."""
+        self._throttle = min(wish.throttle for wish in self.wishes.values())
+        self._queue = max(wish.queue for wish in self.wishes.values())
+        self._waiting = deque(self._waiting, maxlen=self._queue or DEPTH)
+        self._due = min(self._due, now + self._throttle)
+
+    def offer(self, message: _Shared, now: float) -> bool:
+        """Take a message, unless it comes too early and nothing may wait; return whether it was taken."""
+        if self._throttle and not self._queue:
+            if now < self._due:
+                return False
+            self._pass(now)
+        self._waiting.append(message)
+        return True
+
+    def take(self, now: float) -> str | None:
+        """Return the next frame if it is due."""
+        if not self._waiting or self.pause(now) > 0:
+            return None
+        if self._throttle and self._queue:
+            self._pass(now)
+        return f"{self._head}{self._waiting.popleft().text}}}"
+
+    def pause(self, now: float) -> float:
+        """Return the time until the next frame is due [s], infinite if none waits."""
+        if not self._waiting:
+            return math.inf
+        return max(0.0, self._due - now) if self._throttle and self._queue else 0.0
+
+    def _pass(self, now: float) -> None:
+        """Let one message through; the next instants form a grid, so that a rate is kept on average."""
+        is_on_grid = now - self._due < self._throttle
+        self._due = (self._due if is_on_grid else now) + self._throttle
+
+
+class _Client:
+    """One connection: what it wants, and what waits for it."""
+
+    def __init__(self, number: int) -> None:
+        self.number = number
+        self.level = LEVELS.index("warning")
+        self.frames: deque[str] = deque()
+        self.streams: dict[str, _Stream] = {}  # by the name that it uses; the next to be served is the first
+        self.advertised: dict[str, type[Message]] = {}
+        self.open_calls = 0
+        self.lateness = Lateness()
+        self._allowed, self._since = float(MOST_PER_SECOND), -math.inf
+        self._complained = -math.inf  # [s]
+
+    def may_send(self, now: float) -> bool:
+        """Return whether a frame at `now` is within the limit."""
+        if self._since > -math.inf:
+            earned = MOST_PER_SECOND * max(0.0, now - self._since)
+            self._allowed = min(float(MOST_PER_SECOND), self._allowed + earned)
+        self._since = now
+        if self._allowed < 1:
+            return False
+        self._allowed -= 1
+        return True
+
+    def may_complain(self, now: float) -> bool:
+        """Return whether the last complaint about too many frames is a second ago."""
+        if now - self._complained < 1:
+            return False
+        self._complained = now
+        return True
+
+    @property
+    def subscriptions(self) -> int:
+        """Return how many it has."""
+        return sum(len(stream.wishes) for stream in self.streams.values())
+
+
+@dataclass(frozen=True, slots=True)
+class _Waiting:
+    """A call that is not answered yet."""
+
+    client: int
+    id: object
+    service: str
+
+
+@dataclass(slots=True)
+class _Listened:
+    """A topic to which at least one client listens."""
+
+    message: type[Message]
+    is_latched: bool
+    streams: list[tuple[int, _Stream]] = field(default_factory=list)  # each with the number of its client
+    last: _Shared | None = None  # of a latched one
+
+
+@dataclass(slots=True)
+class _Advertised:
+    """A topic on which clients publish, and how many."""
+
+    message: type[Message]
+    clients: int = 0
+
+
+class Bridge:
+    """All clients of one robot."""
+
+    def __init__(self, graph: GraphView, drive: DriveLimits | None = None) -> None:
+        self.lease = DriveLease()
+        self.woken: set[int] = set()
+        """Clients for which something new waits; who sends takes them out."""
+        self._graph, self._drive = graph, drive
+        self._clients: dict[int, _Client] = {}
+        self._listened: dict[str, _Listened] = {}
+        self._advertised: dict[str, _Advertised] = {}
+        self._calls: dict[int, _Waiting] = {}
+        self._clients_so_far = self._calls_so_far = 0
+        self._requests: list[BusRequest] = []
+        self._now, self._stamp = 0.0, 0
+
+    # What the socket does
+
+    def __len__(self) -> int:
+        """Return how many clients there are."""
+        return len(self._clients)
+
+    def open(self) -> int:
+        """Return the number of a new client."""
+        self._clients_so_far += 1
+        self._clients[self._clients_so_far] = _Client(self._clients_so_far)
+        return self._clients_so_far
+
+    def receive(self, number: int, frame: str | bytes, now: float, stamp: int) -> list[BusRequest]:
+        """Carry out a frame of a client; return what the bus has to do for it."""
+        self._now, self._stamp = now, stamp
+        self._halt_if(self.lease.expire(now))
+        client = self._clients[number]
+        if not client.may_send(now):
+            if client.may_complain(now):
+                self._status(client, "error", f"more than {MOST_PER_SECOND} frames a second: the rest is dropped")
+            return self._done()
+        identity: object = None
+        try:
+            data = _parsed(frame)
+            identity = data.get("id")
+            self._carry_out(client, data)
+        except (BadFrameError, WrongMessageError) as error:
+            self._status(client, "error", str(error), identity)
+        return self._done()
+
+    def close(self, number: int, now: float, stamp: int) -> list[BusRequest]:
+        """Forget a client; what it had is withdrawn, and the robot that it drove stops."""
+        self._now, self._stamp = now, stamp
+        client = self._clients.pop(number)
+        self._halt_if(self.lease.release(number))
+        for name in list(client.streams):
+            self._end_stream(client, name)
+        for topic in client.advertised:
+            self._unadvertise(topic)
+        self._calls = {call: waiting for call, waiting in self._calls.items() if waiting.client != number}
+        self.woken.discard(number)
+        return self._done()
+
+    def next_frame(self, number: int, now: float) -> str | None:
+        """Return what to send to a client now; None if nothing is due. Topics take turns."""
+        client = self._clients[number]
+        if client.frames:
+            return client.frames.popleft()
+        for name, stream in client.streams.items():
+            if (frame := stream.take(now)) is not None:
+                client.streams[name] = client.streams.pop(name)
+                return frame
+        return None
+
+    def pause(self, number: int, now: float) -> float:
+        """Return the time until something is due for a client [s], if nothing else happens; it may be infinite."""
+        return min((stream.pause(now) for stream in self._clients[number].streams.values()), default=math.inf)
+
+    def is_overrun(self, number: int) -> bool:
+        """Return whether a client asks for more than it reads, and should be disconnected."""
+        return len(self._clients[number].frames) > MOST_FRAMES
+
+    # What the bus does
+
+    def arrived(self, topic: str, message: Message, now: float) -> None:
+        """Pass a message on to the clients that listen."""
+        if (listened := self._listened.get(topic)) is None:
+            return
+        shared = _Shared(message)
+        if listened.is_latched:
+            listened.last = shared
+        for number, stream in listened.streams:
+            if stream.offer(shared, now):
+                self.woken.add(number)
+
+    def answered(self, number: int, response: Message | None, error: str = "") -> None:
+        """Pass the reply to a call on, or why there is none."""
+        if response is None:
+            self._respond(number, error, is_good=False)
+        else:
+            self._respond(number, to_json(response), is_good=True)
+
+    def robot_answered(self, number: int, answer: str, *, is_good: bool) -> None:
+        """Pass on what the robot said to `stop` or `release`."""
+        self._respond(number, {"success": is_good, "message": answer}, is_good=True)
+
+    def expire(self, now: float, stamp: int) -> list[BusRequest]:
+        """End a drive lease that was not renewed: the robot stops."""
+        self._now, self._stamp = now, stamp
+        self._halt_if(self.lease.expire(now))
+        return self._done()
+
+    def stop_driving(self, now: float, stamp: int) -> list[BusRequest]:
+        """Take the drive lease from whoever has it, since the gateway ends."""
+        self._now, self._stamp = now, stamp
+        self._halt_if(self.lease.client is not None and self.lease.release(self.lease.client))
+        return self._done()
+
+    # Operations
+
+    def _carry_out(self, client: _Client, data: Mapping[str, Any]) -> None:
+        op = data.get("op")
+        if not isinstance(op, str):
+            raise BadFrameError("a frame has an 'op', which is a text")
+        if not isinstance(data.get("id"), str | int | float | None):
+            raise BadFrameError("an 'id' is a text")
+        if (operation := _OPERATIONS.get(op)) is not None:
+            operation(self, client, data)
+        elif LATER.fullmatch(op):
+            raise BadFrameError(f"the operation '{op}' is not yet served")
+        else:
+            raise BadFrameError(f"there is no operation '{_short(op)}'")
+
+    def _subscribe(self, client: _Client, data: Mapping[str, Any]) -> None:
+        name, topic = _topic_of(data)
+        if (compression := data.get("compression", "none")) not in ("none", "", None):
+            raise BadFrameError(f"the compression '{_short(compression)}' is not yet served")
+        wish = _Wish(_count(data, "throttle_rate", math.inf) / 1000, min(_count(data, "queue_length"), LONGEST_QUEUE))
+        message = self._message_on(topic, data)
+        if client.subscriptions >= MOST_SUBSCRIPTIONS:
+            raise BadFrameError(f"a client has at most {MOST_SUBSCRIPTIONS} subscriptions")
+        if (listened := self._listened.get(topic)) is None:
+            listened = self._listened[topic] = _Listened(message, self._graph.is_latched(topic))
+            self._requests.append(Subscribe(topic, message))
+        stream, is_new = client.streams.get(name), False
+        if stream is None:
+            stream, is_new = client.streams.setdefault(name, _Stream(name, topic)), True
+            listened.streams.append((client.number, stream))
+        stream.wishes[_key(data)] = wish
+        stream.follow_wishes(self._now)
+        if is_new and listened.last is not None and stream.offer(listened.last, self._now):
+            self.woken.add(client.number)
+
+    def _unsubscribe(self, client: _Client, data: Mapping[str, Any]) -> None:
+        name, _ = _topic_of(data)
+        if (stream := client.streams.get(name)) is None:
+            raise BadFrameError(f"there is no subscription to '{name}'")
+        if (key := _key(data)) is None:
+            stream.wishes.clear()
+        elif stream.wishes.pop(key, None) is None:
+            raise BadFrameError(f"there is no subscription '{_short(key)}' to '{name}'")
+        if stream.wishes:
+            stream.follow_wishes(self._now)
+        else:
+            self._end_stream(client, name)
+
+    def _advertise(self, client: _Client, data: Mapping[str, Any]) -> None:
+        _, topic = _topic_of(data)
+        self._declare(client, topic, self._message_on(topic, data), is_latched=data.get("latch") is True)
+
+    def _unadvertise_op(self, client: _Client, data: Mapping[str, Any]) -> None:
+        name, topic = _topic_of(data)
+        if client.advertised.pop(topic, None) is None:
+            raise BadFrameError(f"'{name}' is not advertised")
+        if self._drive is not None and topic == self._drive.topic:
+            self._halt_if(self.lease.release(client.number))  # while there is a publisher
+        self._unadvertise(topic)
+
+    def _publish(self, client: _Client, data: Mapping[str, Any]) -> None:
+        name, topic = _topic_of(data)
+        drives = self._drive is not None and topic == self._drive.topic
+        if drives and self.lease.client != client.number:
+            who = f": '{self.lease.holder}' drives" if self.lease.client is not None else ""
+            raise BadFrameError(f"'{name}' takes commands only from who has the drive lease{who}")
+        if (type_ := client.advertised.get(topic)) is None:
+            type_ = self._message_on(topic, data)
+        message = from_json(type_, data.get("msg", {}), self._stamp)
+        if self._drive is not None and drives:
+            late = client.lateness.of(data["sent"], self._now) if "sent" in data else 0.0
+            if late > LATEST:
+                self._status(client, "warning", f"a command was dropped: it is {late * 1000:.0f} ms late")
+                return
+            message = limited(message, self._drive)
+            self.lease.renew(client.number, self._now)
+        self._declare(client, topic, type_, is_latched=data.get("latch") is True)
+        self._requests.append(Publish(topic, message))
+
+    def _call_service(self, client: _Client, data: Mapping[str, Any]) -> None:
+        name = data.get("service")
+        if not isinstance(name, str) or not _is_name(name):
+            raise BadFrameError("'service' is the name of a service")
+        if client.open_calls >= MOST_SUBSCRIPTIONS:
+            raise BadFrameError(f"at most {MOST_SUBSCRIPTIONS} calls of a client are open")
+        self._calls_so_far += 1
+        number, full, given = self._calls_so_far, _full(name), data.get("args")
+        self._calls[number] = _Waiting(client.number, data.get("id"), name)
+        client.open_calls += 1
+        try:
+            rosapi = full.removeprefix("/rosapi/")
+            if rosapi != full and rosapi not in ROSAPI:
+                raise BadFrameError(f"'{full}' is not yet served")
+            values = None
+            if full in _OWN:
+                values = _OWN[full](self, client, _named(given, _DRIVE_ARGUMENTS), number)
+            elif rosapi != full:
+                values = self._rosapi(rosapi, _named(given, ROSAPI[rosapi]))
+            else:
+                self._call(number, full, given, data)
+            if values is not None:
+                self._respond(number, values, is_good=True)
+        except (BadFrameError, WrongMessageError) as error:
+            self._respond(number, str(error), is_good=False)
+
+    def _call(self, number: int, service: str, given: object, data: Mapping[str, Any]) -> None:
+        known = self._graph.services().get(service)
+        if known is None:
+            raise BadFrameError(f"there is no service '{service}'")
+        try:
+            type_ = registry.service(known)
+        except KeyError as error:
+            raise BadFrameError(f"the type '{known}' of '{service}' is not known here") from error
+        request = from_json(type_.Request, arguments(type_.Request, given), self._stamp)
+        timeout = data.get("timeout")
+        is_given = isinstance(timeout, int | float) and 0 < timeout < LONGEST_PATIENCE
+        self._requests.append(ServiceCall(number, service, type_, request, float(timeout) if is_given else PATIENCE))  # type: ignore[arg-type]
+
+    def _set_level(self, client: _Client, data: Mapping[str, Any]) -> None:
+        if (level := data.get("level")) not in LEVELS:
+            raise BadFrameError(f"a level is one of {', '.join(LEVELS)}")
+        client.level = LEVELS.index(level)
+
+    def _take_status(self, client: _Client, data: Mapping[str, Any]) -> None:
+        """Ignore what a client reports: nobody here reads it."""
+
+    # Services of the gateway
+
+    def _drive_service(self, client: _Client, given: Mapping[str, Any], number: int) -> dict[str, Any]:
+        if not isinstance(take := given.get("take"), bool):
+            raise WrongMessageError("'take' is true or false")
+        if not isinstance(name := given.get("name", ""), str):
+            raise WrongMessageError("'name' is a text")
+        if self._drive is None:
+            return {"success": False, "holder": "", "message": "this robot does not drive"}
+        if not take:
+            self._halt_if(self.lease.release(client.number))
+            return {"success": True, "holder": self.lease.holder, "message": ""}
+        shown = "".join(letter for letter in name if letter.isprintable())[:LONGEST_NAME].strip() or "somebody"
+        self._declare(client, self._drive.topic, registry.message(self._drive.type))  # first: it may be refused
+        if not self.lease.take(client.number, shown, self._now):
+            holder = self.lease.holder
+            return {"success": False, "holder": holder, "message": f"'{holder}' drives"}
+        return {"success": True, "holder": shown, "message": ""}
+
+    def _stop_service(self, client: _Client, given: Mapping[str, Any], number: int) -> None:
+        self._requests.append(AskRobot(number, "stop"))
+
+    def _release_service(self, client: _Client, given: Mapping[str, Any], number: int) -> None:
+        self._requests.append(AskRobot(number, "release"))
+
+    def _rosapi(self, name: str, given: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the answer of `/rosapi/NAME`."""
+        graph, topic = self._graph, "topic" in ROSAPI[name] and _full(_text(given, "topic"))
+        match name:
+            case "topics":
+                return {"topics": list(graph.topics()), "types": list(graph.topics().values())}
+            case "services":
+                return {"services": sorted({*graph.services(), *_OWN, *(f"/rosapi/{name}" for name in ROSAPI)})}
+            case "nodes":
+                return {"nodes": list(graph.nodes())}
+            case "topic_type":
+                return {"type": graph.topics().get(topic or "", "")}
+            case "service_type":
+                return {"type": graph.services().get(_full(_text(given, "service")), "")}
+            case "topics_for_type":
+                return {"topics": _of_type(graph.topics(), _text(given, "type"), "msg")}
+            case "services_for_type":
+                return {"services": _of_type(graph.services(), _text(given, "type"), "srv")}
+            case "publishers":
+                return {"publishers": list(graph.publishers(topic or ""))}
+            case "subscribers":
+                return {"subscribers": list(graph.subscribers(topic or ""))}
+        seconds, rest = divmod(self._stamp, 1_000_000_000)
+        return {"time": {"sec": seconds, "nanosec": rest, "secs": seconds, "nsecs": rest}}  # as ROS 2 and ROS 1 say it
+
+    # What they share
+
+    def _message_on(self, topic: str, data: Mapping[str, Any]) -> type[Message]:
+        """Return the type of a topic: the one that exists, else the one that the frame names."""
+        name = data.get("type")
+        if name is not None and not (isinstance(name, str) and _TYPE.fullmatch(name)):
+            raise BadFrameError(f"'{_short(name)}' is not the name of a type")
+        wanted = registry.full_name(name, "msg") if name else ""
+        known = self._known_type(topic)
+        if not (known or wanted):
+            raise BadFrameError(f"there is no topic '{topic}' yet, so its type must be given")
+        if known and wanted and known != wanted:
+            raise BadFrameError(f"'{topic}' is of the type '{known}', not '{wanted}'")
+        try:
+            return registry.message(known or wanted)
+        except KeyError as error:
+            raise BadFrameError(f"the type '{known or wanted}' is not known here") from error
+
+    def _known_type(self, topic: str) -> str:
+        if self._drive is not None and topic == self._drive.topic:
+            return self._drive.type
+        ours = self._listened.get(topic) or self._advertised.get(topic)
+        return ours.message.TYPE if ours is not None else self._graph.topics().get(topic, "")
+
+    def _declare(self, client: _Client, topic: str, message: type[Message], *, is_latched: bool = False) -> None:
+        if topic in client.advertised:
+            return
+        if len(client.advertised) >= MOST_SUBSCRIPTIONS:
+            raise BadFrameError(f"a client advertises at most {MOST_SUBSCRIPTIONS} topics")
+        client.advertised[topic] = message
+        if topic not in self._advertised:
+            self._advertised[topic] = _Advertised(message)
+            self._requests.append(Advertise(topic, message, is_latched))
+        self._advertised[topic].clients += 1
+
+    def _unadvertise(self, topic: str) -> None:
+        self._advertised[topic].clients -= 1
+        if not self._advertised[topic].clients:
+            del self._advertised[topic]
+            self._requests.append(Unadvertise(topic))
+
+    def _end_stream(self, client: _Client, name: str) -> None:
+        stream = client.streams.pop(name)
+        listened = self._listened[stream.topic]
+        listened.streams = [(number, other) for number, other in listened.streams if other is not stream]
+        if not listened.streams:
+            del self._listened[stream.topic]
+            self._requests.append(Unsubscribe(stream.topic))
+
+    def _halt_if(self, has_ended: bool) -> None:
+        """Publish rest, once, if a drive lease has ended."""
+        if has_ended and self._drive is not None:
+            rest = from_json(registry.message(self._drive.type), {}, self._stamp)
+            self._requests.append(Publish(self._drive.topic, rest))
+
+    def _status(self, client: _Client, level: str, text: str, identity: object = None) -> None:
+        if LEVELS.index(level) >= client.level:
+            identified = {} if not isinstance(identity, str | int | float) else {"id": identity}
+            self._send(client, {"op": "status", "level": level, "msg": text, **identified})
+
+    def _respond(self, number: int, values: object, *, is_good: bool) -> None:
+        if (waiting := self._calls.pop(number, None)) is None:
+            return  # its client is gone
+        client = self._clients[waiting.client]
+        client.open_calls -= 1
+        identified = {} if waiting.id is None else {"id": waiting.id}
+        frame = {
+            "op": "service_response",
+            **identified,
+            "service": waiting.service,
+            "values": values,
+            "result": is_good,
+        }
+        self._send(client, frame)
+
+    def _send(self, client: _Client, frame: Mapping[str, object]) -> None:
+        client.frames.append(json.dumps(_finite(frame), separators=(",", ":")))
+        self.woken.add(client.number)
+
+    def _done(self) -> list[BusRequest]:
+        requests, self._requests = self._requests, []
+        return requests
+
+
+_OPERATIONS: Mapping[str, Callable[[Bridge, _Client, Mapping[str, Any]], None]] = {
+    "advertise": Bridge._advertise,
+    "unadvertise": Bridge._unadvertise_op,
+    "publish": Bridge._publish,
+    "subscribe": Bridge._subscribe,
+    "unsubscribe": Bridge._unsubscribe,
+    "call_service": Bridge._call_service,
+    "set_level": Bridge._set_level,
+    "status": Bridge._take_status,
+}
+
+
+_OWN: Mapping[str, Callable[[Bridge, _Client, Mapping[str, Any], int], dict[str, Any] | None]] = {
+    "/console/drive": Bridge._drive_service,
+    "/console/release": Bridge._release_service,
+    "/console/stop": Bridge._stop_service,
+}
+"""Services of the gateway: what answers, or None if the answer comes later."""
+_DRIVE_ARGUMENTS = ("take", "name")
+ROSAPI: Mapping[str, tuple[str, ...]] = {
+    **dict.fromkeys(("get_time", "nodes", "services", "topics"), ()),
+    **dict.fromkeys(("publishers", "subscribers", "topic_type"), ("topic",)),
+    **dict.fromkeys(("services_for_type", "topics_for_type"), ("type",)),
+    "service_type": ("service",),
+}
+"""Services of rosapi that are served, each with its arguments."""
+
+
+def _parsed(frame: str | bytes) -> dict[str, Any]:
+    if len(frame) > LARGEST:
+        raise BadFrameError(f"a frame has at most {LARGEST // 2**20} MiB")
+    try:
+        data = json.loads(frame)
+    except RecursionError as error:
+        raise BadFrameError("the frame is nested too deeply") from error
+    except ValueError as error:
+        raise BadFrameError("the frame is not JSON") from error
+    if not isinstance(data, dict):
+        raise BadFrameError("a frame is a map with an 'op'")
+    return data
+
+
+def _topic_of(data: Mapping[str, Any]) -> tuple[str, str]:
+    """Return the name of a topic as it is written, and its full name."""
+    name = data.get("topic")
+    if not isinstance(name, str) or not _is_name(name):
+        raise BadFrameError("'topic' is the name of a topic")
+    return name, _full(name)
+
+
+def _is_name(name: str) -> bool:
+    return len(name) <= _LONGEST_ROS_NAME and _NAME.fullmatch(name) is not None
+
+
+def _full(name: str) -> str:
+    return f"/{name.lstrip('/')}"
+
+
+def _key(data: Mapping[str, Any]) -> str | None:
+    """Return what tells a subscription from others of the same topic."""
+    identity = data.get("id")
+    return None if identity is None else str(identity)
+
+
+def _count(data: Mapping[str, Any], key: str, most: float = 2**31) -> int:
+    value = data.get(key, 0)
+    if value is None:
+        return 0
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value < min(most, 2**53):
+        raise BadFrameError(f"'{key}' is a number that is not negative")
+    return int(value)
+
+
+def _text(given: Mapping[str, Any], key: str) -> str:
+    if not isinstance(value := given.get(key), str):
+        raise WrongMessageError(f"'{key}' is a text")
+    return value
+
+
+def _named(given: object, names: Sequence[str]) -> dict[str, Any]:
+    """Return arguments by name."""
+    if isinstance(given, list):
+        return dict(zip(names, given, strict=False))
+    if not isinstance(given, dict | None):
+        raise WrongMessageError("'args' is a map or a list")
+    return given or {}
+
+
+def _of_type(names: Mapping[str, str], type_: str, kind: str) -> list[str]:
+    wanted = registry.full_name(type_, kind)
+    return [name for name, known in names.items() if known == wanted]
+
+
+def _short(value: object) -> str:
+    text = str(value) if isinstance(value, str | int | float | bool | None) else type(value).__name__
+    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..."
+
+
+def _finite(value: object) -> object:
+    """Return data without numbers that JSON does not have: a client's own `id` may be one."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if isinstance(value, Mapping):
+        return {key: _finite(inner) for key, inner in value.items()}
+    return value

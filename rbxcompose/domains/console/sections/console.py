@@ -1,0 +1,125 @@
+"""The section `console`: the page that the robot serves."""
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Literal
+
+from pydantic import Field
+
+from rbxcompose.base.config import AngularSpeed, Config, Speed
+from rbxcompose.base.findings import kind
+from rbxcompose.compiler.model.robot import PortEnd, RobotComponent, resolve
+from rbxcompose.compiler.model.values import value_of
+from rbxcompose.compiler.sections.bus import bus
+from rbxcompose.compiler.sections.values import values
+from rbxcompose.manifest.fields import TopicName
+from rbxcompose.manifest.registry import section
+from rbxcompose.manifest.section import OVERLAY, ROBOT, Contents, Reading, WantedComponent, Wiring
+from rbxcompose.manifest.tree import ScalarNode
+from rbxcompose.sdk.capabilities import Drives, Forwards, Setting
+
+NOT_BEYOND_THIS_MACHINE = kind("RBX9601")
+GATEWAY = "gateway"
+_TELEOP = "teleop"  # the input of a mux that is for people
+_VELOCITIES = ("geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped")
+
+
+class DrivePage(Config):
+    """How people drive from the page."""
+
+    topic: TopicName | None = None
+    """Where velocities go. Default: the input `teleop` of the mux before the base, else what the base follows."""
+    max_speed: Speed | None = Field(None, gt=0)
+    """The fastest that the page may drive. Default: the limit of the base."""
+    max_turn_rate: AngularSpeed | None = Field(None, gt=0)
+    """The fastest that the page may turn. Default: the limit of the base."""
+
+
+class ConsoleModel(Config):
+    """The page that the robot serves."""
+
+    listen: Literal["local", "lan"] = "local"
+    """Who may open it: programs of this machine. `lan`, everybody in the network, is not offered yet."""
+    port: int = Field(8080, ge=1, le=65535)
+    """TCP port of the page."""
+    first_page: Literal["drive"] = "drive"
+    """The page that is shown first."""
+    drive: DrivePage = DrivePage()
+    """How people drive from the page."""
+
+
+def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]:
+    if (read := contents.of(console)) is None:
+        return
+    name, about = (node.text if isinstance(node := contents.root.get(key), ScalarNode) else "" for key in _HEAD)
+    components: Mapping[str, RobotComponent] = wiring.components
+    namespace = contents.of(bus).namespace or ""
+    config = {
+        "robot": name,
+        "about": about,
+        "port": read.port,
+        "first_page": read.first_page,
+        **_drive(read.drive, components, namespace),
+        "values": _values(contents, components, namespace),
+    }
+    yield WantedComponent(GATEWAY, GATEWAY, config, ("console",))
+
+
+_HEAD = ("name", "about")
+
+
+def _drive(page: DrivePage, components: Mapping[str, RobotComponent], namespace: str) -> dict[str, object]:
+    """Return where velocities go, and the limits of the first base that follows them; nothing if none does."""
+    for component in components.values():
+        for drives in component.declared(Drives):
+            if (end := component.end(drives.commands)) is not None and end.type_name in _VELOCITIES:
+                topic = resolve(page.topic, namespace) if page.topic else _free(components, end)
+                limits = {"max_speed": drives.max_speed, "max_turn_rate": drives.max_turn_rate}
+                most = {name: _least(getattr(page, name), limit) for name, limit in limits.items()}
+                return {"drive_topic": topic, "drive_type": end.type_name, **most}
+    return {}
+
+
+def _free(components: Mapping[str, RobotComponent], driven: PortEnd) -> str:
+    """Return the topic of the input `teleop` of the mux that commands this end, else its own topic."""
+    for mux in components.values():
+        for forwards in mux.declared(Forwards):
+            output, teleop = mux.end(forwards.output), mux.end(_TELEOP)
+            if output and teleop and output.topic == driven.topic and _TELEOP in forwards.inputs:
+                return teleop.topic
+    return driven.topic
+
+
+def _least(written: float | None, of_base: Setting[float] | None) -> float:
+    return min(math.inf if written is None else written, math.inf if of_base is None else of_base.value)
+
+
+def _values(contents: Contents, components: Mapping[str, RobotComponent], namespace: str) -> dict[str, object]:
+    """Return where the values of the manifest come from, those whose source exists; the unit is that of the message."""
+    ends = [end for component in components.values() for end in component.ends]
+    types = {end.topic: end.type_name for end in reversed(ends) if end.type_name}
+    found: dict[str, object] = {}
+    for name, entry in contents.of(values).items():
+        if (source := value_of(entry, components, types, namespace, {})) is not None:
+            units = [getattr(end.port, "unit", "") for end in ends if end.topic == source.topic]
+            unit = entry.unit or next(filter(None, units), "")
+            found[name] = {"topic": source.topic, "type": source.message, "field": source.field, "unit": unit}
+    return found
+
+
+@section("console", ConsoleModel, files=(ROBOT, OVERLAY), brings=(GATEWAY,), components=_components)
+def console(reading: Reading[ConsoleModel]) -> ConsoleModel | None:
+    """The page that the robot serves, with a gateway for clients of rosbridge; `console: {}` is enough.
+
+    Example:
+        console:
+          port: 8080
+          drive:
+            max_speed: 0.3 m/s
+    """
+    read = reading.whole()
+    if read is not None and read.listen == "lan":
+        message = "the console cannot be opened from other machines yet: anybody there could drive the robot"
+        help_text = f"write 'listen: local', and reach it by 'ssh -L {read.port}:127.0.0.1:{read.port} ROBOT'"
+        reading.report.add(NOT_BEYOND_THIS_MACHINE.at(reading.value("console", "listen"), message, help=help_text))
+    return read

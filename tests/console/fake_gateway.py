@@ -1,0 +1,152 @@
+"""A robot's gateway as small as a page needs it: the built console, its configuration, and rosbridge for one robot."""
+
+from __future__ import annotations
+
+import json
+import mimetypes
+import threading
+import time
+from http import HTTPStatus
+from pathlib import Path
+from typing import Any
+
+from websockets.datastructures import Headers
+from websockets.exceptions import ConnectionClosed
+from websockets.http11 import Request, Response
+from websockets.sync.server import ServerConnection, serve
+
+CONFIG: dict[str, Any] = {
+    "robot": "turtlebot",
+    "about": "A TurtleBot 2 that patrols four rooms",
+    "first_page": "drive",
+    "drive": {
+        "topic": "/cmd_vel_console",
+        "type": "geometry_msgs/Twist",
+        "max_speed": 0.5,
+        "max_turn_rate": 1.5,
+        "holder": "",
+    },
+    "values": {
+        "base_battery": {"topic": "/battery_level", "type": "std_msgs/Float32", "field": "data", "unit": "%"},
+        "laptop_battery": {"topic": "/laptop_charge", "type": "std_msgs/Float32", "field": "data", "unit": "%"},
+        "main_supply": {"topic": "/supply", "type": "std_msgs/Float32", "field": "data", "unit": "V"},
+    },
+}
+POLICY = "default-src 'self'; frame-ancestors 'none'"
+DATA = {"/battery_level": 78.4, "/laptop_charge": 23.0, "/supply": 12.37}
+
+
+class FakeGateway:
+    """Serves pages below `static` at `url` and keeps what their connections sent, with the time [s] of each frame."""
+
+    def __init__(self, static: Path, config: dict[str, Any] = CONFIG) -> None:
+        self.static, self.config = static, config
+        self.frames: list[tuple[float, dict[str, Any]]] = []
+        self.holder = ""
+        self.others: str | None = None  # who drives from elsewhere
+        self.is_away = False  # takes no connections
+        self.subscribed: dict[ServerConnection, set[str]] = {}
+        self.velocity = (0.0, 0.0)
+        self._server = serve(self._serve, "127.0.0.1", 0, process_request=self._respond)
+        self.port = self._server.socket.getsockname()[1]
+        self._threads = [threading.Thread(target=self._server.serve_forever), threading.Thread(target=self._publish)]
+        self._ended = threading.Event()
+        for thread in self._threads:
+            thread.start()
+
+    @property
+    def url(self) -> str:
+        return f"http://127.0.0.1:{self.port}/"
+
+    def close(self) -> None:
+        self._ended.set()
+        self.drop()
+        self._server.shutdown()
+        for thread in self._threads:
+            thread.join()
+
+    def drop(self) -> None:
+        """Close all connections."""
+        for connection in list(self.subscribed):
+            connection.close()
+
+    def commands(self, since: float = 0.0) -> list[tuple[float, float, float]]:
+        """Return time [s], forward and turn of each command."""
+        return [
+            (at, frame["msg"]["linear"]["x"], frame["msg"]["angular"]["z"])
+            for at, frame in list(self.frames)
+            if frame["op"] == "publish" and at >= since
+        ]
+
+    def calls(self, service: str) -> list[dict[str, Any]]:
+        """Return the arguments of each call of a service."""
+        calls = [frame for _, frame in list(self.frames) if frame["op"] == "call_service"]
+        return [frame["args"] for frame in calls if frame["service"] == service]
+
+    def _respond(self, connection: ServerConnection, request: Request) -> Response | None:
+        path = request.path.partition("?")[0]
+        if path == "/rosbridge":
+            return self._response(HTTPStatus.SERVICE_UNAVAILABLE, "text/plain", b"away") if self.is_away else None
+        if path == "/console/config":
+            return self._response(HTTPStatus.OK, "application/json", json.dumps(self._shown_config()).encode())
+        file = (self.static / (path.lstrip("/") or "index.html")).resolve()
+        if not file.is_file() or not file.is_relative_to(self.static):
+            return self._response(HTTPStatus.NOT_FOUND, "text/plain", b"not found")
+        return self._response(HTTPStatus.OK, mimetypes.guess_type(file)[0] or "text/plain", file.read_bytes())
+
+    def _shown_config(self) -> dict[str, Any]:
+        if not (drive := self.config and self.config["drive"]):
+            return self.config
+        return self.config | {"drive": drive | {"holder": self.others or self.holder}}
+
+    def _response(self, status: HTTPStatus, kind: str, body: bytes) -> Response:
+        headers = {"Content-Type": kind, "Content-Length": str(len(body)), "Content-Security-Policy": POLICY}
+        return Response(status.value, status.phrase, Headers({**headers, "Connection": "close"}), body)
+
+    def _serve(self, connection: ServerConnection) -> None:
+        self.subscribed[connection] = set()
+        try:
+            for text in connection:
+                frame = json.loads(text)
+                self.frames.append((time.monotonic(), frame))
+                self._handle(connection, frame)
+        except ConnectionClosed:
+            pass
+        finally:
+            del self.subscribed[connection]
+            self.velocity, self.holder = (0.0, 0.0), ""
+
+    def _handle(self, connection: ServerConnection, frame: dict[str, Any]) -> None:
+        match frame["op"]:
+            case "subscribe":
+                self.subscribed[connection].add(frame["topic"])
+            case "publish":
+                if self.others:
+                    error = {"op": "status", "level": "error", "id": frame["id"], "msg": "not yours"}
+                    connection.send(json.dumps(error))
+                else:
+                    self.velocity = (frame["msg"]["linear"]["x"], frame["msg"]["angular"]["z"])
+            case "call_service":
+                values = self._call(frame["service"], frame["args"])
+                answer = {"op": "service_response", "id": frame["id"], "service": frame["service"]}
+                connection.send(json.dumps({**answer, "result": True, "values": values}))
+
+    def _call(self, service: str, args: dict[str, Any]) -> dict[str, Any]:
+        if service == "/console/drive":
+            if self.others:
+                return {"success": False, "holder": self.others, "message": f"'{self.others}' drives"}
+            self.holder = args["name"] if args["take"] else ""
+            return {"success": True, "holder": self.holder, "message": ""}
+        return {"success": True, "message": ""}
+
+    def _publish(self) -> None:
+        while not self._ended.wait(0.1):
+            forward, turn = self.velocity
+            data: dict[str, dict[str, Any]] = {topic: {"data": value} for topic, value in DATA.items()}
+            data["odom"] = {"twist": {"twist": {"linear": {"x": 0.96 * forward}, "angular": {"z": 0.97 * turn}}}}
+            for connection, topics in list(self.subscribed.items()):
+                for topic in topics & data.keys():
+                    try:
+                        connection.send(json.dumps({"op": "publish", "topic": topic, "msg": data[topic]}))
+                    except ConnectionClosed:
+                        break

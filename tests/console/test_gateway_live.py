@@ -1,0 +1,306 @@
+"""The console of a robot in real processes: its page, real clients, and what stops the robot."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import shutil
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import suppress
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import pytest
+import websockets
+from playwright.sync_api import expect
+from websockets.asyncio.client import ClientConnection, connect
+
+from rbxcompose.commands.guest import Guest
+from rbxcompose.msgs.geometry_msgs import Twist
+from rbxcompose.sdk.ports import Qos
+from tests.cli.live_robot import PATIENCE, Robot
+from tests.conftest import ROOT
+from tests.console.browser import CHROMIUM, chromium, console
+
+TELEOP = "/cmd_vel/teleop"
+pytestmark = pytest.mark.timeout(60)
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+PORT = free_port()
+HOST = f"127.0.0.1:{PORT}"
+
+
+@pytest.fixture(scope="module")
+def robot() -> Iterator[Robot]:
+    with suppress(console.CannotBuildError):
+        console.build()
+    base = Path(tempfile.mkdtemp(prefix="rbx"))
+    text = (ROOT / "robots/turtlebot/robot.yaml").read_text(encoding="utf-8").partition("\nmissions:")[0]
+    made = Robot(base, f"{text}\nconsole: {{port: {PORT}, drive: {{max_speed: 0.25 m/s}}}}\n")
+    up = made.do("up", "-d", str(made.file), "--set", "bus.port=7891")
+    assert up.returncode == 0, up.stderr
+    assert f"console: http://{HOST}/" in up.stdout.splitlines()
+    yield made
+    began = time.monotonic()
+    assert made.do("down").returncode == 0
+    assert time.monotonic() - began < PATIENCE
+    with socket.socket() as probe:
+        assert probe.connect_ex(("127.0.0.1", PORT)) != 0  # nobody is left at the port
+    assert "Error" not in made.do("logs").stdout
+    shutil.rmtree(base)
+
+
+def get(path: str, **headers: str) -> tuple[int, str, dict[str, str]]:
+    asked = urllib.request.Request(f"http://{HOST}{path}", headers=headers)
+    try:
+        with urllib.request.urlopen(asked, timeout=PATIENCE) as answer:
+            return answer.status, answer.read().decode(), {key.lower(): value for key, value in answer.headers.items()}
+    except urllib.error.HTTPError as error:
+        with error:
+            return error.code, error.read().decode(), {key.lower(): value for key, value in error.headers.items()}
+
+
+class Browser:
+    """A connection, as a page has it."""
+
+    def __init__(self, socket: ClientConnection) -> None:
+        self.socket = socket
+
+    async def sends(self, op: str, **fields: Any) -> None:
+        await self.socket.send(json.dumps({"op": op, **fields}))
+
+    async def next(self, op: str) -> dict[str, Any]:
+        while True:
+            frame: dict[str, Any] = json.loads(await asyncio.wait_for(self.socket.recv(), PATIENCE))
+            if frame["op"] == op:
+                return frame
+
+    async def calls(self, service: str, **args: Any) -> Any:
+        await self.sends("call_service", service=service, args=args)
+        return (await self.next("service_response"))["values"]
+
+
+def browse(what: Callable[[Browser], Awaitable[None]], path: str = "/rosbridge", **options: Any) -> None:
+    async def run() -> None:
+        async with connect(f"ws://{HOST}{path}", **options) as socket:
+            await what(Browser(socket))
+
+    asyncio.run(run())
+
+
+class Commands:
+    """What arrives at the mux, and when [s]."""
+
+    def __init__(self, robot: Robot) -> None:
+        self.got: list[tuple[float, float]] = []
+        self._is_over = threading.Event()
+        self._place = robot.place()
+        self._thread = threading.Thread(target=self._listen)
+
+    def __enter__(self) -> Commands:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._is_over.set()
+        self._thread.join()
+
+    def _listen(self) -> None:
+        with Guest(self._place, stays=True) as guest:
+            guest.bus().subscribe("listener", TELEOP, Twist, Qos.EVENT, self._arrived)
+            guest.run(self._is_over.is_set, 0.0)
+            while not self._is_over.is_set():
+                guest.run(self._is_over.is_set, 0.05)
+
+    def _arrived(self, message: Twist) -> None:
+        self.got.append((time.monotonic(), message.linear.x))
+
+    def until(self, speed: float) -> float:
+        """Return when a speed arrived."""
+        deadline = time.monotonic() + PATIENCE
+        while time.monotonic() < deadline:
+            for when, found in self.got:
+                if found == speed:
+                    return when
+            time.sleep(0.01)
+        raise AssertionError(self.got)
+
+
+def test_the_page_is_served_and_nothing_else_may_embed_it(robot: Robot) -> None:
+    status, text, headers = get("/")
+    assert (status, "<html" in text) == (200, True)
+    assert "default-src 'self'" in headers["content-security-policy"]
+    assert "frame-ancestors 'none'" in headers["content-security-policy"]
+    assert headers["x-content-type-options"] == "nosniff"
+    assert get("/../../etc/passwd")[0] == 404
+
+
+def test_the_page_learns_what_the_robot_has(robot: Robot) -> None:
+    config = json.loads(get("/console/config")[1])
+    limits = {"max_speed": 0.25, "max_turn_rate": pytest.approx(1.5708, abs=1e-4)}
+    assert config["robot"] == "turtlebot"
+    assert config["drive"] == {"topic": TELEOP, "type": "geometry_msgs/msg/Twist", "holder": "", **limits}
+    battery = {"topic": "/battery_level", "type": "std_msgs/msg/Float32", "field": "data", "unit": "%"}
+    assert config["values"] == {"battery": battery}
+    assert config["stop"] == "/console/stop"
+
+
+@pytest.mark.parametrize("origin", [f"http://{HOST}", f"http://localhost:{PORT}", None])
+def test_its_own_pages_and_programs_of_this_machine_may_talk(robot: Robot, origin: Any) -> None:
+    async def talk(browser: Browser) -> None:
+        assert "/odom" in (await browser.calls("/rosapi/topics"))["topics"]
+
+    browse(talk, origin=origin)
+    browse(talk, "/", origin=origin)
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"Origin": "http://evil.example"},
+        {"Origin": "null"},
+        {"Origin": f"http://127.0.0.1:{PORT + 1}"},
+        {"Origin": f"https://{HOST}"},
+        {"Host": "evil.example"},
+        {"Host": f"evil.example:{PORT}"},
+    ],
+)
+def test_pages_of_others_are_refused(robot: Robot, headers: dict[str, str]) -> None:
+    async def attempt() -> None:
+        async with connect(f"ws://{HOST}/rosbridge", additional_headers=headers):
+            pass
+
+    assert get("/console/config", **headers)[0] == 403
+    if "Host" not in headers:
+        with pytest.raises(websockets.InvalidStatus):
+            asyncio.run(attempt())
+
+
+def test_roslibpy_does_all_that_it_can(robot: Robot) -> None:
+    command = [sys.executable, "-m", "tests.console.roslibpy_client", str(PORT)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=50)
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert "/odom" in told["topics"]
+    assert (told["type"], told["odometry"], told["echo"]) == ("nav_msgs/msg/Odometry", "base_footprint", "grüße")
+    assert told["parameters"]["values"][0]["double_value"] == 0.5
+    assert told["lease"]["success"]
+    assert "no service" in told["failure"]
+
+
+def test_a_cut_socket_stops_the_robot_at_once(robot: Robot) -> None:
+    with Commands(robot) as commands:
+
+        async def drive(browser: Browser) -> None:
+            assert (await browser.calls("/console/drive", take=True, name="Anna"))["success"]
+            for _ in range(5):
+                await browser.sends("publish", topic=TELEOP, msg={"linear": {"x": 7}})
+                await asyncio.sleep(0.1)
+            commands.until(0.25)
+            browser.socket.transport.abort()
+
+        browse(drive)
+        cut = time.monotonic()
+        assert commands.until(0.0) - cut < 0.3
+    assert [speed for _, speed in commands.got].count(0.0) == 1
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium here")
+def test_the_page_drives_the_robot(robot: Robot) -> None:
+    if not console.is_built():
+        pytest.skip("the page cannot be built here")
+    complaints: list[str] = []
+    with Commands(robot) as commands, chromium() as browser:
+        page = browser.new_page()
+        page.on("console", lambda message: complaints.append(message.text))
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.goto(f"http://{HOST}/")
+        expect(page.locator(".connection")).to_have_text("Connected", timeout=PATIENCE * 1000)
+        page.fill("#name", "Ada")
+        page.keyboard.press("Enter")
+        page.keyboard.down("Shift")
+        page.keyboard.down("ArrowUp")
+        expect(page.locator(".lease")).to_contain_text("You are driving", timeout=PATIENCE * 1000)
+        deadline = time.monotonic() + PATIENCE
+        while not any(speed > 0 for _, speed in commands.got) and time.monotonic() < deadline:
+            page.wait_for_timeout(20)
+        assert 0 < max(speed for _, speed in commands.got) <= 0.25
+        page.keyboard.up("Shift")
+        page.wait_for_timeout(500)
+        assert commands.got[-1][1] == 0.0
+    assert complaints == []
+
+
+def test_silence_stops_the_robot_and_frees_the_lease(robot: Robot) -> None:
+    with Commands(robot) as commands:
+
+        async def drive(browser: Browser) -> None:
+            assert (await browser.calls("/console/drive", take=True, name="Anna"))["success"]
+            await browser.sends("publish", topic=TELEOP, msg={"linear": {"x": 0.125}})
+            sent = time.monotonic()
+            assert 0.4 < await asyncio.to_thread(commands.until, 0.0) - sent < 0.9
+            assert (await browser.calls("/console/drive", take=True, name="Ben"))["success"]
+            assert json.loads(await asyncio.to_thread(lambda: get("/console/config")[1]))["drive"]["holder"] == "Ben"
+
+        browse(drive)
+
+
+def test_anyone_stops_and_releases_the_robot(robot: Robot) -> None:
+    async def stop(browser: Browser) -> None:
+        assert (await browser.calls("/console/stop"))["success"]
+        assert robot.told("ps")["stop"]
+        assert (await browser.calls("/console/release"))["success"]
+        assert not robot.told("ps")["stop"]
+        assert not (await browser.calls("/console/release"))["success"]
+
+    browse(stop)
+
+
+def test_a_slow_reader_delays_nobody(robot: Robot) -> None:
+    async def run() -> None:
+        async with connect(f"ws://{HOST}/") as slow, connect(f"ws://{HOST}/") as fast:
+            await slow.send(json.dumps({"op": "subscribe", "topic": "/odom"}))
+            reader = Browser(fast)
+            await reader.sends("subscribe", topic="/odom")
+            slow.transport.pause_reading()
+            times = []
+            for _ in range(60):
+                await reader.next("publish")
+                times.append(time.monotonic())
+            gaps = [later - earlier for earlier, later in pairwise(times)]
+            assert max(gaps) < 0.5  # at 50 Hz
+            slow.transport.abort()
+
+    asyncio.run(run())
+
+
+async def floods(browser: Browser) -> None:
+    await browser.socket.send(" " * (20 * 1024 * 1024))
+    await browser.next("status")
+
+
+def test_bad_frames_close_at_most_their_own_connection(robot: Robot) -> None:
+    async def talk(browser: Browser) -> None:
+        for frame in ("{", "7", '{"op":' * 10_000, b"\x00\xff", "[" * 100_000, " " * (9 * 1024 * 1024)):
+            await browser.socket.send(frame)
+            assert (await browser.next("status"))["level"] == "error"
+        with pytest.raises(websockets.ConnectionClosed):
+            await floods(browser)
+
+    browse(talk)
+    assert get("/console/config")[0] == 200

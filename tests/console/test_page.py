@@ -1,0 +1,367 @@
+"""The console's page in a real browser, against a fake gateway: it drives, lets go, stops, and can be read."""
+
+from __future__ import annotations
+
+import gzip
+import itertools
+import json
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, BrowserContext, Page, Request, expect
+
+from tests.console.browser import AXE, CHROMIUM, chromium, console
+from tests.console.fake_gateway import CONFIG, FakeGateway
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium here")
+
+WIDE, PHONE = {"width": 1280, "height": 800}, {"width": 390, "height": 844}
+SMALLEST = 44  # [px] of what a finger touches
+MOST = 1_000_000  # [bytes] of the compressed page
+FIRST_PAINT = 1500  # [ms]
+
+
+@pytest.fixture(scope="module")
+def static() -> Path:
+    try:
+        console.build()
+    except console.CannotBuildError as error:
+        pytest.skip(str(error))
+    static: Path = console.STATIC
+    return static
+
+
+@pytest.fixture(scope="module")
+def browser(static: Path) -> Iterator[Browser]:
+    with chromium() as browser:
+        yield browser
+
+
+@pytest.fixture
+def gateway(static: Path) -> Iterator[FakeGateway]:
+    gateway = FakeGateway(static)
+    yield gateway
+    gateway.close()
+
+
+@pytest.fixture
+def open_page(browser: Browser, gateway: FakeGateway) -> Iterator[Callable[..., Page]]:
+    """Return a function that opens the console; no page may complain or ask another host for anything."""
+    contexts: list[BrowserContext] = []
+    complaints: list[str] = []
+
+    def look_at(request: Request) -> None:
+        if not request.url.startswith(gateway.url):
+            complaints.append(request.url)
+
+    def open_page(name: str = "Ada", **options: Any) -> Page:
+        context = browser.new_context(**({"viewport": WIDE} | options))
+        contexts.append(context)
+        page = context.new_page()
+        page.set_default_timeout(10_000)
+        page.on("console", lambda message: complaints.append(message.text))
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.on("request", look_at)
+        page.goto(gateway.url)
+        expect(page.locator(".connection")).to_have_text("Connected")
+        if name and page.locator("#name").is_visible():
+            page.fill("#name", name)
+            page.keyboard.press("Enter")
+            page.keyboard.up("Enter")
+        return page
+
+    yield open_page
+    for context in contexts:
+        context.close()
+    assert [text for text in complaints if "WebSocket" not in text] == []
+
+
+def wait_for(condition: Callable[[], Any], page: Page, seconds: float = 10.0) -> None:
+    """Let the browser work until the condition is true."""
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "waited in vain"
+        page.wait_for_timeout(20)
+
+
+def drive_by_keys(page: Page, gateway: FakeGateway) -> None:
+    page.keyboard.down("Shift")
+    page.keyboard.down("ArrowUp")
+    wait_for(lambda: len(gateway.commands()) > 2, page)
+
+
+def expect_stop(page: Page, gateway: FakeGateway, since: float) -> None:
+    """Expect zero soon after a moment [s], and no motion any more."""
+    wait_for(lambda: [command for command in gateway.commands(since) if command[1:] == (0, 0)], page)
+    first = next(at for at, *motion in gateway.commands(since) if motion == [0, 0])
+    assert first - since < 0.4, "on a busy machine; at once on a free one"
+    page.wait_for_timeout(300)
+    assert all(command[1:] == (0, 0) for command in gateway.commands(first))
+
+
+def test_the_page_shows_the_robot_and_its_batteries(open_page: Callable[..., Page]) -> None:
+    page = open_page(name="")
+    expect(page).to_have_title("Drive · turtlebot")
+    gauge = page.locator("battery-gauge").filter(has_text="Laptop battery")
+    expect(gauge).to_contain_text("23%")
+    expect(gauge).to_contain_text("Low")
+    expect(page.locator("battery-gauge").filter(has_text="Main supply")).to_contain_text("12.4")
+    paint = page.evaluate("performance.getEntriesByName('first-contentful-paint')[0].startTime")
+    assert paint < 4 * FIRST_PAINT, "a busy machine is given time"
+
+
+def test_shift_and_a_key_drive_ten_times_a_second_until_one_is_let_go(
+    open_page: Callable[..., Page], gateway: FakeGateway
+) -> None:
+    page = open_page()
+    drive_by_keys(page, gateway)
+    page.wait_for_timeout(1500)
+    commands = gateway.commands()
+    assert {command[1:] for command in commands} == {(0.25, 0)}
+    rate = (len(commands) - 1) / (commands[-1][0] - commands[0][0])
+    assert 7 < rate < 11
+    expect(page.locator(".axis").first).to_contain_text("0.24")
+    expect(page.locator(".lease")).to_contain_text("You are driving")
+    assert gateway.calls("/console/drive") == [{"take": True, "name": "Ada"}]
+    since = time.monotonic()
+    page.keyboard.up("Shift")
+    expect_stop(page, gateway, since)
+    wait_for(lambda: gateway.calls("/console/drive")[-1]["take"] is False, page)
+    frames = [frame for _, frame in gateway.frames if frame["op"] == "publish"]
+    assert all(a["sent"] < b["sent"] for a, b in itertools.pairwise(frames))
+
+
+def test_keys_alone_do_not_drive_and_say_why(open_page: Callable[..., Page], gateway: FakeGateway) -> None:
+    page = open_page()
+    page.keyboard.down("KeyW")
+    expect(page.locator(".hint").first).to_have_text("Hold Shift as well to drive.")
+    page.wait_for_timeout(300)
+    assert gateway.commands() == []
+
+
+@pytest.mark.parametrize(
+    "event",
+    [
+        "window.dispatchEvent(new Event('blur'))",
+        "window.dispatchEvent(new Event('pagehide'))",
+        "Object.defineProperty(document, 'hidden', {value: true});"
+        "document.dispatchEvent(new Event('visibilitychange'))",
+    ],
+    ids=["blur", "left", "hidden"],
+)
+def test_who_looks_away_stops_and_hands_back(open_page: Callable[..., Page], gateway: FakeGateway, event: str) -> None:
+    page = open_page()
+    drive_by_keys(page, gateway)
+    since = time.monotonic()
+    page.evaluate(event)
+    expect_stop(page, gateway, since)
+    assert gateway.calls("/console/drive")[-1] == {"take": False, "name": "Ada"}
+
+
+def test_the_pad_drives_in_proportion_while_the_mouse_holds_it(
+    open_page: Callable[..., Page], gateway: FakeGateway
+) -> None:
+    page = open_page()
+    box = page.locator("drive-pad").bounding_box()
+    assert box is not None
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] * 0.3)
+    page.wait_for_timeout(200)
+    assert gateway.commands() == []
+    page.mouse.down()
+    wait_for(lambda: len(gateway.commands()) > 2, page)
+    _, forward, turn = gateway.commands()[-1]
+    assert forward == pytest.approx(0.25 * 0.5, abs=0.01)
+    assert turn == 0
+    page.mouse.move(box["x"] - 300, box["y"] + box["height"] / 2)
+    wait_for(lambda: gateway.commands()[-1][1:] == (0, 0.75), page)
+    since = time.monotonic()
+    page.mouse.up()
+    expect_stop(page, gateway, since)
+
+
+@pytest.mark.parametrize("end", ["touchEnd", "touchCancel"])
+def test_a_finger_drives_until_it_is_lifted_or_taken_away(
+    open_page: Callable[..., Page], gateway: FakeGateway, end: str
+) -> None:
+    page = open_page(viewport=PHONE, has_touch=True, is_mobile=True)
+    expect(page.locator(".hint").first).to_have_text("Touch the pad and drag. Lift your finger to stop.")
+    box = page.locator("drive-pad").bounding_box()
+    assert box is not None
+    device = page.context.new_cdp_session(page)
+    point = {"x": box["x"] + box["width"] * 0.8, "y": box["y"] + box["height"] * 0.8}
+    device.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [point]})
+    wait_for(lambda: len(gateway.commands()) > 2, page)
+    assert all(forward < 0 and turn < 0 for _, forward, turn in gateway.commands())
+    since = time.monotonic()
+    device.send("Input.dispatchTouchEvent", {"type": end, "touchPoints": []})
+    expect_stop(page, gateway, since)
+
+
+def test_stop_needs_no_lease_and_nothing_moves_until_release(
+    open_page: Callable[..., Page], gateway: FakeGateway
+) -> None:
+    page = open_page(name="")
+    page.keyboard.press("Space")
+    wait_for(lambda: gateway.calls("/console/stop") == [{}], page)
+    page.get_by_role("button", name="Release").click()
+    wait_for(lambda: gateway.calls("/console/release") == [{}], page)
+    page.fill("#name", "Ada")
+    page.keyboard.press("Enter")
+    drive_by_keys(page, gateway)
+    since = time.monotonic()
+    page.get_by_role("button", name="STOP").click()
+    expect_stop(page, gateway, since)
+    wait_for(lambda: len(gateway.calls("/console/stop")) == 2, page)
+    expect(page.get_by_text("Nothing moves until you press Release")).to_be_visible()
+    page.keyboard.up("Shift")
+    page.keyboard.up("ArrowUp")
+    count = len(gateway.calls("/console/drive"))
+    page.keyboard.down("Shift")
+    page.keyboard.down("ArrowUp")
+    page.wait_for_timeout(200)
+    assert len(gateway.calls("/console/drive")) == count
+
+
+def test_somebody_else_who_drives_is_named(open_page: Callable[..., Page], gateway: FakeGateway) -> None:
+    gateway.others = "Ben"
+    page = open_page()
+    expect(page.locator(".lease")).to_contain_text("Ben is driving")
+    page.keyboard.down("Shift")
+    page.keyboard.down("ArrowUp")
+    expect(page.locator(".hint").first).to_have_text("Ben is driving.")
+    page.wait_for_timeout(300)
+    assert (gateway.commands(), len(gateway.calls("/console/drive"))) == ([], 1)
+    page.keyboard.up("ArrowUp")
+    gateway.others = None
+    page.keyboard.down("ArrowUp")
+    wait_for(lambda: len(gateway.commands()) > 2, page)
+    gateway.others = "Ben"
+    expect(page.locator(".hint").first).to_have_text("You no longer drive. Let go, then press again.")
+    expect(page.locator(".lease")).to_contain_text("Ben is driving")
+    count = len(gateway.commands())
+    page.wait_for_timeout(300)
+    assert len(gateway.commands()) - count < 2
+
+
+def test_without_a_name_nobody_drives(open_page: Callable[..., Page], gateway: FakeGateway) -> None:
+    page = open_page(name="")
+    page.keyboard.down("Shift")
+    page.keyboard.down("KeyA")
+    expect(page.locator(".hint").first).to_have_text("Enter your name first.")
+    assert gateway.calls("/console/drive") == []
+    page.keyboard.up("KeyA")
+    page.keyboard.up("Shift")
+    page.fill("#name", "  Ada ")
+    page.keyboard.press("Enter")
+    page.reload()
+    expect(page.locator(".lease")).to_contain_text("You are Ada")
+
+
+def test_sliders_limit_the_speed_and_shift_with_arrows_drives_all_the_same(
+    open_page: Callable[..., Page], gateway: FakeGateway
+) -> None:
+    page = open_page()
+    slider = page.get_by_label("Top speed")
+    slider.focus()
+    page.keyboard.press("Home")
+    expect(page.locator(".slider output").first).to_have_text("0.01\u202fm/s")
+    page.keyboard.press("End")
+    drive_by_keys(page, gateway)
+    assert gateway.commands()[-1][1:] == (0.5, 0)
+    assert slider.input_value() == "0.5"
+
+
+def test_a_lost_connection_is_said_and_comes_back_without_motion(
+    open_page: Callable[..., Page], gateway: FakeGateway
+) -> None:
+    page = open_page()
+    drive_by_keys(page, gateway)
+    gateway.drop()
+    expect(page.get_by_role("alert").filter(has_text="Connection lost")).to_be_visible()
+    expect(page.locator(".connection")).to_have_text("Connected")
+    since = time.monotonic()
+    expect(page.locator("battery-gauge").first).to_contain_text("78%")
+    page.wait_for_timeout(300)
+    assert gateway.commands(since) == []
+    page.keyboard.up("ArrowUp")
+    page.keyboard.down("ArrowUp")
+    wait_for(lambda: gateway.commands(since), page)
+
+
+def test_a_robot_without_a_base_and_without_batteries_says_so(
+    open_page: Callable[..., Page], gateway: FakeGateway
+) -> None:
+    gateway.config = {"robot": "arm", "drive": None, "values": {}}
+    page = open_page()
+    expect(page.get_by_text("This robot has no base to drive.")).to_be_visible()
+    expect(page.get_by_text("This robot reports no battery.")).to_be_visible()
+    assert violations(page) == []
+
+
+def test_what_is_no_robot_is_an_error_with_a_way_out(browser: Browser, gateway: FakeGateway) -> None:
+    gateway.config = []  # type: ignore[assignment]
+    page = browser.new_page()
+    page.goto(gateway.url)
+    expect(page.get_by_role("alert")).to_contain_text("What answers at this address is not a robot's console.")
+    assert violations(page) == []
+    gateway.config = CONFIG
+    page.get_by_role("button", name="Try again").click()
+    expect(page.locator(".connection")).to_have_text("Connected")
+    page.close()
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_everyone_can_read_and_reach_it(open_page: Callable[..., Page], gateway: FakeGateway, scheme: str) -> None:
+    page = open_page(name="", color_scheme=scheme)
+
+    def name() -> None:
+        page.fill("#name", "A very long name, as some people have it")
+        page.keyboard.press("Enter")
+
+    def stop() -> None:
+        page.get_by_role("button", name="STOP").click()
+
+    def lose() -> None:
+        gateway.is_away = True
+        gateway.drop()
+        expect(page.get_by_role("alert").filter(has_text="Connection lost")).to_be_visible()
+
+    for prepare in (None, name, stop, lose):
+        if prepare:
+            prepare()
+        page.wait_for_timeout(100)
+        for width in (1280, 768, 390, 320):
+            page.set_viewport_size({"width": width, "height": 844})
+            assert page.evaluate("document.documentElement.scrollWidth") <= width
+            assert page.evaluate(TOO_SMALL, SMALLEST) == []
+        assert violations(page) == []
+
+
+TOO_SMALL = """smallest => [...document.querySelectorAll("button, input, a")]
+    .map(element => [element.outerHTML, element.getBoundingClientRect()])
+    .filter(([, box]) => box.width > 0 && (box.width < smallest || box.height < smallest))
+    .map(([html]) => html)"""
+
+
+def test_the_tab_key_reaches_every_control_and_shows_where_it_is(open_page: Callable[..., Page]) -> None:
+    page = open_page(name="")
+    seen = []
+    for _ in range(7):
+        page.keyboard.press("Tab")
+        seen.append(page.evaluate("document.activeElement.id || document.activeElement.textContent || 'pad'"))
+        assert page.evaluate("getComputedStyle(document.activeElement).outlineStyle") == "solid"
+    assert seen == ["Drive", "STOP", "name", "OK", "pad", "top-forward", "top-turn"]
+
+
+def test_the_page_is_small(static: Path) -> None:
+    assert sum(len(gzip.compress(file.read_bytes())) for file in static.rglob("*") if file.is_file()) < MOST
+
+
+def violations(page: Page) -> list[str]:
+    """Return what axe-core finds wrong with the page as it is."""
+    page.evaluate(f"() => {{{AXE.read_text(encoding='utf-8')}}}")
+    found = page.evaluate("axe.run().then(({violations}) => violations)")
+    return [f"{violation['id']}: {json.dumps([node['html'] for node in violation['nodes']])}" for violation in found]

@@ -1,0 +1,478 @@
+"""rosbridge v2, without a socket: what each operation does, and what a bad frame gets."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rbxcompose.domains.console import json_messages
+from rbxcompose.domains.console.json_messages import WrongMessageError, from_json, numbers_of, to_json
+from rbxcompose.domains.console.protocol import (
+    LARGEST,
+    MOST_FRAMES,
+    MOST_PER_SECOND,
+    MOST_SUBSCRIPTIONS,
+    Advertise,
+    AskRobot,
+    Publish,
+    ServiceCall,
+    Subscribe,
+    Unadvertise,
+    Unsubscribe,
+)
+from rbxcompose.msgs.geometry_msgs import PoseStamped, Twist, Vector3
+from rbxcompose.msgs.sensor_msgs import Image, LaserScan
+from rbxcompose.msgs.std_msgs import ColorRGBA, Float32, Header, String
+from rbxcompose.msgs.std_srvs import SetBool
+from tests.console.clients import STAMP, TELEOP, Room
+
+
+def level(percent: float) -> Float32:
+    return Float32(data=percent)
+
+
+def test_a_topic_is_on_the_bus_only_while_a_client_wants_it() -> None:
+    room = Room()
+    one, two = room.client(), room.client()
+    assert one.does("subscribe", topic="/level") == []
+    assert two.does("subscribe", topic="level", type="std_msgs/Float32") == []
+    assert room.asked() == [Subscribe("/level", Float32)]
+    room.arrives("/level", level(50))
+    assert one.gets() == [{"op": "publish", "topic": "/level", "msg": {"data": 50.0}}]
+    assert two.gets() == [{"op": "publish", "topic": "level", "msg": {"data": 50.0}}]  # as it calls it
+    one.does("unsubscribe", topic="/level")
+    assert room.asked() == []
+    two.leaves()
+    assert room.asked() == [Unsubscribe("/level")]
+
+
+def test_a_message_is_encoded_once_for_all_and_only_for_who_takes_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    room, encoded = Room(), list[object]()
+    monkeypatch.setattr(
+        "rbxcompose.domains.console.protocol.encoded",
+        lambda message: encoded.append(message) or json_messages.encoded(message),  # type: ignore[func-returns-value]
+    )
+    clients = [room.client() for _ in range(20)]
+    for client in clients:
+        client.does("subscribe", topic="/level")
+    for count in range(30):
+        room.arrives("/level", level(count))
+    assert encoded == []
+    received = [client.gets() for client in clients]
+    assert [frame["msg"]["data"] for frame in received[0]] == list(range(20, 30))  # the newest
+    assert all(frames == received[0] for frames in received)
+    assert len(encoded) == 10
+
+
+def test_a_throttle_keeps_the_rate_on_average() -> None:
+    room = Room()
+    client = room.client()
+    client.does("subscribe", topic="/level", throttle_rate=250)
+    got = []
+    for count in range(150):  # 50 Hz for 3 s
+        room.now = count * 0.02
+        room.arrives("/level", level(count))
+        got += client.gets()
+    assert len(got) == 12
+
+
+def test_the_lowest_throttle_and_the_longest_queue_of_several_subscriptions_count() -> None:
+    room = Room()
+    client = room.client()
+    client.does("subscribe", topic="/level", id="slow", throttle_rate=1000, queue_length=2)
+    client.does("subscribe", topic="/level", id="fast", throttle_rate=100)
+    for count in range(4):
+        room.arrives("/level", level(count))
+    assert [frame["msg"]["data"] for frame in client.gets()] == [2.0]
+    assert room.bridge.pause(client.number, room.now) == pytest.approx(0.1)
+    room.now = 0.1
+    assert [frame["msg"]["data"] for frame in client.gets()] == [3.0]
+    assert room.bridge.pause(client.number, room.now) == math.inf
+    client.does("unsubscribe", topic="/level", id="fast")
+    room.now = 0.2
+    for count in range(5, 10):
+        room.arrives("/level", level(count))
+    assert [frame["msg"]["data"] for frame in client.gets()] == [8.0]
+    room.now = 1.1
+    assert client.gets() == []
+    room.now = 1.2
+    assert [frame["msg"]["data"] for frame in client.gets()] == [9.0]
+    room.asked()
+    client.does("unsubscribe", topic="/level", id="slow")
+    assert room.asked() == [Unsubscribe("/level")]
+
+
+def test_topics_take_turns() -> None:
+    room = Room()
+    client = room.client()
+    for topic in ("/level", "/other"):
+        client.does("subscribe", topic=topic, type="std_msgs/msg/Float32")
+    for count in range(3):
+        room.arrives("/level", level(count))
+        room.arrives("/other", level(count))
+    assert [frame["topic"] for frame in client.gets()] == ["/level", "/other"] * 3
+
+
+def test_a_late_client_gets_the_last_message_of_a_latched_topic() -> None:
+    room = Room()
+    room.graph.latched.add("/level")
+    early, late = room.client(), room.client()
+    early.does("subscribe", topic="/level")
+    room.arrives("/level", level(7))
+    assert late.does("subscribe", topic="/level")[0]["msg"] == {"data": 7.0}
+
+
+def test_messages_are_published_with_defaults_and_a_stamp() -> None:
+    room = Room()
+    client = room.client()
+    assert client.does("advertise", topic="/goal", type="geometry_msgs/PoseStamped") == []
+    assert client.does("publish", topic="/goal", msg={"pose": {"position": {"x": 1}}}) == []
+    advertised, published = room.asked()
+    assert advertised == Advertise("/goal", PoseStamped)
+    assert isinstance(published, Publish)
+    made: Any = published.message
+    assert (made.pose.position.x, made.pose.orientation.w) == (1.0, 1.0)
+    assert (made.header.stamp.sec, made.header.stamp.nanosec) == divmod(STAMP, 10**9)
+    client.does("unadvertise", topic="goal")
+    assert room.asked() == [Unadvertise("/goal")]
+
+
+def test_a_topic_that_exists_needs_no_type_and_no_advertisement() -> None:
+    room = Room()
+    client = room.client()
+    assert client.does("publish", topic="level", msg={"data": 3}) == []
+    assert room.asked() == [Advertise("/level", Float32), Publish("/level", level(3.0))]
+    client.leaves()
+    assert room.asked() == [Unadvertise("/level")]
+
+
+def test_services_are_called_with_maps_and_lists() -> None:
+    room = Room()
+    client = room.client()
+    for args in ({"data": True}, [True]):
+        assert client.does("call_service", service="lamp", args=args, id="call:1", timeout=3) == []
+        (call,) = room.asked()
+        assert isinstance(call, ServiceCall)
+        assert (call.service, call.request, call.timeout) == ("/lamp", SetBool.Request(data=True), 3.0)
+        room.bridge.answered(call.number, SetBool.Response(success=True, message="on"))
+        values = {"success": True, "message": "on"}
+        answer = {"op": "service_response", "id": "call:1", "service": "lamp", "values": values, "result": True}
+        assert client.gets() == [answer]
+
+
+def test_each_failed_call_is_answered_with_values() -> None:
+    room = Room()
+    client = room.client()
+    for service, args, why in (
+        ("/none", {}, "there is no service"),
+        ("/strange", {}, "is not known here"),
+        ("/lamp", {"datum": 1}, "has no field 'datum'"),
+        ("/lamp", [True, True], "has 1 fields"),
+        ("/rosapi/set_param", {}, "not yet served"),
+        ("/rosapi/topic_type", {}, "'topic' is a text"),
+        ("/console/drive", {"take": "yes"}, "true or false"),
+        ("/console/drive", 7, "a map or a list"),
+    ):
+        (answer,) = client.does("call_service", service=service, args=args)
+        assert (answer["result"], why in answer["values"]) == (False, True), answer
+    client.does("call_service", service="/lamp")
+    call = room.asked()[-1]
+    assert isinstance(call, ServiceCall)
+    room.bridge.answered(call.number, None, "the server is gone")
+    assert client.gets()[0]["values"] == "the server is gone"
+
+
+def test_an_answer_for_a_client_that_is_gone_is_dropped() -> None:
+    room = Room()
+    client = room.client()
+    client.does("call_service", service="/lamp")
+    (call,) = room.asked()
+    assert isinstance(call, ServiceCall)
+    client.leaves()
+    room.bridge.answered(call.number, SetBool.Response())
+
+
+def test_rosapi_answers_with_and_without_a_slash() -> None:
+    client = Room().client()
+    for prefix in ("/", ""):
+        assert client.calls(f"{prefix}rosapi/topics")["topics"] == ["/odom", "/level", TELEOP]
+        assert client.calls(f"{prefix}rosapi/topic_type", {"topic": "level"}) == {"type": "std_msgs/msg/Float32"}
+        assert client.calls(f"{prefix}rosapi/topic_type", ["/none"]) == {"type": ""}
+        assert client.calls(f"{prefix}rosapi/service_type", {"service": "lamp"}) == {"type": "std_srvs/srv/SetBool"}
+        assert client.calls(f"{prefix}rosapi/topics_for_type", {"type": "std_msgs/Float32"}) == {"topics": ["/level"]}
+        assert client.calls(f"{prefix}rosapi/services_for_type", ["std_srvs/SetBool"]) == {"services": ["/lamp"]}
+        assert client.calls(f"{prefix}rosapi/publishers", {"topic": "odom"}) == {"publishers": ["/base"]}
+        assert client.calls(f"{prefix}rosapi/subscribers", {"topic": "odom"}) == {"subscribers": []}
+        assert client.calls(f"{prefix}rosapi/nodes") == {"nodes": ["/base"]}
+        assert client.calls(f"{prefix}rosapi/get_time")["time"] == {"sec": 5, "nanosec": 7, "secs": 5, "nsecs": 7}
+        assert "/console/stop" in client.calls(f"{prefix}rosapi/services")["services"]
+
+
+def test_anyone_may_stop_and_release_the_robot() -> None:
+    room = Room()
+    client = room.client()
+    for what in ("stop", "release"):
+        assert client.does("call_service", service=f"/console/{what}", id="x") == []
+        (asked,) = room.asked()
+        assert isinstance(asked, AskRobot)
+        assert asked.what == what
+        room.bridge.robot_answered(asked.number, "done", is_good=True)
+        assert client.gets()[0]["values"] == {"success": True, "message": "done"}
+
+
+@pytest.mark.parametrize(
+    "op", ["advertise_service", "unadvertise_action", "action_result", "fragment", "png", "cbor-raw", "auth"]
+)
+def test_what_is_not_served_yet_is_said(op: str) -> None:
+    (status,) = Room().client().does(op, id="a")
+    assert status == {"op": "status", "level": "error", "msg": f"the operation '{op}' is not yet served", "id": "a"}
+
+
+@pytest.mark.parametrize(
+    ("frame", "why"),
+    [
+        ("", "not JSON"),
+        ("{", "not JSON"),
+        (b"\xff\xfe", "not JSON"),
+        ("7", "a map"),
+        ("[]", "a map"),
+        ("null", "a map"),
+        ("{}", "'op'"),
+        ('{"op": 3}', "'op'"),
+        ('{"op": "dance"}', "no operation 'dance'"),
+        ('{"op": "subscribe"}', "'topic'"),
+        ('{"op": "subscribe", "topic": "a b"}', "'topic'"),
+        ('{"op": "subscribe", "topic": "/new"}', "its type must be given"),
+        ('{"op": "subscribe", "topic": "/new", "type": "a/msg/B"}', "not known here"),
+        ('{"op": "subscribe", "topic": "/new", "type": "../../etc"}', "not the name of a type"),
+        ('{"op": "subscribe", "topic": "/level", "type": "std_msgs/String"}', "is of the type"),
+        ('{"op": "subscribe", "topic": "/level", "id": []}', "'id'"),
+        ('{"op": "subscribe", "topic": "/level", "throttle_rate": -1}', "'throttle_rate'"),
+        ('{"op": "subscribe", "topic": "/level", "throttle_rate": NaN}', "'throttle_rate'"),
+        ('{"op": "subscribe", "topic": "/level", "queue_length": "5"}', "'queue_length'"),
+        ('{"op": "subscribe", "topic": "/level", "compression": "png"}', "'png' is not yet served"),
+        ('{"op": "unsubscribe", "topic": "/level"}', "no subscription"),
+        ('{"op": "unadvertise", "topic": "/level"}', "not advertised"),
+        ('{"op": "publish", "topic": "/level", "msg": 3}', "is a map of its fields"),
+        ('{"op": "publish", "topic": "/level", "msg": {"data": "x"}}', "expected a number"),
+        ('{"op": "publish", "topic": "/text", "type": "std_msgs/String", "msg": {"data": "\\ud800"}}', "surrogates"),
+        ('{"op": "call_service"}', "'service'"),
+        ('{"op": "set_level", "level": "loud"}', "a level"),
+        ('{"op":' * 10_000, "nested"),
+        ('{"op": "publish", "msg": ' + "[" * 100_000 + "]" * 100_000 + "}", "nested"),
+        (" " * (LARGEST + 1), "at most 8 MiB"),
+    ],
+)
+def test_a_bad_frame_gets_a_status(frame: str | bytes, why: str) -> None:
+    room = Room()
+    client = room.client()
+    client.sends(frame)
+    (status,) = client.gets()
+    assert (status["op"], status["level"]) == ("status", "error")
+    assert why in status["msg"]
+    assert client.calls("/rosapi/nodes") == {"nodes": ["/base"]}  # it goes on
+
+
+def test_a_client_chooses_what_it_is_told() -> None:
+    client = Room().client()
+    assert client.does("set_level", level="none") == []
+    assert client.does("dance") == []
+    client.does("set_level", level="error")
+    assert len(client.does("dance")) == 1
+    assert client.does("status", level="info", msg="hello") == []
+
+
+def test_a_flood_of_frames_is_dropped_with_one_word_a_second() -> None:
+    room = Room()
+    client, other = room.client(), room.client()
+    for _ in range(MOST_PER_SECOND):
+        client.sends('{"op": "status"}')
+    got = [frame for _ in range(300) for frame in client.does("dance")]
+    assert [frame["msg"] for frame in got] == [f"more than {MOST_PER_SECOND} frames a second: the rest is dropped"]
+    assert len(other.does("dance")) == 1
+    room.now = 1.0
+    assert client.calls("rosapi/nodes") == {"nodes": ["/base"]}
+
+
+def test_subscriptions_and_advertisements_have_a_limit() -> None:
+    room = Room()
+    client = room.client()
+    for count in range(MOST_SUBSCRIPTIONS):
+        room.now += 0.1
+        assert client.does("subscribe", topic=f"/t{count}", type="std_msgs/Float32") == []
+        assert client.does("advertise", topic=f"/t{count}", type="std_msgs/Float32") == []
+    assert "at most" in client.does("subscribe", topic="/more", type="std_msgs/Float32")[0]["msg"]
+    assert "at most" in client.does("advertise", topic="/more", type="std_msgs/Float32")[0]["msg"]
+
+
+def test_a_client_that_asks_and_does_not_read_is_given_up() -> None:
+    room = Room()
+    client = room.client()
+    for count in range(MOST_FRAMES + 1):
+        room.now = count * 0.01
+        assert not room.bridge.is_overrun(client.number)
+        client.sends('{"op": "dance"}')
+    assert room.bridge.is_overrun(client.number)
+
+
+def test_messages_become_json_that_javascript_reads() -> None:
+    scan = LaserScan(header=Header(frame_id="laser"), ranges=np.array([math.inf, 0.1, math.nan], np.float32))
+    assert to_json(scan)["ranges"] == [None, 0.1, None]
+    assert to_json(Image(width=1, data=bytes([0, 255])))["data"] == "AP8="
+    assert json.loads(json_messages.encoded(scan))["header"]["frame_id"] == "laser"
+
+
+def test_what_javascript_and_ros_1_write_is_understood() -> None:
+    image = from_json(Image, {"data": "AP8=", "width": 2.0, "header": {"seq": 4, "stamp": {"secs": 3, "nsecs": 4}}}, 1)
+    assert (bytes(image.data), image.width, image.header.stamp.sec) == (b"\0\xff", 2, 3)
+    assert bytes(from_json(Image, {"data": [0, 255]}, 1).data) == b"\0\xff"
+    assert math.isnan(from_json(Float32, {"data": None}, 1).data)
+    assert from_json(ColorRGBA, None, 1) == ColorRGBA()
+    for wrong in ({"data": "no base64!"}, {"width": 2.5}, {"width": True}, {"header": 3}):
+        with pytest.raises(WrongMessageError):
+            from_json(Image, wrong, 1)
+
+
+@given(st.floats(width=32), st.floats(), st.text(st.characters(exclude_categories=["Cs"])))
+def test_there_and_back_is_the_same(narrow: float, wide: float, text: str) -> None:
+    for message in (Float32(data=narrow), String(data=text), Twist(linear=Vector3(x=wide))):
+        back = from_json(type(message), json.loads(json_messages.encoded(message)), 1)
+        assert to_json(back) == to_json(message)
+
+
+ANYTHING = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=3),
+    max_leaves=8,
+)
+WORDS = st.sampled_from(
+    [
+        "/level",
+        "level",
+        TELEOP,
+        "/odom",
+        "/lamp",
+        "/console/drive",
+        "/rosapi/topic_type",
+        "a",
+        "png",
+        "none",
+        "std_msgs/Float32",
+        "nav_msgs/msg/Odometry",
+        "std_msgs/String",
+    ]
+)
+OPS = ("subscribe", "unsubscribe", "advertise", "unadvertise", "publish", "call_service")
+KEYS = ("topic", "type", "service", "id", "throttle_rate", "queue_length", "compression", "sent", "latch")
+FRAMES = st.fixed_dictionaries(
+    {"op": st.sampled_from(OPS)},
+    optional=dict.fromkeys(
+        ("topic", "type", "service", "id", "throttle_rate", "queue_length", "compression", "sent", "latch"),
+        WORDS | ANYTHING,
+    )
+    | {
+        "msg": ANYTHING | st.fixed_dictionaries({}, optional={"data": ANYTHING, "linear": ANYTHING, "pose": ANYTHING}),
+        "args": ANYTHING | st.fixed_dictionaries({"take": st.booleans() | ANYTHING}, optional={"name": ANYTHING}),
+        "timeout": ANYTHING,
+        "level": ANYTHING,
+    },
+)
+
+
+@given(st.lists(st.tuples(st.integers(0, 1), FRAMES | ANYTHING | st.binary(max_size=50), st.floats(0, 0.6))))
+def test_no_frame_raises_and_whatever_is_sent_is_json(frames: list[tuple[int, Any, float]]) -> None:
+    room = Room()
+    clients = [room.client(), room.client()]
+    for who, frame, pause in frames:
+        room.now += pause
+        room.requests += room.bridge.expire(room.now, STAMP)
+        clients[who].sends(frame if isinstance(frame, bytes) else json.dumps(frame))
+        room.arrives("/level", level(1))
+        for client in clients:
+            client.gets()
+    for client in clients:
+        client.leaves()
+    subscribed, advertised = set[str](), set[str]()
+    for request in room.requests:
+        match request:
+            case Subscribe(topic):
+                assert topic not in subscribed
+                subscribed.add(topic)
+            case Unsubscribe(topic):
+                subscribed.remove(topic)
+            case Advertise(topic):
+                assert topic not in advertised
+                advertised.add(topic)
+            case Unadvertise(topic):
+                advertised.remove(topic)
+            case Publish(topic):
+                assert topic in advertised
+    assert (subscribed, advertised) == (set(), set())  # nothing is left on the bus
+
+
+@pytest.mark.parametrize(
+    ("type_", "field", "item"),
+    [
+        ("sensor_msgs/LaserScan", "ranges", "1.5"),
+        ("sensor_msgs/LaserScan", "ranges", "null"),
+        ("sensor_msgs/LaserScan", "ranges", "[]"),
+        ("sensor_msgs/JointState", "name", '"a"'),
+        ("sensor_msgs/Image", "data", "7"),
+        ("geometry_msgs/PoseArray", "poses", "{}"),
+    ],
+)
+def test_a_long_message_holds_up_nobody(type_: str, field: str, item: str) -> None:
+    room = Room()
+    client = room.client()
+    frame = f'{{"op":"publish","topic":"/x","type":"{type_}","msg":{{"{field}":[{",".join([item] * 1_000_000)}]}}}}'
+    began = time.process_time()
+    client.sends(frame)
+    taken = time.process_time() - began
+    began = time.process_time()
+    json.loads(frame)
+    assert taken < 6 * (time.process_time() - began) + 0.2
+
+
+def test_many_wrong_fields_hold_up_nobody() -> None:
+    client = Room().client()
+    fields = ",".join(f'"field{count}":0' for count in range(300_000))
+    began = time.process_time()
+    client.sends(f'{{"op":"publish","topic":"/level","msg":{{{fields}}}}}')
+    assert time.process_time() - began < 2
+    assert "has no field 'field0'" in client.gets()[0]["msg"]
+
+
+@pytest.mark.parametrize(
+    ("type_", "data"),
+    [
+        ("uint8", [0, 256]),
+        ("byte", [-1]),
+        ("int32", [2**31]),
+        ("int32", [0.5]),
+        ("int64", [2**70]),
+        ("int32", [None]),
+        ("float32", [1e39]),
+        ("float32", ["1"]),
+        ("float64", [True, False]),
+        ("float64", [[1.0]]),
+        ("float64", [[1.0], [1.0, 2.0]]),
+        ("float64", [{}]),
+    ],
+)
+def test_lists_of_numbers_are_of_their_type(type_: str, data: list[Any]) -> None:
+    with pytest.raises(ValueError, match=r"expected a list of numbers|inhomogeneous"):
+        numbers_of(type_, data)
+
+
+@pytest.mark.parametrize("data", [[1.0, 2], [0, 255], []])
+@pytest.mark.parametrize("type_", ["uint8", "int16", "uint64", "float32", "float64"])
+def test_lists_of_numbers_are_taken_as_javascript_writes_them(type_: str, data: list[Any]) -> None:
+    made = numbers_of(type_, data)
+    assert (made.dtype, made.tolist()) == (np.dtype(type_), data)
