@@ -168,8 +168,9 @@ class Walk:
     def _check_comment(self, value: tree.TreeNode) -> None:
         span = value.span
         line = self.commented.get(span.end_line)
-        is_plain = line is not None and isinstance(value, tree.ScalarNode) and value.plain
-        if line is not None and is_plain and (found := _SWALLOWED.match(line, span.end_column - 1)):
+        if line is None or not isinstance(value, tree.ScalarNode) or not value.plain:
+            return
+        if found := _SWALLOWED.match(line, span.end_column - 1):
             start, end = found.span(1)
             place = Span(self.file, span.end_line, start + 1, span.end_line, end + 1)
             help_text = "put quotes around the whole text, or a space after the '#'"
