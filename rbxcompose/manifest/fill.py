@@ -15,7 +15,7 @@ from rbxcompose.base.expressions.parser import parse_fill
 from rbxcompose.base.expressions.tree import Expression, ExpressionError
 from rbxcompose.base.expressions.types import Type, TypeKind
 from rbxcompose.base.expressions.values import EvaluationError
-from rbxcompose.base.findings import DID_YOU_MEAN, Report, Span, correction, kind, replacement, suggest
+from rbxcompose.base.findings import DID_YOU_MEAN, Report, Span, correction, kind, once, replacement, suggest
 from rbxcompose.base.printable import plain
 from rbxcompose.base.units import NUMBER, QUOTIENT, Quantity
 from rbxcompose.manifest import tree
@@ -172,6 +172,9 @@ _SECRET = re.compile(r"\s*secret\.(?P<name>[a-z][a-z0-9_]{0,59})\s*")
 _ENVIRONMENT = re.compile(r"\s*env\.(?P<name>[A-Za-z_][A-Za-z0-9_]*)(:(?P<mode>[-?])(?P<rest>.*))?\s*", re.DOTALL)
 
 
+_parsed = once(parse_fill)  # many settings name the same argument
+
+
 def fill(root: tree.MappingNode, names: Names, report: Report, *, runs: bool = False) -> tree.MappingNode:
     """Return the tree with every `${...}` filled in; `runs` means that `$name` has a meaning in it (missions).
 
@@ -281,7 +284,7 @@ class _Filler:
         if secret := _SECRET.fullmatch(body):
             return self.secret(scalar, piece, secret["name"])
         try:
-            expression = parse_fill(body)
+            expression = _parsed(body)
         except ExpressionError as error:
             if other := cure_of_variable(body):
                 return self.foreign(scalar, piece, "this is the syntax of a shell", other)

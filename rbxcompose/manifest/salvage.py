@@ -12,7 +12,7 @@ from rbxcompose.base.config import Place
 from rbxcompose.base.units import Quantity
 from rbxcompose.manifest.shapes import dimension_at
 from rbxcompose.manifest.tree import KeyPath, TreeNode
-from rbxcompose.manifest.validate import adapter, changed, repaired, to_plain
+from rbxcompose.manifest.validate import changed, repaired, to_plain, validator
 
 T = TypeVar("T")
 _ROUNDS = 60  # of repairs; each replaces, at every place that is refused, one value by the next stand-in
@@ -31,7 +31,7 @@ def salvaged(model: type[T], node: TreeNode, context: Mapping[str, object] | Non
     data, tried = to_plain(node), Counter[KeyPath]()
     for _ in range(_ROUNDS):
         try:
-            return cast(T, adapter(cast(Any, model)).validate_python(data, strict=True, context=context))
+            return cast(T, validator(cast(Any, model)).validate_python(data, strict=True, context=context))
         except ValidationError as error:
             errors = error.errors(include_url=False)
         for details in errors:

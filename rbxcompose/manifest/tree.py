@@ -112,8 +112,10 @@ def all_nodes(root: TreeNode) -> Iterator[TreeNode]:
     while waiting:
         node = waiting.pop()
         yield node
-        if not isinstance(node, ScalarNode):
-            waiting += reversed([below for _, below in children(node)])
+        if isinstance(node, MappingNode):
+            waiting += [entry.value for entry in reversed(node.entries.values())]
+        elif isinstance(node, SequenceNode):
+            waiting += reversed(node.items)
 
 
 def with_children(node: TreeNode, change: Callable[[Key, TreeNode], TreeNode]) -> TreeNode:

@@ -9,7 +9,7 @@ from itertools import islice
 from typing import Any, TypeVar, cast, get_args, get_origin
 
 from pydantic import TypeAdapter, ValidationError
-from pydantic_core import ErrorDetails
+from pydantic_core import ErrorDetails, SchemaValidator
 
 from rbxcompose.base.config import Secret
 from rbxcompose.base.expressions.parser import CURLY_QUOTES
@@ -231,15 +231,17 @@ def to_plain(node: tree.TreeNode) -> object:
 
 
 @cache
-def adapter(model: Any) -> TypeAdapter[Any]:
-    """Return what validates against a model."""
-    return TypeAdapter(model)
+def validator(model: Any) -> SchemaValidator:
+    """Return what validates against a model, without the layer of Python that `TypeAdapter` has around it."""
+    adapter = TypeAdapter(model)
+    adapter.rebuild()  # else a model that is built late leaves a stand-in here, which looks for it in each call
+    return cast(SchemaValidator, adapter.validator)
 
 
 def is_valid(model: Any, data: object) -> bool:
     """Return whether `model` accepts plain data, without reasons."""
     try:
-        adapter(model).validate_python(data, strict=True)
+        validator(model).validate_python(data, strict=True)
     except ValidationError:
         return False
     return True
@@ -263,7 +265,7 @@ def validate(
     data = to_plain(node)
     for _ in range(_ROUNDS):
         try:
-            return cast(T, adapter(cast(Any, model)).validate_python(data, strict=True, context=context))
+            return cast(T, validator(cast(Any, model)).validate_python(data, strict=True, context=context))
         except ValidationError as error:
             errors = error.errors(include_url=False)
         before = data
@@ -451,7 +453,7 @@ def _with(data: object, path: tree.KeyPath, value: object) -> object:
 def _takes(model: Any, data: object, loc: tree.KeyPath) -> bool:
     """Return whether a model accepts the value at `loc`."""
     try:
-        adapter(model).validate_python(data)
+        validator(model).validate_python(data)
     except ValidationError as error:
         return not any(entry["loc"][: len(loc)] == loc for entry in error.errors(include_url=False))
     return True

@@ -6,6 +6,7 @@ text in a capability is the name of a port of the component; everything else is 
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields, replace
+from functools import cache
 from typing import Any, Generic, TypeVar
 
 from rbxcompose.base.config import Config, Place
@@ -286,4 +287,10 @@ def _ports(capability: Capability) -> Iterator[str]:
 
 
 def _values(capability: Capability) -> list[object]:
-    return [getattr(capability, field.name) for field in fields(capability)]
+    kind: Any = type(capability)
+    return [getattr(capability, name) for name in _names(kind)]
+
+
+@cache
+def _names(kind: Any) -> tuple[str, ...]:
+    return tuple(field.name for field in fields(kind))

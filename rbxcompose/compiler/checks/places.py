@@ -82,7 +82,7 @@ _PLAIN_DISTANCE_LEAST = 5.0  # [m] of a number that was probably not meant in me
 @check("RBX4165", Severity.WARNING, closed=("places",))
 def plain_distance(robot: Robot) -> Iterator[Finding]:
     """A distance without a unit is larger than all ways between places."""
-    places = list(robot.manifest.places.values())
+    places = list(robot.manifest.places.values()) if robot.missions else []
     most = max((distance(place, other) for place, other in combinations(places[:_MOST_PLACES], 2)), default=0.0)
     for mission in robot.missions.values() if most and len(places) <= _MOST_PLACES else ():
         asked = [one for view in views(mission.program, robot.names) for one in view.node.asked]

@@ -18,7 +18,7 @@ from rbxcompose.manifest.files import PROFILE, find, shown_name
 from rbxcompose.manifest.reader import read_text
 from rbxcompose.manifest.registry import model_for, section_named, sections
 from rbxcompose.manifest.section import OVERLAY, ROBOT, Contents, SetScope
-from rbxcompose.manifest.tree import KEYS, Entry, Key, MappingNode, ScalarNode, TreeNode, with_children
+from rbxcompose.manifest.tree import KEYS, Entry, Key, MappingNode, ScalarNode, TreeNode, all_nodes, with_children
 from rbxcompose.manifest.yaml_nodes import TOO_LARGE
 
 BAD_SET = kind("RBX1303")
@@ -167,6 +167,8 @@ def _with_few_keys(root: MappingNode, report: Report) -> MappingNode:
             node = replace(node, entries=dict(islice(node.entries.items(), KEYS)))
         return node if isinstance(node, ScalarNode) else with_children(node, shortened)
 
+    if not any(isinstance(node, MappingNode) and len(node.entries) > KEYS for node in all_nodes(root)):
+        return root
     short = shortened("", root)
     return short if isinstance(short, MappingNode) else root
 

@@ -222,10 +222,13 @@ class RobotManifest:
     inclusions: Inclusions = field(default_factory=Inclusions)
     bounds: ScopedBounds = field(default_factory=dict)  # of arguments, by scope and name
 
+    @property
+    def has_bounds(self) -> bool:
+        """Return whether any argument has bounds."""
+        return any(bounds for named in self.bounds.values() for bounds in named.values())
+
     def bounds_at(self, path: KeyPath) -> tuple[Bound, ...]:
         """Return what bounds the value at a path beside its type: those of the argument that it is taken from."""
-        if not any(bounds for named in self.bounds.values() for bounds in named.values()):
-            return ()  # whatever the value is taken from
         steps = self.history.of(path)
         return bounds_of(steps[-1].node, self.bounds) if steps else ()
 

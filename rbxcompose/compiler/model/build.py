@@ -248,7 +248,7 @@ def _component(manifest: RobotManifest, wanted: WantedComponent, given: Mapping[
         wanted.places,
         wanted.is_sound,
     )
-    live = (name for name, one in leaves(config) if is_live(one))
+    live = (name for name, one in leaves(config) if is_live(one)) if manifest.has_bounds else ()
     bounds = {name: bounds for name in live if (bounds := manifest.bounds_at(made.place(key_of(config, name))))}
     return replace(made, bounds=bounds) if bounds else made
 

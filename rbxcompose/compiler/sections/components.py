@@ -168,14 +168,14 @@ def _component(reading: Reading[ComponentOptions], name: str, entry: Entry) -> C
         report.add(WRONG_TYPE.at(node.span, message, label=label_of(node), help=help_text))
         return None
     # A missing key is reported at the component's name, not at whatever its first key happens to be.
-    options_node = replace(_part(node, OPTIONS), span=entry.key.span)
+    options_node = _part(node, OPTIONS, entry.key.span)
     options = validate(ComponentOptions, options_node, path, report) or salvaged(ComponentOptions, options_node)
     type_name = _type_name(name, entry, node, report)
     if type_name is None:
         return None
     model = registry.component_type(type_name).config_type()
     keys = [key for key in node.entries if key not in (*OPTIONS, "type")]
-    config_node = replace(_part(node, keys), span=entry.key.span)
+    config_node = _part(node, keys, entry.key.span)
     before = len(report.findings)
     sound = validate(model, config_node, path, report, known, also=[*OPTIONS, "type"])
     if sound is None:
@@ -199,8 +199,8 @@ def _report_other_type(type_name: str, unknown: Set[str], keys: Collection[str],
             report.findings[index] = replace(finding, help=text)
 
 
-def _part(node: MappingNode, keys: Collection[str]) -> MappingNode:
-    return replace(node, entries={name: entry for name, entry in node.entries.items() if name in keys})
+def _part(node: MappingNode, keys: Collection[str], span: Span) -> MappingNode:
+    return MappingNode({name: entry for name, entry in node.entries.items() if name in keys}, span)
 
 
 def _type_name(name: str, entry: Entry, node: MappingNode, report: Report) -> str | None:

@@ -23,7 +23,7 @@ from rbxcompose.domains.diagnostics.settings import (
     is_glob,
     matches,
 )
-from rbxcompose.manifest.tree import SequenceNode
+from rbxcompose.manifest.tree import KeyPath, SequenceNode
 from rbxcompose.manifest.walk import REPLACE
 from rbxcompose.manifest.yaml_nodes import TOO_LARGE
 from rbxcompose.sdk.capabilities import ExpectsRate
@@ -76,15 +76,15 @@ def count_of_items(robot: Robot) -> Iterator[Finding]:
 def empty_analyzer(robot: Robot) -> Iterator[Finding]:
     """An analyzer does not say what belongs to it."""
     for path, analyzer in each_analyzer(robot.manifest.contents.of(diagnostics).analyzers):
-        place = robot.key("diagnostics", "analyzers", *path)
+        place = ("diagnostics", "analyzers", *path)
         if analyzer.kind == "group" and not analyzer.analyzers:
             help_text = "write 'analyzers:' with the groups below it, or omit 'type: group' and write 'match:'"
-            yield empty_analyzer.at(place, f"group '{path[-1]}' has no groups below it", help=help_text)
+            yield empty_analyzer.at(robot.key(*place), f"group '{path[-1]}' has no groups below it", help=help_text)
         elif analyzer.kind not in ("group", "other") and not (
             analyzer.match or analyzer.expected or analyzer.strip_prefix
         ):
             help_text = "write 'match:' with names of components, such as 'match: [battery]'"
-            yield empty_analyzer.at(place, f"analyzer '{path[-1]}' matches nothing", help=help_text)
+            yield empty_analyzer.at(robot.key(*place), f"analyzer '{path[-1]}' matches nothing", help=help_text)
 
 
 @check("RBX5003", is_fixable=True, closed=(NAMES,))
@@ -291,10 +291,10 @@ def unmatched_analyzer(robot: Robot) -> Iterator[Finding]:
     for path, analyzer in each_analyzer(robot.manifest.contents.of(diagnostics).analyzers):
         patterns = [(index, item) for index, item in enumerate(analyzer.conditions) if isinstance(item, str)]
         for index, pattern in patterns:
-            place = robot.value("diagnostics", "analyzers", *path, "match", index)
+            place: KeyPath = ("diagnostics", "analyzers", *path, "match", index)
             if compared > _MOST_COMPARED:
                 message = f"the patterns up to this one take more than {_MOST_COMPARED:,} comparisons with components"
-                yield TOO_LARGE.at(place, message, help="use fewer patterns")
+                yield TOO_LARGE.at(robot.value(*place), message, help="use fewer patterns")
                 return
             wanted = component_of(pattern)  # which details it has shows only while it runs
             tried = () if wanted in known or not is_glob(wanted) else known
@@ -302,7 +302,7 @@ def unmatched_analyzer(robot: Robot) -> Iterator[Finding]:
             is_known = wanted in known or wanted in named_elsewhere
             if not is_known and not any(fits(wanted, component) for component in tried):
                 yield unmatched_analyzer.misspelt(
-                    place,
+                    robot.value(*place),
                     f"analyzer '{path[-1]}' matches no component with '{pattern}'",
                     pattern,
                     known,

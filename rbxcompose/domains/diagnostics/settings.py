@@ -253,7 +253,8 @@ def each_analyzer(
     """Yield all analyzers, each before those below it, with its keys below the section's `analyzers`."""
     for name, analyzer in analyzers.items():
         yield (*above, name), analyzer
-        yield from each_analyzer(analyzer.analyzers, (*above, name, "analyzers"))
+        if analyzer.analyzers:
+            yield from each_analyzer(analyzer.analyzers, (*above, name, "analyzers"))
 
 
 def component_of(name: str) -> str:
