@@ -106,7 +106,7 @@ def test_robots_components_and_topics_are_known() -> None:
     assert candidates(["param", "set", "battery.w"], known) == ["battery.warn"]
     assert candidates(["param", "set", "battery.warn=3%", "battery.e"], known) == ["battery.error"]
     assert candidates(["param", "get", "base", ""], known) == []
-    assert candidates(["down", "c"], known) == ["cart"]
+    assert candidates(["down", "ca"], known) == ["cart"]
     assert candidates(["topic", "echo", ""], known) == ["/odom"]
     assert candidates(["topic", "echo", "od"], known) == ["odom"]
     assert candidates(["topic", "echo", "--router", "tcp/9:9", "--domain", "3", ""], known) == ["/odom"]
