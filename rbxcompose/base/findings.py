@@ -12,6 +12,7 @@ from contextvars import ContextVar
 from dataclasses import field
 from enum import StrEnum
 from functools import lru_cache, wraps
+from itertools import product
 from typing import Generic, NamedTuple, ParamSpec, TypeVar, cast
 
 from rbxcompose.base.dataclass import dataclass
@@ -310,7 +311,8 @@ def clauses(*parts: str) -> str:
 def _is_chance(name: str, near: str) -> bool:
     """Return whether two names are only somewhat alike, in no word: `wheel_separation` and `acceleration`."""
     words, others = _words(name), _words(near)
-    if not _shared(words, others) and _edits(name, near) > max(1, len(name) // 3):
+    pairs = [(name, near), *product(words, others)]
+    if not _shared(words, others) and all(_edits(word, other) > max(1, len(word) // 3) for word, other in pairs):
         return True
     if min(len(name), len(near)) >= _LONG and _similarity(name, near) < _ALIKE and not _shared(words, others):
         return not any(_is_slip(word, other) for word in words for other in others)

@@ -25,7 +25,9 @@ class Blink(Action["Blink.Goal", "Blink.Result", "Blink.Feedback"]):
 
         TYPE: ClassVar[str] = "rbx_lamp/action/Blink_Goal"
         HASH: ClassVar[str] = "RIHS01_61812882326d7aa40e1aad9acbd8c52fe6b3b69c98513eda0b2072a032700e00"
-        FIELDS: ClassVar[Fields] = {"flashes": "uint32"}
+        FIELDS: ClassVar[Fields] = {
+            "flashes": "uint32",
+        }
 
         flashes: int = 0
 
@@ -35,7 +37,9 @@ class Blink(Action["Blink.Goal", "Blink.Result", "Blink.Feedback"]):
 
         TYPE: ClassVar[str] = "rbx_lamp/action/Blink_Result"
         HASH: ClassVar[str] = "RIHS01_05cb3108c2ff0bd66a4241f83cbcee8a947585803bf1358c8ad39ac926091111"
-        FIELDS: ClassVar[Fields] = {"flashes": "uint32"}
+        FIELDS: ClassVar[Fields] = {
+            "flashes": "uint32",
+        }
 
         flashes: int = 0
 
@@ -45,7 +49,9 @@ class Blink(Action["Blink.Goal", "Blink.Result", "Blink.Feedback"]):
 
         TYPE: ClassVar[str] = "rbx_lamp/action/Blink_Feedback"
         HASH: ClassVar[str] = "RIHS01_19598dca2ef856706751b44e3ab648da92f4f37981000a3c00641b0a9122a34a"
-        FIELDS: ClassVar[Fields] = {"flashes": "uint32"}
+        FIELDS: ClassVar[Fields] = {
+            "flashes": "uint32",
+        }
 
         flashes: int = 0  # so far
 
@@ -75,7 +81,10 @@ class Blink(Action["Blink.Goal", "Blink.Result", "Blink.Feedback"]):
 
             TYPE: ClassVar[str] = "rbx_lamp/action/Blink_SendGoal_Response"
             HASH: ClassVar[str] = "RIHS01_55a2d40e6c0b97a153b8ca00e4b01c3f79b40112df469fe8beebab8e4b3f7349"
-            FIELDS: ClassVar[Fields] = {"accepted": "bool", "stamp": "builtin_interfaces/msg/Time"}
+            FIELDS: ClassVar[Fields] = {
+                "accepted": "bool",
+                "stamp": "builtin_interfaces/msg/Time",
+            }
 
             accepted: bool = False
             stamp: builtin_interfaces.Time = field(default_factory=builtin_interfaces.Time)
@@ -92,7 +101,9 @@ class Blink(Action["Blink.Goal", "Blink.Result", "Blink.Feedback"]):
 
             TYPE: ClassVar[str] = "rbx_lamp/action/Blink_GetResult_Request"
             HASH: ClassVar[str] = "RIHS01_c7d01fa239efb4c870d3a14e81cf780b570f62da76dd797f05d97d3fff36a5bd"
-            FIELDS: ClassVar[Fields] = {"goal_id": "unique_identifier_msgs/msg/UUID"}
+            FIELDS: ClassVar[Fields] = {
+                "goal_id": "unique_identifier_msgs/msg/UUID",
+            }
 
             goal_id: unique_identifier_msgs.UUID = field(default_factory=unique_identifier_msgs.UUID)
 
@@ -102,7 +113,10 @@ class Blink(Action["Blink.Goal", "Blink.Result", "Blink.Feedback"]):
 
             TYPE: ClassVar[str] = "rbx_lamp/action/Blink_GetResult_Response"
             HASH: ClassVar[str] = "RIHS01_0690f74864a8a7b8139065e9f0ec7a0f22b3b86f1e4b53835598542ee4367114"
-            FIELDS: ClassVar[Fields] = {"status": "int8", "result": "rbx_lamp/action/Blink_Result"}
+            FIELDS: ClassVar[Fields] = {
+                "status": "int8",
+                "result": "rbx_lamp/action/Blink_Result",
+            }
 
             status: int = 0
             result: Blink.Result = field(default_factory=lambda: Blink.Result())
@@ -128,7 +142,11 @@ class Dimmed(Message):
 
     TYPE: ClassVar[str] = "rbx_lamp/msg/Dimmed"
     HASH: ClassVar[str] = "RIHS01_0b6925d2d7a459dc465ef22262e02fd23eed9dd93eba6533d6389e901a247891"
-    FIELDS: ClassVar[Fields] = {"success": "bool", "message": "string", "brightness": "float64"}
+    FIELDS: ClassVar[Fields] = {
+        "success": "bool",
+        "message": "string",
+        "brightness": "float64",
+    }
 
     success: bool = False
     message: str = ""
