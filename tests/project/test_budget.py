@@ -37,7 +37,7 @@ class Cost(NamedTuple):
 ROOMS: dict[str, tuple[int, int, int, int]] = {
     "__init__": (1, 1, 1, 0),
     "__main__": (4, 1, 1, 2),
-    "base": (3531, 31, 4, 217),
+    "base": (3533, 31, 4, 218),
     "bus": (2364, 20, 0, 167),
     "commands": (2393, 25, 1, 282),
     "compiler": (6956, 69, 9, 808),
@@ -62,10 +62,10 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 82_938,
+    "lines of code": 82_940,
     "files": 695,
     "files of 1 to 30 lines of code": 62,
-    "lines of imports": 7826,
+    "lines of imports": 7827,
     "packages at the top": 12,
     "modules at the top": 0,
     "kB of schemas": 303,
