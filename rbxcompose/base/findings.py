@@ -312,6 +312,8 @@ def _is_chance(name: str, near: str) -> bool:
     """Return whether two names are only somewhat alike, in no word: `wheel_separation` and `acceleration`."""
     words, others = _words(name), _words(near)
     pairs = [(name, near), *product(words, others)]
+    if not may_guess(2 * len(name) * len(near)):
+        return True
     if not _shared(words, others) and all(_edits(word, other) > max(1, len(word) // 3) for word, other in pairs):
         return True
     if min(len(name), len(near)) >= _LONG and _similarity(name, near) < _ALIKE and not _shared(words, others):

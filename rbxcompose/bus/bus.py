@@ -115,7 +115,8 @@ class Bus:
     ) -> Server[Q, R]:
         """Call `handle` with each request, to be answered now or later; with `waits`, none before `open`.
 
-        Takes at most `rate` [Hz] from each client elsewhere. `client_left` gets the GID of each client that is gone.
+        Takes at most `rate` [Hz] from each client elsewhere, and none of their requests beyond the `limits`.
+        `client_left` gets the GID of each client that is gone.
         """
         node = self._node(owner)
         return _kept(
@@ -138,7 +139,10 @@ class Bus:
         waits: bool = False,
         limits: MessageLimits = ORDINARY,
     ) -> ActionServer[G, R, F]:
-        """Carry out goals; with `waits`, none before `open`. `accept` returns why it refuses a goal, or nothing."""
+        """Carry out goals; with `waits`, none before `open`. `accept` returns why it refuses a goal, or nothing.
+
+        Goals of other processes beyond the `limits` are refused before that.
+        """
         node = self._node(owner)
         return _kept(
             node, ActionServer(self._topics, self._services, node, name, action, accept, waits=waits, limits=limits)

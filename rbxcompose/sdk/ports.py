@@ -31,9 +31,9 @@ _DEPTH = {Qos.COMMAND: 1, Qos.STATE: 10, Qos.LATCHED: 1, Qos.EVENT: 10_000, Qos.
 class MessageLimits(NamedTuple):
     """What a port takes of another process at most; a message beyond that is refused before it is decoded."""
 
-    size: float = 256 * 1024
+    size: int = 256 * 1024
     """Bytes."""
-    entries: float = 2_000
+    entries: int = 2_000
     """Entries of all its lists of texts and messages; each takes some 10 µs to decode."""
 
 

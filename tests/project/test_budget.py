@@ -37,7 +37,7 @@ class Cost(NamedTuple):
 ROOMS: dict[str, tuple[int, int, int, int]] = {
     "__init__": (1, 1, 1, 0),
     "__main__": (4, 1, 1, 2),
-    "base": (3533, 31, 4, 218),
+    "base": (3535, 31, 4, 218),
     "bus": (2364, 20, 0, 167),
     "commands": (2393, 25, 1, 282),
     "compiler": (6956, 69, 9, 808),
@@ -45,7 +45,7 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
     "domains/arms": (12431, 74, 2, 1135),
     "domains/bases": (1444, 14, 0, 113),
     "domains/body": (3540, 28, 2, 372),
-    "domains/console": (1252, 9, 1, 105),
+    "domains/console": (1253, 9, 1, 106),
     "domains/devices": (741, 9, 0, 80),
     "domains/diagnostics": (2349, 24, 4, 214),
     "domains/muxes": (1984, 15, 1, 116),
@@ -62,10 +62,10 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
 """Of each room: lines of code, files, files of 1 to 30 lines of code, lines of imports."""
 
 WHOLE = {
-    "lines of code": 82_940,
+    "lines of code": 82941,
     "files": 695,
     "files of 1 to 30 lines of code": 62,
-    "lines of imports": 7827,
+    "lines of imports": 7828,
     "packages at the top": 12,
     "modules at the top": 0,
     "kB of schemas": 303,

@@ -18,10 +18,11 @@ from rbxcompose.msgs.definitions import FLOATS, INTEGERS, OCTETS, FieldShape, Fi
 from rbxcompose.msgs.plain import from_plain, shortest
 from rbxcompose.msgs.stamps import to_time
 from rbxcompose.msgs.types import Message
+from rbxcompose.sdk.ports import BULK
 
 M = TypeVar("M", bound=Message)
 
-MOST_ENTRIES = 10_000  # texts, flags and messages in all lists of a message, each of which takes some 10 µs
+MOST_ENTRIES = BULK.entries  # texts, flags and messages in all lists of a message: as many as the bus takes
 _SHOWN = 60  # characters of a name that is wrong
 _HEADER = "std_msgs/msg/Header"
 _TIMES = ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")

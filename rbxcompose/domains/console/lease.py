@@ -40,7 +40,7 @@ class DriveLease:
         return True
 
     def renew(self, client: int, now: float) -> bool:
-        """Begin anew, if this client has the lease; return whether it has."""
+        """Extend the lease if this client has it; return whether it has."""
         if self.client != client or now >= self.until:
             return False
         self.until = now + LEASE

@@ -25,7 +25,6 @@ ENOUGH = 3  # solutions, of which the nearest one is taken
 TOGETHER = 8  # descents of compiled code, after which a search lets others run
 EDGE = 1e-4  # [rad or m] from the limits of joints, so that curves through solutions stay within them
 CLOSER = 0.2  # of a tolerance that the search aims at, so that rounding decides nothing
-# Of a descent by damped least squares; plain and compiled code share them.
 
 
 @dataclass(frozen=True, slots=True)

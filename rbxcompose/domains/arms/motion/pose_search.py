@@ -132,10 +132,8 @@ def _approached(
     size = float(error @ error)
     for _ in range(MOST_APPROACH_STEPS):
         step = _approach_step(jacobian, error, damping, values, bounds)
-        moved = np.clip(
-            values + step * min(1.0, damped_steps.LONGEST / max(float(np.abs(step).max()), damped_steps.LONGEST)),
-            *bounds,
-        )
+        share = damped_steps.LONGEST / max(float(np.abs(step).max()), damped_steps.LONGEST)
+        moved = np.clip(values + share * step, *bounds)
         ahead, there = _weighed(kinematics, target, wanted, moved)
         left = float(ahead @ ahead)
         if left < size:

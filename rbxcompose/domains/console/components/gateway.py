@@ -519,7 +519,7 @@ class GatewaySession:
         self._bus.withdraw(NAME, end)
 
     def _call(self, request: ServiceCall) -> None:
-        """ServiceCall a service as soon as its server is known to a client of it."""
+        """Call a service as soon as its server is known to a client of it."""
         caller = self._ends.get((ServiceCall, request.service))
         if caller is None:
             caller = self._ends[ServiceCall, request.service] = self._bus.client(NAME, request.service, request.type)
