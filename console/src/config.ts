@@ -17,8 +17,6 @@ export interface DriveConfig {
   maxSpeed: number;
   /** [rad/s] */
   maxTurnRate: number;
-  /** Name of who holds the drive lease, empty while nobody does. */
-  holder: string;
 }
 
 export interface Config {
@@ -75,7 +73,6 @@ function parseDrive(drive: Message): DriveConfig | null {
     type: text(drive.type) || "geometry_msgs/Twist",
     maxSpeed: positive(drive.max_speed, 0.5),
     maxTurnRate: positive(drive.max_turn_rate, 1),
-    holder: text(drive.holder),
   };
 }
 

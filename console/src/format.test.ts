@@ -55,7 +55,7 @@ it("a configuration has defaults, and a robot without a base has no drive", () =
     drive: { topic: "/cmd", max_speed: null },
     values: { a: { topic: "/a" }, b: 3 },
   });
-  expect(drive).toEqual({ topic: "/cmd", type: "geometry_msgs/Twist", maxSpeed: 0.5, maxTurnRate: 1, holder: "" });
+  expect(drive).toEqual({ topic: "/cmd", type: "geometry_msgs/Twist", maxSpeed: 0.5, maxTurnRate: 1 });
   expect(values).toEqual([{ name: "a", topic: "/a", type: "", field: "data", unit: "" }]);
 });
 

@@ -3,7 +3,7 @@ import type { Config } from "./config";
 import { h, icon, setText } from "./dom";
 import { formatAge } from "./format";
 import { pages, type Robot } from "./page";
-import type { LinkState, Rosbridge } from "./rosbridge";
+import { isMessage, type LinkState, type Rosbridge } from "./rosbridge";
 import { Signal } from "./signal";
 import { stopButtons } from "./stop";
 
@@ -39,11 +39,20 @@ export function showFrame(config: Config, link: Rosbridge): void {
   };
   const title = h("h1", {}, config.robot);
   const tabs = h("nav", { "aria-label": "Pages" });
-  const bar = h("header", {}, h("div", { class: "who" }, title, h("p", {}, config.about)), tabs, connection(link));
+  const bar = h("header", {}, h("div", { class: "who" }, title, h("p", {}, config.about)), connection(link));
   const stops = stopButtons(link, robot.stopped, robot.notify);
   const host = h("main", { id: "page" });
-  document.body.replaceChildren(bar, stops, lostBanner(link), stoppedBanner(robot.stopped), host, notice);
+  const banner = stoppedBanner();
+  document.body.replaceChildren(bar, stops, tabs, lostBanner(link), banner.element, host, notice);
   link.state.watch((state) => document.body.classList.toggle("offline", state.is !== "open"));
+  let by = "";
+  robot.stopped.watch((stopped) => banner.show(stopped, by));
+  link.watch("robot/RobotStatus", (status) => {
+    if (!isMessage(status)) return;
+    by = isMessage(status.stop) ? String(status.stop.by) : "";
+    robot.stopped.set(by !== "");
+    banner.show(robot.stopped.value, by);
+  });
   route(host, tabs, robot);
 }
 
@@ -113,12 +122,13 @@ function lostBanner(link: Rosbridge): HTMLElement {
   return banner;
 }
 
-function stoppedBanner(stopped: Signal<boolean>): HTMLElement {
+function stoppedBanner(): { element: HTMLElement; show: (stopped: boolean, by: string) => void } {
   const message = h("p", { role: "alert" });
-  const banner = h("div", { class: "banner stopped" }, icon("stop"), message);
-  stopped.watch((value) => {
-    banner.hidden = !value;
-    setText(message, value ? "Stopped. Nothing moves until you press Release." : "");
-  });
-  return banner;
+  const element = h("div", { class: "banner stopped" }, icon("stop"), message);
+  const show = (stopped: boolean, by: string) => {
+    element.hidden = !stopped;
+    const who = by ? ` by ${by}` : "";
+    setText(message, stopped ? `Stopped${who}. Nothing moves until you press Release.` : "");
+  };
+  return { element, show };
 }

@@ -148,6 +148,26 @@ export class Rosbridge {
     };
   }
 
+  /**
+   * Calls the listener with the answer to a query of the robot, such as `mission/ListMissions` or
+   * `mux/LookAtMux/component/cmd_vel`, now and whenever it is another; if the robot refuses, with null and why.
+   * `period` is the time between two looks [ms].
+   */
+  watch(query: string, listener: (answer: Json, refused: string) => void, period?: number): () => void {
+    return this.subscribe(
+      `/console/windows/${query}`,
+      ({ answer, refused }) => listener(answer ?? null, typeof refused === "string" ? refused : ""),
+      period === undefined ? {} : { throttle: period },
+    );
+  }
+
+  /** Sends a request to the robot, such as `{ type: "mission.PauseMission", mission: "patrol" }`; returns its answer. */
+  async ask(request: Message & { type: string }, timeout?: number): Promise<Json> {
+    const values = await this.call("/console/ask", request, timeout);
+    if (!isMessage(values) || values.success !== true) throw new CallError(reasonOf(values));
+    return values.answer ?? null;
+  }
+
   /** Announces that this client publishes on a topic. */
   advertise(topic: string, type: string): void {
     if (this.#advertised.get(topic) === type) return;

@@ -48,7 +48,7 @@ export function stopButtons(link: Rosbridge, stopped: Signal<boolean>, notify: (
   return h("section", { class: "stops", "aria-label": "Emergency" }, release, stop);
 }
 
-/** Calls a service that may answer that it did not succeed. */
+/** Calls a service that may answer that it did not succeed: unlike a request, STOP needs no supervisor. */
 async function ask(link: Rosbridge, service: string): Promise<void> {
   const values = await link.call(service);
   if (isMessage(values) && values.success === false) throw new CallError(String(values.message || "the robot refused"));

@@ -9,11 +9,11 @@ import os
 import selectors
 import socket
 import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import field
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.base.requests import Refused, Request, UnreadableError, from_data, requests
@@ -207,14 +207,20 @@ def ask(folder: RobotFolder, request: Request[A], *, timeout: float = ANSWER) ->
         NoAnswerError: if there is no supervisor, or it does not answer within `timeout` [s].
         Refused: if it refuses, or answers as another version of rbxcompose would.
     """
-    reply = json.loads(_exchange(folder, requests(type(request)).to_line(request), timeout))
-    if "refused" in reply:
-        raise Refused(reply["refused"])
+    data = ask_as_data(folder, requests(type(request)).to_data(request), timeout=timeout)
     try:
-        answer: A = from_data(request.answer_type(), reply["answer"])
+        answer: A = from_data(request.answer_type(), data)
     except UnreadableError as error:
         raise Refused(f"its answer is from another version of rbxcompose: {error}") from error
     return answer
+
+
+def ask_as_data(folder: RobotFolder, request: Mapping[str, Any], *, timeout: float = ANSWER) -> Any:
+    """Send a request as data, and return the answer as data; the rest is as in `ask`."""
+    reply = json.loads(_exchange(folder, json.dumps(request).encode() + b"\n", timeout))
+    if "refused" in reply:
+        raise Refused(reply["refused"])
+    return reply["answer"]
 
 
 def _exchange(folder: RobotFolder, line: bytes, timeout: float) -> bytes:

@@ -213,7 +213,7 @@ class ParameterField:
 
     def _description(self) -> str:
         text = field_docs(self.model).get(self.name.rpartition(SEPARATOR)[2], "") if self.model else ""
-        return f"{text} [{unit}]".strip() if (unit := _si_unit(self.dimension)) else text
+        return f"{text} [{unit}]".strip() if (unit := si_unit(self.dimension)) else text
 
     def _bounds(self) -> Iterator[tuple[str, float]]:
         for mark in self._marks:
@@ -288,7 +288,7 @@ def shown(value: object, dimension: Dimension | None, unit: str | None = None) -
     return str(value)
 
 
-def _si_unit(dimension: Dimension | None) -> str:
+def si_unit(dimension: Dimension | None) -> str:
     """Return the unit of a parameter's values; ratios go from 0 to 1."""
     if dimension == RATIO:
         return _RATIO

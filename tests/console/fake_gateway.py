@@ -6,6 +6,8 @@ import json
 import mimetypes
 import threading
 import time
+from collections.abc import Callable
+from contextlib import suppress
 from http import HTTPStatus
 from pathlib import Path
 from typing import Any
@@ -15,23 +17,21 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 from websockets.sync.server import ServerConnection, serve
 
+from rbxcompose.base.requests import Refused
+
 CONFIG: dict[str, Any] = {
     "robot": "turtlebot",
     "about": "A TurtleBot 2 that patrols four rooms",
     "first_page": "drive",
-    "drive": {
-        "topic": "/cmd_vel_console",
-        "type": "geometry_msgs/Twist",
-        "max_speed": 0.5,
-        "max_turn_rate": 1.5,
-        "holder": "",
-    },
+    "drive": {"topic": "/cmd_vel_console", "type": "geometry_msgs/Twist", "max_speed": 0.5, "max_turn_rate": 1.5},
     "values": {
         "base_battery": {"topic": "/battery_level", "type": "std_msgs/Float32", "field": "data", "unit": "%"},
         "laptop_battery": {"topic": "/laptop_charge", "type": "std_msgs/Float32", "field": "data", "unit": "%"},
         "main_supply": {"topic": "/supply", "type": "std_msgs/Float32", "field": "data", "unit": "V"},
     },
 }
+WINDOWS = "/console/windows/"
+RUNNING = "robot/RobotStatus"
 POLICY = "default-src 'self'; frame-ancestors 'none'"
 DATA = {"/battery_level": 78.4, "/laptop_charge": 23.0, "/supply": 12.37}
 
@@ -43,7 +43,13 @@ class FakeGateway:
         self.static, self.config = static, config
         self.frames: list[tuple[float, dict[str, Any]]] = []
         self.holder = ""
-        self.others: str | None = None  # who drives from elsewhere
+        self.windows: dict[str, Any] = {"drive": {"holder": ""}, RUNNING: {"stop": None}}
+        """What queries answer, by name and fields: `mission/ListMissions`; change them by `show`."""
+        self.answers: dict[str, Callable[[dict[str, Any]], Any]] = {}
+        """What requests answer, by name: `mission.PauseMission`; and services, by name: `/arm/home`."""
+        self.latched: dict[str, dict[str, Any]] = {}
+        """What a new subscriber of a topic gets at once."""
+        self._others: str | None = None
         self.is_away = False  # takes no connections
         self.subscribed: dict[ServerConnection, set[str]] = {}
         self.velocity = (0.0, 0.0)
@@ -53,6 +59,16 @@ class FakeGateway:
         self._ended = threading.Event()
         for thread in self._threads:
             thread.start()
+
+    @property
+    def others(self) -> str | None:
+        """Who drives from elsewhere."""
+        return self._others
+
+    @others.setter
+    def others(self, name: str | None) -> None:
+        self._others = name
+        self.show("drive", {"holder": name or ""})
 
     @property
     def url(self) -> str:
@@ -78,6 +94,22 @@ class FakeGateway:
             if frame["op"] == "publish" and at >= since
         ]
 
+    def show(self, window: str, answer: Any) -> None:
+        """Let a query answer this from now on."""
+        self.windows[window] = answer
+        self.say(f"{WINDOWS}{window}", {"answer": answer})
+
+    def say(self, topic: str, message: dict[str, Any]) -> None:
+        """Send a message to who subscribed to its topic."""
+        for connection, topics in list(self.subscribed.items()):
+            if topic in topics:
+                with suppress(ConnectionClosed):
+                    connection.send(json.dumps({"op": "publish", "topic": topic, "msg": message}))
+
+    def asked(self, request: str) -> list[dict[str, Any]]:
+        """Return the requests of a type that were sent to the robot."""
+        return [given for given in self.calls("/console/ask") if given["type"] == request]
+
     def calls(self, service: str) -> list[dict[str, Any]]:
         """Return the arguments of each call of a service."""
         calls = [frame for _, frame in list(self.frames) if frame["op"] == "call_service"]
@@ -88,16 +120,11 @@ class FakeGateway:
         if path == "/rosbridge":
             return self._response(HTTPStatus.SERVICE_UNAVAILABLE, "text/plain", b"away") if self.is_away else None
         if path == "/console/config":
-            return self._response(HTTPStatus.OK, "application/json", json.dumps(self._shown_config()).encode())
+            return self._response(HTTPStatus.OK, "application/json", json.dumps(self.config).encode())
         file = (self.static / (path.lstrip("/") or "index.html")).resolve()
         if not file.is_file() or not file.is_relative_to(self.static):
             return self._response(HTTPStatus.NOT_FOUND, "text/plain", b"not found")
         return self._response(HTTPStatus.OK, mimetypes.guess_type(file)[0] or "text/plain", file.read_bytes())
-
-    def _shown_config(self) -> dict[str, Any]:
-        if not (drive := self.config and self.config["drive"]):
-            return self.config
-        return self.config | {"drive": drive | {"holder": self.others or self.holder}}
 
     def _response(self, status: HTTPStatus, kind: str, body: bytes) -> Response:
         headers = {"Content-Type": kind, "Content-Length": str(len(body)), "Content-Security-Policy": POLICY}
@@ -119,7 +146,14 @@ class FakeGateway:
     def _handle(self, connection: ServerConnection, frame: dict[str, Any]) -> None:
         match frame["op"]:
             case "subscribe":
-                self.subscribed[connection].add(frame["topic"])
+                topic = frame["topic"]
+                self.subscribed[connection].add(topic)
+                window = topic.removeprefix(WINDOWS)
+                shown = {"answer": self.windows[window]} if window in self.windows else self.latched.get(topic)
+                if shown is not None:
+                    connection.send(json.dumps({"op": "publish", "topic": topic, "msg": shown}))
+            case "unsubscribe":
+                self.subscribed[connection].discard(frame["topic"])
             case "publish":
                 if self.others:
                     error = {"op": "status", "level": "error", "id": frame["id"], "msg": "not yours"}
@@ -136,7 +170,20 @@ class FakeGateway:
             if self.others:
                 return {"success": False, "holder": self.others, "message": f"'{self.others}' drives"}
             self.holder = args["name"] if args["take"] else ""
+            self.show("drive", {"holder": self.holder})
             return {"success": True, "holder": self.holder, "message": ""}
+        if service == "/console/ask":
+            if (answer := self.answers.get(args["type"])) is None:
+                return {"success": False, "message": f"there is no request '{args['type']}'", "answer": None}
+            try:
+                return {"success": True, "message": "", "answer": answer(args)}
+            except Refused as refusal:
+                return {"success": False, "message": str(refusal), "answer": None}
+        if service in self.answers:
+            values: dict[str, Any] = self.answers[service](args)
+            return values
+        if service in ("/console/stop", "/console/release"):
+            self.show(RUNNING, {"stop": {"by": "the console", "time": 1.0} if service.endswith("stop") else None})
         return {"success": True, "message": ""}
 
     def _publish(self) -> None:
@@ -144,9 +191,5 @@ class FakeGateway:
             forward, turn = self.velocity
             data: dict[str, dict[str, Any]] = {topic: {"data": value} for topic, value in DATA.items()}
             data["odom"] = {"twist": {"twist": {"linear": {"x": 0.96 * forward}, "angular": {"z": 0.97 * turn}}}}
-            for connection, topics in list(self.subscribed.items()):
-                for topic in topics & data.keys():
-                    try:
-                        connection.send(json.dumps({"op": "publish", "topic": topic, "msg": data[topic]}))
-                    except ConnectionClosed:
-                        break
+            for topic, message in data.items():
+                self.say(topic, message)

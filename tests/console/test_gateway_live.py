@@ -154,10 +154,45 @@ def test_the_page_learns_what_the_robot_has(robot: Robot) -> None:
     config = json.loads(get("/console/config")[1])
     limits = {"max_speed": 0.25, "max_turn_rate": pytest.approx(1.5708, abs=1e-4)}
     assert config["robot"] == "turtlebot"
-    assert config["drive"] == {"topic": TELEOP, "type": "geometry_msgs/msg/Twist", "holder": "", **limits}
+    assert config["drive"] == {"topic": TELEOP, "type": "geometry_msgs/msg/Twist", **limits}
     battery = {"topic": "/battery_level", "type": "std_msgs/msg/Float32", "field": "data", "unit": "%"}
     assert config["values"] == {"battery": battery}
     assert config["stop"] == "/console/stop"
+
+
+def test_every_component_describes_itself_and_answers_what_it_takes(robot: Robot) -> None:
+    async def ask(browser: Browser) -> None:
+        described = (await browser.calls("/console/ask", type="robot.DescribeRobot"))["answer"]
+        components = {each["name"]: each for each in described}
+        assert {"base", "battery", "go_to", "charger", "cmd_vel", "diagnostics", "gateway"} <= components.keys()
+        assert components["battery"]["capabilities"]["Drains"][0]["level"] == "battery_level"
+        (goals,) = [port for port in components["go_to"]["ports"] if port["kind"] == "serves_action"]
+        assert (goals["skill"], goals["claims"]) == ("go_to", "base")
+        assert components["cmd_vel"]["requests"]["mux.SelectMuxInput"] is True
+        seen = await browser.calls("/console/ask", type="mux.LookAtMux", component="cmd_vel")
+        assert {one["name"] for one in seen["answer"]["inputs"]} == {"teleop", "navigation"}
+
+    browse(ask)
+
+
+@pytest.mark.parametrize("what", ["ApplyPlan", "RevertPlan", "BringDown"])
+def test_no_request_of_a_page_changes_what_runs(robot: Robot, what: str) -> None:
+    async def ask(browser: Browser) -> None:
+        answer = await browser.calls("/console/ask", type=f"robot.{what}")
+        assert answer == {"success": False, "message": f"there is no request 'robot.{what}'", "answer": None}
+
+    browse(ask)
+
+
+def test_a_window_shows_a_query_and_never_carries_out_a_command(robot: Robot) -> None:
+    async def look(browser: Browser) -> None:
+        await browser.sends("subscribe", topic="/console/windows/robot/RobotStatus")
+        assert (await browser.next("publish"))["msg"]["answer"]["stop"] is None
+        await browser.sends("unsubscribe", topic="/console/windows/robot/RobotStatus")
+        await browser.sends("subscribe", topic="/console/windows/robot/StopRobot")
+        assert (await browser.next("publish"))["msg"] == {"refused": "there is no query 'robot.StopRobot'"}
+
+    browse(look)
 
 
 @pytest.mark.parametrize("origin", [f"http://{HOST}", f"http://localhost:{PORT}", None], ids=["own", "local", "none"])
@@ -255,7 +290,8 @@ def test_silence_stops_the_robot_and_frees_the_lease(robot: Robot) -> None:
             sent = time.monotonic()
             assert 0.4 < await asyncio.to_thread(commands.until, 0.0) - sent < 0.9
             assert (await browser.calls("/console/drive", take=True, name="Ben"))["success"]
-            assert json.loads(await asyncio.to_thread(lambda: get("/console/config")[1]))["drive"]["holder"] == "Ben"
+            await browser.sends("subscribe", topic="/console/windows/drive")
+            assert (await browser.next("publish"))["msg"] == {"answer": {"holder": "Ben"}}
 
         browse(drive)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -11,7 +12,7 @@ from hypothesis import strategies as st
 from rbxcompose.domains.console.lease import LEASE, DriveLimits
 from rbxcompose.domains.console.protocol import MOST_SUBSCRIPTIONS, Publish, Unadvertise
 from rbxcompose.msgs.geometry_msgs import Twist, TwistStamped, Vector3
-from tests.console.clients import TELEOP, Client, Room
+from tests.console.clients import LIMITS, TELEOP, TWIST, Client, Room
 
 REST = Publish(TELEOP, Twist())
 
@@ -37,9 +38,7 @@ def driver(room: Room, name: str = "Anna") -> Client:
 
 def test_only_the_holder_drives() -> None:
     room = Room()
-    other = room.client()
-    assert "drive lease" in drives(other)[0]["msg"]
-    anna = driver(room)
+    other, anna = room.client(), driver(room)
     assert "'Anna' drives" in drives(other)[0]["msg"]
     answer = {"success": False, "holder": "Anna", "message": "'Anna' drives"}
     assert other.calls("/console/drive", {"take": True, "name": "Ben"}) == answer
@@ -208,3 +207,46 @@ def test_a_name_is_shown_as_text() -> None:
     room = Room()
     room.client().calls("/console/drive", {"take": True, "name": "\x1b[2J" + "x" * 500})
     assert room.bridge.lease.holder == "[2J" + "x" * 61
+
+
+def test_everybody_sees_who_drives() -> None:
+    room = Room()
+    viewer = room.client()
+    assert viewer.does("subscribe", topic="/console/windows/drive")[0]["msg"] == {"answer": {"holder": ""}}
+    driver(room)
+    assert viewer.gets()[0]["msg"] == {"answer": {"holder": "Anna"}}
+    room.wait(LEASE + 0.1)
+    assert viewer.gets()[0]["msg"] == {"answer": {"holder": ""}}
+
+
+def test_a_page_that_knows_no_lease_has_it_while_it_moves_by_whatever_topic_leads_to_the_base() -> None:
+    room = Room(replace(LIMITS, aliases=frozenset({"/cmd_vel"})))
+    old = room.client()
+
+    def sends(x: float) -> list[dict[str, Any]]:
+        return old.does("publish", topic="/cmd_vel", type=TWIST, msg={"linear": {"x": x}})
+
+    assert old.does("advertise", topic="cmd_vel", type="geometry_msgs/Twist") == []
+    assert sends(0.0) == []
+    assert speeds(room) == []
+    for _ in range(4):
+        assert sends(3.0) == []
+        room.wait(0.2)
+    assert room.bridge.lease.holder == f"client {old.number}"
+    assert sends(0.0) == []
+    assert speeds(room) == [0.5] * 4 + [0.0]
+    for _ in range(5):
+        room.wait(0.2)
+        assert sends(0.0) == []
+    assert room.bridge.lease.holder == ""
+    driver(room)
+    assert sends(0.0) == []
+    assert "'Anna' drives" in sends(0.1)[0]["msg"]
+
+
+def test_a_client_that_asks_for_the_lease_never_gets_it_by_a_late_command() -> None:
+    room = Room()
+    anna = driver(room)
+    room.wait(LEASE + 0.1)
+    assert "drive lease" in drives(anna)[0]["msg"]
+    assert speeds(room) == [0.0]

@@ -26,6 +26,8 @@ from rbxcompose.domains.console.protocol import (
     Subscribe,
     Unadvertise,
     Unsubscribe,
+    Unwatch,
+    Watch,
 )
 from rbxcompose.msgs.geometry_msgs import PoseStamped, Twist, Vector3
 from rbxcompose.msgs.sensor_msgs import Image, LaserScan
@@ -222,9 +224,57 @@ def test_anyone_may_stop_and_release_the_robot() -> None:
         assert client.does("call_service", service=f"/console/{what}", id="x") == []
         (asked,) = room.asked()
         assert isinstance(asked, AskRobot)
-        assert asked.what == what
-        room.bridge.robot_answered(asked.number, "done", is_good=True)
-        assert client.gets()[0]["values"] == {"success": True, "message": "done"}
+        assert asked.request == {"type": f"robot.{what.title()}Robot"}
+        room.bridge.robot_answered(asked.number, "done")
+        assert client.gets()[0]["values"] == {"success": True, "message": "done", "answer": "done"}
+
+
+def test_a_request_goes_to_the_robot_and_its_answer_comes_back() -> None:
+    room = Room()
+    client = room.client()
+    assert (
+        client.calls("/console/ask", {"mission": "patrol"})
+        == "'type' is the name of a request, such as 'mission.ListMissions'"
+    )
+    request = {"type": "mission.PauseMission", "mission": "patrol"}
+    for answer, refusal in (([1, math.nan], ""), (None, "it is not running")):
+        assert client.does("call_service", service="/console/ask", args=request) == []
+        (asked,) = room.asked()
+        assert isinstance(asked, AskRobot)
+        assert asked.request == request
+        room.bridge.robot_answered(asked.number, answer, refusal)
+        shown = answer and [1, None]
+        assert client.gets()[0]["values"] == {"success": not refusal, "message": refusal, "answer": shown}
+
+
+def test_a_window_is_looked_through_as_often_as_the_most_curious_client_wants_and_shows_changes() -> None:
+    room = Room()
+    window = "/console/windows/mux/LookAtMux/component/cmd_vel"
+    query = {"type": "mux.LookAtMux", "component": "cmd_vel"}
+    one, other = room.client(), room.client()
+    one.does("subscribe", topic=window, throttle_rate=1000)
+    assert room.asked() == [Watch(window, query, 1.0)]
+    other.does("subscribe", topic=window)
+    assert room.asked() == [Watch(window, query, 0.2)]
+    for _ in range(2):
+        room.bridge.seen(window, {"holder": "teleop"}, room.now)
+    assert [client.gets()[0]["msg"] for client in (one, other)] == [{"answer": {"holder": "teleop"}}] * 2
+    assert other.gets() == []
+    late = room.client()
+    assert late.does("subscribe", topic=window)[0]["msg"] == {"answer": {"holder": "teleop"}}
+    room.bridge.seen(window, None, room.now, "it has failed")
+    assert late.gets()[0]["msg"] == {"refused": "it has failed"}
+    for client in (other, late):
+        client.leaves()
+    assert room.asked() == [Watch(window, query, 1.0)]
+    one.does("unsubscribe", topic=window)
+    assert room.asked() == [Unwatch(window)]
+
+
+@pytest.mark.parametrize("path", ["mission", "mission/ListMissions/name", "x/y/z/w/v"])
+def test_what_is_no_window_is_refused(path: str) -> None:
+    (status,) = Room().client().does("subscribe", topic=f"/console/windows/{path}")
+    assert "a subject, a query, and its fields" in status["msg"]
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,5 @@
 /** Drive: the pad, keys with a dead-man switch, speeds, batteries, and who drives. */
-import { fetchConfig, pluck, type DriveConfig } from "../config";
+import { pluck, type DriveConfig } from "../config";
 import { h, icon, setText } from "../dom";
 import { drive, parked, PERIOD, STILL, wanted, type Direction, type DriveEvent, type Motion } from "../driving";
 import { BatteryGauge } from "../elements/battery_gauge";
@@ -7,6 +7,7 @@ import { DrivePad } from "../elements/drive_pad";
 import { formatNumber, formatValue } from "../format";
 import type { Page, Robot } from "../page";
 import { isMessage, type Json, type Message } from "../rosbridge";
+import "./drive.css";
 
 const KEYS: Record<string, Direction> = {
   ArrowUp: "forward",
@@ -21,7 +22,6 @@ const KEYS: Record<string, Direction> = {
 const NAME = "rbxcompose.name";
 const NAME_LENGTH = 40;
 const STALE = 1_000; // [ms] after which a measured speed is unknown
-const LOOK = 2_000; // [ms] between two looks for who drives
 const AXES = [
   { key: "forward", label: "Forward", unit: "m/s", place: "twist.twist.linear.x" },
   { key: "turn", label: "Turn", unit: "rad/s", place: "twist.twist.angular.z" },
@@ -55,7 +55,7 @@ function openDrive(host: HTMLElement, robot: Robot, config: DriveConfig): () => 
   const limits: Motion = { forward: config.maxSpeed, turn: config.maxTurnRate };
   let state = parked({ forward: limits.forward / 2, turn: limits.turn / 2 });
   let name = storedName();
-  let holder = config.holder;
+  let holder = "";
   let lastPublish = 0;
   let blocked = ""; // why the last attempt to drive came to nothing
 
@@ -116,15 +116,6 @@ function openDrive(host: HTMLElement, robot: Robot, config: DriveConfig): () => 
 
   const showHolder = (values: Json) => {
     if (isMessage(values) && typeof values.holder === "string") holder = values.holder;
-    paint();
-  };
-
-  /** Asks who drives, while that is not this page and somebody looks. */
-  const lookForHolder = async () => {
-    if (state.lease !== "none" || !state.connected || document.hidden) return;
-    const fresh = await fetchConfig().catch(() => null);
-    if (!fresh || state.lease !== "none") return;
-    holder = fresh.drive?.holder ?? "";
     paint();
   };
 
@@ -239,6 +230,7 @@ function openDrive(host: HTMLElement, robot: Robot, config: DriveConfig): () => 
       dispatch({ is: is === "open" ? "connected" : "disconnected" });
     }),
     robot.stopped.watch((stopped) => dispatch({ is: stopped ? "stopped" : "released" })),
+    link.watch("drive", showHolder),
     link.subscribe("odom", velocity.measured, { type: "nav_msgs/Odometry", throttle: PERIOD }),
     batteries.close,
   );
@@ -252,11 +244,7 @@ function openDrive(host: HTMLElement, robot: Robot, config: DriveConfig): () => 
     dispatch({ is: "tick" });
     velocity.refresh(performance.now());
   }, PERIOD);
-  const looking = setInterval(() => void lookForHolder(), LOOK);
-  cleanups.push(
-    () => clearInterval(timer),
-    () => clearInterval(looking),
-  );
+  cleanups.push(() => clearInterval(timer));
 
   const stick = h("section", { class: "card stick", "aria-label": "Pad" }, pad, hint);
   host.append(h("div", { class: "drive" }, lease, stick, velocity.element, speeds, batteries.element));

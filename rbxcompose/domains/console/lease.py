@@ -22,6 +22,8 @@ class DriveLimits:
     type: str
     max_speed: float = math.inf  # [m/s]
     max_turn_rate: float = math.inf  # [rad/s]
+    aliases: frozenset[str] = frozenset()
+    """Other topics on the way to the base: who sends there is taken to send to `topic`."""
 
 
 class DriveLease:
@@ -97,6 +99,12 @@ def limited(message: Message, limits: DriveLimits) -> Message:
     if isinstance(message, TwistStamped):
         return replace(message, twist=_limited(message.twist, limits))
     raise WrongMessageError(f"{message.TYPE} has no velocity")
+
+
+def moves(message: Message) -> bool:
+    """Return whether a limited command is other than rest."""
+    twist = message.twist if isinstance(message, TwistStamped) else message
+    return isinstance(twist, Twist) and any((twist.linear.x, twist.linear.y, twist.angular.z))
 
 
 def _limited(twist: Twist, limits: DriveLimits) -> Twist:

@@ -15,7 +15,7 @@ from typing import Any, Protocol
 
 from rbxcompose.base.dataclass import dataclass
 from rbxcompose.domains.console.json_messages import WrongMessageError, arguments, encoded, from_json, to_json
-from rbxcompose.domains.console.lease import LATEST, DriveLease, DriveLimits, Lateness, limited
+from rbxcompose.domains.console.lease import LATEST, DriveLease, DriveLimits, Lateness, limited, moves
 from rbxcompose.msgs import registry
 from rbxcompose.msgs.types import Message, Service
 
@@ -25,7 +25,10 @@ MOST_SUBSCRIPTIONS = 200  # of a client; as many topics may it advertise, and as
 MOST_FRAMES = 1000  # statuses and answers that wait for a client, which is then given up
 LONGEST_QUEUE = 1000  # messages of a topic that wait for a client
 DEPTH = 10  # messages of a topic that wait for a client that wants no queue, but reads slowly
+STOP: Mapping[str, str] = {"type": "robot.StopRobot"}
+RELEASE: Mapping[str, str] = {"type": "robot.ReleaseRobot"}
 LONGEST_NAME = 64  # characters of the name of who drives
+LOOK = 0.2  # [s] between two looks at the robot itself, unless its clients want fewer
 PATIENCE = 10.0  # [s] for an answer, if a client does not say
 LONGEST_PATIENCE = 60.0  # [s]
 
@@ -36,6 +39,9 @@ LATER = re.compile(
 )
 """Operations of the protocol that are not served yet."""
 
+WINDOWS = "/console/windows/"
+DRIVE_WINDOW = f"{WINDOWS}drive"  # who holds the drive lease
+_QUERY = re.compile(r"(?P<about>\w+)/(?P<name>\w+)(?P<values>(/\w+/\w+)*)", re.ASCII)
 _NAME = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 _TYPE = re.compile(r"\w+(/(msg|srv|action))?/\w+", re.ASCII)
 _LONGEST_ROS_NAME = 247
@@ -122,13 +128,29 @@ class ServiceCall:
 
 @dataclass(frozen=True, slots=True)
 class AskRobot:
-    """Ask the robot itself to `stop` or to `release`, and pass what it answers to `Bridge.robot_answered`."""
+    """Send a request to the robot itself, as `commands` do, and pass its answer to `Bridge.robot_answered`."""
 
     number: int
-    what: str
+    request: Mapping[str, Any]
 
 
-BusRequest = Subscribe | Unsubscribe | Advertise | Unadvertise | Publish | ServiceCall | AskRobot
+@dataclass(frozen=True, slots=True)
+class Watch:
+    """Repeat a query of the robot every `period` [s], in place of an earlier period; pass answers to `Bridge.seen`."""
+
+    window: str
+    request: Mapping[str, str]
+    period: float
+
+
+@dataclass(frozen=True, slots=True)
+class Unwatch:
+    """No client looks through this window any more."""
+
+    window: str
+
+
+BusRequest = Subscribe | Unsubscribe | Advertise | Unadvertise | Publish | ServiceCall | AskRobot | Watch | Unwatch
 
 
 class BadFrameError(ValueError):
@@ -136,17 +158,17 @@ class BadFrameError(ValueError):
 
 
 class _Shared:
-    """A message for several clients, which is encoded when the first of them takes it."""
+    """A message for several clients, or an answer of the robot, which is encoded when the first of them takes it."""
 
     __slots__ = ("_message", "_text")
 
-    def __init__(self, message: Message) -> None:
-        self._message = message
-        self._text = ""
+    def __init__(self, message: Message | None, text: str = "") -> None:
+        self._message, self._text = message, text
 
     @property
     def text(self) -> str:
-        self._text = self._text or encoded(self._message)
+        if not self._text and self._message is not None:
+            self._text = encoded(self._message)
         return self._text
 
 
@@ -193,6 +215,11 @@ class _Stream:
             self._pass(now)
         return f"{self._head}{self._waiting.popleft().text}}}"
 
+    @property
+    def throttle(self) -> float:
+        """Return the least time between two messages [s]."""
+        return self._throttle
+
     def pause(self, now: float) -> float:
         """Return the time until the next frame is due [s], infinite if none waits."""
         if not self._waiting:
@@ -215,6 +242,7 @@ class _Client:
         self.streams: dict[str, _Stream] = {}  # by the name that it uses; the next to be served is the first
         self.advertised: dict[str, type[Message]] = {}
         self.open_calls = 0
+        self.asks_for_lease = False  # before it drives
         self.lateness = Lateness()
         self._allowed, self._since = float(MOST_PER_SECOND), -math.inf
         self._complained = -math.inf  # [s]
@@ -254,12 +282,13 @@ class _Waiting:
 
 @dataclass(slots=True)
 class _Listened:
-    """A topic to which at least one client listens."""
+    """A topic or a window to which at least one client listens."""
 
-    message: type[Message]
+    message: type[Message] | None  # None for a window
     is_latched: bool
     streams: list[tuple[int, _Stream]] = field(default_factory=list)  # each with the number of its client
     last: _Shared | None = None  # of a latched one
+    period: float = math.inf  # [s] of a window
 
 
 @dataclass(slots=True)
@@ -352,9 +381,18 @@ class Bridge:
 
     def arrived(self, topic: str, message: Message, now: float) -> None:
         """Pass a message on to the clients that listen."""
+        self._pass_on(topic, _Shared(message), now)
+
+    def seen(self, window: str, answer: object, now: float, refusal: str = "") -> None:
+        """Pass what the robot answers to a query on, or why it refuses, if that is another answer than before."""
+        listened = self._listened.get(window)
+        text = json.dumps(_finite({"refused": refusal} if refusal else {"answer": answer}), separators=(",", ":"))
+        if listened is not None and (listened.last is None or listened.last.text != text):
+            self._pass_on(window, _Shared(None, text), now)
+
+    def _pass_on(self, topic: str, shared: _Shared, now: float) -> None:
         if (listened := self._listened.get(topic)) is None:
             return
-        shared = _Shared(message)
         if listened.is_latched:
             listened.last = shared
         for number, stream in listened.streams:
@@ -368,9 +406,10 @@ class Bridge:
         else:
             self._respond(number, to_json(response), is_good=True)
 
-    def robot_answered(self, number: int, answer: str, *, is_good: bool) -> None:
-        """Pass on what the robot said to `stop` or `release`."""
-        self._respond(number, {"success": is_good, "message": answer}, is_good=True)
+    def robot_answered(self, number: int, answer: object, refusal: str = "") -> None:
+        """Pass on what the robot answered to a request, or why it refused."""
+        message = refusal or (answer if isinstance(answer, str) else "")
+        self._respond(number, {"success": not refusal, "message": message, "answer": answer}, is_good=True)
 
     def expire(self, now: float, stamp: int) -> list[BusRequest]:
         """End a drive lease that was not renewed: the robot stops."""
@@ -404,18 +443,24 @@ class Bridge:
         if (compression := data.get("compression", "none")) not in ("none", "", None):
             raise BadFrameError(f"the compression '{_short(compression)}' is not yet served")
         wish = _Wish(_count(data, "throttle_rate", math.inf) / 1000, min(_count(data, "queue_length"), LONGEST_QUEUE))
-        message = self._message_on(topic, data)
+        is_window = topic.startswith(WINDOWS)
+        message = None if is_window else self._message_on(topic, data)
+        if is_window and topic != DRIVE_WINDOW and not _QUERY.fullmatch(topic.removeprefix(WINDOWS)):
+            raise BadFrameError(f"after '{WINDOWS}' come a subject, a query, and its fields with their values")
         if client.subscriptions >= MOST_SUBSCRIPTIONS:
             raise BadFrameError(f"a client has at most {MOST_SUBSCRIPTIONS} subscriptions")
         if (listened := self._listened.get(topic)) is None:
-            listened = self._listened[topic] = _Listened(message, self._graph.is_latched(topic))
-            self._requests.append(Subscribe(topic, message))
+            listened = self._listened[topic] = _Listened(message, is_window or self._graph.is_latched(topic))
+            if message is not None:
+                self._requests.append(Subscribe(topic, message))
+            self._show_holder()
         stream, is_new = client.streams.get(name), False
         if stream is None:
             stream, is_new = client.streams.setdefault(name, _Stream(name, topic)), True
             listened.streams.append((client.number, stream))
         stream.wishes[_key(data)] = wish
         stream.follow_wishes(self._now)
+        self._follow_windows(topic)
         if is_new and listened.last is not None and stream.offer(listened.last, self._now):
             self.woken.add(client.number)
 
@@ -429,15 +474,17 @@ class Bridge:
             raise BadFrameError(f"there is no subscription '{_short(key)}' to '{name}'")
         if stream.wishes:
             stream.follow_wishes(self._now)
+            self._follow_windows(stream.topic)
         else:
             self._end_stream(client, name)
 
     def _advertise(self, client: _Client, data: Mapping[str, Any]) -> None:
-        _, topic = _topic_of(data)
+        topic = self._commanded(_topic_of(data)[1])
         self._declare(client, topic, self._message_on(topic, data), is_latched=data.get("latch") is True)
 
     def _unadvertise_op(self, client: _Client, data: Mapping[str, Any]) -> None:
         name, topic = _topic_of(data)
+        topic = self._commanded(topic)
         if client.advertised.pop(topic, None) is None:
             raise BadFrameError(f"'{name}' is not advertised")
         if self._drive is not None and topic == self._drive.topic:
@@ -446,22 +493,44 @@ class Bridge:
 
     def _publish(self, client: _Client, data: Mapping[str, Any]) -> None:
         name, topic = _topic_of(data)
-        drives = self._drive is not None and topic == self._drive.topic
-        if drives and self.lease.client != client.number:
-            who = f": '{self.lease.holder}' drives" if self.lease.client is not None else ""
-            raise BadFrameError(f"'{name}' takes commands only from who has the drive lease{who}")
+        topic = self._commanded(topic)
         if (type_ := client.advertised.get(topic)) is None:
             type_ = self._message_on(topic, data)
         message = from_json(type_, data.get("msg", {}), self._stamp)
-        if self._drive is not None and drives:
+        if self._drive is not None and topic == self._drive.topic:
             late = client.lateness.of(data["sent"], self._now) if "sent" in data else 0.0
             if late > LATEST:
                 self._status(client, "warning", f"a command was dropped: it is {late * 1000:.0f} ms late")
                 return
             message = limited(message, self._drive)
-            self.lease.renew(client.number, self._now)
+            if not self._may_drive(client, name, is_moving=moves(message)):
+                return
         self._declare(client, topic, type_, is_latched=data.get("latch") is True)
         self._requests.append(Publish(topic, message))
+
+    def _commanded(self, topic: str) -> str:
+        """Return where velocities go that a client sends to some topic: there is one way to the base."""
+        return self._drive.topic if self._drive is not None and topic in self._drive.aliases else topic
+
+    def _may_drive(self, client: _Client, name: str, *, is_moving: bool) -> bool:
+        """Renew the lease of a client that has it; one that knows no leases gets it while it wants to move.
+
+        Pages of other programs send zero all the time: this neither takes nor keeps the lease.
+
+        Raises:
+            BadFrameError: if the client must not drive.
+        """
+        is_free = self.lease.client is None
+        if self.lease.client != client.number:
+            if client.asks_for_lease or not is_free:
+                if not (is_moving or client.asks_for_lease):
+                    return False
+                who = "" if is_free else f": '{self.lease.holder}' drives"
+                raise BadFrameError(f"'{name}' takes commands only from who has the drive lease{who}")
+            return is_moving and self.lease.take(client.number, f"client {client.number}", self._now)
+        if is_moving or client.asks_for_lease:
+            self.lease.renew(client.number, self._now)
+        return True
 
     def _call_service(self, client: _Client, data: Mapping[str, Any]) -> None:
         name = data.get("service")
@@ -519,6 +588,7 @@ class Bridge:
             raise WrongMessageError("'name' is a text")
         if self._drive is None:
             return {"success": False, "holder": "", "message": "this robot does not drive"}
+        client.asks_for_lease = True
         if not take:
             self._halt_if(self.lease.release(client.number))
             return {"success": True, "holder": self.lease.holder, "message": ""}
@@ -530,10 +600,15 @@ class Bridge:
         return {"success": True, "holder": shown, "message": ""}
 
     def _stop_service(self, client: _Client, given: Mapping[str, Any], number: int) -> None:
-        self._requests.append(AskRobot(number, "stop"))
+        self._requests.append(AskRobot(number, STOP))
 
     def _release_service(self, client: _Client, given: Mapping[str, Any], number: int) -> None:
-        self._requests.append(AskRobot(number, "release"))
+        self._requests.append(AskRobot(number, RELEASE))
+
+    def _ask_service(self, client: _Client, given: Mapping[str, Any], number: int) -> None:
+        if not isinstance(given.get("type"), str):
+            raise WrongMessageError("'type' is the name of a request, such as 'mission.ListMissions'")
+        self._requests.append(AskRobot(number, given))
 
     def _rosapi(self, name: str, given: Mapping[str, Any]) -> dict[str, Any]:
         """Return the answer of `/rosapi/NAME`."""
@@ -582,7 +657,7 @@ class Bridge:
         if self._drive is not None and topic == self._drive.topic:
             return self._drive.type
         ours = self._listened.get(topic) or self._advertised.get(topic)
-        return ours.message.TYPE if ours is not None else self._graph.topics().get(topic, "")
+        return ours.message.TYPE if ours and ours.message else self._graph.topics().get(topic, "")
 
     def _declare(self, client: _Client, topic: str, message: type[Message], *, is_latched: bool = False) -> None:
         if topic in client.advertised:
@@ -605,9 +680,30 @@ class Bridge:
         stream = client.streams.pop(name)
         listened = self._listened[stream.topic]
         listened.streams = [(number, other) for number, other in listened.streams if other is not stream]
-        if not listened.streams:
-            del self._listened[stream.topic]
+        if listened.streams:
+            self._follow_windows(stream.topic)
+            return
+        del self._listened[stream.topic]
+        if stream.topic.startswith(WINDOWS):
+            self._requests.append(Unwatch(stream.topic))
+        else:
             self._requests.append(Unsubscribe(stream.topic))
+
+    def _follow_windows(self, topic: str) -> None:
+        """Look through a window as often as the most curious of its clients wants."""
+        listened = self._listened[topic]
+        if listened.message is not None or (query := _QUERY.fullmatch(topic.removeprefix(WINDOWS))) is None:
+            return
+        period = max(LOOK, min(stream.throttle for _, stream in listened.streams))
+        if period != listened.period:
+            listened.period = period
+            words = query["values"].split("/")[1:]
+            fields = dict(zip(words[::2], words[1::2], strict=True))
+            self._requests.append(Watch(topic, {"type": f"{query['about']}.{query['name']}", **fields}, period))
+
+    def _show_holder(self) -> None:
+        if DRIVE_WINDOW in self._listened:
+            self.seen(DRIVE_WINDOW, {"holder": self.lease.holder}, self._now)
 
     def _halt_if(self, has_ended: bool) -> None:
         """Publish rest, once, if a drive lease has ended."""
@@ -640,6 +736,7 @@ class Bridge:
         self.woken.add(client.number)
 
     def _done(self) -> list[BusRequest]:
+        self._show_holder()
         requests, self._requests = self._requests, []
         return requests
 
@@ -657,6 +754,7 @@ _OPERATIONS: Mapping[str, Callable[[Bridge, _Client, Mapping[str, Any]], None]] 
 
 
 _OWN: Mapping[str, Callable[[Bridge, _Client, Mapping[str, Any], int], dict[str, Any] | None]] = {
+    "/console/ask": Bridge._ask_service,
     "/console/drive": Bridge._drive_service,
     "/console/release": Bridge._release_service,
     "/console/stop": Bridge._stop_service,
@@ -748,4 +846,6 @@ def _finite(value: object) -> object:
         return None
     if isinstance(value, Mapping):
         return {key: _finite(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(inner) for inner in value]
     return value

@@ -9,13 +9,14 @@ from rbxcompose.compiler.plan.model import Instance, Plan
 from rbxcompose.runtime import channel as messages
 from rbxcompose.runtime.folder import ChosenLayers, RobotState
 from rbxcompose.runtime.plan_requests import ApplyPlan, ComparePlan, PlanComparison, RevertPlan
-from rbxcompose.runtime.requests import ROBOT, BringDown, ReleaseRobot, RobotStatus, StopRobot
+from rbxcompose.runtime.requests import ROBOT, BringDown, DescribeRobot, ReleaseRobot, RobotStatus, StopRobot
 from rbxcompose.runtime.supervision.changes import Changes, changes
 from rbxcompose.runtime.supervision.conductor import FINE, Conductor
+from rbxcompose.runtime.supervision.descriptions import described
 from rbxcompose.runtime.supervision.setting_changes import SettingChanges
 from rbxcompose.sdk.registry import component_type
 
-OWN = requests(RobotStatus, StopRobot, ReleaseRobot, ComparePlan, ApplyPlan, RevertPlan, BringDown)
+OWN = requests(RobotStatus, DescribeRobot, StopRobot, ReleaseRobot, ComparePlan, ApplyPlan, RevertPlan, BringDown)
 
 
 class Supervised(Protocol):
@@ -67,7 +68,7 @@ class RequestHandler:
             self._supervisor.refuse(number, str(refusal))
 
     def _carry_out(self, request: Request[Any], number: int) -> None:
-        if not isinstance(request, RobotStatus | BringDown):
+        if not isinstance(request, RobotStatus | DescribeRobot | BringDown):
             self._refuse_at_the_end()
         match request:
             case ApplyPlan():
@@ -77,10 +78,12 @@ class RequestHandler:
             case _:
                 self._supervisor.answer(number, to_data(self._answer(request)))
 
-    def _answer(self, request: Request[Any]) -> RobotState | PlanComparison | str:
+    def _answer(self, request: Request[Any]) -> object:
         match request:
             case RobotStatus():
                 return self._supervisor.state()
+            case DescribeRobot():
+                return tuple(map(described, self._supervisor.conductor.plan.instances))
             case StopRobot():
                 return self._stop()
             case ReleaseRobot():

@@ -7,7 +7,7 @@ import math
 import os
 import socket
 import threading
-from collections.abc import Awaitable, Callable, MutableMapping, Sequence
+from collections.abc import Awaitable, Callable, Coroutine, Mapping, MutableMapping, Sequence
 from contextlib import suppress
 from functools import cached_property, partial
 from pathlib import Path
@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from rbxcompose.base.clock import SteppedClock
 from rbxcompose.base.config import AngularSpeed, Config, Speed
 from rbxcompose.base.levels import Level
-from rbxcompose.base.requests import Command, Refused
+from rbxcompose.base.requests import Refused
 from rbxcompose.bus.graph import Graph, GraphName
 from rbxcompose.bus.tokens import SPACE
 from rbxcompose.bus.transport import Closable
@@ -27,6 +27,8 @@ from rbxcompose.commands.lookup import place_of
 from rbxcompose.domains.console.lease import DriveLimits
 from rbxcompose.domains.console.protocol import (
     LARGEST,
+    RELEASE,
+    STOP,
     Advertise,
     AskRobot,
     Bridge,
@@ -36,11 +38,12 @@ from rbxcompose.domains.console.protocol import (
     Subscribe,
     Unadvertise,
     Unsubscribe,
+    Unwatch,
+    Watch,
 )
-from rbxcompose.runtime.control import NoAnswerError, ask
+from rbxcompose.runtime.control import NoAnswerError, ask_as_data
 from rbxcompose.runtime.folder import BrokenStateError, RobotFolder, all_folders
 from rbxcompose.runtime.process_group.group import stop_key
-from rbxcompose.runtime.requests import ReleaseRobot, StopRobot
 from rbxcompose.sdk import Capability, Component, NeedsExtra, Qos, Setting, TaskStatus, component
 from rbxcompose.sdk.bound import Reply
 from rbxcompose.sdk.capabilities import ServesPage
@@ -69,6 +72,8 @@ _HEADERS = (
     (b"x-frame-options", b"DENY"),
     (b"referrer-policy", b"no-referrer"),
 )
+_DESCRIBE = {"type": "robot.DescribeRobot"}
+_SHOWN = 60  # characters of a name that is wrong
 _NOT_BUILT = Path(__file__).parents[1] / "not_built.html"
 
 
@@ -87,6 +92,8 @@ class GatewayConfig(Config):
     """Where velocities go, by its full name; empty if people cannot drive."""
     drive_type: str = ""
     """The type of that topic."""
+    drive_aliases: tuple[str, ...] = ()
+    """Other topics on the way to the base."""
     max_speed: Speed = math.inf
     """The fastest that is let through."""
     max_turn_rate: AngularSpeed = math.inf
@@ -99,7 +106,8 @@ class GatewayConfig(Config):
         """Return how people drive; None if they cannot."""
         if not self.drive_topic:
             return None
-        return DriveLimits(self.drive_topic, self.drive_type, self.max_speed, self.max_turn_rate)
+        aliases = frozenset(self.drive_aliases)
+        return DriveLimits(self.drive_topic, self.drive_type, self.max_speed, self.max_turn_rate, aliases)
 
 
 @component("gateway")
@@ -313,6 +321,9 @@ class GatewaySession:
         self._pump_timer: asyncio.TimerHandle | None = None
         self._lease_timer: asyncio.TimerHandle | None = None
         self._tasks: set[asyncio.Task[None]] = set()
+        self._is_command: dict[str, bool] = dict.fromkeys((STOP["type"], RELEASE["type"]), True)
+        self._is_command |= dict.fromkeys(("robot.RobotStatus", _DESCRIBE["type"]), False)
+        self._watches: dict[str, asyncio.Task[None]] = {}  # by window
         guest.scheduler.on_error = lambda owner, error: self._loop.call_exception_handler(
             {"message": str(error), "exception": error}
         )
@@ -389,7 +400,7 @@ class GatewaySession:
         if (drive := config.drive) is not None:
             limits = {"max_speed": drive.max_speed, "max_turn_rate": drive.max_turn_rate}
             finite = {name: limit if math.isfinite(limit) else None for name, limit in limits.items()}
-            shown = {"topic": drive.topic, "type": drive.type, **finite, "holder": self._bridge.lease.holder}
+            shown = {"topic": drive.topic, "type": drive.type, **finite}
         about = {"robot": config.robot, "about": config.about, "first_page": config.first_page}
         return {**about, "drive": shown, "values": config.values, "stop": "/console/stop"}
 
@@ -511,9 +522,22 @@ class GatewaySession:
             case ServiceCall():
                 self._call(request)
             case AskRobot():
-                task = self._loop.create_task(self._ask_robot(request))
-                self._tasks.add(task)
-                task.add_done_callback(self._tasks.discard)
+                self._begin(self._ask_robot(request))
+            case Watch():
+                self._stop_watching(request.window)
+                self._watches[request.window] = self._begin(self._watch(request))
+            case Unwatch(window):
+                self._stop_watching(window)
+
+    def _begin(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
+        task = self._loop.create_task(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+        return task
+
+    def _stop_watching(self, window: str) -> None:
+        if (task := self._watches.pop(window, None)) is not None:
+            task.cancel()
 
     def _withdraw(self, end: Closable) -> None:
         self._bus.withdraw(NAME, end)
@@ -538,17 +562,41 @@ class GatewaySession:
         attempt()
 
     async def _ask_robot(self, request: AskRobot) -> None:
-        """Stop or release the robot as the command line does, in a thread: its supervisor may be slow."""
-        command: Command = StopRobot() if request.what == "stop" else ReleaseRobot()
-        try:
-            answer, is_good = await asyncio.to_thread(ask, self._folder, command), True
-        except Refused as refusal:
-            answer, is_good = str(refusal), False
-        except NoAnswerError as error:
-            answer, is_good = str(error), False
-            if request.what == "stop":
-                stopped = await asyncio.to_thread(self._guest.ask, stop_key(self._config.robot), _STOPPED)
-                names = ", ".join(sorted(name.decode() for name in stopped))
-                answer, is_good = f"the supervisor does not answer: stopped over the bus: {names}", bool(names)
-        self._bridge.robot_answered(request.number, answer, is_good=is_good)
+        """Send a request as the command line does; a stop also reaches a robot whose supervisor is slow."""
+        answer, refusal = await self._asked(request.request)
+        if refusal and request.request is STOP:
+            stopped = await asyncio.to_thread(self._guest.ask, stop_key(self._config.robot), _STOPPED)
+            if names := ", ".join(sorted(name.decode() for name in stopped)):
+                answer, refusal = f"the supervisor does not answer: stopped over the bus: {names}", ""
+        self._bridge.robot_answered(request.number, answer, refusal)
         self._pump()
+
+    async def _asked(self, request: Mapping[str, Any], *, may_change: bool = True) -> tuple[Any, str]:
+        """Return the answer of the robot, or why there is none; ask in a thread: its supervisor may be slow."""
+        name = request["type"]
+        if name not in self._is_command:
+            await self._learn_requests()
+        if name not in self._is_command or (self._is_command[name] and not may_change):
+            return None, f"there is no {'request' if may_change else 'query'} '{name[:_SHOWN]}'"
+        return await self._answer(request)
+
+    async def _answer(self, request: Mapping[str, Any]) -> tuple[Any, str]:
+        try:
+            return await asyncio.to_thread(ask_as_data, self._folder, request), ""
+        except (Refused, NoAnswerError) as error:
+            return None, str(error) or "the supervisor does not answer"
+
+    async def _learn_requests(self) -> None:
+        """Ask which requests the components take: `apply` may have brought others."""
+        described, _ = await self._answer(_DESCRIBE)
+        for each in described or ():
+            self._is_command |= each["requests"]
+
+    async def _watch(self, watch: Watch) -> None:
+        """Look at the robot again and again; nobody else looks."""
+        while True:
+            began = self._now
+            answer, refusal = await self._asked(watch.request, may_change=False)
+            self._bridge.seen(watch.window, answer, self._now, refusal)
+            self._pump()
+            await asyncio.sleep(max(0.0, watch.period - (self._now - began)))

@@ -76,7 +76,8 @@ def _drive(page: DrivePage, components: Mapping[str, RobotComponent], namespace:
                 topic = resolve(page.topic, namespace) if page.topic else _free(components, end)
                 limits = {"max_speed": drives.max_speed, "max_turn_rate": drives.max_turn_rate}
                 most = {name: _least(getattr(page, name), limit) for name, limit in limits.items()}
-                return {"drive_topic": topic, "drive_type": end.type_name, **most}
+                aliases = sorted(_on_the_way(components, end) - {topic})
+                return {"drive_topic": topic, "drive_type": end.type_name, "drive_aliases": aliases, **most}
     return {}
 
 
@@ -88,6 +89,17 @@ def _free(components: Mapping[str, RobotComponent], driven: PortEnd) -> str:
             if output and teleop and output.topic == driven.topic and _TELEOP in forwards.inputs:
                 return teleop.topic
     return driven.topic
+
+
+def _on_the_way(components: Mapping[str, RobotComponent], driven: PortEnd) -> set[str]:
+    """Return the topics by which velocities come to this end: its own, and those of the inputs of its mux."""
+    found = {driven.topic}
+    for mux in components.values():
+        for forwards in mux.declared(Forwards):
+            if (output := mux.end(forwards.output)) is not None and output.topic == driven.topic:
+                inputs = filter(None, map(mux.end, forwards.inputs))
+                found |= {end.topic for end in inputs if end.type_name == driven.type_name}
+    return found
 
 
 def _least(written: float | None, of_base: Setting[float] | None) -> float:
