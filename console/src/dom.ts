@@ -51,3 +51,8 @@ export function svg<K extends keyof SVGElementTagNameMap>(
 export function setText(element: Element, text: string): void {
   if (element.textContent !== text) element.textContent = text;
 }
+
+/** Returns what a page shows in place of its content: that it is loading, empty, or what went wrong. */
+export function emptyCard(picture: Icon, text: string, ...more: Child[]): HTMLElement {
+  return h("section", { class: "card empty", role: "status" }, icon(picture), h("p", {}, text), ...more);
+}

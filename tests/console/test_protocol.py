@@ -237,13 +237,13 @@ def test_a_request_goes_to_the_robot_and_its_answer_comes_back() -> None:
         == "'type' is the name of a request, such as 'mission.ListMissions'"
     )
     request = {"type": "mission.PauseMission", "mission": "patrol"}
-    for answer, refusal in (([1, math.nan], ""), (None, "it is not running")):
+    answers: list[tuple[object, object, str]] = [([1, math.nan], [1, None], ""), (None, None, "it is not running")]
+    for answer, shown, refusal in answers:
         assert client.does("call_service", service="/console/ask", args=request) == []
         (asked,) = room.asked()
         assert isinstance(asked, AskRobot)
         assert asked.request == request
         room.bridge.robot_answered(asked.number, answer, refusal)
-        shown = answer and [1, None]
         assert client.gets()[0]["values"] == {"success": not refusal, "message": refusal, "answer": shown}
 
 
