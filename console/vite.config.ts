@@ -9,6 +9,7 @@ export default defineConfig({
     assetsInlineLimit: 0,
     modulePreload: { polyfill: false },
     target: "es2022",
+    license: { fileName: "licenses.md" }, // of what is in the page
   },
   server: { proxy: { "/console": "http://127.0.0.1:8080", "/rosbridge": { target: "ws://127.0.0.1:8080", ws: true } } },
 });
