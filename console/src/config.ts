@@ -25,6 +25,8 @@ export interface Config {
   firstPage: string;
   drive: DriveConfig | null;
   values: Value[];
+  /** Where the consoles of the robots of its system are: `ADDRESS:PORT`, without an address on the same machine. */
+  fleet: Record<string, string>;
 }
 
 export class ConfigError extends Error {
@@ -61,6 +63,9 @@ export function parseConfig(json: unknown): Config {
     about: text(json.about),
     firstPage: text(json.first_page),
     drive: isMessage(json.drive) ? parseDrive(json.drive) : null,
+    fleet: Object.fromEntries(
+      Object.entries(isMessage(json.fleet) ? json.fleet : {}).map(([name, address]) => [name, text(address)]),
+    ),
     values: Object.entries(values).flatMap(([name, value]) => parseValue(name, value)),
   };
 }

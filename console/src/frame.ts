@@ -2,7 +2,7 @@
 import type { Config } from "./config";
 import { h, icon, setText } from "./dom";
 import { formatAge } from "./format";
-import { pages, type Robot } from "./page";
+import { pages as allPages, type Robot } from "./page";
 import { isMessage, type LinkState, type Rosbridge } from "./rosbridge";
 import { Signal } from "./signal";
 import { stopButtons } from "./stop";
@@ -57,6 +57,7 @@ export function showFrame(config: Config, link: Rosbridge): void {
 }
 
 function route(host: HTMLElement, tabs: HTMLElement, robot: Robot): void {
+  const pages = allPages.filter((page) => page.isFor?.(robot) ?? true);
   const links = pages.map((page) => h("a", { href: `#${page.name}` }, page.title));
   tabs.append(...links);
   let close = () => undefined as void;

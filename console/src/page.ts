@@ -17,6 +17,8 @@ export interface Page {
   name: string;
   title: string;
   order: number;
+  /** Whether a robot has anything to show on it; without this, every robot has. */
+  isFor?(robot: Robot): boolean;
   /** Fills the element and returns what closes the page again. */
   open(host: HTMLElement, robot: Robot): () => void;
 }

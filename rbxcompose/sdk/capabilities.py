@@ -7,6 +7,7 @@ text in a capability is the name of a port of the component; everything else is 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields, replace
 from functools import cache
+from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
 from rbxcompose.base.config import Config, Place
@@ -229,6 +230,8 @@ class ServesPage(Capability):
     """TCP port."""
     commands: Setting[str] = Setting("")
     """The topic on which people drive by it, by its full name; empty if they cannot."""
+    fleet: Setting[Mapping[str, str]] = Setting(MappingProxyType({}))
+    """Where the pages of a system's robots are, by robot: `ADDRESS:PORT`, without an address on the same host."""
 
 
 @dataclass(frozen=True, slots=True)

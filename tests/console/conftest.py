@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +11,7 @@ from playwright.sync_api import Browser, BrowserContext, Page, Request, expect
 
 from tests.console.browser import chromium, console
 from tests.console.fake_gateway import FakeGateway
-
-WIDE = {"width": 1280, "height": 800}
+from tests.console.looks import WIDE
 
 
 @pytest.fixture(scope="session")
@@ -44,11 +43,13 @@ def open_page(browser: Browser, gateway: FakeGateway) -> Iterator[Callable[..., 
     contexts: list[BrowserContext] = []
     complaints: list[str] = []
 
-    def look_at(request: Request) -> None:
-        if not request.url.startswith(gateway.url):
-            complaints.append(request.url)
+    def open_page(name: str = "Ada", page_name: str = "", foreign: Sequence[str] = (), **options: Any) -> Page:
+        known = (gateway.url, *foreign)
 
-    def open_page(name: str = "Ada", page_name: str = "", **options: Any) -> Page:
+        def look_at(request: Request) -> None:
+            if not request.url.startswith(known):
+                complaints.append(request.url)
+
         context = browser.new_context(**({"viewport": WIDE} | options))
         contexts.append(context)
         page = context.new_page()

@@ -126,8 +126,12 @@ class FakeGateway:
             return self._response(HTTPStatus.NOT_FOUND, "text/plain", b"not found")
         return self._response(HTTPStatus.OK, mimetypes.guess_type(file)[0] or "text/plain", file.read_bytes())
 
+    def _policy(self) -> str:
+        fleet = self.config.get("fleet", {}) if self.config else {}
+        return f"{POLICY}; connect-src 'self' {' '.join(f'ws://127.0.0.1{address}' for address in fleet.values())}"
+
     def _response(self, status: HTTPStatus, kind: str, body: bytes) -> Response:
-        headers = {"Content-Type": kind, "Content-Length": str(len(body)), "Content-Security-Policy": POLICY}
+        headers = {"Content-Type": kind, "Content-Length": str(len(body)), "Content-Security-Policy": self._policy()}
         return Response(status.value, status.phrase, Headers({**headers, "Connection": "close"}), body)
 
     def _serve(self, connection: ServerConnection) -> None:

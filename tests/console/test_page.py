@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gzip
 import itertools
-import json
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -13,13 +12,12 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.console.browser import AXE, CHROMIUM
+from tests.console.browser import CHROMIUM
 from tests.console.fake_gateway import CONFIG, FakeGateway
+from tests.console.looks import PHONE, overflows, too_small, violations
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium here")
 
-WIDE, PHONE = {"width": 1280, "height": 800}, {"width": 390, "height": 844}
-SMALLEST = 44  # [px] of what a finger touches
 MOST = 1_000_000  # [bytes] of the compressed page
 FIRST_PAINT = 1500  # [ms]
 
@@ -280,15 +278,9 @@ def test_everyone_can_read_and_reach_it(open_page: Callable[..., Page], gateway:
         page.wait_for_timeout(100)
         for width in (1280, 768, 390, 320):
             page.set_viewport_size({"width": width, "height": 844})
-            assert page.evaluate("document.documentElement.scrollWidth") <= width
-            assert page.evaluate(TOO_SMALL, SMALLEST) == []
+            assert not overflows(page)
+            assert too_small(page) == []
         assert violations(page) == []
-
-
-TOO_SMALL = """smallest => [...document.querySelectorAll("button, input, a")]
-    .map(element => [element.outerHTML, element.getBoundingClientRect()])
-    .filter(([, box]) => box.width > 0 && (box.width < smallest || box.height < smallest))
-    .map(([html]) => html)"""
 
 
 def test_the_tab_key_reaches_every_control_and_shows_where_it_is(open_page: Callable[..., Page]) -> None:
@@ -303,10 +295,3 @@ def test_the_tab_key_reaches_every_control_and_shows_where_it_is(open_page: Call
 
 def test_the_page_is_small(static: Path) -> None:
     assert sum(len(gzip.compress(file.read_bytes())) for file in static.rglob("*") if file.is_file()) < MOST
-
-
-def violations(page: Page) -> list[str]:
-    """Return what axe-core finds wrong with the page as it is."""
-    page.evaluate(f"() => {{{AXE.read_text(encoding='utf-8')}}}")
-    found = page.evaluate("axe.run().then(({violations}) => violations)")
-    return [f"{violation['id']}: {json.dumps([node['html'] for node in violation['nodes']])}" for violation in found]

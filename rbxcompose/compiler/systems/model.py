@@ -14,6 +14,8 @@ from rbxcompose.compiler.systems.traffic import Crossing, TopicEnd, crossings, e
 from rbxcompose.manifest.system_file import HostModel, LinkModel, SystemRobotModel
 from rbxcompose.manifest.tree import MappingNode, value_span
 
+PORTS = 65536
+
 
 @dataclass(frozen=True, slots=True)
 class HostOffer:
@@ -162,3 +164,9 @@ class System:
     sources: dict[str, str] = field(default_factory=dict)
     profiles: tuple[str, ...] = ()  # those that were chosen
     known_profiles: tuple[str, ...] = ()
+
+
+def next_port(first: int, taken: Collection[int]) -> int:
+    """Return a port that no robot has; two robots of a host would else try one after the other."""
+    ports: Iterable[int] = (*range(first, PORTS), *range(1024, first))
+    return next(port for port in ports if port not in taken)

@@ -1,7 +1,7 @@
 """Compiles a system: reads its file, compiles its robots, places their components, and checks the whole."""
 
 import hashlib
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import field, replace
 from pathlib import Path
 from typing import Any
@@ -17,8 +17,18 @@ from rbxcompose.compiler.model.robot import resolve as absolute
 from rbxcompose.compiler.model.skills import served_skills
 from rbxcompose.compiler.plan.model import Plan
 from rbxcompose.compiler.systems.certificates import NO_SECURITY
+from rbxcompose.compiler.systems.consoles import ports_of, with_free_ports
 from rbxcompose.compiler.systems.exchange import shared_name
-from rbxcompose.compiler.systems.model import HostOffer, PlacedRobot, System, Wishes, hosts_called, place
+from rbxcompose.compiler.systems.model import (
+    PORTS,
+    HostOffer,
+    PlacedRobot,
+    System,
+    Wishes,
+    hosts_called,
+    next_port,
+    place,
+)
 from rbxcompose.compiler.systems.rules import UNKNOWN_HOST, system_findings
 from rbxcompose.manifest.documents import Documents
 from rbxcompose.manifest.files import PREFIX, PROFILE, find, resolve, shown_name
@@ -70,7 +80,7 @@ def joined(parts: Iterable[Outside]) -> Outside:
     )
 
 
-_PORTS, _APART = 65536, 1000  # all ports; from a robot's links to what it shares
+_APART = 1000  # from the port of a robot's links to that of what it shares
 
 
 def compile_system(
@@ -247,9 +257,10 @@ def _placed_robot(member: _Member, out: System, compiling: _Compiling) -> Placed
     if compilation is None or robot is None or plan is None:
         return None
     bus = replace(
-        plan.bus, port=_next_port(plan.bus.port, {placed_robot.plan.bus.port for placed_robot in out.robots.values()})
+        plan.bus, port=next_port(plan.bus.port, {placed_robot.plan.bus.port for placed_robot in out.robots.values()})
     )
     plan, link_port = replace(plan, robot=name, bus=bus), _link_port(model, plan, out)
+    plan = with_free_ports(plan, {port for robot in out.robots.values() for port in ports_of(robot.plan)})
     names = [instance.name for instance in plan.instances]
     parts = {key: part.components for key, part in robot.manifest.parts.items()}
     problems = list(_wrong_wishes(entry, model, out, {*names, *parts}))
@@ -259,7 +270,7 @@ def _placed_robot(member: _Member, out: System, compiling: _Compiling) -> Placed
     devices = {component.name: {connected.port.value} for component, connected in robot.declared(ConnectedBy)}
     facts = {key: HostOffer(frozenset(host.labels), frozenset(host.devices)) for key, host in out.hosts.items()}
     placed = place(names, facts, Wishes(model.on, model.place), parts, devices)
-    share_port = model.share_port or (link_port + _APART) % _PORTS or _APART
+    share_port = model.share_port or (link_port + _APART) % PORTS or _APART
     version = _version(compilation, out)
     return PlacedRobot(name, entry, model, robot, plan, placed, link_port, share_port, version)
 
@@ -287,13 +298,7 @@ def _link_port(model: SystemRobotModel, plan: Plan, out: System) -> int:
     if model.link_port is not None:
         return model.link_port
     taken = {robot.link_port for robot in out.robots.values()}
-    return _next_port(plan.bus.port, taken)
-
-
-def _next_port(first: int, taken: Collection[int]) -> int:
-    """Return a port that no robot has; two robots of a host would else try one after the other."""
-    ports: Iterable[int] = (*range(first, _PORTS), *range(1024, first))
-    return next(port for port in ports if port not in taken)
+    return next_port(plan.bus.port, taken)
 
 
 def _version(compilation: Compilation, out: System) -> str:

@@ -8,6 +8,7 @@ from typing import TypeVar
 from rbxcompose.compiler.model.robot import resolve
 from rbxcompose.compiler.plan.model import HostAccess, OtherHost, Plan, Share
 from rbxcompose.compiler.systems.certificates import MUTUAL, NO_SECURITY, common_name
+from rbxcompose.compiler.systems.consoles import with_fleet
 from rbxcompose.compiler.systems.cut_link import lease_of
 from rbxcompose.compiler.systems.model import PlacedRobot, System
 from rbxcompose.compiler.systems.traffic import Crossing
@@ -77,7 +78,7 @@ def share_of(system: System, robot: PlacedRobot, host: str) -> Plan:
     plan, hosts = robot.plan, robot.hosts
     others = [other for other in hosts_of(system, robot) if other != host]
     if not others:
-        return plan
+        return with_fleet(system, robot, host, plan)
     mine = tuple(instance for instance in plan.instances if hosts[instance.name] == host)
     runs_missions = any(declared(instance.type, instance.config, RunsMissions) for instance in mine)
     share = Share(
@@ -92,7 +93,8 @@ def share_of(system: System, robot: PlacedRobot, host: str) -> Plan:
         largest=largest(system, robot, host),
         lease=lease_of(robot, is_shared=False),
     )
-    return replace(plan, instances=mine, start=plan.start if runs_missions else None, share=share)
+    mine_alone = replace(plan, instances=mine, start=plan.start if runs_missions else None, share=share)
+    return with_fleet(system, robot, host, mine_alone)
 
 
 def downsampled(system: System, robot: PlacedRobot, host: str) -> dict[str, float]:

@@ -98,6 +98,8 @@ class GatewayConfig(Config):
     """The fastest that is let through."""
     max_turn_rate: AngularSpeed = math.inf
     """The fastest turn that is let through."""
+    fleet: dict[str, str] = {}
+    """Where the pages of the robots of its system are: `ADDRESS:PORT`, without an address on the same host."""
     values: dict[str, dict[str, str]] = {}
     """The values of the manifest: topic, type and field of each, and the unit of the number in the message."""
 
@@ -125,7 +127,8 @@ class Gateway(Component[GatewayConfig]):
     def capabilities(cls, config: GatewayConfig) -> tuple[Capability, ...]:
         """Declare the page, and what it needs."""
         needed = (NeedsExtra(Setting(package), Setting("console")) for package in PACKAGES)
-        return (ServesPage(Setting(config.port, "port"), Setting(config.drive_topic, "drive_topic")), *needed)
+        settings = Setting(config.port, "port"), Setting(config.drive_topic, "drive_topic")
+        return (ServesPage(*settings, Setting(config.fleet, "fleet")), *needed)
 
     def configure(self) -> None:
         """Serve nothing yet: the robot must be known from outside first."""
@@ -401,8 +404,8 @@ class GatewaySession:
             limits = {"max_speed": drive.max_speed, "max_turn_rate": drive.max_turn_rate}
             finite = {name: limit if math.isfinite(limit) else None for name, limit in limits.items()}
             shown = {"topic": drive.topic, "type": drive.type, **finite}
-        about = {"robot": config.robot, "about": config.about, "first_page": config.first_page}
-        return {**about, "drive": shown, "values": config.values, "stop": "/console/stop"}
+        about = {"robot": self._folder.path.name, "about": config.about, "first_page": config.first_page}
+        return {**about, "drive": shown, "values": config.values, "fleet": config.fleet, "stop": "/console/stop"}
 
     def _guarded(self, application: Any) -> Callable[..., Awaitable[None]]:
         """Return the application behind a door that pages of others do not pass."""
@@ -565,7 +568,7 @@ class GatewaySession:
         """Send a request as the command line does; a stop also reaches a robot whose supervisor is slow."""
         answer, refusal = await self._asked(request.request)
         if refusal and request.request is STOP:
-            stopped = await asyncio.to_thread(self._guest.ask, stop_key(self._config.robot), _STOPPED)
+            stopped = await asyncio.to_thread(self._guest.ask, stop_key(self._folder.path.name), _STOPPED)
             if names := ", ".join(sorted(name.decode() for name in stopped)):
                 answer, refusal = f"the supervisor does not answer: stopped over the bus: {names}", ""
         self._bridge.robot_answered(request.number, answer, refusal)

@@ -1,0 +1,173 @@
+/** Fleet: the robots of a system, each with its charge, mission, diagnostics and place, and the way to its console. */
+import { pluck, type Config } from "../config";
+import { h, icon, setText, svg, type Icon } from "../dom";
+import { BatteryGauge } from "../elements/battery_gauge";
+import { frameOf, gridOf, pageOf } from "../fleet";
+import { formatName, formatNumber } from "../format";
+import type { Page, Robot } from "../page";
+import { isMessage, Rosbridge, type Json } from "../rosbridge";
+import "./fleet.css";
+
+const SLOW = 1_000; // [ms] between two looks at a robot
+const LEVELS: readonly { icon: Icon; word: string; kind: string }[] = [
+  { icon: "check", word: "All well", kind: "good" },
+  { icon: "warning", word: "Warning", kind: "fair" },
+  { icon: "warning", word: "Error", kind: "bad" },
+  { icon: "wait", word: "Stale", kind: "none" },
+];
+
+export const page: Page = {
+  name: "fleet",
+  title: "Fleet",
+  order: 5,
+  isFor: ({ config }) => Object.keys(config.fleet).length > 0,
+  open(host, robot) {
+    const map = new FleetMap(robot.config);
+    const rows = Object.entries(robot.config.fleet).map(([name, address]) => robotCard(robot, name, address, map));
+    host.append(
+      h(
+        "div",
+        { class: "fleet" },
+        h("section", { class: "robots", "aria-label": "Robots" }, ...rows.map(({ element }) => element)),
+        map.element,
+      ),
+    );
+    return () => rows.forEach(({ close }) => close());
+  },
+};
+
+function robotCard(robot: Robot, name: string, address: string, map: FleetMap) {
+  const url = pageOf(address, location);
+  const isOwn = name === robot.config.robot;
+  const link = isOwn ? robot.link : new Rosbridge(`${url.replace(/^http/, "ws")}rosbridge`);
+  const state = h("p", { class: "fleet-state", role: "status" });
+  const mission = h("p", { class: "fleet-mission" }, "No mission is running");
+  const health = h("p", { class: "fleet-health" });
+  const charges = h("div", { class: "fleet-charges" });
+  const open = isOwn ? h("span", { class: "label" }, "This page") : h("a", { href: url, class: "button" }, "Open");
+  const element = h(
+    "article",
+    { class: "card fleet-robot" },
+    h("header", {}, h("h2", {}, formatName(name)), open),
+    state,
+    mission,
+    health,
+    charges,
+  );
+  let stoppedBy = "";
+  const showState = () => {
+    const is = link.state.value.is;
+    const lost = is !== "open";
+    element.classList.toggle("lost", lost);
+    if (lost) map.move(name, null);
+    const [picture, words]: [Icon, string] = lost
+      ? ["unlink", is === "connecting" ? "Connecting\u2026" : "Does not answer"]
+      : stoppedBy
+        ? ["stop", `Stopped by ${stoppedBy}`]
+        : ["link", "Up"];
+    state.replaceChildren(icon(picture), words);
+  };
+  const gauges = new Map<string, () => void>();
+  const showStatus = (status: Json) => {
+    if (!isMessage(status)) return;
+    stoppedBy = isMessage(status.stop) ? String(status.stop.by) : "";
+    showState();
+    for (const [battery, gauge] of Object.entries(isMessage(status.batteries) ? status.batteries : {})) {
+      if (gauges.has(battery) || !isMessage(gauge)) continue;
+      const value = { name: battery, topic: String(gauge.topic), type: String(gauge.message), field: "data" };
+      const shown = new BatteryGauge().describe({ ...value, unit: String(gauge.unit ?? "") });
+      charges.append(shown);
+      const stop = link.subscribe(value.topic, (message) => shown.show(pluck(message, "data"), performance.now()), {
+        type: value.type,
+        throttle: SLOW,
+      });
+      gauges.set(battery, stop);
+    }
+  };
+  const showMissions = (missions: Json) => {
+    const running = (Array.isArray(missions) ? missions.filter(isMessage) : []).filter(({ state: is }) =>
+      ["running", "paused", "waiting"].includes(String(is)),
+    );
+    const words = running.map(({ name: mission_, state: is }) => `${formatName(String(mission_))} is ${String(is)}`);
+    setText(mission, words.join(", ") || "No mission is running");
+  };
+  const closers = [
+    link.state.watch(showState),
+    link.watch("robot/RobotStatus", showStatus, SLOW),
+    link.watch("mission/ListMissions", showMissions, SLOW),
+    link.subscribe(
+      "/diagnostics_toplevel_state",
+      ({ level, message }) => {
+        const shown = LEVELS[Number(level)] ?? LEVELS[3]!;
+        health.dataset.kind = shown.kind;
+        health.replaceChildren(icon(shown.icon), [shown.word, level ? String(message ?? "") : ""].filter(Boolean).join(": "));
+      },
+      { type: "diagnostic_msgs/DiagnosticStatus" },
+    ),
+    link.subscribe(
+      "/odom",
+      (message) => {
+        const x = pluck(message, "pose.pose.position.x");
+        const y = pluck(message, "pose.pose.position.y");
+        const z = pluck(message, "pose.pose.orientation.z") ?? 0;
+        const w = pluck(message, "pose.pose.orientation.w") ?? 1;
+        if (x !== null && y !== null) map.move(name, { x, y, heading: 2 * Math.atan2(z, w) });
+      },
+      { type: "nav_msgs/Odometry", throttle: SLOW / 2 },
+    ),
+  ];
+  return {
+    element,
+    close: () => {
+      for (const close of [...closers, ...gauges.values()]) close();
+      if (!isOwn) link.close();
+    },
+  };
+}
+
+interface Pose {
+  x: number;
+  y: number;
+  heading: number;
+}
+
+/** All robots from above, where their odometry has them; x points right. */
+class FleetMap {
+  readonly element: HTMLElement;
+  readonly #drawing = svg("svg", { role: "img", "aria-label": "Where the robots are" });
+  readonly #caption = h("p", { class: "label" }, "Waiting for the first position\u2026");
+  readonly #poses = new Map<string, Pose>();
+
+  constructor(config: Config) {
+    this.element = h("section", { class: "card fleet-map", "aria-label": "Map" }, this.#drawing, this.#caption);
+    for (const name of Object.keys(config.fleet)) this.move(name, null);
+  }
+
+  move(name: string, pose: Pose | null): void {
+    if (pose) this.#poses.set(name, pose);
+    else this.#poses.delete(name);
+    this.#draw();
+  }
+
+  #draw(): void {
+    const poses = [...this.#poses];
+    this.#drawing.replaceChildren();
+    if (poses.length === 0) return;
+    const { left, top, size } = frameOf(poses.map(([, pose]) => pose));
+    this.#drawing.setAttribute("viewBox", `${left} ${top} ${size} ${size}`);
+    const unit = size / 100;
+    this.#drawing.append(svg("path", { d: gridOf(left, top, size), class: "fleet-grid" }));
+    for (const [name, { x, y, heading }] of poses) {
+      const turn = `translate(${x} ${-y}) rotate(${(-heading * 180) / Math.PI}) scale(${unit})`;
+      const arrow = svg("path", { d: "M3 0L-2.500 2L-1.500 0L-2.500 -2Z", transform: turn, class: "fleet-arrow" });
+      const label = svg("text", { x: String(x), y: String(-y + 7 * unit), class: "fleet-label" });
+      label.setAttribute("font-size", String(4 * unit));
+      label.textContent = formatName(name);
+      this.#drawing.append(arrow, label);
+    }
+    setText(
+      this.#caption,
+      poses.map(([name, { x, y }]) => `${formatName(name)} at ${formatNumber(x, "m")}, ${formatNumber(y, "m")} m`).join("; "),
+    );
+  }
+}

@@ -1,0 +1,34 @@
+"""What every page of the console keeps: it fits a phone, fingers hit its controls, and everyone can read it."""
+
+from __future__ import annotations
+
+import json
+
+from playwright.sync_api import Page
+
+from tests.console.browser import AXE
+
+WIDE, PHONE = {"width": 1280, "height": 800}, {"width": 390, "height": 844}
+SMALLEST = 44  # [px] of what a finger touches
+_TOO_SMALL = """smallest => [...document.querySelectorAll("button, input, a")]
+    .map(element => [element.outerHTML, element.getBoundingClientRect()])
+    .filter(([, box]) => box.width > 0 && (box.width < smallest || box.height < smallest))
+    .map(([html]) => html)"""
+
+
+def too_small(page: Page) -> list[str]:
+    """Return the controls that a finger misses."""
+    found: list[str] = page.evaluate(_TOO_SMALL, SMALLEST)
+    return found
+
+
+def overflows(page: Page) -> bool:
+    """Return whether the page is wider than its window."""
+    return bool(page.evaluate("document.documentElement.scrollWidth > document.documentElement.clientWidth"))
+
+
+def violations(page: Page) -> list[str]:
+    """Return what axe-core finds wrong with the page as it is."""
+    page.evaluate(f"() => {{{AXE.read_text(encoding='utf-8')}}}")
+    found = page.evaluate("axe.run().then(({violations}) => violations)")
+    return [f"{violation['id']}: {json.dumps([node['html'] for node in violation['nodes']])}" for violation in found]
