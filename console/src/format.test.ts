@@ -50,7 +50,7 @@ it.each<[string, number | null]>([
 });
 
 it("a configuration has defaults, and a robot without a base has no drive", () => {
-  expect(parseConfig({})).toEqual({ robot: "robot", about: "", firstPage: "", drive: null, values: [] });
+  expect(parseConfig({})).toMatchObject({ robot: "robot", about: "", firstPage: "", drive: null, values: [] });
   const { drive, values } = parseConfig({
     drive: { topic: "/cmd", max_speed: null },
     values: { a: { topic: "/a" }, b: 3 },
