@@ -19,6 +19,8 @@ from rbxcompose.base.printable import plain
 from rbxcompose.commands.formats.text import render_text
 
 FINDINGS, USAGE = 1, 2  # exit codes
+_OF_OTHERS = {"list": "ls", "info": "show"}  # actions as ROS 2 calls them
+_ROBOT = "--robot"
 _NO_ACTION = re.compile(r"-(?!h$|-help$)|.*[./]")  # an option, a path or a type
 
 
@@ -112,7 +114,8 @@ class Parser(argparse.ArgumentParser):
     """Parses the words after a verb; what it refuses is noted as well.
 
     A quantity below zero, `-90deg`, is a value and not an option. Without an action, the default of `action` is
-    carried out: `diag --json` is `diag tree --json`, and `arm robots/mini` is `arm ls robots/mini`.
+    carried out: `diag --json` is `diag tree --json`, `arm robots/mini` is `arm ls robots/mini`, and `diag turtlebot` is
+    `diag tree --robot turtlebot` if a robot of this name is up. Actions may be called as ROS 2 does: `topic list`.
     """
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
@@ -122,14 +125,28 @@ class Parser(argparse.ArgumentParser):
     def parse_known_args(self, args: Iterable[str] | None = None, namespace: Any = None) -> tuple[Any, list[str]]:
         """Parse words, with the usual action before them if they begin with none: a plain word is a misspelt one."""
         words = list(sys.argv[1:] if args is None else args)
-        if (usual := self.get_default("action")) and (not words or _NO_ACTION.match(words[0])):
-            words.insert(0, usual)
+        if usual := self.get_default("action"):
+            groups = self._subparsers._group_actions if self._subparsers else ()
+            actions = {str(name): parser for group in groups for name, parser in dict(group.choices or {}).items()}
+            if words and words[0] not in actions and _OF_OTHERS.get(words[0]) in actions:
+                words[0] = _OF_OTHERS[words[0]]
+            if not words or _NO_ACTION.match(words[0]):
+                words.insert(0, usual)
+            elif words[0] not in actions and _is_robot(words[0]):
+                takes_name = _ROBOT in actions[usual]._option_string_actions
+                words[:0] = [usual, _ROBOT] if takes_name else [usual]
         return super().parse_known_args(words, namespace)
 
     def error(self, message: str) -> NoReturn:
         """Note the error, report it with the usage, and end the command."""
         output().misuse = message
         super().error(message)
+
+
+def _is_robot(word: str) -> bool:
+    from rbxcompose.runtime.folder import RobotFolder  # which verbs that need no robot do not import
+
+    return RobotFolder.of(word).is_known
 
 
 class NotDoneError(Exception):

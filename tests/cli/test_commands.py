@@ -18,7 +18,7 @@ from rbxcompose.base.levels import Level
 from rbxcompose.base.rooms import file_of
 from rbxcompose.commands import main as command
 from rbxcompose.commands import verbs
-from rbxcompose.runtime.folder import ComponentState, RobotFolder, RobotState, StopState
+from rbxcompose.runtime.folder import STATE, ComponentState, RobotFolder, RobotState, StopState
 from rbxcompose.runtime.log import Record, start_new
 from rbxcompose.runtime.processes import Process, boot_id
 from rbxcompose.testing.golden import Golden
@@ -87,6 +87,9 @@ def test_an_unknown_command_is_wrong_usage_with_a_hint(capsys: pytest.CaptureFix
         ("servo --port /dev/ttyUSB0", "servo scan --port /dev/ttyUSB0"),
         ("tf --timeout 1s", "tf tree --timeout 1s"),
         ("topic -a", "topic ls -a"),
+        ("topic list -a", "topic ls -a"),
+        ("topic info /odom", "topic show /odom"),
+        ("action list", "action ls"),
         ("udev", "udev scan"),
     ],
 )
@@ -94,6 +97,15 @@ def test_without_an_action_the_most_common_one_is_meant(written: str, usual: str
     verb, *words = written.split()
     parser = verbs.parser_of(verb, verbs.load(verb))
     assert parser.parse_args(words) == parser.parse_args(usual.split()[1:])
+
+
+def test_the_name_of_a_robot_that_is_up_is_no_misspelt_action(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    folder = RobotFolder.of("turtlebot")
+    folder.make()
+    (folder.path / STATE).touch()
+    parser = verbs.parser_of("diag", verbs.load("diag"))
+    assert parser.parse_args(["turtlebot"]) == parser.parse_args(["tree", "--robot", "turtlebot"])
 
 
 def parsers() -> Iterator[argparse.ArgumentParser]:
