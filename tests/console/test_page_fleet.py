@@ -43,7 +43,7 @@ def test_robots_of_a_system_are_seen_at_once_and_one_opens_each(
     page = open_page(page_name="fleet", foreign=[fleet.url, "http://127.0.0.1:9/"])
     cards = {name: page.locator("article").filter(has_text=name) for name in ("Turtlebot", "Digger", "Lost one")}
     expect(cards["Turtlebot"]).to_contain_text("Patrol is running")
-    expect(cards["Turtlebot"]).to_contain_text("All well")
+    expect(cards["Turtlebot"]).to_contain_text("OK")
     expect(cards["Turtlebot"].locator("battery-gauge")).to_contain_text("78%")
     expect(cards["Digger"]).to_contain_text("Dig is running")
     expect(cards["Digger"]).to_contain_text("Stopped by the mushroom")

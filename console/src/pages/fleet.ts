@@ -1,5 +1,6 @@
 /** Fleet: the robots of a system, each with its charge, mission, diagnostics and place, and the way to its console. */
 import { pluck, type Config } from "../config";
+import { levelOf } from "../diagnostics";
 import { h, icon, setText, svg, type Icon } from "../dom";
 import { BatteryGauge } from "../elements/battery_gauge";
 import { frameOf, gridOf, pageOf } from "../fleet";
@@ -9,13 +10,6 @@ import { isMessage, Rosbridge, type Json } from "../rosbridge";
 import "./fleet.css";
 
 const SLOW = 1_000; // [ms] between two looks at a robot
-const LEVELS: readonly { icon: Icon; word: string; kind: string }[] = [
-  { icon: "check", word: "All well", kind: "good" },
-  { icon: "warning", word: "Warning", kind: "fair" },
-  { icon: "warning", word: "Error", kind: "bad" },
-  { icon: "wait", word: "Stale", kind: "none" },
-];
-
 export const page: Page = {
   name: "fleet",
   title: "Fleet",
@@ -98,7 +92,7 @@ function robotCard(robot: Robot, name: string, address: string, map: FleetMap) {
     link.subscribe(
       "/diagnostics_toplevel_state",
       ({ level, message }) => {
-        const shown = LEVELS[Number(level)] ?? LEVELS[3]!;
+        const shown = levelOf(level);
         health.dataset.kind = shown.kind;
         health.replaceChildren(icon(shown.icon), [shown.word, level ? String(message ?? "") : ""].filter(Boolean).join(": "));
       },

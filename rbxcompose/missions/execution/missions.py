@@ -3,17 +3,29 @@
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
+from rbxcompose.base.expressions.text import show_value
+from rbxcompose.base.expressions.types import FLAG
 from rbxcompose.base.expressions.values import Value
 from rbxcompose.base.findings import clauses, suggest
 from rbxcompose.base.levels import Level
 from rbxcompose.base.requests import Query, Refused
+from rbxcompose.base.units import format_quantity
 from rbxcompose.missions.engine.inputs import NoSuchState, bind_texts, start_at
 from rbxcompose.missions.engine.logbook import LogRecord
 from rbxcompose.missions.engine.world import Observer, Settings
 from rbxcompose.missions.execution.errands import Equipment
 from rbxcompose.missions.execution.mission_run import LogStore, MakeWorld, MissionRun, claims_of
-from rbxcompose.missions.execution.requests import ListedMission, ListMissions, LogPart, LookAtAll, PictureData, Seen
+from rbxcompose.missions.execution.requests import (
+    ListedInput,
+    ListedMission,
+    ListMissions,
+    LogPart,
+    LookAtAll,
+    PictureData,
+    Seen,
+)
 from rbxcompose.missions.program.linker import link
+from rbxcompose.missions.program.machines import Datum, Input
 from rbxcompose.missions.program.outcomes import IDLE, NAMES
 from rbxcompose.missions.program.program import Program
 from rbxcompose.missions.view.picture import picture_of, picture_to_data
@@ -122,7 +134,10 @@ class RunningMissions:
     def _listed(self, name: str, program: Program) -> ListedMission:
         run, names = self.runs.get(name), self._equipment.names
         claims = sorted(claims_of(link(program, names.missions), names.skills)) if name in names.missions else []
-        return ListedMission(name, program.about, run.state if run else NAMES[IDLE], tuple(claims))
+        inputs = tuple(map(_listed_input, program.inputs.values()))
+        states = program.nodes[program.main].step.states
+        starts = states.names if states else ()
+        return ListedMission(name, program.about, run.state if run else NAMES[IDLE], tuple(claims), inputs, starts)
 
     def since(self, number: int) -> LogPart:
         """Return the records of the log after the first `number`."""
@@ -200,3 +215,16 @@ class MissionFeed:
             return
         self._published = seen
         self._window.put(fresh)
+
+
+def _listed_input(given: Input) -> ListedInput:
+    choices = ("false", "true") if given.type == FLAG else given.type.choices
+    return ListedInput(
+        given.name, given.type.detail, choices, None if given.default is None else _written(given.default)
+    )
+
+
+def _written(datum: Datum) -> str:
+    if datum.type.dimension is not None and isinstance(datum.value, int | float):
+        return format_quantity(datum.value, datum.type.dimension)
+    return show_value("", datum.value)

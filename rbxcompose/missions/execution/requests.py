@@ -63,13 +63,27 @@ class ResumeMission(_OfMission):
 
 
 @dataclass(frozen=True, slots=True)
+class ListedInput:
+    """An input of a mission: what may be given in words, the words of a choice, and its default as it is written."""
+
+    name: str
+    about: str
+    choices: tuple[str, ...] = ()
+    default: str | None = None
+    """None if it must be given."""
+
+
+@dataclass(frozen=True, slots=True)
 class ListedMission:
-    """A mission of the robot, its state, and the parts of the robot that it needs exclusively."""
+    """A mission of the robot, its state, the parts of the robot that it needs exclusively, and its inputs."""
 
     name: str
     about: str
     state: str
     claims: tuple[str, ...]
+    inputs: tuple[ListedInput, ...] = ()
+    starts: tuple[str, ...] = ()
+    """The states in which it may start, if it is a machine."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ import math
 import os
 import socket
 import threading
-from collections.abc import Awaitable, Callable, Coroutine, Mapping, MutableMapping, Sequence
+from collections.abc import Awaitable, Callable, Coroutine, Iterable, Iterator, Mapping, MutableMapping, Sequence
 from contextlib import suppress
 from functools import cached_property, partial
 from pathlib import Path
@@ -66,8 +66,9 @@ _PING = 5.0  # [s] until a client that does not read counts as gone
 _FAREWELL = 1  # [s] for clients to let go
 _GOODBYE = 3.0  # [s] to wait for the thread to end
 _STOPPED = 1.0  # [s] for all processes to answer to a stop over the bus
+_NAMES = ("127.0.0.1", "localhost", "[::1]")  # of this machine
+_POLICY = "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; object-src 'none'"
 _HEADERS = (
-    (b"content-security-policy", b"default-src 'self'; frame-ancestors 'none'; base-uri 'none'; object-src 'none'"),
     (b"x-content-type-options", b"nosniff"),
     (b"x-frame-options", b"DENY"),
     (b"referrer-policy", b"no-referrer"),
@@ -305,6 +306,12 @@ class LiveGraph:
         return sorted({end.node for found in self._graph.topics if found.name == topic for end in getattr(found, side)})
 
 
+def _places(addresses: Iterable[str]) -> Iterator[str]:
+    """Yield the hosts with ports of pages; one without a host is on this machine, by each of its names."""
+    for address in addresses:
+        yield from (f"{name}{address}" for name in _NAMES) if address.startswith(":") else (address,)
+
+
 def _types(names: Sequence[GraphName]) -> dict[str, str]:
     return {found.name: found.types[0] for found in names if not found.is_hidden}
 
@@ -410,8 +417,12 @@ class GatewaySession:
     def _guarded(self, application: Any) -> Callable[..., Awaitable[None]]:
         """Return the application behind a door that pages of others do not pass."""
         port = self._config.port
-        hosts = {f"{name}{end}" for name in ("127.0.0.1", "localhost", "[::1]") for end in (f":{port}", "")}
+        hosts = {f"{name}{end}" for name in _NAMES for end in (f":{port}", "")}
         origins = {f"http://{host}" for host in hosts if port == 80 or host.endswith(f":{port}")}
+        fleet = sorted(_places(self._config.fleet.values()))  # a page shows all robots of its system
+        origins |= {f"http://{place}" for place in fleet}
+        policy = "; connect-src ".join((_POLICY, " ".join(("'self'", *(f"ws://{place}" for place in fleet)))))
+        hardening = ((b"content-security-policy", policy.encode()), *_HEADERS)
 
         async def guarded(scope: MutableMapping[str, Any], receive: Any, send: Any) -> None:
             headers = dict(scope["headers"])
@@ -429,7 +440,7 @@ class GatewaySession:
 
             async def hardened(message: MutableMapping[str, Any]) -> None:
                 if message["type"] == "http.response.start":
-                    message["headers"] = [*message.get("headers", ()), *_HEADERS]
+                    message["headers"] = [*message.get("headers", ()), *hardening]
                 await send(message)
 
             if is_known:

@@ -1,0 +1,123 @@
+/** A mission as its page shows it: rows of its picture, with the status of each node. */
+import { isMessage, type Json, type Message } from "./rosbridge";
+
+/** One node of the picture; an interrupt is a node without a number. */
+export interface Drawn {
+  number: number | null;
+  kind: string;
+  text: string;
+  name: string;
+  role: string;
+  notes: string[];
+  arrows: { outcome: string; to: string }[];
+  is_start: boolean;
+  children: Drawn[];
+  sign: string;
+  form: string;
+}
+
+export interface Picture {
+  name: string;
+  about: string;
+  main: Drawn;
+  interrupts: Drawn[];
+  count: number;
+}
+
+export interface Transition {
+  time: number;
+  state: string;
+  to: string;
+  outcome: string;
+}
+
+/** What a look at a mission shows; statuses are by node number. */
+export interface Seen {
+  mission: string;
+  state: string;
+  began: number;
+  statuses: Record<string, number>;
+  data: Record<string, Json>;
+  transitions: Transition[];
+  picture: Picture;
+}
+
+export interface Input {
+  name: string;
+  about: string;
+  choices: string[];
+  default: string | null;
+}
+
+export interface Listed {
+  name: string;
+  about: string;
+  state: string;
+  claims: string[];
+  inputs: Input[];
+  starts: string[];
+}
+
+export const STATUSES = ["idle", "running", "success", "failure", "skipped"] as const;
+export type Status = (typeof STATUSES)[number];
+
+export const ACTIVE: ReadonlySet<string> = new Set(["running", "paused", "waiting"]);
+
+/** Returns the status of a node; an interrupt has that of its reaction. */
+export function statusOf(node: Drawn, statuses: Record<string, number>): Status {
+  const number = node.number ?? node.children[0]?.number;
+  return STATUSES[number == null ? 0 : (statuses[number] ?? 0)] ?? "idle";
+}
+
+/** Returns what stands in the row of a node: its role, its name and what it does. */
+export function titleOf(node: Drawn): { role: string; name: string; what: string } {
+  const isState = node.form === "state";
+  return {
+    role: node.role,
+    name: node.name,
+    what: isState ? (node.kind === "state" ? node.text : `${node.kind} ${node.text}`.trim()) : `${node.kind} ${node.text}`.trim(),
+  };
+}
+
+/** Returns the deepest node that runs, which a viewer wants to see; null if none does. */
+export function activeNode(picture: Picture, statuses: Record<string, number>): Drawn | null {
+  const within = (node: Drawn): Drawn | null => {
+    if (statusOf(node, statuses) !== "running") return null;
+    for (const child of node.children) {
+      const found = within(child);
+      if (found) return found;
+    }
+    return node;
+  };
+  for (const root of [...picture.interrupts, picture.main]) {
+    const found = within(root);
+    if (found) return found;
+  }
+  return null;
+}
+
+/** Returns a value of a mission's data for people: places by their names, numbers with few digits. */
+export function shownValue(value: Json): string {
+  if (value === null) return "nothing yet";
+  if (typeof value === "number") return String(Number(value.toPrecision(4)));
+  if (typeof value === "boolean") return value ? "true" : "false";
+  if (typeof value === "string") return value || "(empty)";
+  if (Array.isArray(value)) return value.map(shownValue).join(", ") || "(empty)";
+  const keys = Object.keys(value);
+  const inner = value[keys[0] ?? ""];
+  if (keys.length === 1 && /^[A-Z]/.test(keys[0]!)) {
+    if (isMessage(inner)) return typeof inner.name === "string" && inner.name ? inner.name : fields(inner);
+    return inner === undefined || inner === null ? "nothing yet" : shownValue(inner);
+  }
+  return keys.length === 1 && keys[0] === "map" && isMessage(inner) ? fields(inner) : fields(value);
+}
+
+function fields(value: Message): string {
+  return Object.entries(value)
+    .map(([name, one]) => `${name} ${shownValue(one)}`)
+    .join(", ");
+}
+
+export function isSeen(answer: Json): answer is Message & Seen {
+  return isMessage(answer) && isMessage(answer.picture) && isMessage(answer.statuses);
+}

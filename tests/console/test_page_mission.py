@@ -1,0 +1,150 @@
+"""The pages of missions and of diagnostics in a real browser."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from rbxcompose.base.requests import Refused
+from tests.console.browser import CHROMIUM
+from tests.console.fake_gateway import FakeGateway
+from tests.console.looks import PHONE, WIDE, overflows, too_small, violations
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium here")
+
+LOOK_AT = "mission/LookAtAll/mission/patrol"
+TREE = "diagnostics/ShowDiagnostics"
+
+
+def node(number: int | None, kind: str, text: str = "", *children: dict[str, Any], **more: Any) -> dict[str, Any]:
+    plain = {"name": "", "role": "", "notes": [], "arrows": [], "is_start": False, "sign": "", "form": "after"}
+    return {"number": number, "kind": kind, "text": text, "children": list(children), **plain, **more}
+
+
+def seen(state: str, statuses: dict[str, int]) -> dict[str, Any]:
+    main = node(0, "repeat", "$rounds", node(1, "go_to", "$corner", notes=["timeout 10 s"]))
+    interrupt = node(None, "interrupt", "when $battery < 50 %", node(2, "recharge"), name="battery_low")
+    picture = {"name": "patrol", "about": "", "main": main, "interrupts": [interrupt], "count": 3}
+    data = {"corner": {"Place": {"name": "corner_2", "x": 1.0, "y": 1.0, "heading": 0.0}}}
+    look = {"mission": "patrol", "version": 1, "began": 1.0, "transitions": []}
+    return {**look, "state": state, "statuses": statuses, "data": data, "picture": picture}
+
+
+def listed(state: str) -> list[dict[str, Any]]:
+    rounds = {"name": "rounds", "about": "a count", "choices": [], "default": "2"}
+    speed = {"name": "speed", "about": "one of slow, fast", "choices": ["slow", "fast"], "default": "slow"}
+    about = {"about": "Visit the corners.", "claims": ["base"], "starts": []}
+    return [{"name": "patrol", "state": state, "inputs": [rounds, speed], **about}]
+
+
+@pytest.fixture
+def patrol(gateway: FakeGateway) -> FakeGateway:
+    gateway.windows["mission/ListMissions"] = listed("running")
+    gateway.windows[LOOK_AT] = seen("running", {"0": 1, "1": 1})
+    return gateway
+
+
+def test_a_mission_is_seen_live_and_every_status_has_a_word(
+    open_page: Callable[..., Page], patrol: FakeGateway
+) -> None:
+    page = open_page(page_name="mission")
+    step = page.get_by_role("treeitem").filter(has_text="go_to $corner").last
+    expect(step).to_contain_text("running")
+    expect(page.get_by_label("Data")).to_contain_text("corner_2")
+    interrupt = page.get_by_role("treeitem").filter(has_text="battery_low")
+    expect(interrupt).to_contain_text("not yet")
+    patrol.show(LOOK_AT, seen("running", {"0": 1, "1": 2, "2": 1}))
+    expect(step).to_contain_text("done")
+    expect(interrupt.locator(".node").first).to_contain_text("running")
+    patrol.say("/rosout", {"name": "mission", "msg": "recharge", "stamp": {"sec": 1, "nanosec": 0}})
+    expect(page.get_by_label("Story")).to_contain_text("recharge")
+    assert violations(page) == []
+
+
+def test_a_person_pauses_cancels_and_starts_a_mission(open_page: Callable[..., Page], patrol: FakeGateway) -> None:
+    def refuse(_: dict[str, Any]) -> str:
+        raise Refused("mission patrol is waiting")
+
+    patrol.answers |= {"mission.PauseMission": refuse, "mission.RunMission": lambda _: "patrol runs"}
+    page = open_page(page_name="mission")
+    page.get_by_role("button", name="Pause").click()
+    expect(page.get_by_text("mission patrol is waiting")).to_be_visible()
+    patrol.show("mission/ListMissions", listed("success"))
+    page.get_by_role("textbox", name="Rounds").fill("3")
+    page.get_by_role("combobox", name="Speed").select_option("fast")
+    page.get_by_role("button", name="Start").click()
+    expect(page.get_by_text("patrol runs")).to_be_visible()
+    (asked,) = patrol.asked("mission.RunMission")
+    assert asked["inputs"] == {"rounds": "3", "speed": "fast"}
+    assert asked["start"] == ""
+    assert violations(page) == []
+
+
+def test_a_robot_without_missions_says_where_they_are_written(
+    open_page: Callable[..., Page], gateway: FakeGateway
+) -> None:
+    gateway.windows["mission/ListMissions"] = []
+    expect(open_page(page_name="mission").get_by_text("This robot has no missions.")).to_be_visible()
+
+
+def line(path: str, level: int, message: str, *, is_group: bool = False) -> dict[str, Any]:
+    plain = {"depth": path.count("/") - 1, "hardware_id": "", "values": [["temperature", "71 °C"]]}
+    return {
+        "path": path,
+        "name": path.rpartition("/")[2],
+        "is_group": is_group,
+        "level": level,
+        "message": message,
+        **plain,
+    }
+
+
+def tree(level: int) -> dict[str, Any]:
+    lines = [
+        line("/arm", level, "", is_group=True),
+        line("/arm/elbow", level, "overheated" if level else "OK"),
+        line("/base", 0, "", is_group=True),
+        line("/base/wheels", 0, "OK"),
+    ]
+    return {
+        "time": 100.0,
+        "level": level,
+        "cause": "/arm: elbow: overheated" if level else "",
+        "lines": lines,
+        "left_out": 0,
+    }
+
+
+def test_what_is_wrong_and_why_is_seen_at_once(open_page: Callable[..., Page], gateway: FakeGateway) -> None:
+    gateway.windows[TREE] = tree(0)
+    change = {"number": 1, "time": 60.0, "path": "/arm/elbow", "old": 0, "new": 2, "cause": "overheated"}
+    gateway.answers["diagnostics.ListChanges"] = lambda asked: [change] if asked["after"] < 1 else []
+    gateway.answers["diagnostics.Acknowledge"] = lambda _: "acknowledged"
+    page = open_page(page_name="diagnostics")
+    expect(page.get_by_role("heading", name="Everything is fine")).to_be_visible()
+    expect(page.get_by_role("button", name="wheels")).to_have_count(0)
+    gateway.show(TREE, tree(2))
+    expect(page.get_by_role("heading", name="Error: /arm: elbow: overheated")).to_be_visible()
+    expect(page.get_by_label("Details")).to_contain_text("71 °C")
+    gateway.show(TREE, tree(2) | {"time": 101.0})
+    expect(page.get_by_label("History", exact=True)).to_contain_text("/arm/elbow Error overheated")
+    assert violations(page) == []
+    page.get_by_role("button", name="Acknowledge", exact=True).click()
+    expect(page.get_by_text("acknowledged", exact=True)).to_be_visible()
+    assert gateway.asked("diagnostics.Acknowledge")[0]["path"] == ""
+
+
+@pytest.mark.parametrize("name", ["mission", "diagnostics"])
+@pytest.mark.parametrize("size", [WIDE, PHONE], ids=["wide", "phone"])
+def test_it_fits_the_window_and_the_finger(
+    open_page: Callable[..., Page], patrol: FakeGateway, name: str, size: Any
+) -> None:
+    patrol.windows[TREE] = tree(2)
+    page = open_page(page_name=name, viewport=size, color_scheme="dark")
+    expect(page.get_by_role("treeitem").first).to_be_visible()
+    assert not overflows(page)
+    assert too_small(page) == []
+    assert violations(page) == []
