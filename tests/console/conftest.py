@@ -24,7 +24,7 @@ def static() -> Path:
     return static
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")  # its event loop must be gone before tests of other modules have theirs
 def browser(static: Path) -> Iterator[Browser]:
     with chromium() as browser:
         yield browser

@@ -421,7 +421,10 @@ class GatewaySession:
         origins = {f"http://{host}" for host in hosts if port == 80 or host.endswith(f":{port}")}
         fleet = sorted(_places(self._config.fleet.values()))  # a page shows all robots of its system
         origins |= {f"http://{place}" for place in fleet}
-        policy = "; connect-src ".join((_POLICY, " ".join(("'self'", *(f"ws://{place}" for place in fleet)))))
+        # A policy cannot name addresses of IPv6.
+        policy = "; connect-src ".join(
+            (_POLICY, " ".join(("'self'", *(f"ws://{place}" for place in fleet if "[" not in place))))
+        )
         hardening = ((b"content-security-policy", policy.encode()), *_HEADERS)
 
         async def guarded(scope: MutableMapping[str, Any], receive: Any, send: Any) -> None:
