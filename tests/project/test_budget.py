@@ -45,7 +45,7 @@ ROOMS: dict[str, tuple[int, int, int, int]] = {
     "domains/arms": (12431, 74, 2, 1135),
     "domains/bases": (1444, 14, 0, 113),
     "domains/body": (3540, 28, 2, 372),
-    "domains/console": (1387, 9, 1, 109),
+    "domains/console": (1389, 9, 1, 109),
     "domains/devices": (741, 9, 0, 80),
     "domains/diagnostics": (2349, 24, 4, 214),
     "domains/muxes": (1984, 15, 1, 116),

@@ -50,7 +50,8 @@ def test_people_drive_by_the_input_teleop_of_the_mux_before_the_base(tmp_path: P
 def test_what_is_written_counts_within_the_limits_of_the_base(tmp_path: Path) -> None:
     drive = "{topic: cmd_vel/joystick, max_speed: 2 m/s, max_turn_rate: 0.5 rad/s}"
     config = gateway(tmp_path, f"{BASE}{MUX}console: {{port: 80, drive: {drive}}}")
-    assert config.drive == DriveLimits("/cmd_vel/joystick", TWIST, 0.5, 0.5)
+    others = frozenset({"/cmd_vel", "/cmd_vel/teleop"})
+    assert config.drive == DriveLimits("/cmd_vel/joystick", TWIST, 0.5, 0.5, others)
     assert config.port == 80
 
 
