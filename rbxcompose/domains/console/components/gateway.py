@@ -612,8 +612,9 @@ class GatewaySession:
     async def _watch(self, watch: Watch) -> None:
         """Look at the robot again and again; nobody else looks."""
         while True:
-            began = self._now
+            is_due = asyncio.Event()
+            self._loop.call_later(watch.period, is_due.set)
             answer, refusal = await self._asked(watch.request, may_change=False)
             self._bridge.seen(watch.window, answer, self._now, refusal)
             self._pump()
-            await asyncio.sleep(max(0.0, watch.period - (self._now - began)))
+            await is_due.wait()
