@@ -19,12 +19,22 @@ export interface DriveConfig {
   maxTurnRate: number;
 }
 
+/** A place of the manifest, a pose in `map` [m, m, rad]. */
+export interface Place {
+  name: string;
+  x: number;
+  y: number;
+  heading: number;
+  colour: string;
+}
+
 export interface Config {
   robot: string;
   about: string;
   firstPage: string;
   drive: DriveConfig | null;
   values: Value[];
+  places: Place[];
   /** Where the consoles of the robots of its system are: `ADDRESS:PORT`, without an address on the same machine. */
   fleet: Record<string, string>;
 }
@@ -67,6 +77,7 @@ export function parseConfig(json: unknown): Config {
       Object.entries(isMessage(json.fleet) ? json.fleet : {}).map(([name, address]) => [name, text(address)]),
     ),
     values: Object.entries(values).flatMap(([name, value]) => parseValue(name, value)),
+    places: Object.entries(isMessage(json.places) ? json.places : {}).flatMap(([name, place]) => parsePlace(name, place)),
   };
 }
 
@@ -92,6 +103,13 @@ function parseValue(name: string, value: Json): Value[] {
       unit: text(value.unit),
     },
   ];
+}
+
+function parsePlace(name: string, place: Json): Place[] {
+  if (!isMessage(place)) return [];
+  const { x, y, heading } = place;
+  if (typeof x !== "number" || typeof y !== "number" || typeof heading !== "number") return [];
+  return [{ name, x, y, heading, colour: text(place.colour) }];
 }
 
 function text(value: Json | undefined): string {

@@ -8,6 +8,8 @@ export type Message = { [key: string]: Json };
 export type Frame =
   | { op: "publish"; topic: string; msg: Message }
   | { op: "service_response"; id: string; service: string; result: boolean; values: Json }
+  | { op: "action_feedback"; id: string; values: Message }
+  | { op: "action_result"; id: string; result: boolean; status: number; values: Json }
   | { op: "status"; id: string; level: string; msg: string };
 
 /** `retry` is when the next attempt begins [ms, of the clock of `Date.now`]. */
@@ -38,6 +40,28 @@ export class CallError extends Error {
   override name = "CallError";
 }
 
+/** A call whose outcome nobody knows: the link was lost meanwhile. */
+export class LostError extends CallError {
+  override name = "LostError";
+}
+
+/** How goals end, by the numbers of `action_msgs/GoalStatus`. */
+export const SUCCEEDED = 4;
+export const CANCELED = 5;
+export const ABORTED = 6;
+
+/** How a goal has ended: with one of the numbers above, and its result, or why. */
+export interface Outcome {
+  status: number;
+  values: Json;
+}
+
+/** A goal that was sent. `done` fails with a CallError if it was refused, a LostError if the link was lost. */
+export interface Goal {
+  done: Promise<Outcome>;
+  cancel(): void;
+}
+
 /** Returns how long to wait before an attempt [ms]: doubled each time, with up to a quarter taken off at random. */
 export function waitBefore(attempt: number, random: () => number = Math.random): number {
   return Math.min(LONGEST_WAIT, FIRST_WAIT * 2 ** attempt) * (1 - random() / 4);
@@ -64,6 +88,13 @@ export function parseFrame(text: unknown): Frame | undefined {
       values: frame.values ?? null,
     };
   }
+  if (op === "action_feedback" && typeof id === "string") {
+    return { op, id, values: isMessage(frame.values) ? frame.values : {} };
+  }
+  if (op === "action_result" && typeof id === "string") {
+    const status = typeof frame.status === "number" ? frame.status : 0;
+    return { op, id, result: frame.result !== false, status, values: frame.values ?? null };
+  }
   if (op === "status" && typeof msg === "string") {
     return { op, id: typeof id === "string" ? id : "", level: typeof level === "string" ? level : "", msg };
   }
@@ -86,6 +117,12 @@ interface Call {
   timer: ReturnType<typeof setTimeout>;
 }
 
+interface SentGoal {
+  resolve(outcome: Outcome): void;
+  reject(error: CallError): void;
+  onFeedback(values: Message): void;
+}
+
 /**
  * The link to a robot. Subscriptions and advertisements outlive a lost connection: they are sent again when it is back.
  * Publishing and calling do not wait for it: a command that comes late is worse than none.
@@ -104,6 +141,7 @@ export class Rosbridge {
   readonly #subscriptions = new Map<string, Subscription>();
   readonly #advertised = new Map<string, string>();
   readonly #calls = new Map<string, Call>();
+  readonly #goals = new Map<string, SentGoal>();
 
   constructor(url: string, open: (url: string) => Socket = (address) => new WebSocket(address)) {
     this.#url = url;
@@ -196,6 +234,19 @@ export class Rosbridge {
     });
   }
 
+  /** Sends a goal to an action. It ends when the robot says so: there is no timeout. */
+  act(action: string, type: string, goal: Message, onFeedback: (values: Message) => void = () => undefined): Goal {
+    const id = this.#nextId("goal");
+    const done = new Promise<Outcome>((resolve, reject) => {
+      if (this.#send({ op: "send_action_goal", id, action, action_type: type, args: goal, feedback: true })) {
+        this.#goals.set(id, { resolve, reject, onFeedback });
+      } else {
+        reject(new CallError("not connected"));
+      }
+    });
+    return { done, cancel: () => void (this.#goals.has(id) && this.#send({ op: "cancel_action_goal", id, action })) };
+  }
+
   #nextId(what: string): string {
     this.#lastId += 1;
     return `${what}:${this.#lastId}`;
@@ -233,9 +284,11 @@ export class Rosbridge {
     socket.close();
     for (const call of this.#calls.values()) {
       clearTimeout(call.timer);
-      call.reject(new CallError("the connection was lost"));
+      call.reject(new LostError("the connection was lost"));
     }
     this.#calls.clear();
+    for (const goal of this.#goals.values()) goal.reject(new LostError("the connection was lost"));
+    this.#goals.clear();
     if (this.state.value.is === "closed") return;
     const wait = waitBefore(this.#attempt);
     this.#attempt += 1;
@@ -247,7 +300,16 @@ export class Rosbridge {
     const frame = parseFrame(text);
     if (!frame) return;
     if (frame.op === "status") {
-      this.onStatus(frame);
+      const refused = frame.level === "error" ? this.#take(frame.id) : undefined;
+      if (refused) refused.reject(new CallError(frame.msg));
+      else this.onStatus(frame);
+    } else if (frame.op === "action_feedback") {
+      this.#goals.get(frame.id)?.onFeedback(frame.values);
+    } else if (frame.op === "action_result") {
+      const { status, values } = frame;
+      const goal = this.#take(frame.id);
+      if (frame.result || status === CANCELED || status === ABORTED) goal?.resolve({ status, values });
+      else goal?.reject(new CallError(reasonOf(values)));
     } else if (frame.op === "publish") {
       for (const listener of [...(this.#subscriptions.get(frame.topic)?.listeners ?? [])]) listener(frame.msg);
     } else {
@@ -258,6 +320,13 @@ export class Rosbridge {
       if (frame.result) call.resolve(frame.values);
       else call.reject(new CallError(reasonOf(frame.values)));
     }
+  }
+
+  /** Returns a goal that has ended, and forgets it. */
+  #take(id: string): SentGoal | undefined {
+    const goal = this.#goals.get(id);
+    this.#goals.delete(id);
+    return goal;
   }
 }
 

@@ -11,11 +11,12 @@ from rbxcompose.base.findings import kind
 from rbxcompose.compiler.model.robot import PortEnd, RobotComponent, resolve
 from rbxcompose.compiler.model.values import value_of
 from rbxcompose.compiler.sections.bus import bus
+from rbxcompose.compiler.sections.places import places
 from rbxcompose.compiler.sections.values import values
 from rbxcompose.manifest.fields import TopicName
 from rbxcompose.manifest.registry import section
 from rbxcompose.manifest.section import OVERLAY, ROBOT, Contents, Reading, WantedComponent, Wiring
-from rbxcompose.manifest.tree import ScalarNode
+from rbxcompose.manifest.tree import MappingNode, ScalarNode, TreeNode
 from rbxcompose.sdk.capabilities import Drives, Forwards, Setting
 
 NOT_BEYOND_THIS_MACHINE = kind("RBX9601")
@@ -51,7 +52,7 @@ class ConsoleModel(Config):
 def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]:
     if (read := contents.of(console)) is None:
         return
-    name, about = (node.text if isinstance(node := contents.root.get(key), ScalarNode) else "" for key in _HEAD)
+    name, about = (_text(contents.root, key) for key in _HEAD)
     components: Mapping[str, RobotComponent] = wiring.components
     namespace = contents.of(bus).namespace or ""
     config = {
@@ -61,11 +62,32 @@ def _components(contents: Contents, wiring: Wiring) -> Iterator[WantedComponent]
         "first_page": read.first_page,
         **_drive(read.drive, components, namespace),
         "values": _values(contents, components, namespace),
+        "places": _places(contents),
     }
     yield WantedComponent(GATEWAY, GATEWAY, config, ("console",))
 
 
 _HEAD = ("name", "about")
+
+
+def _text(node: TreeNode | None, key: str) -> str:
+    """Return what is written at a key; empty if nothing is."""
+    value = node.get(key) if isinstance(node, MappingNode) else None
+    return value.text if isinstance(value, ScalarNode) else ""
+
+
+def _places(contents: Contents) -> dict[str, object]:
+    """Return the places of the manifest, with the colours that only viewers need."""
+    written = contents.root.get("places")
+    return {
+        name: {
+            "x": place.x,
+            "y": place.y,
+            "heading": place.heading,
+            "colour": _text(written.get(name) if isinstance(written, MappingNode) else None, "colour"),
+        }
+        for name, place in contents.of(places).items()
+    }
 
 
 def _drive(page: DrivePage, components: Mapping[str, RobotComponent], namespace: str) -> dict[str, object]:

@@ -1,0 +1,507 @@
+/** Map: where the robot is, what it sees and where it goes; press a pose or choose a place, and it drives there. */
+import type { Place } from "../config";
+import { watchComponents, type Component, type Port } from "../description";
+import { h, icon, setText, type Icon } from "../dom";
+import { MapCanvas, type Drag, type Tool } from "../elements/map_canvas";
+import { formatAge, formatName, formatNumber } from "../format";
+import {
+  applied,
+  distance,
+  frameOf,
+  Frames,
+  poseMessage,
+  poseOf,
+  readGrid,
+  readPath,
+  readScan,
+  readTransform,
+  Trail,
+  type Grid,
+  type Pose,
+  type Vector,
+} from "../map";
+import type { Page, Robot } from "../page";
+import { isMessage, type Json, type Message, type Rosbridge } from "../rosbridge";
+import { Trip, type TripState } from "../trip";
+import "./map.css";
+
+const ODOMETRY = 100; // [ms] between two messages
+const LOOK = 2_000; // [ms] between two looks at the topics
+const TICK = 500;
+const OLD = 2_000; // [ms] after which a position is called old
+const BASES = ["base_footprint", "base_link"]; // of robots that publish no odometry
+const NAVIGATE = "nav2_msgs/action/NavigateToPose";
+const INITIAL = "/initialpose";
+const SPREAD: Record<number, number> = { 0: 0.25, 7: 0.25, 35: 0.07 }; // of a pose shown by hand [m², m², rad²]
+const DEGREES = 180 / Math.PI;
+
+const TOOLS: Record<Tool, readonly [words: string, hint: string]> = {
+  move: ["Move view", ""],
+  go: ["Go", "Press where the robot is to go, and drag to where it is to look. Escape gives up."],
+  initial: ["Initial pose", "Press where the robot is, and drag to where it looks. Escape gives up."],
+  measure: ["Measure", "Drag from one point to another."],
+};
+const ICONS: Record<Exclude<TripState["is"], "none">, Icon> = {
+  driving: "play",
+  arrived: "check",
+  canceled: "cross",
+  failed: "warning",
+  unknown: "unlink",
+};
+
+/** Topics that are drawn, by type: the time between two messages [ms], and how one is read. */
+const LAYERS: Record<string, { throttle: number; read: (message: Message) => Drawn | null }> = {
+  Path: { throttle: 500, read: (path) => ({ is: "path", frame: frameOf(path), points: readPath(path) }) },
+  LaserScan: { throttle: 200, read: (scan) => ({ is: "scan", frame: frameOf(scan), points: readScan(scan) }) },
+  OccupancyGrid: {
+    throttle: 1_000,
+    read: (message) => {
+      const grid = readGrid(message);
+      return grid && { is: "grid", frame: grid.frame, grid };
+    },
+  },
+};
+
+type Drawn = { is: "path" | "scan"; frame: string; points: Vector[] } | { is: "grid"; frame: string; grid: Grid };
+
+const trips = new WeakMap<Rosbridge, Trip>();
+
+export const page: Page = {
+  name: "map",
+  title: "Map",
+  order: 20,
+  isFor: ({ config }) => config.drive !== null || config.places.length > 0,
+  open(host, robot) {
+    const view = new MapView(robot);
+    host.append(view.element);
+    return () => view.close();
+  },
+};
+
+class MapView {
+  readonly element: HTMLElement;
+  readonly #robot: Robot;
+  readonly #trip: Trip;
+  readonly #canvas = new MapCanvas();
+  readonly #where = h("p", { class: "label" });
+  readonly #hint = h("p", { class: "map-hint", role: "status" });
+  readonly #tools = new Map<Tool, HTMLButtonElement>();
+  readonly #state = h("p", { class: "map-state", role: "status" });
+  readonly #note = h("p", { class: "label" });
+  readonly #cancel = button([icon("cross"), "Cancel"], () => this.#trip.cancel());
+  readonly #numbers: HTMLFormElement;
+  readonly #places: { place: Place; note: HTMLElement; go: HTMLButtonElement }[];
+  readonly #layers = h("ul", { class: "map-list" });
+  readonly #layersCard = h("section", { class: "card", "aria-label": "Layers" }, h("h2", {}, "Layers"), this.#layers);
+  readonly #closers: (() => void)[] = [];
+  readonly #frames = new Frames();
+  readonly #trail = new Trail();
+  readonly #published = new Set<string>(); // frames whose transforms are published
+  readonly #drawn = new Map<string, Drawn | null>();
+  readonly #followed = new Map<string, () => void>();
+  #base = "";
+  #fixed = "map";
+  #pose: Pose | null = null;
+  #seenAt = -Infinity; // when the position came [ms]
+  #navigator: Port | null = null;
+  #isDescribed = false;
+  #docks: ReadonlySet<string> = new Set();
+  #hasLocaliser = false;
+  #driver = ""; // the mission that moves the base
+  #tool: Tool = "move";
+  #measured = "";
+  #failure = "";
+  #isClosed = false;
+  #timer: ReturnType<typeof setTimeout> | undefined;
+  #frame = 0;
+
+  constructor(robot: Robot) {
+    this.#robot = robot;
+    const { link, config } = robot;
+    this.#trip = trips.get(link) ?? new Trip(link);
+    trips.set(link, this.#trip);
+    for (const tool of Object.keys(TOOLS) as Tool[]) this.#tools.set(tool, button([TOOLS[tool][0]], () => this.#choose(tool)));
+    this.#places = config.places.map((place) => {
+      const go = button(["Go"], () => this.#go(place, formatName(place.name), "map"));
+      go.setAttribute("aria-label", `Go to ${formatName(place.name)}`);
+      return { place, note: h("small", { class: "label" }), go };
+    });
+    this.#numbers = this.#numbersForm();
+    this.element = h("div", { class: "map" }, this.#chart(), this.#side());
+    this.#canvas.onDrag = (drag) => this.#dragged(drag);
+    this.#choose("move");
+    const ticker = setInterval(() => this.#tick(), TICK);
+    this.#closers.push(
+      () => clearInterval(ticker),
+      () => cancelAnimationFrame(this.#frame),
+      this.#trip.state.watch((state) => this.#showTrip(state)),
+      watchComponents(link, (components) => this.#learn(components)),
+      link.watch("mission/ListMissions", (missions) => this.#learnMissions(missions), LOOK),
+      robot.stopped.watch(() => this.#enable()),
+      link.state.watch(({ is }) => {
+        if (is === "open") void this.#findTopics();
+        else this.#seenAt = -Infinity;
+        this.#tick();
+      }),
+    );
+  }
+
+  close(): void {
+    this.#isClosed = true;
+    clearTimeout(this.#timer);
+    for (const close of [...this.#closers, ...this.#followed.values()]) close();
+  }
+
+  #chart(): HTMLElement {
+    const zooms = [
+      button(["+"], () => this.#canvas.zoom(1.3), "Zoom in"),
+      button(["\u2212"], () => this.#canvas.zoom(1 / 1.3), "Zoom out"),
+      button(["Fit"], () => this.#canvas.fit(), "Fit everything into the view"),
+    ];
+    const tools = h("div", { class: "map-tools", role: "group", "aria-label": "What a drag does" }, ...this.#tools.values());
+    const keys =
+      "Drag or arrow keys move the view; wheel, pinch, + and \u2212 zoom; 0 fits everything. x points right, y up.";
+    return h(
+      "section",
+      { class: "card map-chart", "aria-label": "View" },
+      tools,
+      h("div", { class: "map-box" }, this.#canvas, h("div", { class: "map-zooms" }, ...zooms)),
+      this.#hint,
+      this.#where,
+      h("p", { class: "label map-keys", id: "map-keys" }, keys),
+    );
+  }
+
+  #side(): HTMLElement {
+    const rows = this.#places.map(({ place, note, go }) =>
+      h("li", {}, h("div", {}, h("strong", {}, formatName(place.name)), note), go),
+    );
+    const places = rows.length
+      ? h("ul", { class: "map-list" }, ...rows)
+      : h("p", { class: "label" }, "This robot has no places. They are written under `places:` in its manifest.");
+    const byNumbers = h("details", {}, h("summary", {}, "Another pose"), this.#numbers);
+    this.#layersCard.hidden = true;
+    return h(
+      "div",
+      { class: "map-side" },
+      h("section", { class: "card map-goal", "aria-label": "Goal" }, h("h2", {}, "Goal"), this.#state, this.#note, this.#cancel),
+      h("section", { class: "card", "aria-label": "Places" }, h("h2", {}, "Places"), places, byNumbers),
+      this.#layersCard,
+    );
+  }
+
+  #numbersForm(): HTMLFormElement {
+    const field = (name: string, words: string) =>
+      h("label", { class: "field" }, words, h("input", { name, type: "number", step: "any", required: "", value: "0" }));
+    const set = h("button", { value: "initial" }, "Set initial pose");
+    const form = h(
+      "form",
+      { class: "map-numbers" },
+      field("x", "x [m]"),
+      field("y", "y [m]"),
+      field("heading", "heading [°]"),
+      h("button", { value: "go" }, "Go"),
+      set,
+    );
+    form.onsubmit = (event) => {
+      event.preventDefault();
+      const [x, y, heading] = ["x", "y", "heading"].map((name) => Number(new FormData(form).get(name)));
+      const pose = { x: x!, y: y!, heading: heading! / DEGREES };
+      if (event.submitter === set) this.#setInitial(pose);
+      else this.#go(pose, nameOf(pose), this.#fixed);
+    };
+    return form;
+  }
+
+  // What there is
+
+  #learn(components: Component[]): void {
+    const servers = components.flatMap(({ ports, capabilities }) => {
+      const goals = (capabilities.Navigates ?? []).map((navigates) => navigates.goals);
+      const found = ports.filter(({ kind, type }) => kind === "serves_action" && type === NAVIGATE);
+      return found.map((port) => ({ port, isDeclared: goals.includes(port.name) }));
+    });
+    this.#navigator = (servers.find(({ isDeclared }) => isDeclared) ?? servers[0])?.port ?? null;
+    const docks = components.flatMap(({ capabilities }) => capabilities.Charges ?? []).map(({ place }) => place ?? null);
+    this.#docks = new Set(docks.filter(isMessage).map(({ name }) => String(name)));
+    this.#isDescribed = components.length > 0;
+    this.#showTrip(this.#trip.state.value);
+    this.#tick();
+  }
+
+  #learnMissions(missions: Json): void {
+    const driver = (Array.isArray(missions) ? missions.filter(isMessage) : []).find(
+      ({ state, claims }) =>
+        state === "running" && Array.isArray(claims) && claims.includes(this.#navigator?.claims ?? ""),
+    );
+    this.#driver = driver ? formatName(String(driver.name)) : "";
+    this.#showTrip(this.#trip.state.value);
+  }
+
+  /** Looks again and again which topics there are: programs come and go. */
+  async #findTopics(): Promise<void> {
+    clearTimeout(this.#timer);
+    const { link } = this.#robot;
+    try {
+      const [found, listeners] = await Promise.all([
+        link.call("/rosapi/topics"),
+        link.call("/rosapi/subscribers", { topic: INITIAL }),
+      ]);
+      if (this.#isClosed) return;
+      if (isMessage(found) && Array.isArray(found.topics) && Array.isArray(found.types)) {
+        for (const [turn, topic] of found.topics.entries()) this.#follow(String(topic), String(found.types[turn]));
+      }
+      this.#hasLocaliser = isMessage(listeners) && Array.isArray(listeners.subscribers) && listeners.subscribers.length > 0;
+      if (this.#hasLocaliser) link.advertise(INITIAL, "geometry_msgs/PoseWithCovarianceStamped");
+      this.#failure = "";
+    } catch (error) {
+      if (this.#isClosed) return;
+      this.#failure = `What the robot publishes is not known: ${(error as Error).message}.`;
+    }
+    this.#enable();
+    this.#showHint();
+    if (link.state.value.is === "open") this.#timer = setTimeout(() => void this.#findTopics(), LOOK);
+  }
+
+  #follow(topic: string, type: string): void {
+    if (this.#followed.has(topic)) return;
+    const { link } = this.#robot;
+    const kind = type.split("/").at(-1)!;
+    if (kind === "TFMessage") {
+      this.#followed.set(topic, link.subscribe(topic, (message) => this.#onTransforms(message), { type }));
+    } else if (kind === "Odometry") {
+      const options = { type, throttle: ODOMETRY };
+      this.#followed.set(topic, link.subscribe(topic, (message) => this.#onOdometry(message), options));
+    } else if (LAYERS[kind]) {
+      this.#addLayer(topic, type, LAYERS[kind]);
+    }
+  }
+
+  #addLayer(topic: string, type: string, { throttle, read }: (typeof LAYERS)[string]): void {
+    const listen = () =>
+      this.#robot.link.subscribe(
+        topic,
+        (message) => {
+          this.#drawn.set(topic, read(message));
+          this.#draw();
+        },
+        { type, throttle },
+      );
+    let isShown = true;
+    const toggle = button([icon("check"), topic, h("small", { class: "label" }, type.split("/").at(-1)!)], () => {
+      isShown = !isShown;
+      this.#followed.get(topic)?.();
+      this.#followed.set(topic, isShown ? listen() : () => undefined);
+      this.#drawn.delete(topic);
+      toggle.setAttribute("aria-pressed", String(isShown));
+      toggle.firstChild?.replaceWith(icon(isShown ? "check" : "dot"));
+      this.#draw();
+    });
+    toggle.setAttribute("aria-pressed", "true");
+    this.#layers.append(h("li", {}, toggle));
+    this.#layersCard.hidden = false;
+    this.#followed.set(topic, listen());
+  }
+
+  // Where the robot is
+
+  #onTransforms({ transforms }: Message): void {
+    const base = this.#baseFrame();
+    const above = this.#frames.above(base);
+    for (const stamped of Array.isArray(transforms) ? transforms.filter(isMessage) : []) {
+      const transform = readTransform(stamped.transform);
+      const child = String(stamped.child_frame_id).replace(/^\//, "");
+      if (!transform) continue;
+      this.#frames.set(frameOf(stamped), child, transform);
+      this.#published.add(child);
+      if (above.has(child)) this.#seenAt = performance.now();
+    }
+    this.#moved();
+  }
+
+  /** Takes the pose of an odometry for a transform, unless somebody publishes that as well. */
+  #onOdometry(message: Message): void {
+    const child = String(message.child_frame_id ?? "").replace(/^\//, "");
+    const transform = isMessage(message.pose) ? readTransform(message.pose.pose) : null;
+    if (!child || !transform) return;
+    this.#base ||= child;
+    this.#seenAt = performance.now();
+    if (!this.#published.has(child)) this.#frames.set(frameOf(message), child, transform);
+    this.#moved();
+  }
+
+  #baseFrame(): string {
+    return this.#base || (BASES.find((frame) => this.#frames.has(frame)) ?? "");
+  }
+
+  #moved(): void {
+    const base = this.#baseFrame();
+    if (!this.#frames.has(base)) return;
+    const fixed = this.#frames.fixedFor(base);
+    if (fixed !== this.#fixed) this.#trail.clear();
+    this.#fixed = fixed;
+    const transform = this.#frames.lookUp(fixed, base);
+    const isFirst = this.#pose === null;
+    this.#pose = transform && poseOf(transform);
+    if (this.#pose) this.#trail.add(this.#pose, performance.now());
+    if (isFirst) this.#tick();
+    this.#draw();
+  }
+
+  #isOld(): boolean {
+    return performance.now() - this.#seenAt > OLD;
+  }
+
+  // What is shown
+
+  #draw(): void {
+    this.#frame ||= requestAnimationFrame(() => {
+      this.#frame = 0;
+      this.#paint();
+    });
+  }
+
+  #paint(): void {
+    const drawn = [...this.#drawn.values()].flatMap((each) => {
+      const place = each && this.#frames.lookUp(this.#fixed, each.frame);
+      return each && place ? [{ each, place }] : [];
+    });
+    const lines = (is: "path" | "scan") =>
+      drawn.flatMap(({ each, place }) => (each.is === is ? [each.points.map((point) => applied(place, point))] : []));
+    const { pose, frame } = this.#trip.state.value;
+    this.#canvas.show({
+      robot: this.#pose,
+      isOld: this.#isOld(),
+      trail: this.#trail.points,
+      places: this.#placesAreOnMap() ? this.#robot.config.places.map((place) => this.#shownPlace(place)) : [],
+      grids: drawn.flatMap(({ each, place }) => (each.is === "grid" ? [{ grid: each.grid, place }] : [])),
+      paths: lines("path"),
+      scans: lines("scan"),
+      goal: frame === this.#fixed ? pose : null,
+    });
+  }
+
+  /** Returns whether places, which are poses in `map`, can be drawn. */
+  #placesAreOnMap(): boolean {
+    return this.#fixed === "map";
+  }
+
+  #shownPlace(place: Place) {
+    const isDock = this.#docks.has(place.name);
+    const name = formatName(place.name);
+    const label = isDock && !/dock/i.test(name) ? `${name} (dock)` : name;
+    return { ...place, label, isDock };
+  }
+
+  #tick(): void {
+    const old = this.#isOld();
+    for (const { place, note } of this.#places) {
+      const away = this.#pose && !old && this.#placesAreOnMap() ? `, ${formatNumber(distance(this.#pose, place), "m")}\u202fm away` : "";
+      setText(note, `${this.#docks.has(place.name) ? "Dock: it charges here. " : ""}${numbersOf(place)}${away}`);
+    }
+    if (this.#pose) {
+      const age = Number.isFinite(this.#seenAt) ? ` ${formatAge(performance.now() - this.#seenAt)} ago` : " before";
+      setText(this.#where, `${old ? `Robot, as it was${age}` : "Robot"}: ${numbersOf(this.#pose)}, in ${this.#fixed}`);
+    }
+    this.#enable();
+    this.#showHint();
+    this.#draw();
+  }
+
+  #showHint(): void {
+    const texts = [
+      this.#measured,
+      TOOLS[this.#tool][1],
+      this.#failure,
+      this.#pose ? "" : "Where the robot is, is not known yet: nobody publishes its odometry or transforms.",
+      this.#placesAreOnMap() || !this.#places.length ? "" : "Places are poses in map, and no transform leads there: they are not drawn.",
+    ];
+    setText(this.#hint, texts.find(Boolean) ?? "");
+  }
+
+  #enable(): void {
+    const isOpen = this.#robot.link.state.value.is === "open";
+    const mayGo = isOpen && !this.#robot.stopped.value && this.#navigator !== null;
+    for (const { go } of this.#places) {
+      go.disabled = !mayGo;
+      go.hidden = this.#navigator === null;
+    }
+    const [go, initial] = [this.#tools.get("go")!, this.#tools.get("initial")!];
+    go.disabled = !mayGo;
+    go.hidden = this.#navigator === null;
+    initial.disabled = !isOpen;
+    initial.hidden = !this.#hasLocaliser;
+    const [byNumbers, set] = this.#numbers.querySelectorAll("button");
+    byNumbers!.disabled = !mayGo;
+    byNumbers!.hidden = this.#navigator === null;
+    set!.disabled = !isOpen;
+    set!.hidden = !this.#hasLocaliser;
+    this.#numbers.parentElement!.hidden = this.#navigator === null && !this.#hasLocaliser;
+    if (this.#tools.get(this.#tool)!.matches(":disabled, [hidden]")) this.#choose("move");
+  }
+
+  #showTrip(state: TripState): void {
+    const isDriving = state.is === "driving";
+    if (this.#state.dataset.is !== state.is || this.#state.textContent !== state.text) {
+      this.#state.dataset.is = state.is;
+      this.#state.replaceChildren(...(state.is === "none" ? [] : [icon(ICONS[state.is])]), h("span", {}, state.text));
+    }
+    this.#cancel.hidden = !isDriving;
+    const left = state.left === null ? "" : `${formatNumber(state.left, "m")}\u202fm to go`;
+    const missing = this.#navigator || !this.#isDescribed ? "" : "This robot has no skill that drives to a pose.";
+    const driver = this.#driver ? `Mission ${this.#driver} is running: a goal of yours replaces the one it drives to.` : "";
+    setText(this.#note, isDriving ? left : missing || driver);
+    this.#draw();
+  }
+
+  // What people do
+
+  #choose(tool: Tool): void {
+    this.#tool = tool;
+    this.#measured = "";
+    this.#canvas.tool = tool;
+    for (const [name, each] of this.#tools) each.setAttribute("aria-pressed", String(name === tool));
+    this.#showHint();
+  }
+
+  #dragged(drag: Drag | null): void {
+    if (drag?.tool === "measure") {
+      this.#measured = `${formatNumber(distance(drag.pose, drag.end), "m")}\u202fm`;
+      this.#showHint();
+      return;
+    }
+    this.#choose("move"); // so that the next touch moves the view and not the robot
+    if (drag?.tool === "go") this.#go(drag.pose, nameOf(drag.pose), this.#fixed);
+    if (drag?.tool === "initial") this.#setInitial(drag.pose);
+  }
+
+  #go({ x, y, heading }: Pose, name: string, frame: string): void {
+    if (!this.#navigator) return;
+    const pose = { x, y, heading };
+    const goal = { pose: { header: { frame_id: frame }, pose: poseMessage(pose) } };
+    this.#trip.begin(this.#navigator.topic, this.#navigator.type, goal, { name, pose, frame });
+  }
+
+  #setInitial(pose: Pose): void {
+    const covariance = Array.from({ length: 36 }, (_, turn) => SPREAD[turn] ?? 0);
+    const message = { header: { frame_id: this.#fixed }, pose: { pose: poseMessage(pose), covariance } };
+    const isSent = this.#robot.link.publish(INITIAL, message);
+    this.#robot.notify(isSent ? `The robot was told that it is at ${nameOf(pose)}` : "Not connected: nothing was sent");
+  }
+}
+
+function button(content: (Node | string)[], action: () => void, words = ""): HTMLButtonElement {
+  const element = h("button", { type: "button" }, ...content);
+  if (words) element.setAttribute("aria-label", words);
+  element.onclick = action;
+  return element;
+}
+
+function nameOf({ x, y }: Pose): string {
+  return `(${formatNumber(x, "m")}, ${formatNumber(y, "m")})`;
+}
+
+function numbersOf({ x, y, heading }: Pose): string {
+  const degrees = formatNumber(Math.round(heading * DEGREES) || 0, "%");
+  return `x ${formatNumber(x, "m")}\u202fm, y ${formatNumber(y, "m")}\u202fm, heading ${degrees}°`;
+}
