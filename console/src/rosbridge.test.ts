@@ -1,5 +1,5 @@
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
-import { CallError, parseFrame, Rosbridge, waitBefore, type Message, type Socket } from "./rosbridge";
+import { CallError, LostError, parseFrame, Rosbridge, waitBefore, type Message, type Socket } from "./rosbridge";
 
 class FakeSocket implements Socket {
   static all: FakeSocket[] = [];
@@ -193,4 +193,66 @@ it("status frames say which request was wrong", () => {
   link.onStatus = vi.fn();
   last().open().receive({ op: "status", level: "error", msg: "not yours", id: "drive:3" });
   expect(link.onStatus).toHaveBeenCalledWith({ op: "status", level: "error", msg: "not yours", id: "drive:3" });
+});
+
+describe("goals", () => {
+  const begin = () => {
+    const link = make();
+    last().open();
+    const heard: Message[] = [];
+    const goal = link.act("/go_to", "nav2_msgs/NavigateToPose", { pose: {} }, (values) => heard.push(values));
+    const sent = last().sent.at(-1)!;
+    return { link, heard, goal, sent, id: String(sent.id) };
+  };
+
+  it("are sent, tell their progress and end with a status and a result", async () => {
+    const { heard, goal, sent, id } = begin();
+    expect(sent).toMatchObject({
+      op: "send_action_goal",
+      action: "/go_to",
+      action_type: "nav2_msgs/NavigateToPose",
+      args: { pose: {} },
+      feedback: true,
+    });
+    last().receive({ op: "action_feedback", id, action: "/go_to", values: { distance_remaining: 2 } });
+    last().receive({ op: "action_feedback", id: "another", action: "/go_to", values: { distance_remaining: 9 } });
+    expect(heard).toEqual([{ distance_remaining: 2 }]);
+    last().receive({ op: "action_result", id, action: "/go_to", values: { error_code: 0 }, status: 4, result: true });
+    await expect(goal.done).resolves.toEqual({ status: 4, values: { error_code: 0 } });
+    last().receive({ op: "action_feedback", id, action: "/go_to", values: { distance_remaining: 1 } });
+    expect(heard).toHaveLength(1);
+  });
+
+  it("are canceled while they run, and not afterwards", async () => {
+    const { goal, id } = begin();
+    goal.cancel();
+    expect(last().sent.at(-1)).toEqual({ op: "cancel_action_goal", id, action: "/go_to" });
+    last().receive({ op: "action_result", id, action: "/go_to", values: "", status: 5, result: false });
+    await expect(goal.done).resolves.toMatchObject({ status: 5 });
+    const count = last().sent.length;
+    goal.cancel();
+    expect(last().sent).toHaveLength(count);
+  });
+
+  it("that the robot refuses fail with its reason", async () => {
+    const { goal, id } = begin();
+    last().receive({ op: "action_result", id, action: "/go_to", values: "too far", status: 0, result: false });
+    await expect(goal.done).rejects.toThrow(new CallError("too far"));
+  });
+
+  it("that the server cannot carry out fail with its status", async () => {
+    const { link, goal, id } = begin();
+    link.onStatus = vi.fn();
+    last().receive({ op: "status", level: "warning", id, msg: "slow" });
+    last().receive({ op: "status", level: "error", id, msg: "not served" });
+    await expect(goal.done).rejects.toThrow(new CallError("not served"));
+    expect(link.onStatus).toHaveBeenCalledOnce();
+  });
+
+  it("fail as unknown when the connection is lost, and are not sent without one", async () => {
+    const { link, goal } = begin();
+    last().lose();
+    await expect(goal.done).rejects.toBeInstanceOf(LostError);
+    await expect(link.act("/go_to", "nav2_msgs/NavigateToPose", {}).done).rejects.toThrow("not connected");
+  });
 });

@@ -46,7 +46,7 @@ class FakeGateway:
         self.windows: dict[str, Any] = {"drive": {"holder": ""}, RUNNING: {"stop": None}}
         """What queries answer, by name and fields: `mission/ListMissions`; change them by `show`."""
         self.answers: dict[str, Callable[[dict[str, Any]], Any]] = {}
-        """What requests answer, by name: `mission.PauseMission`; and services, by name: `/arm/home`."""
+        """What requests answer, by name: `mission.PauseMission`; and services and actions, by name: `/arm/home`."""
         self.latched: dict[str, dict[str, Any]] = {}
         """What a new subscriber of a topic gets at once."""
         self._others: str | None = None
@@ -106,6 +106,17 @@ class FakeGateway:
                 with suppress(ConnectionClosed):
                     connection.send(json.dumps({"op": "publish", "topic": topic, "msg": message}))
 
+    def goals(self) -> list[dict[str, Any]]:
+        """Return the frames of the goals that were sent."""
+        return [frame for _, frame in list(self.frames) if frame["op"] == "send_action_goal"]
+
+    def act(self, op: str, goal: dict[str, Any], values: Any, **more: Any) -> None:
+        """Send feedback or the result of a goal to all clients."""
+        frame = {"op": op, "id": goal["id"], "action": goal["action"], "values": values, **more}
+        for connection in list(self.subscribed):
+            with suppress(ConnectionClosed):
+                connection.send(json.dumps(frame))
+
     def asked(self, request: str) -> list[dict[str, Any]]:
         """Return the requests of a type that were sent to the robot."""
         return [given for given in self.calls("/console/ask") if given["type"] == request]
@@ -158,7 +169,14 @@ class FakeGateway:
                     connection.send(json.dumps({"op": "publish", "topic": topic, "msg": shown}))
             case "unsubscribe":
                 self.subscribed[connection].discard(frame["topic"])
-            case "publish":
+            case "send_action_goal" if frame["action"] in self.answers:
+                try:
+                    self.answers[frame["action"]](frame["args"])
+                except Refused as refusal:
+                    self.act("action_result", frame, str(refusal), status=0, result=False)
+            case "cancel_action_goal":
+                self.act("action_result", frame, {}, status=5, result=True)
+            case "publish" if "linear" in frame["msg"]:
                 if self.others:
                     error = {"op": "status", "level": "error", "id": frame["id"], "msg": "not yours"}
                     connection.send(json.dumps(error))

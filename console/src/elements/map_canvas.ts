@@ -307,17 +307,19 @@ export class MapCanvas extends HTMLElement {
     let picture = this.#pictures.get(grid);
     if (!picture) {
       picture = h("canvas", { width: String(grid.width), height: String(grid.height) });
-      const pixels = gridPixels(grid, partsOf(colour("free")), partsOf(colour("occupied")));
-      picture.getContext("2d")?.putImageData(new ImageData(pixels, grid.width, grid.height), 0, 0);
+      const context = picture.getContext("2d")!;
+      const pixels = gridPixels(grid, partsOf(context, colour("free")), partsOf(context, colour("occupied")));
+      context.putImageData(new ImageData(pixels, grid.width, grid.height), 0, 0);
       this.#pictures.set(grid, picture);
     }
     return picture;
   }
 }
 
-/** Returns the parts of a colour that is written `#rrggbb`. */
-function partsOf(colour: string): Colour {
-  const [red, green, blue] = [1, 3, 5].map((at) => parseInt(colour.slice(at, at + 2), 16));
+/** Returns the parts of a colour, however it is written: a context knows them all. */
+function partsOf(context: CanvasRenderingContext2D, colour: string): Colour {
+  context.fillStyle = colour;
+  const [red, green, blue] = [1, 3, 5].map((at) => parseInt(String(context.fillStyle).slice(at, at + 2), 16));
   return [red!, green!, blue!];
 }
 

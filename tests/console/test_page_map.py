@@ -1,0 +1,350 @@
+"""The page of the map in a real browser: what stands where, and that a drag is exactly the goal that it shows."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from playwright.sync_api import Locator, Page, expect
+
+from rbxcompose.base.requests import Refused
+from tests.console.browser import CHROMIUM
+from tests.console.fake_gateway import CONFIG, FakeGateway
+from tests.console.looks import PHONE, WIDE, overflows, too_small, violations
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium here")
+
+SCALE = 200.0  # [px/m] of a small map that fits
+PLACES = {
+    "dock": {"x": 0.0, "y": 0.0, "heading": 0.0, "colour": "yellow"},
+    "window_seat": {"x": 1.0, "y": 0.5, "heading": math.pi / 2, "colour": ""},
+}
+MIDDLE = (0.5, 0.25)  # of the places
+TYPES = {
+    "/tf": "tf2_msgs/msg/TFMessage",
+    "/tf_static": "tf2_msgs/msg/TFMessage",
+    "/odom": "nav_msgs/msg/Odometry",
+    "/map": "nav_msgs/msg/OccupancyGrid",
+    "/plan": "nav_msgs/msg/Path",
+    "/scan": "sensor_msgs/msg/LaserScan",
+}
+NAVIGATE = "nav2_msgs/action/NavigateToPose"
+
+
+def component(name: str, ports: list[dict[str, Any]], capabilities: dict[str, Any]) -> dict[str, Any]:
+    plain = {"type": name, "about": "", "process": "robot", "requests": {}}
+    return {"name": name, "ports": ports, "capabilities": capabilities, **plain}
+
+
+GO_TO = component(
+    "go_to",
+    [{"name": "go_to", "kind": "serves_action", "topic": "/go_to", "type": NAVIGATE, "claims": "base"}],
+    {"Navigates": [{"goals": "go_to"}]},
+)
+CHARGER = component("charger", [], {"Charges": [{"goals": "recharge", "place": {**PLACES["dock"], "name": "dock"}}]})
+
+
+def turned(heading: float) -> dict[str, float]:
+    return {"x": 0.0, "y": 0.0, "z": math.sin(heading / 2), "w": math.cos(heading / 2)}
+
+
+def moved(x: float, y: float) -> dict[str, float]:
+    return {"x": x, "y": y, "z": 0.0}
+
+
+def transform(parent: str, child: str, x: float, y: float, heading: float) -> dict[str, Any]:
+    place = {"translation": moved(x, y), "rotation": turned(heading)}
+    return {"header": {"frame_id": parent}, "child_frame_id": child, "transform": place}
+
+
+def pose(x: float, y: float, heading: float) -> dict[str, Any]:
+    return {"position": moved(x, y), "orientation": turned(heading)}
+
+
+@pytest.fixture
+def rolling(gateway: FakeGateway) -> FakeGateway:
+    """A robot at (1, 0.5) in `map`, by a transform to `odom`, in which it is at (0.5, 0) and looks along x."""
+    gateway.config = {**CONFIG, "places": PLACES}
+    gateway.windows["robot/DescribeRobot"] = [GO_TO, CHARGER]
+    gateway.answers["/rosapi/topics"] = lambda _: {"topics": list(TYPES), "types": list(TYPES.values())}
+    gateway.answers["/rosapi/subscribers"] = lambda _: {"subscribers": []}
+    gateway.latched["/tf_static"] = {"transforms": [transform("map", "odom", 1.0, 0.0, math.pi / 2)]}
+    gateway.latched["/odom"] = {
+        "header": {"frame_id": "odom"},
+        "child_frame_id": "base_footprint",
+        "pose": {"pose": pose(0.5, 0.0, 0.0)},
+    }
+    return gateway
+
+
+def canvas(page: Page) -> Locator:
+    return page.locator("map-canvas canvas")
+
+
+def at(page: Page, x: float, y: float, scale: float = SCALE) -> tuple[float, float]:
+    """Return where a point of the map is in the window, if the middle of the places is in that of the canvas."""
+    box = canvas(page).bounding_box()
+    assert box
+    right, up = x - MIDDLE[0], y - MIDDLE[1]
+    return box["x"] + box["width"] / 2 + scale * right, box["y"] + box["height"] / 2 - scale * up
+
+
+_PIXEL = """([x, y]) => {
+    const canvas = document.querySelector("map-canvas canvas");
+    const box = canvas.getBoundingClientRect();
+    const ratio = canvas.width / box.width;
+    const copy = new OffscreenCanvas(1, 1).getContext("2d", { willReadFrequently: true });
+    copy.drawImage(canvas, -Math.floor((x - box.x) * ratio), -Math.floor((y - box.y) * ratio));
+    return [...copy.getImageData(0, 0, 1, 1).data];
+}"""
+
+
+def wait_for_colour(page: Page, x: float, y: float, colour: list[int]) -> None:
+    """Wait until a point of the map has a colour, RGBA."""
+    same = f"([x, y, wanted]) => String(({_PIXEL})([x, y])) === String(wanted)"
+    page.wait_for_function(same, arg=[*at(page, x, y), colour])
+
+
+def drag(page: Page, start: tuple[float, float], end: tuple[float, float]) -> None:
+    page.mouse.move(*start)
+    page.mouse.down()
+    page.mouse.move(*((a + b) / 2 for a, b in zip(start, end, strict=True)))
+    page.mouse.move(*end)
+    page.mouse.up()
+
+
+def finger_drag(page: Page, start: tuple[float, float], end: tuple[float, float]) -> None:
+    session = page.context.new_cdp_session(page)
+    for kind, points in (("touchStart", [start]), ("touchMove", [end]), ("touchEnd", [])):
+        given = [{"x": x, "y": y} for x, y in points]
+        session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": given})
+
+
+def is_goal(frame: dict[str, Any], x: float, y: float, heading: float) -> bool:
+    """Return whether a frame sends the robot to a pose, to the pixel."""
+    sent = frame["args"]["pose"]
+    assert frame["action"], frame["action_type"] == ("/go_to", NAVIGATE)
+    assert sent["header"]["frame_id"] == "map"
+    position, orientation = sent["pose"]["position"], sent["pose"]["orientation"]
+    return bool(
+        (position["x"], position["y"]) == pytest.approx((x, y), abs=1 / SCALE)
+        and 2 * math.atan2(orientation["z"], orientation["w"]) == pytest.approx(heading, abs=0.02)
+    )
+
+
+def state(page: Page) -> Locator:
+    return page.locator(".map-state")
+
+
+def tool(page: Page, name: str) -> Locator:
+    return page.get_by_role("group", name="What a drag does").get_by_role("button", name=name, exact=True)
+
+
+def test_the_robot_is_where_transforms_and_odometry_have_it(
+    open_page: Callable[..., Page], rolling: FakeGateway
+) -> None:
+    page = open_page(page_name="map")
+    expect(page.get_by_text("Robot: x 1.00\u202fm, y 0.50\u202fm, heading 90°, in map")).to_be_visible()
+    wait_for_colour(page, 1.0, 0.5, [26, 95, 208, 255])
+    wait_for_colour(page, 0.0, 0.045, [255, 255, 0, 255])
+    moves = [transform("odom", "base_footprint", -0.25, 0.0, math.pi)]
+    rolling.say("/tf", {"transforms": moves})
+    expect(page.get_by_text("Robot: x 1.00\u202fm, y \u22120.25\u202fm, heading \u221290°, in map")).to_be_visible()
+    rolling.say("/odom", rolling.latched["/odom"])
+    rolling.say("/tf", {"transforms": [transform("odom", "base_footprint", 0.0, 0.0, math.pi)]})
+    expect(page.get_by_text("Robot: x 1.00\u202fm, y 0.00\u202fm, heading \u221290°, in map")).to_be_visible()
+
+
+def test_a_drag_is_exactly_the_goal_at_each_zoom(open_page: Callable[..., Page], rolling: FakeGateway) -> None:
+    page = open_page(page_name="map")
+    tool(page, "Go").click()
+    drag(page, at(page, 0.2, 0.1), at(page, 0.2, 0.6))
+    expect(state(page)).to_have_text("Driving to (0.20, 0.10)")
+    expect(tool(page, "Move view")).to_have_attribute("aria-pressed", "true")
+    page.get_by_role("button", name="Zoom in").click()
+    tool(page, "Go").click()
+    drag(page, at(page, 0.9, 0.3, 1.3 * SCALE), at(page, 0.6, 0.0, 1.3 * SCALE))
+    expect(state(page)).to_have_text("Driving to (0.90, 0.30)")
+    first, second = rolling.goals()
+    assert is_goal(first, 0.2, 0.1, math.pi / 2)
+    assert is_goal(second, 0.9, 0.3, -3 * math.pi / 4)
+
+
+def test_without_the_tool_a_drag_moves_the_view_and_not_the_robot(
+    open_page: Callable[..., Page], rolling: FakeGateway
+) -> None:
+    page = open_page(page_name="map")
+    expect(page.get_by_text("Robot: x 1.00")).to_be_visible()
+    drag(page, at(page, 0.5, 0.2), at(page, 0.2, 0.2))
+    canvas(page).press("ArrowRight")
+    tool(page, "Go").click()
+    drag(page, at(page, 0.0, 0.2), at(page, 0.5, 0.2))
+    expect(state(page)).to_have_text("Driving to (0.60, 0.20)")
+    (goal,) = rolling.goals()
+    assert is_goal(goal, 0.6, 0.2, 0.0)
+
+
+def test_a_finger_sends_the_same_goal_and_escape_gives_up(open_page: Callable[..., Page], rolling: FakeGateway) -> None:
+    page = open_page(page_name="map", has_touch=True)
+    expect(page.get_by_text("Robot: x 1.00")).to_be_visible()
+    tool(page, "Go").tap()
+    finger_drag(page, at(page, 0.2, 0.1), at(page, 0.7, 0.1))
+    expect(state(page)).to_have_text("Driving to (0.20, 0.10)")
+    (goal,) = rolling.goals()
+    assert is_goal(goal, 0.2, 0.1, 0.0)
+    tool(page, "Go").tap()
+    canvas(page).press("Escape")
+    expect(tool(page, "Move view")).to_have_attribute("aria-pressed", "true")
+
+
+def test_a_grid_is_drawn_where_its_origin_and_its_frame_put_it(
+    open_page: Callable[..., Page], rolling: FakeGateway
+) -> None:
+    """Cells of 0.1 m from (0.3, 0.1), turned by 90 degrees: its x is along y, its y against x."""
+    info = {"width": 3, "height": 2, "resolution": 0.1, "origin": pose(0.3, 0.1, math.pi / 2)}
+    rolling.latched["/map"] = {"header": {"frame_id": "map"}, "info": info, "data": [100, 0, -1, 0, 50, 100]}
+    page = open_page(page_name="map")
+    ground, free, occupied = [0, 0, 0, 0], [255, 255, 255, 255], [57, 66, 77, 255]
+    wait_for_colour(page, 0.25, 0.15, occupied)
+    wait_for_colour(page, 0.25, 0.25, free)
+    wait_for_colour(page, 0.25, 0.35, ground)
+    wait_for_colour(page, 0.15, 0.15, free)
+    wait_for_colour(page, 0.15, 0.25, [156, 161, 166, 255])
+    wait_for_colour(page, 0.15, 0.35, occupied)
+    wait_for_colour(page, 0.35, 0.15, ground)
+    page.get_by_role("button", name="/map OccupancyGrid").click()
+    wait_for_colour(page, 0.25, 0.15, ground)
+
+
+def test_a_path_and_a_scan_are_drawn_in_their_frames(open_page: Callable[..., Page], rolling: FakeGateway) -> None:
+    poses = [{"pose": pose(x, 0.0, 0.0)} for x in (0.0, 0.35)]
+    rolling.latched["/plan"] = {"header": {"frame_id": "odom"}, "poses": poses}
+    beams = {"angle_min": 0.0, "angle_increment": math.pi / 2, "range_min": 0.0, "range_max": 9.0}
+    rolling.latched["/scan"] = {"header": {"frame_id": "base_footprint"}, **beams, "ranges": [None, 0.6]}
+    page = open_page(page_name="map")
+    wait_for_colour(page, 0.4, 0.5, [179, 22, 28, 255])
+    wait_for_colour(page, 1.0, 0.25, [20, 113, 58, 255])
+
+
+def test_places_are_the_way_without_the_canvas(open_page: Callable[..., Page], rolling: FakeGateway) -> None:
+    page = open_page(page_name="map")
+    places = page.get_by_label("Places")
+    expect(places.get_by_role("listitem")).to_have_count(2)
+    expect(places.get_by_role("listitem").first).to_contain_text("Dock: it charges here")
+    expect(places.get_by_role("listitem").last).to_contain_text("x 1.00\u202fm, y 0.50\u202fm, heading 90°")
+    page.get_by_role("button", name="Go to Window seat").press("Enter")
+    expect(state(page)).to_have_text("Driving to Window seat")
+    (goal,) = rolling.goals()
+    assert is_goal(goal, 1.0, 0.5, math.pi / 2)
+    rolling.act("action_feedback", goal, {"distance_remaining": 1.25})
+    expect(page.get_by_text("1.25\u202fm to go")).to_be_visible()
+    page.get_by_role("link", name="Mission").click()
+    page.get_by_role("link", name="Map").click()
+    page.get_by_role("button", name="Cancel").click()
+    expect(state(page)).to_have_text("Canceled on the way to Window seat")
+    page.get_by_text("Another pose").click()
+    page.get_by_label("x [m]").fill("0.25")
+    page.get_by_label("heading [°]").fill("45")
+    page.get_by_role("button", name="Go", exact=True).last.click()
+    expect(state(page)).to_have_text("Driving to (0.25, 0.00)")
+    assert is_goal(rolling.goals()[1], 0.25, 0.0, math.pi / 4)
+    rolling.act("action_result", rolling.goals()[1], {}, status=4, result=True)
+    expect(state(page)).to_have_text("Arrived at (0.25, 0.00)")
+
+
+def test_why_the_robot_does_not_go_is_said(open_page: Callable[..., Page], rolling: FakeGateway) -> None:
+    def refuse(_: dict[str, Any]) -> None:
+        raise Refused("the goal is too far away")
+
+    rolling.answers["/go_to"] = refuse
+    page = open_page(page_name="map")
+    go = page.get_by_role("button", name="Go to Dock")
+    go.click()
+    expect(state(page)).to_have_text("Refused to drive to Dock: the goal is too far away")
+    del rolling.answers["/go_to"]
+    go.click()
+    expect(state(page)).to_have_text("Driving to Dock")
+    rolling.act("action_result", rolling.goals()[-1], {"error_msg": "stuck"}, status=6, result=True)
+    expect(state(page)).to_have_text("Gave up on the way to Dock: stuck")
+    rolling.show("robot/RobotStatus", {"stop": {"by": "Ada", "time": 1.0}})
+    expect(go).to_be_disabled()
+    expect(tool(page, "Go")).to_be_disabled()
+    rolling.show("robot/RobotStatus", {"stop": None})
+    go.click()
+    rolling.drop()
+    expect(state(page)).to_contain_text("whether the robot still drives to Dock, or has arrived, is unknown")
+
+
+def test_a_running_mission_whose_goal_would_be_replaced_is_named(
+    open_page: Callable[..., Page], rolling: FakeGateway
+) -> None:
+    page = open_page(page_name="map")
+    rolling.show("mission/ListMissions", [{"name": "patrol", "state": "running", "claims": ["base"]}])
+    expect(page.get_by_label("Goal")).to_contain_text("Mission Patrol is running")
+
+
+def test_the_robot_is_told_where_it_is_if_something_listens(
+    open_page: Callable[..., Page], rolling: FakeGateway
+) -> None:
+    page = open_page(page_name="map")
+    expect(page.get_by_text("Robot: x 1.00")).to_be_visible()
+    expect(tool(page, "Initial pose")).to_be_hidden()
+    rolling.answers["/rosapi/subscribers"] = lambda asked: {"subscribers": ["/amcl"]}
+    tool(page, "Initial pose").click()
+    drag(page, at(page, 0.2, 0.1), at(page, 0.2, 0.6))
+    expect(page.get_by_text("The robot was told that it is at (0.20, 0.10)")).to_be_visible()
+    (told,) = [frame for _, frame in rolling.frames if frame["op"] == "publish"]
+    assert (told["topic"], told["msg"]["header"]["frame_id"]) == ("/initialpose", "map")
+    assert told["msg"]["pose"]["pose"]["position"] == pytest.approx(moved(0.2, 0.1), abs=1 / SCALE)
+    assert told["msg"]["pose"]["pose"]["orientation"] == pytest.approx(turned(math.pi / 2), abs=0.01)
+    assert len(told["msg"]["pose"]["covariance"]) == 36
+    assert rolling.goals() == []
+
+
+def test_a_distance_is_measured(open_page: Callable[..., Page], rolling: FakeGateway) -> None:
+    page = open_page(page_name="map")
+    tool(page, "Measure").click()
+    drag(page, at(page, 0.0, 0.0), at(page, 0.3, 0.4))
+    expect(page.locator(".map-hint")).to_have_text("0.50\u202fm")
+
+
+def test_what_is_not_known_is_said(open_page: Callable[..., Page], gateway: FakeGateway) -> None:
+    gateway.windows["robot/DescribeRobot"] = [CHARGER]
+    page = open_page(page_name="map")
+    expect(page.get_by_text("Where the robot is, is not known yet")).to_be_visible()
+    expect(page.get_by_text("This robot has no places.")).to_be_visible()
+    expect(page.get_by_text("This robot has no skill that drives to a pose.")).to_be_visible()
+    expect(tool(page, "Go")).to_be_hidden()
+    assert violations(page) == []
+
+
+def test_an_old_position_is_said_to_be_old(open_page: Callable[..., Page], rolling: FakeGateway) -> None:
+    page = open_page(page_name="map")
+    expect(page.get_by_text("Robot: x 1.00")).to_be_visible()
+    rolling.is_away = True
+    rolling.drop()
+    expect(page.get_by_text("Robot, as it was before")).to_be_visible()
+    expect(page.get_by_role("button", name="Go to Dock")).to_be_disabled()
+
+
+def test_places_are_not_drawn_without_a_way_to_map(open_page: Callable[..., Page], rolling: FakeGateway) -> None:
+    del rolling.latched["/tf_static"]
+    page = open_page(page_name="map")
+    expect(page.get_by_text("in odom")).to_be_visible()
+    expect(page.get_by_text("they are not drawn")).to_be_visible()
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("size", [WIDE, PHONE], ids=["wide", "phone"])
+def test_it_fits_the_window_and_the_finger(
+    open_page: Callable[..., Page], rolling: FakeGateway, size: Any, scheme: str
+) -> None:
+    page = open_page(page_name="map", viewport=size, color_scheme=scheme)
+    page.get_by_text("Another pose").click()
+    page.get_by_role("button", name="Go to Dock").click()
+    expect(page.get_by_role("button", name="/scan LaserScan")).to_be_visible()
+    assert not overflows(page)
+    assert too_small(page) == []
+    assert violations(page) == []
